@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The extension's zip, one per platform: `python tools/build_extension.py [linux-x64|windows-x64|macos-arm64|all]`.
+
+Blender's own builder (blender_ext.py, inside the bpy wheel) builds and validates. It wants every wheel of every
+platform to be there, so it is given a staged copy whose manifest lists one platform and the wheels of that platform.
+"""
+
+import argparse
+import hashlib
+import importlib.util
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+# How a wheel's file name ends → which Blender runs it.
+PLATFORM_TAGS = {"linux-x64": "_x86_64.whl", "windows-x64": "-win_amd64.whl", "macos-arm64": "_arm64.whl"}
+
+
+class BuildError(Exception):
+    """Something that whoever builds can mend; the message says how."""
+
+
+def this_platform() -> str:
+    """Blender's name of the platform that this Python runs on."""
+    system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}.get(platform.system(), platform.system())
+    machine = {"x86_64": "x64", "AMD64": "x64", "aarch64": "arm64"}.get(platform.machine(), platform.machine())
+    return f"{system}-{machine}"
+
+
+def manifest() -> dict:
+    """The parsed blender_manifest.toml."""
+    return tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
+
+
+def packaged_names() -> list[str]:
+    """Top-level files and folders of the zip: what the manifest's exclude patterns take back with a `!`."""
+    patterns = manifest()["build"]["paths_exclude_pattern"]
+    return [pattern.removeprefix("!/").rstrip("/") for pattern in patterns if pattern.startswith("!/")]
+
+
+def zip_path(target: str) -> Path:
+    """dist/vellus-VERSION-PLATFORM.zip."""
+    fields = manifest()
+    return ROOT / "dist" / f"{fields['id']}-{fields['version']}-{target}.zip"
+
+
+def wheels_of(target: str) -> list[Path]:
+    """The manifest's wheels that run on one platform."""
+    wheels = [ROOT / wheel for wheel in manifest()["wheels"]]
+    return [wheel for wheel in wheels if wheel.name.endswith(PLATFORM_TAGS[target])]
+
+
+def lock_entry(package: str) -> str:
+    """The lines of requirements.lock that pin one package, hashes included."""
+    lock = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+    entry = re.search(rf"^{re.escape(package)}==(?:.*\\\n)*.*\n", lock, re.MULTILINE)
+    if entry is None:
+        raise BuildError(f"requirements.lock does not pin {package}; run `make lock`.")
+    return entry[0]
+
+
+def is_locked(wheel: Path) -> bool:
+    """Whether a wheel is here and its content is what requirements.lock says."""
+    if not wheel.is_file():
+        return False
+    with wheel.open("rb") as content:
+        digest = hashlib.file_digest(content, "sha256").hexdigest()
+    return f"sha256:{digest}" in lock_entry(package_of(wheel))
+
+
+def package_of(wheel: Path) -> str:
+    """warp_lang-1.19.0-….whl → warp-lang."""
+    return wheel.name.split("-")[0].replace("_", "-")
+
+
+def fetch(wheel: Path) -> None:
+    """Download one wheel into wheels/; pip refuses it when its hash is not the lock's."""
+    _, _, python_tag, _, platform_tag = wheel.stem.split("-")
+    python_version = {"py3": "3.13", "cp313": "3.13", "cp314": "3.14"}[python_tag]
+    requirement = ROOT / "build" / f"{package_of(wheel)}.txt"
+    requirement.parent.mkdir(exist_ok=True)
+    requirement.write_text(lock_entry(package_of(wheel)), encoding="utf-8")
+    wheel.unlink(missing_ok=True)
+    print(f"fetching {wheel.name}", flush=True)
+    command = [sys.executable, "-m", "pip", "download", "--quiet", "--disable-pip-version-check", "--no-deps"]
+    command += ["--require-hashes", "--only-binary=:all:", "--platform", platform_tag, "--python-version"]
+    command += [python_version, "--dest", wheel.parent, "--requirement", requirement]
+    if subprocess.run(command).returncode != 0:
+        raise BuildError(f"{wheel.name} could not be downloaded; see pip's message above.")
+    if not is_locked(wheel):
+        raise BuildError(f"The manifest names {wheel.name}, which is not what requirements.lock pins; mend its wheels.")
+
+
+def stage(target: str) -> Path:
+    """A copy of what the zip holds, with a manifest for one platform. Returns its folder."""
+    folder = ROOT / "build" / f"extension-{target}"
+    shutil.rmtree(folder, ignore_errors=True)
+    (folder / "wheels").mkdir(parents=True)
+    for wheel in wheels_of(target):
+        (folder / "wheels" / wheel.name).hardlink_to(wheel)
+    for name in packaged_names():
+        if (ROOT / name).is_dir():
+            shutil.copytree(ROOT / name, folder / name)
+        else:
+            shutil.copy2(ROOT / name, folder / name)
+    text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
+    text = re.sub(r"^platforms = .*$", f'platforms = ["{target}"]', text, flags=re.MULTILINE)
+    lines = text.splitlines(keepends=True)
+    kept = [line for line in lines if ".whl" not in line or PLATFORM_TAGS[target] in line]
+    (folder / "blender_manifest.toml").write_text("".join(kept), encoding="utf-8")
+    return folder
+
+
+def blender_ext(*arguments: str | Path) -> None:
+    """Run Blender's extension tool."""
+    # Found, not imported: importing bpy starts Blender.
+    bpy = Path(importlib.util.find_spec("bpy").origin).parent
+    (tool,) = bpy.glob("*/scripts/addons_core/bl_pkg/cli/blender_ext.py")
+    if subprocess.run([sys.executable, tool, *arguments]).returncode != 0:
+        raise BuildError(f"Blender's extension tool refused: {' '.join(map(str, arguments))}")
+
+
+def build(target: str) -> Path:
+    """Build and validate the zip of one platform; raises BuildError with what to mend."""
+    for wheel in wheels_of(target):
+        if not is_locked(wheel):
+            fetch(wheel)
+    folder = stage(target)
+    output = zip_path(target)
+    output.parent.mkdir(exist_ok=True)
+    blender_ext("build", "--source-dir", folder, "--output-filepath", output)
+    blender_ext("validate", output)
+    return output
+
+
+def main() -> None:
+    """The command line."""
+    platforms = manifest()["platforms"]
+    parser = argparse.ArgumentParser(description="Build the extension's zip.")
+    parser.add_argument("platform", nargs="?", default=this_platform(), choices=[*platforms, "all"])
+    chosen = parser.parse_args().platform
+    try:
+        for target in platforms if chosen == "all" else [chosen]:
+            output = build(target)
+            print(f"{output.relative_to(ROOT)}  {output.stat().st_size / 1e6:.0f} MB")
+    except BuildError as error:
+        sys.exit(f"build: {error}")
+
+
+if __name__ == "__main__":
+    main()
