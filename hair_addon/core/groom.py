@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Section 2 of [Report12] as two functions: `distribute_guides` and `generate_hair`, with their settings.
+
+`generate_hair` is `bind_hair` (roots, neighbours, weights: all that depends on where guides are rooted) followed by
+`follow_guides` (what combing repeats). The stages need Warp, which takes long to import, so they are imported late.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh import SurfacePoints, check_mesh, normals, positions
+from .params import Settings, param
+from .strands import Strands
+
+CONTROL_POINT_COUNT = 6  # [Report12] section 5
+POINT_COUNT = 41  # [Report12] section 2.2
+
+
+@dataclass(frozen=True)
+class GuideSettings(Settings):
+    """Where guides are rooted and how they grow."""
+
+    guide_count: int = param(200, "How many guides are placed", label="Guides", low=1, high=1_000_000, soft_high=4000)
+    seed: int = param(1, "Number that all randomness follows from", low=0, high=2**31 - 1)
+    density_group: str = param("", "Vertex group that guides follow; empty: the whole surface")
+    relax_iterations: int = param(30, "Rounds of relaxation that even out the guides", low=0, high=1000, soft_high=100)
+    length: float = param(
+        0.15, "Length of the guides from root to tip", above=0.0, soft_high=1.0, unit="LENGTH", subtype="DISTANCE"
+    )
+    length_variation: float = param(0.2, "Random part of the length", low=0.0, high=1.0, subtype="FACTOR")
+    tilt: float = param(
+        math.radians(15.0),
+        "Largest random angle between a guide and the surface's normal at its root",
+        low=0.0,
+        high=math.radians(90.0),
+        unit="ROTATION",
+        subtype="ANGLE",
+    )
+    gravity: float = param(0.5, "How far guides lean towards the ground", low=0.0, high=1.0, subtype="FACTOR")
+
+
+@dataclass(frozen=True)
+class HairSettings(Settings):
+    """How many strands grow between the guides, and which guides each of them follows."""
+
+    strand_count: int = param(
+        30_000, "How many strands are grown", label="Strands", low=1, high=10_000_000, soft_high=100_000
+    )
+    seed: int = param(1, "Number that all randomness follows from", low=0, high=2**31 - 1)
+    density_group: str = param("", "Vertex group that strands follow; empty: the whole surface")
+    automatic_influence: bool = param(True, "Choose the influence distance from the spacing of the guides")
+    influence_distance: float = param(
+        0.03,
+        "Guides nearer to a root than this shape its strand",
+        above=0.0,
+        soft_high=1.0,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+    neighbour_limit: int = param(8, "Most guides that one strand follows: the nearest", low=1, high=32)
+    radius: float = param(
+        0.00008, "Radius of a strand at its root", above=0.0, soft_high=0.01, unit="LENGTH", precision=6
+    )
+    tip_taper: float = param(
+        0.2, "Radius at the tip as a part of the radius at the root", low=0.0, high=1.0, subtype="FACTOR"
+    )
+
+
+@dataclass(frozen=True)
+class HairBinding:
+    """What ties hair to a surface and its guides, and does not change while guides are combed."""
+
+    roots: SurfacePoints
+    positions: "wp.array[wp.vec3]"  # noqa: F821 (S,) [m]
+    normals: "wp.array[wp.vec3]"  # noqa: F821 (S,) unit
+    guide_normals: "wp.array[wp.vec3]"  # noqa: F821 (G,) unit, at the guides' roots
+    guide_weights: "interpolation.GuideWeights"  # noqa: F821 (S, k)
+
+
+def distribute_guides(mesh, settings, *, density=None, device="cpu") -> Strands:
+    """Guides, evenly placed and grown: (guide_count, POINT_COUNT) strands.
+
+    mesh: `TriMesh` [m]; settings: `GuideSettings`; density: (V,) per vertex, at least 0, or None for uniform.
+    """
+    raise NotImplementedError
+
+
+def bind_hair(mesh, guides, settings, *, density=None, device="cpu") -> HairBinding:
+    """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape."""
+    raise NotImplementedError
+
+
+def follow_guides(binding, guides) -> Strands:
+    """Strands of a binding for the guides as they are combed now: no search, this is what live editing repeats."""
+    raise NotImplementedError
+
+
+def generate_hair(mesh, guides, settings, *, density=None, device="cpu") -> Strands:
+    """(strand_count, P) strands between the guides, P the guides' own point count.
+
+    mesh: `TriMesh` [m] with the guides' roots on it; settings: `HairSettings`; density as in `distribute_guides`.
+    """
+    return follow_guides(bind_hair(mesh, guides, settings, density=density, device=device), guides)
+
+
+def strand_radii(settings, point_count=POINT_COUNT):
+    """(point_count,) float32 [m]: radius along every strand, from `radius` at the root to its `tip_taper` part."""
+    return np.linspace(settings.radius, settings.radius * settings.tip_taper, point_count, dtype=np.float32)

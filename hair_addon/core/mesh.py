@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Triangle meshes and points that live on them."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from .errors import HairError
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """Points on a mesh: triangle (N,) int32 and barycentric (N, 3) float32, each row of which sums to one."""
+
+    triangle: np.ndarray
+    barycentric: np.ndarray
+
+    def __len__(self):
+        return len(self.triangle)
+
+    def __getitem__(self, selection):
+        """The points of a slice, a mask or an index array."""
+        return SurfacePoints(self.triangle[selection], self.barycentric[selection])
+
+
+@dataclass(frozen=True)
+class TriMesh:
+    """vertices (V, 3) float32 [m] and triangles (F, 3) int32, wound counter-clockwise seen from outside.
+
+    Triangles without area are kept, so that a triangle's index means the same everywhere; nothing grows on them.
+    Call `check_mesh` on a mesh that comes from outside.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+
+    @cached_property
+    def corners(self):
+        """(F, 3, 3) float64 [m]: the positions of each triangle's corners."""
+        return self.vertices.astype(np.float64)[self.triangles]
+
+    @cached_property
+    def scaled_normals(self):
+        """(F, 3) float64 [m²]: each triangle's normal, twice its area long."""
+        first, second, third = np.moveaxis(self.corners, 1, 0)
+        return np.cross(second - first, third - first)
+
+    @cached_property
+    def areas(self):
+        """(F,) float64 [m²]; exactly zero where a triangle is degenerate to single precision."""
+        areas = 0.5 * np.linalg.norm(self.scaled_normals, axis=1)
+        first, second, third = np.moveaxis(self.corners, 1, 0)
+        edges = np.stack([second - first, third - second, first - third])
+        longest = np.einsum("efi,efi->ef", edges, edges).max(axis=0)
+        # A sliver thinner than the rounding of its own coordinates has no side to grow hair on.
+        return np.where(areas > 1e-9 * longest, areas, 0.0)
+
+    @cached_property
+    def vertex_normals(self):
+        """(V, 3) float32: unit normals, each the mean of the faces around weighted by their angle [Thurmer98].
+
+        Zero where no face with an area meets, or where those that do cancel.
+        """
+        corners, face_normals = self.corners, _unit(self.scaled_normals)
+        normals = np.zeros(self.vertices.shape)
+        face_normals[self.areas == 0.0] = 0.0
+        for corner in range(3):
+            towards_next = _unit(corners[:, (corner + 1) % 3] - corners[:, corner])
+            towards_last = _unit(corners[:, (corner + 2) % 3] - corners[:, corner])
+            angles = np.arccos(np.clip(np.einsum("fi,fi->f", towards_next, towards_last), -1.0, 1.0))
+            for axis in range(3):
+                normals[:, axis] += np.bincount(
+                    self.triangles[:, corner], weights=angles * face_normals[:, axis], minlength=len(normals)
+                )
+        return _unit(normals).astype(np.float32)
+
+
+def check_mesh(mesh):
+    """Raise `HairError` unless hair can grow on the mesh: faces, indices in range, finite vertices, some area."""
+    if len(mesh.triangles) == 0:
+        raise HairError("The surface has no faces to grow hair on.")
+    lowest, highest = int(mesh.triangles.min()), int(mesh.triangles.max())
+    if lowest < 0 or highest >= len(mesh.vertices):
+        outside = lowest if lowest < 0 else highest
+        raise HairError(
+            f"A face of the surface uses vertex {outside}, but the mesh has {len(mesh.vertices)}: validate the mesh."
+        )
+    bad_count = int(np.count_nonzero(~np.isfinite(mesh.vertices).all(axis=1)))
+    if bad_count:
+        raise HairError(
+            f"{bad_count} of the surface's {len(mesh.vertices)} vertices are not finite numbers: "
+            "repair the mesh or the modifier that makes them."
+        )
+    if not np.any(mesh.areas > 0.0):
+        raise HairError("Every face of the surface has zero area: check the object's shape and scale.")
+
+
+def interpolate(values, mesh, points):
+    """Per-vertex values (V,) or (V, K) → (N,) or (N, K) float32 at the points, linear inside each triangle."""
+    corner_values = np.asarray(values)[mesh.triangles[points.triangle]]
+    return np.einsum("nc,nc...->n...", points.barycentric, corner_values, dtype=np.float64).astype(np.float32)
+
+
+def positions(mesh, points):
+    """(N, 3) float32 [m]."""
+    return interpolate(mesh.vertices, mesh, points)
+
+
+def normals(mesh, points):
+    """(N, 3) float32: unit normals, smooth over the surface; the triangle's own where the smooth one vanishes."""
+    smooth = interpolate(mesh.vertex_normals, mesh, points)
+    lengths = np.linalg.norm(smooth, axis=1, keepdims=True)
+    flat = _unit(mesh.scaled_normals[points.triangle])
+    return np.where(lengths > 1e-6, smooth / np.maximum(lengths, 1e-6), flat).astype(np.float32)
+
+
+def _unit(vectors):
+    """Vectors (N, 3) made unit; zero stays zero."""
+    lengths = np.linalg.norm(vectors, axis=1, keepdims=True)
+    return vectors / np.where(lengths > 0.0, lengths, 1.0)

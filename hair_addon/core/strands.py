@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands: polylines from root to tip.
+
+Warp is imported where an array is made, not above: the doors import this file while Blender starts.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .errors import HairError
+from .mesh import SurfacePoints
+
+
+@dataclass(frozen=True)
+class Strands:
+    """points (S, P) vec3 [m], a Warp array on the device that the strands live on, and the S roots on the surface.
+
+    points[:, 0] are the roots' positions; every strand has the same number of points.
+    """
+
+    points: "wp.array2d[wp.vec3]"  # noqa: F821 (Warp is imported late)
+    roots: SurfacePoints
+
+    def __len__(self):
+        return self.points.shape[0]
+
+    @property
+    def point_count(self):
+        """Points per strand."""
+        return self.points.shape[1]
+
+    def numpy(self):
+        """(S, P, 3) float32 [m]; on the CPU a view that shares the strands' memory."""
+        return self.points.numpy()
+
+
+def from_numpy(points, roots, device="cpu"):
+    """Points (S, P, 3) [m] and their S roots → `Strands`; on the CPU float32 points are shared, not copied."""
+    import warp as wp
+
+    points = np.ascontiguousarray(points, dtype=np.float32)
+    if points.ndim != 3 or points.shape[2] != 3 or points.shape[0] != len(roots):
+        raise ValueError(f"points must be ({len(roots)}, P, 3), not {points.shape}")
+    return Strands(wp.array(points, dtype=wp.vec3, device=device, copy=False), roots)
+
+
+def offsets(points):
+    """(S, P, 3) [m] → o (S, P, 3) [m]: o_0 = p_0, o_i = p_i - p_(i-1)  (Eq. 7)."""
+    return np.concatenate([points[:, :1], np.diff(points, axis=1)], axis=1)
+
+
+def segment_lengths(points):
+    """(S, P, 3) [m] → (S, P-1) [m]."""
+    return np.linalg.norm(np.diff(points, axis=1), axis=-1)
+
+
+def lengths(points):
+    """(S, P, 3) [m] → (S,) [m], from root to tip."""
+    return segment_lengths(points).sum(axis=1)
+
+
+def resample(points, starts, point_count):
+    """Ragged polylines → (S, point_count, 3) float32 [m], equally spaced along each, ends kept.
+
+    points (N, 3) holds all polylines one after the other and starts (S+1,) says where each begins, the last entry
+    being N (Blender's `curve_offset_data`). A polyline of one point, or of no length, becomes that point repeated.
+    """
+    points = np.asarray(points, dtype=np.float64)
+    starts = np.asarray(starts, dtype=np.int64)
+    counts = np.diff(starts)
+    if len(starts) < 1 or starts[0] != 0 or starts[-1] != len(points) or np.any(counts < 0):
+        raise ValueError("starts must rise from 0 to the number of points")
+    if np.any(counts == 0):
+        raise HairError(f"{np.count_nonzero(counts == 0)} curves have no points: delete them.")
+    if not np.isfinite(points).all():
+        raise HairError("Some points of the curves are not finite numbers: delete those curves.")
+    if len(counts) == 0:
+        return np.empty((0, point_count, 3), np.float32)
+    # One running arc length over all polylines; the jump from a tip to the next root counts as nothing.
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    steps[starts[1:-1] - 1] = 0.0
+    along = np.concatenate([[0.0], np.cumsum(steps)])
+    first, last = starts[:-1], starts[1:] - 1
+    wanted = along[first, None] + np.linspace(0.0, 1.0, point_count) * (along[last] - along[first])[:, None]
+    # The segment that holds each wanted length, kept inside its own polyline.
+    segment = np.searchsorted(along, wanted.ravel(), side="right").reshape(wanted.shape) - 1
+    segment = np.clip(segment, first[:, None], np.maximum(last - 1, first)[:, None])
+    ahead = np.minimum(segment + 1, last[:, None])
+    span = along[ahead] - along[segment]
+    fraction = np.clip((wanted - along[segment]) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)[..., None]
+    resampled = (1.0 - fraction) * points[segment] + fraction * points[ahead]
+    resampled[:, 0], resampled[:, -1] = points[first], points[last]
+    return resampled.astype(np.float32)
