@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Marschner's angles about a fibre [Marschner03], from directions and back.
+
+The tangent points from root to tip, `to_light` and `to_view` away from the fibre; all three are unit vectors (..., 3).
+An inclination theta is measured from the normal plane, positive towards the tip. The azimuth phi is turned about the
+tangent from the light to the viewer: 0 looks back at the light, pi looks straight through. Radians everywhere.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+
+class FibreAngles(NamedTuple):
+    """Arrays of one shape (...), radians."""
+
+    theta_i: np.ndarray  # inclination of the light, [-pi/2, pi/2]
+    theta_o: np.ndarray  # inclination of the viewer, [-pi/2, pi/2]
+    phi: np.ndarray  # relative azimuth, (-pi, pi]
+
+    @property
+    def theta_h(self):
+        """Half angle: zero on the mirror cone."""
+        return 0.5 * (self.theta_o + self.theta_i)
+
+    @property
+    def theta_d(self):
+        """Difference angle: the inclination inside which the azimuthal scattering happens."""
+        return 0.5 * (self.theta_o - self.theta_i)
+
+
+def fibre_angles(tangent, to_light, to_view):
+    """Unit vectors (..., 3) → `FibreAngles` (...). A direction along the tangent has no azimuth: phi is then 0."""
+    sin_theta_i = np.sum(tangent * to_light, axis=-1)
+    sin_theta_o = np.sum(tangent * to_view, axis=-1)
+    light = to_light - sin_theta_i[..., None] * tangent
+    view = to_view - sin_theta_o[..., None] * tangent
+    # The arc tangent keeps its precision at phi = 0 and pi, where an arc cosine of the dot product loses half of it.
+    phi = np.arctan2(np.sum(tangent * np.cross(light, view), axis=-1), np.sum(light * view, axis=-1))
+    return FibreAngles(inclination(sin_theta_i), inclination(sin_theta_o), phi)
+
+
+def inclination(sin_theta):
+    """Dot product with the tangent (...) → theta (...); rounding may have carried it past ±1."""
+    return np.arcsin(np.clip(sin_theta, -1.0, 1.0))
+
+
+def direction(tangent, normal, theta, phi):
+    """Inclinations and azimuths (...) → unit vectors (..., 3), with phi counted from `normal` about `tangent`.
+
+    `normal` (..., 3) is a unit vector perpendicular to `tangent` (..., 3).
+    """
+    theta = np.asarray(theta)[..., None]
+    phi = np.asarray(phi)[..., None]
+    binormal = np.cross(tangent, normal)
+    return np.sin(theta) * tangent + np.cos(theta) * (np.cos(phi) * normal + np.sin(phi) * binormal)
+
+
+def cos_theta_d(sin_theta_i, sin_theta_o):
+    """cos((theta_o - theta_i) / 2) from the two dot products, without an inverse function; in [0, 1]."""
+    cos_product = np.sqrt(np.maximum(0.0, (1.0 - sin_theta_i**2) * (1.0 - sin_theta_o**2)))
+    return np.sqrt(np.maximum(0.0, 0.5 * (1.0 + cos_product + sin_theta_i * sin_theta_o)))

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The opaque cylinder of [Kajiya89], Eq. 11-13 of [Report12].
+
+Convention: light that falls on the fibre with irradiance E on a plane facing the light leaves it with the radiance
+`kajiya_kay(...) * E`. The cosine of the light's inclination is therefore already in it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..params import Settings as _Settings
+from ..params import param
+
+
+@dataclass(frozen=True)
+class Settings(_Settings):
+    """Both colours are albedos, so a sharper highlight is brighter and narrower, not more light."""
+
+    diffuse_color: tuple = param(
+        (0.30, 0.18, 0.10), "Part of the light that the fibre scatters evenly", low=0.0, high=1.0, subtype="COLOR"
+    )
+    specular_color: tuple = param(
+        (0.10, 0.09, 0.08), "Part of the light in the highlight", low=0.0, high=1.0, subtype="COLOR"
+    )
+    exponent: float = param(60.0, "Sharpness of the highlight", low=1.0, high=10000.0, soft_high=500.0)
+
+
+def kajiya_kay_diffuse(tangent, to_light):
+    """sin(T, L), the cosine of the light's inclination, (...). Eq. 11.
+
+    Greatest for light across the fibre and zero along it: the report's text says the opposite.
+    """
+    return sin_from_cos(np.sum(tangent * to_light, axis=-1))
+
+
+def kajiya_kay_specular(tangent, to_light, to_view, exponent):
+    """max(0, cos(theta_i + theta_o))^exponent, (...): 1 on the mirror cone theta_o = -theta_i. Eq. 12.
+
+    Departs from the report: its second sine is of V, and the product of cosines is subtracted because L and V both
+    point away from the fibre.
+    """
+    t_dot_l = np.sum(tangent * to_light, axis=-1)
+    t_dot_v = np.sum(tangent * to_view, axis=-1)
+    cone = sin_from_cos(t_dot_l) * sin_from_cos(t_dot_v) - t_dot_l * t_dot_v
+    return np.maximum(0.0, cone) ** exponent
+
+
+def kajiya_kay(tangent, to_light, to_view, settings):
+    """Radiance per irradiance towards the viewer, RGB (..., 3). Eq. 13."""
+    diffuse = kajiya_kay_diffuse(tangent, to_light)[..., None]
+    specular = kajiya_kay_specular(tangent, to_light, to_view, settings.exponent)[..., None]
+    diffuse_gain = 1.0 / np.pi**2  # the cosine alone would send pi^2 of the light back
+    specular_gain = kajiya_kay_specular_gain(settings.exponent)
+    return (
+        diffuse_gain * np.asarray(settings.diffuse_color) * diffuse
+        + specular_gain * np.asarray(settings.specular_color) * specular
+    )
+
+
+def kajiya_kay_specular_gain(exponent):
+    """Factor that makes the highlight's energy one for light across the fibre.
+
+    The exact value is 1 / (2 pi int cos^(exponent + 2)); the square root is within 0.5 % of it from exponent 1 on,
+    and needs no Gamma function in the shader.
+    """
+    return np.sqrt((exponent + 2.5) / (2.0 * np.pi)) / (2.0 * np.pi)
+
+
+def sin_from_cos(cosine):
+    """Sine of an angle in [0, pi]; a dot product of unit vectors may round to just beyond ±1."""
+    return np.sqrt(np.maximum(0.0, 1.0 - np.square(cosine)))
