@@ -30,14 +30,21 @@ class FibreAngles(NamedTuple):
 
 
 def fibre_angles(tangent, to_light, to_view):
-    """Unit vectors (..., 3) → `FibreAngles` (...). A direction along the tangent has no azimuth: phi is then 0."""
-    sin_theta_i = np.sum(tangent * to_light, axis=-1)
-    sin_theta_o = np.sum(tangent * to_view, axis=-1)
-    light = to_light - sin_theta_i[..., None] * tangent
-    view = to_view - sin_theta_o[..., None] * tangent
+    """Unit vectors (..., 3) → `FibreAngles` (...)."""
+    theta_i = inclination(np.sum(tangent * to_light, axis=-1))
+    theta_o = inclination(np.sum(tangent * to_view, axis=-1))
+    return FibreAngles(theta_i, theta_o, relative_azimuth(tangent, to_light, to_view))
+
+
+def relative_azimuth(tangent, to_light, to_view):
+    """phi (...) in (-pi, pi]. A direction along the tangent has no azimuth: phi is then 0.
+
+    Scattering is even in phi, so the shader's twin gives |phi|.
+    """
+    light = to_light - np.sum(tangent * to_light, axis=-1)[..., None] * tangent
+    view = to_view - np.sum(tangent * to_view, axis=-1)[..., None] * tangent
     # The arc tangent keeps its precision at phi = 0 and pi, where an arc cosine of the dot product loses half of it.
-    phi = np.arctan2(np.sum(tangent * np.cross(light, view), axis=-1), np.sum(light * view, axis=-1))
-    return FibreAngles(inclination(sin_theta_i), inclination(sin_theta_o), phi)
+    return np.arctan2(np.sum(tangent * np.cross(light, view), axis=-1), np.sum(light * view, axis=-1))
 
 
 def inclination(sin_theta):
@@ -57,6 +64,11 @@ def direction(tangent, normal, theta, phi):
 
 
 def cos_theta_d(sin_theta_i, sin_theta_o):
-    """cos((theta_o - theta_i) / 2) from the two dot products, without an inverse function; in [0, 1]."""
-    cos_product = np.sqrt(np.maximum(0.0, (1.0 - sin_theta_i**2) * (1.0 - sin_theta_o**2)))
-    return np.sqrt(np.maximum(0.0, 0.5 * (1.0 + cos_product + sin_theta_i * sin_theta_o)))
+    """cos((theta_o - theta_i) / 2) from the two dot products, exact by the half-angle formula; in [0, 1]."""
+    cosines = sin_from_cos(sin_theta_i) * sin_from_cos(sin_theta_o)
+    return np.sqrt(np.maximum(0.0, 0.5 * (1.0 + cosines + sin_theta_i * sin_theta_o)))
+
+
+def sin_from_cos(cosine):
+    """Sine of an angle in [0, pi], or cosine of an inclination from its sine; rounding may exceed ±1."""
+    return np.sqrt(np.maximum(0.0, 1.0 - np.square(cosine)))
