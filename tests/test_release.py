@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is released is what is locked: manifest, lock file, version, and nothing of one machine in the checkout."""
+
+import re
+import tomllib
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from tools import build_extension
+
+ROOT = Path(__file__).resolve().parent.parent
+MANIFEST = build_extension.manifest()
+GROUPS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
+REQUIREMENTS = {group: [Requirement(line) for line in lines] for group, lines in GROUPS.items()}
+LOCK = (ROOT / "requirements.lock").read_text(encoding="utf-8")
+# One entry a package: its pin, its hashes, and the comment that says who asked for it.
+LOCKED = {entry.split("==")[0]: entry for entry in re.split(r"\n(?=\S)", LOCK)}
+
+TEXT_FOLDERS = ["hair_addon", "shaders", "tests", "tools", "blend_samples", ".ci"]
+TEXT_SUFFIXES = {"", ".py", ".sh", ".md", ".toml", ".txt", ".lock", ".glsl", ".frag", ".vert", ".comp"}
+TEXTS = [path for folder in TEXT_FOLDERS for path in sorted((ROOT / folder).rglob("*"))] + sorted(ROOT.glob("*"))
+TEXTS = [path for path in TEXTS if path.is_file() and path.suffix in TEXT_SUFFIXES and path != Path(__file__)]
+
+
+def each_text():
+    return pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.relative_to(ROOT).as_posix())
+
+
+def version_of(package):
+    return re.match(r"[\w-]+==([^\s;\\]+)", LOCKED[package])[1]
+
+
+@each_text()
+def test_no_registry_address(path):
+    """Where packages come from is each machine's own business."""
+    text = path.read_text(encoding="utf-8")
+    registries = r"https?://\S*(pypi|pythonhosted|/simple\b|artifact)"
+    options = r"(?<!emit-)\b(extra-)?index-url\b|--find-links|--index\b|--trusted-host"
+    assert re.search(f"{registries}|{options}", text) is None
+
+
+@each_text()
+def test_no_path_of_one_machine(path):
+    found = re.search(r"(?<![\w.~}/])/(root|home|Users|work)/|[A-Z]:\\Users", path.read_text(encoding="utf-8"))
+    assert found is None, found
+
+
+@each_text()
+def test_version_stands_only_in_the_manifest(path):
+    if path.name in {"blender_manifest.toml", "CHANGELOG.md"}:
+        return
+    literal = rf"(?<![\d.]){re.escape(MANIFEST['version'])}(?![\d.])"
+    # Other people's versions may be the same number: the lock's pins carry two equal signs.
+    text = re.sub(r"==\S+", "", path.read_text(encoding="utf-8"))
+    assert re.search(literal, text) is None
+
+
+def test_changelog_has_the_version():
+    changelog = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
+    assert re.search(rf"^## \[{re.escape(MANIFEST['version'])}\]", changelog, re.MULTILINE)
+
+
+@pytest.mark.parametrize("package", LOCKED)
+def test_lock_pins_and_hashes(package):
+    entry = LOCKED[package]
+    assert version_of(package)
+    assert re.search(r"--hash=sha256:[0-9a-f]{64}", entry)
+    assert "://" not in entry and " @ " not in entry
+
+
+@pytest.mark.parametrize("group", REQUIREMENTS)
+def test_lock_is_in_step_with_pyproject(group):
+    for requirement in REQUIREMENTS[group]:
+        assert requirement.specifier.contains(version_of(canonicalize_name(requirement.name)))
+    asked_for = {package for package, entry in LOCKED.items() if f"(pyproject.toml:{group})" in entry}
+    assert asked_for == {canonicalize_name(requirement.name) for requirement in REQUIREMENTS[group]}
+
+
+@pytest.mark.parametrize("platform", MANIFEST["platforms"])
+def test_each_platform_has_its_wheels(platform):
+    """Warp for any Python; OpenEXR for Blender's own (3.13) and Debian's (3.14); in the versions of the lock."""
+    wheels = [wheel.name.split("-")[:3] for wheel in build_extension.wheels_of(platform)]
+    openexr, warp = version_of("openexr"), version_of("warp-lang")
+    assert sorted(wheels) == [["openexr", openexr, "cp313"], ["openexr", openexr, "cp314"], ["warp_lang", warp, "py3"]]
+
+
+def test_a_foreign_wheel_is_refused(tmp_path):
+    wheel = tmp_path / build_extension.wheels_of("linux-x64")[0].name
+    wheel.write_bytes(b"something else")
+    assert not build_extension.is_locked(wheel)
+    with pytest.raises(build_extension.BuildError, match="does not pin"):
+        build_extension.lock_entry("something-else")
