@@ -126,11 +126,14 @@ def import_lines(path, *names):
     return [line for line, name in outside_imports(path) if any(f"{name}.".startswith(f"{n}.") for n in names)]
 
 
-def layout_lines(path):
+def array_lines(path):
+    """Where arrays of geometry pass between Blender and NumPy; a picture's pixels are not geometry."""
     tree = syntax(path)
-    names = [node.lineno for node in ast.walk(tree) if isinstance(node, ast.Name) and node.id == "layout"]
-    return names + list(attribute_lines(tree, ".layout"))
+    pixels = attribute_lines(tree, ".pixels.foreach_get", ".pixels.foreach_set")
+    return sorted({*attribute_lines(tree, ".foreach_get", ".foreach_set", ".attributes.new")} - {*pixels})
 
+
+LAYOUT = [".layout", *(f"layout.{part}" for part in ("prop", "row", "column", "box", "label", "operator", "split"))]
 
 ROOMS = {
     "bpy": (lambda path: import_lines(path, "bpy", "mathutils", "bmesh", "bl_ui", "bpy_extras"), r"blender/.*"),
@@ -142,11 +145,8 @@ ROOMS = {
         lambda path: [*attribute_lines(syntax(path), "bpy.props"), *import_lines(path, "bpy.props")],
         r"blender/(properties|preferences)\.py",
     ),
-    "Blender's arrays": (
-        lambda path: list(attribute_lines(syntax(path), ".foreach_get", ".foreach_set", ".attributes.new")),
-        r"blender/(scene|curves)\.py",
-    ),
-    "layout": (layout_lines, r"blender/(panels|preferences)\.py"),
+    "Blender's arrays": (array_lines, r"blender/(scene|curves)\.py"),
+    "layout": (lambda path: list(attribute_lines(syntax(path), *LAYOUT)), r"blender/(panels|preferences)\.py"),
     "self.report": (lambda path: list(attribute_lines(syntax(path), "self.report")), r"blender/operators/.*"),
     "wp.kernel": (lambda path: list(attribute_lines(syntax(path), "wp.kernel", "wp.func")), r"core/.*"),
     "OpenEXR": (lambda path: import_lines(path, "OpenEXR"), r"core/exr\.py"),

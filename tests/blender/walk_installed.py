@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an artist does with the installed extension; run by a Python that has nothing but the bpy wheel.
+
+    python -I walk_installed.py install|operators|twice ZIP FOLDER
+
+Prints one line of JSON at the end; test_install.py says what must stand in it.
+"""
+
+import json
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+MODULE = "bl_ext.user_default.vellus"
+
+
+def install(zip_path, _folder):
+    """Install from disk into an empty profile and enable, as the Preferences do."""
+    result = bpy.ops.extensions.package_install_files(filepath=zip_path, repo="user_default", enable_on_install=True)
+    return {"result": list(result), "enabled": MODULE in bpy.context.preferences.addons}
+
+
+def operators(_zip_path, folder):
+    """Mesh to pixels by the four operators."""
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=0.1)
+    results = [
+        bpy.ops.vellus.distribute_guides(guide_count=30, relax_iterations=5, length=0.05),
+        bpy.ops.vellus.interpolate_hair(strand_count=300),
+        bpy.ops.vellus.bake_tables(directory=str(folder)),
+        bpy.ops.vellus.render_picture(filepath=str(folder / "picture.png"), width=160, height=120),
+    ]
+    picture = bpy.data.images.load(str(folder / "picture.png"))
+    pixels = np.array(picture.pixels[:]).reshape(-1, 4)
+    import OpenEXR  # both are there only once Blender has unpacked the extension's wheels
+    import warp
+
+    return {
+        "results": [list(result) for result in results],
+        "curves": {curves.name: len(curves.curves) for curves in bpy.data.hair_curves},
+        "finite": all(np.isfinite(_positions(curves)).all() for curves in bpy.data.hair_curves),
+        "tables": sorted(path.name for path in folder.glob("*.exr")),
+        "picture": [*picture.size, float(pixels[:, :3].std())],
+        "wheels": [warp.__file__, OpenEXR.__file__],
+    }
+
+
+def _positions(curves):
+    values = np.empty(len(curves.points) * 3, np.float32)
+    curves.attributes["position"].data.foreach_get("vector", values)
+    return values
+
+
+def twice(_zip_path, _folder):
+    """What Blender holds before the add-on is ever enabled, and enabled and disabled, twice each."""
+    draw_handlers = _count_draw_handlers()
+    states = [_state(draw_handlers)]
+    for _ in range(2):
+        bpy.ops.preferences.addon_enable(module=MODULE)
+        states.append(_state(draw_handlers))
+        bpy.ops.preferences.addon_disable(module=MODULE)
+        states.append(_state(draw_handlers))
+    return {"states": states}
+
+
+def _state(draw_handlers):
+    """Everything that an add-on can add to, by name."""
+    types = {name: dir(getattr(bpy.types, name)) for name in dir(bpy.types)}
+    handlers = {
+        name: value for name in dir(bpy.app.handlers) if isinstance(value := getattr(bpy.app.handlers, name), list)
+    }
+    keymaps = bpy.context.window_manager.keyconfigs.addon.keymaps
+    return {
+        "types": sorted(types),
+        "attributes": sorted(f"{name}.{attribute}" for name, attributes in types.items() for attribute in attributes),
+        "operators": sorted(dir(bpy.ops.vellus)),
+        "handlers": sorted(f"{name}: {function!r}" for name, functions in handlers.items() for function in functions),
+        "draw handlers": sorted(map(repr, draw_handlers)),
+        "keymaps": sorted(f"{keymap.name}: {item.idname}" for keymap in keymaps for item in keymap.keymap_items),
+        "modules": sorted(name for name in sys.modules if name.startswith(MODULE)),
+        "path": sys.path,
+        "drivers": sorted(bpy.app.driver_namespace),
+        "data": sorted(repr(block) for block in bpy.data.user_map()),
+    }
+
+
+def _count_draw_handlers():
+    """Handles that SpaceView3D holds: Blender gives no list, so its two functions are wrapped."""
+    space, handles = bpy.types.SpaceView3D, []
+    add, remove = space.draw_handler_add, space.draw_handler_remove
+
+    def counting_add(*arguments):
+        handles.append(add(*arguments))
+        return handles[-1]
+
+    def counting_remove(handle, region):
+        remove(handle, region)
+        handles.remove(handle)
+
+    space.draw_handler_add, space.draw_handler_remove = counting_add, counting_remove
+    return handles
+
+
+if __name__ == "__main__":
+    verb, zip_argument, folder_argument = sys.argv[1:]
+    outcome = {"install": install, "operators": operators, "twice": twice}[verb](zip_argument, Path(folder_argument))
+    if verb == "install":
+        bpy.ops.wm.save_userpref()
+    print(json.dumps(outcome))
