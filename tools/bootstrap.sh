@@ -38,14 +38,11 @@ find_uv() {
 
 check_libraries() {
   [ "$(uname -s)" = Linux ] || return 0
-  bpy_library=$(echo .venv/lib/python3.13/site-packages/bpy/__init__.so)
-  missing=$(ldd "$bpy_library" | awk '/not found/ { print $1 }' | sort -u | tr '\n' ' ')
-  # bpy opens these two by name when something is drawn, so ldd does not list them.
-  if ! .venv/bin/python -c 'import ctypes; ctypes.CDLL("libEGL.so.1")' 2>/dev/null; then
-    missing="${missing}libEGL.so.1 "
-  fi
-  [ -z "$missing" ] || fail "Blender needs shared libraries that this machine lacks: $missing" \
-    "(on Debian, as root: apt-get install $(tr '\n' ' ' < tools/debian-packages.txt))."
+  missing=$(ldd .venv/lib/python3.13/site-packages/bpy/__init__.so | awk '/not found/ { print $1 }' | sort -u)
+  # bpy opens this one by name when something is drawn, so ldd does not list it.
+  .venv/bin/python -c 'import ctypes; ctypes.CDLL("libEGL.so.1")' 2>/dev/null || missing="$missing libEGL.so.1"
+  [ -z "$missing" ] || fail "Blender needs shared libraries that this machine lacks:" $missing \
+    "(on Debian, as root: apt-get install $(paste -s -d ' ' tools/debian-packages.txt))."
   .venv/bin/python -c 'import bpy, gpu; gpu.init()' >/dev/null 2>&1 ||
     say "warning: nothing can be drawn here, so pictures and their tests will fail;" \
       "an OpenGL driver is missing (on Debian: libgl1-mesa-dri)."
