@@ -1,0 +1,288 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lookup tables as OpenEXR files: half floats, and a header that says all that is known of them.
+
+The first line of a file is row 0 of its table. A file is encoded in memory and decoded from memory, because OpenEXR
+reports neither a full disk nor a truncated file as an error.
+"""
+
+import contextlib
+import hashlib
+import io
+import json
+import os
+import secrets
+import stat
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import OpenEXR
+
+from .errors import HairError
+from .params import declared
+from .shading.lookup_tables import MAX_SIZE, Settings, Tables, to_half
+
+FORMAT_VERSION = 1
+
+_MAX_BYTES = 64 * 2**20
+_MAX_SETTINGS_LENGTH = 10_000
+_MAGIC = b"\x76\x2f\x31\x01"
+_PREFIX = "vellus."  # of our header attributes
+
+_CHANNELS = {
+    "m": {"R": "M_R", "G": "M_TT", "B": "M_TRT", "A": "cos(theta_d)"},
+    "n": {"R": "N_TT red", "G": "N_TT green", "B": "N_TT blue", "A": "N_R"},
+    "n_trt": {"R": "N_TRT red", "G": "N_TRT green", "B": "N_TRT blue"},
+}
+
+_LONGITUDINAL_AXES = {
+    "ANGLES": (
+        "column k of W, left to right: theta_i = ((k + 0.5) / W - 0.5) pi, the inclination of the light",
+        "row j of H, top to bottom: theta_o = ((j + 0.5) / H - 0.5) pi, the inclination of the viewer",
+    ),
+    "COSINES": (
+        "column k of W, left to right: sin(theta_i) = 2 (k + 0.5) / W - 1, theta_i the inclination of the light",
+        "row j of H, top to bottom: sin(theta_o) = 2 (j + 0.5) / H - 1, theta_o the inclination of the viewer",
+    ),
+}
+_AZIMUTHAL_COLUMNS = {
+    "ANGLES": "column k of W, left to right: phi / pi = (k + 0.5) / W, phi the azimuth between light and viewer; "
+    "each texel is the mean over phi / pi from k / W to (k + 1) / W",
+    "COSINES": "column k of W, left to right: (cos(phi) + 1) / 2 = (k + 0.5) / W, phi the azimuth between light and "
+    "viewer; each texel is the mean over its cell of phi",
+}
+_AZIMUTHAL_ROWS = "row j of H, top to bottom: cos(theta_d) = (j + 0.5) / H, theta_d = (theta_o - theta_i) / 2"
+
+
+def write_table(path, array, channels, header):
+    """(H, W, C) array → a half-float EXR file at `path`, which is either written whole or left as it was.
+
+    channels: C names; header: {attribute: str, int, float or three floats}. Raises `HairError` when `path` cannot be
+    written.
+    """
+    _write_files({Path(path): _encode(to_half(array), channels, header)})
+
+
+def read_table(path, channels, size=None):
+    """The float32 (H, W, C) array of an EXR file with exactly these channels, in their order, and its header dict.
+
+    size: the (height, width) demanded; None takes any up to `MAX_SIZE`. Raises `HairError` on anything else than one
+    plain finite half-float image of that shape, and unless the pixels are at fault before memory is taken for them.
+    """
+    image = _Image(path, channels)
+    image.demand_size(size)
+    return image.pixels().astype(np.float32), image.header
+
+
+def write_tables(folder, tables, version):
+    """`Tables` → m.exr, n.exr and n_trt.exr in a folder, made if missing. Returns their paths.
+
+    All three are on disk before the first takes its place. version: of the project, for the header. Raises
+    `HairError` when the folder cannot be written.
+    """
+    folder = Path(folder)
+    files = {}
+    for name, meanings in _CHANNELS.items():
+        half = to_half(getattr(tables, name))
+        files[folder / f"{name}.exr"] = _encode(half, meanings, _table_header(name, half, tables.settings, version))
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:  # ValueError: a path with a null character
+        raise HairError(f"Cannot make the folder {folder}: {_reason(error)}. Choose another folder.") from error
+    _write_files(files)
+    return list(files)
+
+
+def read_tables(folder):
+    """`Tables` from a folder that `write_tables` filled, with the settings that they were baked with.
+
+    Raises `HairError` when a file is missing, damaged, foreign, or belongs to another bake.
+    """
+    arrays, settings = {}, None
+    for name, meanings in _CHANNELS.items():
+        image = _Image(Path(folder) / f"{name}.exr", meanings)
+        baked_with = _settings_from_header(image, name)
+        if baked_with != (settings or baked_with):
+            raise HairError(f"{image.path} and the tables beside it are of different bakes. Bake the tables again.")
+        settings = baked_with
+        image.demand_size((settings.size, settings.size))
+        half = image.pixels()
+        if image.header.get(_PREFIX + "sha256") != _digest(half, image.header[_PREFIX + "settings"]):
+            raise HairError(f"{image.path} was changed after it was baked. Bake the tables again.")
+        arrays[name] = half.astype(np.float32)
+    return Tables(**arrays, settings=settings)
+
+
+# What a header says.
+
+
+def _table_header(name, half, settings, version):
+    azimuthal_axes = (_AZIMUTHAL_COLUMNS[settings.axes], _AZIMUTHAL_ROWS)
+    x_axis, y_axis = _LONGITUDINAL_AXES[settings.axes] if name == "m" else azimuthal_axes
+    exact = json.dumps(asdict(settings))
+    header = {
+        "table": name,
+        "format": FORMAT_VERSION,
+        "version": version,
+        "xAxis": x_axis,
+        "yAxis": y_axis,
+        "channelMeaning": "; ".join(f"{channel}: {meaning}" for channel, meaning in _CHANNELS[name].items()),
+        "settings": exact,
+        "sha256": _digest(half, exact),
+    }
+    for key, default, _ in declared(Settings):  # to single precision, for people who read headers
+        value = getattr(settings, key)
+        header["settings." + key] = tuple(map(float, value)) if isinstance(default, tuple) else type(default)(value)
+    return {_PREFIX + key: value for key, value in header.items()}
+
+
+def _digest(half, settings_text):
+    """Tells a table whose texels or settings were damaged or edited, which OpenEXR need not notice."""
+    return hashlib.sha256(settings_text.encode() + np.ascontiguousarray(half, "<f2").tobytes()).hexdigest()
+
+
+def _settings_from_header(image, name):
+    foreign = HairError(f"{image.path} is not the table {name} of this version of Vellus. Bake the tables again.")
+    header = image.header
+    text = header.get(_PREFIX + "settings")
+    if (
+        header.get(_PREFIX + "table") != name
+        or header.get(_PREFIX + "format") != FORMAT_VERSION
+        or not isinstance(text, str)
+        or len(text) > _MAX_SETTINGS_LENGTH
+    ):
+        raise foreign
+    defaults = {key: default for key, default, _ in declared(Settings)}
+    try:
+        values = json.loads(text)
+        if values.keys() != defaults.keys():
+            raise foreign
+        values = {key: _like(default, values[key]) for key, default in defaults.items()}
+    except (AttributeError, TypeError, ValueError, OverflowError, RecursionError) as error:
+        raise foreign from error
+    try:
+        return Settings(**values)
+    except HairError as error:
+        raise HairError(f"{image.path} holds settings that cannot be: {error} Bake the tables again.") from error
+
+
+def _like(default, value):
+    """A JSON value as the type of a setting's default; raises TypeError or ValueError when it is of another kind."""
+    if isinstance(default, tuple) and isinstance(value, list):
+        return tuple(_like(example, component) for example, component in zip(default, value, strict=True))
+    if isinstance(default, float) and type(value) is int:
+        return float(value)
+    if type(value) is not type(default):
+        raise TypeError(f"{value!r} in place of {default!r}")
+    return value
+
+
+# Writing.
+
+
+def _encode(half, channels, header):
+    attributes = {"type": OpenEXR.scanlineimage, "compression": OpenEXR.ZIP_COMPRESSION, **header}
+    planes = {name: np.ascontiguousarray(half[..., index]) for index, name in enumerate(channels)}
+    stream = io.BytesIO()
+    OpenEXR.File(attributes, planes).write(stream)
+    return stream.getvalue()
+
+
+def _write_files(files):
+    """{path: bytes} → files. Each is written beside its place first, so that none is ever seen half-made."""
+    temporary = {path: path.with_name(f".{path.name}.{secrets.token_hex(4)}") for path in files}
+    try:
+        for path, data in files.items():
+            if path.is_dir():
+                raise HairError(f"{path} is a folder. Move it away or choose another place.")
+            with open(temporary[path], "xb") as file:
+                file.write(data)
+        for path in files:
+            os.replace(temporary[path], path)
+    except (OSError, ValueError) as error:
+        folder = next(iter(files)).parent
+        raise HairError(f"Cannot write to {folder}: {_reason(error)}. Choose another folder or make room.") from error
+    finally:
+        for path in temporary.values():
+            with contextlib.suppress(OSError, ValueError):  # it has moved to its place, or was never made
+                path.unlink()
+
+
+def _reason(error):
+    return getattr(error, "strerror", None) or str(error)
+
+
+# Reading.
+
+
+class _Image:
+    """A file whose header has been found to be that of one plain image with the channels asked for."""
+
+    def __init__(self, path, channels):
+        self.path = Path(path)
+        self.channels = list(channels)
+        self._data = self._read_bytes()
+        part_count, self.header, _ = self._parse(header_only=True)
+        if part_count != 1:
+            self._refuse(f"holds {part_count} images, not one")
+        if self.header.get("type") != OpenEXR.scanlineimage:
+            self._refuse("holds tiles or depth samples, not a plain image")
+        found = self.header["channels"]
+        if found != dict.fromkeys(self.channels, (1, 1)):
+            self._refuse(f"has the channels {', '.join(sorted(found))}, not {', '.join(self.channels)}")
+        self.demand_size(None)
+
+    def demand_size(self, size):
+        """Refuse any other (height, width) than `size`, and any beyond `MAX_SIZE`."""
+        (left, top), (right, bottom) = self.header["dataWindow"]
+        height, width = int(bottom) - int(top) + 1, int(right) - int(left) + 1
+        if max(height, width) > MAX_SIZE:
+            self._refuse(f"is {width} x {height} texels, not at most {MAX_SIZE} x {MAX_SIZE}")
+        if size is not None and (height, width) != tuple(size):
+            self._refuse(f"is {width} x {height} texels, not {size[1]} x {size[0]}")
+
+    def pixels(self):
+        """(H, W, C) float16, all finite."""
+        _, _, planes = self._parse(header_only=False)
+        planes = [planes[name].pixels for name in self.channels]
+        if any(plane.dtype != np.float16 for plane in planes):
+            self._refuse("does not hold half floats")
+        half = np.stack(planes, axis=-1)
+        if not np.isfinite(half).all():
+            self._refuse("holds values that are not finite")
+        return half
+
+    def _read_bytes(self):
+        """The bytes of a plain file that begins as an EXR does and is not too large."""
+        try:
+            # Not blocking: opening a pipe to which nobody writes would take for ever.
+            flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+            with open(self.path, "rb", opener=lambda path, _flags: os.open(path, flags)) as file:
+                status = os.fstat(file.fileno())
+                if not stat.S_ISREG(status.st_mode):
+                    self._refuse("is not a file")
+                if status.st_size > _MAX_BYTES:
+                    self._refuse("is larger than any table (64 MB)")
+                if file.read(len(_MAGIC)) != _MAGIC:
+                    self._refuse("is not an EXR file")
+                return _MAGIC + file.read(_MAX_BYTES)
+        except (OSError, ValueError) as error:
+            raise HairError(f"Cannot read {self.path}: {_reason(error)}. Bake the tables again.") from error
+
+    def _parse(self, header_only):
+        """(part count, header, {channel: Channel}) of the first part; header["channels"] is {name: sampling}."""
+        OpenEXR.setMaxImageSize(MAX_SIZE, MAX_SIZE)
+        OpenEXR.setMaxTileSize(MAX_SIZE, MAX_SIZE)
+        try:
+            file = OpenEXR.File(io.BytesIO(self._data), separate_channels=True, header_only=header_only)
+            # After pixels that cannot be decoded OpenEXR only warns on the console, and gives no parts.
+            if not file.parts:
+                self._refuse("is truncated or damaged")
+            header = file.header()
+            header["channels"] = {each.name: (each.xSampling, each.ySampling) for each in header["channels"]}
+            return len(file.parts), header, file.channels()
+        except (RuntimeError, ValueError, TypeError, OverflowError) as error:
+            raise HairError(f"{self.path} is damaged. Bake the tables again.") from error
+
+    def _refuse(self, what):
+        raise HairError(f"{self.path} {what}. Bake the tables again.")
