@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Hair tab of the N-panel: the pipeline in order. Layout, nothing else."""
+
+import bpy
+
+from ..core.groom import GuideSettings, HairSettings
+from ..core.params import declared
+from ..core.shading import kajiya_kay, lookup_tables, marschner
+from .operators.selection import active_of_kind, guides_of, surface_of
+
+
+class _HairTab:
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Hair"
+
+    @staticmethod
+    def rows(layout, group, settings_class, skip=()):
+        """A row for each setting of a class, in the order of declaration."""
+        for name, _default, _details in declared(settings_class):
+            if name not in skip:
+                layout.prop(group, name)
+
+
+class VELLUS_PT_guides(_HairTab, bpy.types.Panel):
+    """Guides on the surface"""
+
+    bl_label = "Guides"
+    bl_idname = "VELLUS_PT_guides"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        surface = surface_of(context.object)
+        layout.label(text=surface.name if surface else "Select a mesh to grow hair on", icon="MESH_DATA")
+        guides = active_of_kind(context.object, "GUIDES")
+        if guides is None:
+            layout.operator("vellus.distribute_guides", icon="OUTLINER_OB_CURVES")
+            return
+        _draw_status(layout, guides)
+        group = guides.vellus.guides
+        if surface:
+            layout.prop_search(group, "density_group", surface, "vertex_groups")
+        self.rows(layout, group, GuideSettings, skip=("density_group",))
+        layout.prop(guides.vellus, "is_live")
+        layout.operator("vellus.distribute_guides", text="Distribute Again", icon="FILE_REFRESH")
+
+
+class VELLUS_PT_interpolation(_HairTab, bpy.types.Panel):
+    """Strands between the guides"""
+
+    bl_label = "Interpolation"
+    bl_idname = "VELLUS_PT_interpolation"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        hair = active_of_kind(context.object, "HAIR")
+        if hair is None:
+            if guides_of(context.object) is None:
+                layout.label(text="Distribute guides first", icon="INFO")
+            layout.operator("vellus.interpolate_hair", icon="CURVES")
+            return
+        _draw_status(layout, hair)
+        layout.prop(hair.vellus, "guide_curves")
+        group = hair.vellus.hair
+        if hair.surface:
+            layout.prop_search(group, "density_group", hair.surface, "vertex_groups")
+        self.rows(layout, group, HairSettings, skip=("density_group", "influence_distance"))
+        row = layout.row()
+        row.active = not group.automatic_influence
+        row.prop(group, "influence_distance")
+        layout.prop(hair.vellus, "is_live")
+        layout.operator("vellus.interpolate_hair", text="Interpolate Again", icon="FILE_REFRESH")
+
+
+class _OfHair(_HairTab):
+    @classmethod
+    def poll(cls, context):
+        return active_of_kind(context.object, "HAIR") is not None
+
+
+class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
+    """How strands scatter light"""
+
+    bl_label = "Shading"
+    bl_idname = "VELLUS_PT_shading"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        state = context.object.data.vellus
+        layout.prop(state, "is_drawn")
+        layout.prop(state, "model")
+        if state.model == "KAJIYA_KAY":
+            self.rows(layout, state.kajiya_kay, kajiya_kay.Settings)
+        else:
+            self.rows(layout, state.marschner, marschner.Settings)
+
+
+class VELLUS_PT_tables(_OfHair, bpy.types.Panel):
+    """The Marschner model's tables"""
+
+    bl_label = "Tables"
+    bl_idname = "VELLUS_PT_tables"
+
+    def draw(self, context):
+        layout = self.layout
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        state = context.object.data.vellus
+        inherited = [name for name, _default, _details in declared(marschner.Settings)]
+        self.rows(layout, state.marschner, lookup_tables.Settings, skip=inherited)
+        layout.prop(state, "table_folder")
+        layout.operator("vellus.bake_tables", icon="RENDER_STILL")
+
+
+class VELLUS_PT_output(_HairTab, bpy.types.Panel):
+    """Pictures of the hair"""
+
+    bl_label = "Output"
+    bl_idname = "VELLUS_PT_output"
+
+    def draw(self, context):
+        self.layout.operator("vellus.render_picture", icon="IMAGE_DATA")
+
+
+def _draw_status(layout, curves):
+    if curves.vellus.status:
+        layout.label(text=curves.vellus.status, icon="ERROR")
+
+
+CLASSES = (
+    VELLUS_PT_guides,
+    VELLUS_PT_interpolation,
+    VELLUS_PT_shading,
+    VELLUS_PT_tables,
+    VELLUS_PT_output,
+)

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings ↔ Blender's properties. Every default, range, unit and tooltip comes from the `Settings` classes.
+
+A change marks its Curves stale and tags them; handlers.py learns of it with the next depsgraph update. So a script
+that sets ten properties pays for one evaluation, and an undo step never holds hair that its settings did not make.
+"""
+
+import math
+
+import bpy
+import numpy as np
+
+from ..core.groom import GuideSettings, HairSettings
+from ..core.params import declared, label_of
+from ..core.shading import kajiya_kay, lookup_tables
+
+MODELS = (
+    ("KAJIYA_KAY", "Kajiya-Kay", "An opaque cylinder: a diffuse part and one highlight"),
+    ("MARSCHNER", "Marschner", "A glass fibre: reflection, transmission and internal reflection from baked tables"),
+)
+
+
+def annotations(settings_class, update=None):
+    """{name: bpy property} for the fields of a `Settings` class; `update` as in bpy.props."""
+    return {name: _property(name, default, details, update) for name, default, details in declared(settings_class)}
+
+
+def _property(name, default, details, update):
+    common = {"name": label_of(name, details), "description": details.description, "default": default}
+    if update is not None:
+        common["update"] = update
+    if isinstance(default, str):
+        if details.choices:
+            return bpy.props.EnumProperty(items=details.choices, **common)
+        return bpy.props.StringProperty(**common)
+    if isinstance(default, bool):
+        return bpy.props.BoolProperty(**common)
+    limits = _limits(details, isinstance(default, int))
+    if isinstance(default, int):
+        return bpy.props.IntProperty(**common, **limits)
+    limits["precision"] = details.precision
+    if isinstance(default, tuple):
+        return bpy.props.FloatVectorProperty(size=len(default), subtype=details.subtype, **common, **limits)
+    # A subtype such as DISTANCE or ANGLE implies its unit.
+    return bpy.props.FloatProperty(subtype=details.subtype, unit=details.unit, **common, **limits)
+
+
+def _limits(details, is_integer):
+    # Blender has no exclusive limit; ten nanometres stand for "above zero".
+    low = max(details.low, details.above + 1e-8) if math.isfinite(details.above) else details.low
+    limits = {"min": low, "max": details.high, "soft_max": min(details.soft_high, details.high)}
+    finite = {key: value for key, value in limits.items() if math.isfinite(value)}
+    return {key: int(value) for key, value in finite.items()} if is_integer else finite
+
+
+def to_settings(owner, settings_class):
+    """The `Settings` that an operator or property group holds. Raises `HairError` for what the range forbids."""
+    return settings_class(
+        **{name: _plain(getattr(owner, name)) for name, _default, _details in declared(settings_class)}
+    )
+
+
+def _plain(value):
+    if isinstance(value, float):
+        # Properties are single precision: 0.15 comes back as 0.15000000596. The shortest decimal is what was meant.
+        return float(str(np.float32(value)))
+    if isinstance(value, str | bool | int):
+        return value
+    return tuple(_plain(float(component)) for component in value)
+
+
+def assign(owner, settings):
+    """Write `Settings` into an operator's or group's properties."""
+    for name, _default, _details in declared(type(settings)):
+        setattr(owner, name, getattr(settings, name))
+
+
+def _mark_geometry(group, _context):
+    group.id_data.vellus.is_stale = True
+    group.id_data.update_tag()
+
+
+def _mark_shading(group, _context):
+    group.id_data.vellus.is_shading_stale = True
+    group.id_data.update_tag()
+
+
+class VellusGuideSettings(bpy.types.PropertyGroup):
+    """How guides were distributed"""
+
+    __annotations__ = annotations(GuideSettings, _mark_geometry)
+
+
+class VellusHairSettings(bpy.types.PropertyGroup):
+    """How hair was grown between guides"""
+
+    __annotations__ = annotations(HairSettings, _mark_geometry)
+
+
+class VellusKajiyaKaySettings(bpy.types.PropertyGroup):
+    """How the Kajiya-Kay model shades hair"""
+
+    __annotations__ = annotations(kajiya_kay.Settings, _mark_shading)
+
+
+class VellusMarschnerSettings(bpy.types.PropertyGroup):
+    """How the Marschner model shades hair, and how its tables are baked"""
+
+    __annotations__ = annotations(lookup_tables.Settings, _mark_shading)
+
+
+class VellusCurves(bpy.types.PropertyGroup):
+    """What Vellus knows of a Curves datablock"""
+
+    kind: bpy.props.EnumProperty(
+        items=[
+            ("NONE", "None", "Not made by Vellus"),
+            ("GUIDES", "Guides", "Guides that hair follows"),
+            ("HAIR", "Hair", "Strands between guides"),
+        ],
+        default="NONE",
+    )
+    guide_curves: bpy.props.PointerProperty(
+        name="Guides",
+        description="The guides that this hair follows",
+        type=bpy.types.Curves,
+        poll=lambda _group, curves: curves.vellus.kind == "GUIDES",
+        update=_mark_geometry,
+    )
+    guides: bpy.props.PointerProperty(type=VellusGuideSettings)
+    hair: bpy.props.PointerProperty(type=VellusHairSettings)
+    model: bpy.props.EnumProperty(
+        name="Shading Model", description="How strands scatter light", items=MODELS, default="MARSCHNER"
+    )
+    kajiya_kay: bpy.props.PointerProperty(type=VellusKajiyaKaySettings)
+    marschner: bpy.props.PointerProperty(type=VellusMarschnerSettings)
+    table_folder: bpy.props.StringProperty(
+        name="Table Folder",
+        description="Folder with baked tables; they are used while their settings are those of this hair",
+        subtype="DIR_PATH",
+        update=_mark_shading,
+    )
+    is_drawn: bpy.props.BoolProperty(
+        name="Shaded in Viewport",
+        description="Draw this hair with its shading model; off: as Blender draws curves",
+        default=True,
+        update=_mark_shading,
+    )
+    is_live: bpy.props.BoolProperty(
+        name="Live", description="Make this again whenever its settings or its inputs change", default=True
+    )
+    is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
+    is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
+    status: bpy.props.StringProperty(description="Why this could not be made again", options={"HIDDEN"})
+
+
+CLASSES = (
+    VellusGuideSettings,
+    VellusHairSettings,
+    VellusKajiyaKaySettings,
+    VellusMarschnerSettings,
+    VellusCurves,
+)
+
+
+def register():
+    """Attach the settings to every Curves datablock."""
+    bpy.types.Curves.vellus = bpy.props.PointerProperty(type=VellusCurves)
+
+
+def unregister():
+    """Take them away again; what is stored in files stays there."""
+    del bpy.types.Curves.vellus
+
+
+def copy(source, target, settings_class):
+    """Copy the properties of a `Settings` class from one owner to another, as they are."""
+    for name, _default, _details in declared(settings_class):
+        setattr(target, name, getattr(source, name))
+
+
+def folder(description):
+    """The `directory` property that a file browser fills."""
+    return bpy.props.StringProperty(name="Folder", description=description, subtype="DIR_PATH")
+
+
+def file(description):
+    """The `filepath` property that a file browser fills."""
+    return bpy.props.StringProperty(name="File", description=description, subtype="FILE_PATH")

@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The door for surfaces, lights and cameras: Blender's data → arrays."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.errors import HairError
+from ..core.mesh import SurfacePoints, TriMesh
+from . import uniforms
+
+LIGHT_KINDS = {"SUN": 0, "POINT": 1, "SPOT": 2, "AREA": 3}  # as in shaders/include/lights.glsl
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A mesh object as the mathematics sees it: world axes and scale [m], the object's origin at zero.
+
+    So gravity is -Z and lengths are true, while an object far from the world's origin loses no precision.
+    """
+
+    name: str
+    mesh: TriMesh
+    corner_uvs: np.ndarray | None  # (F, 3, 2) float32, None without a UV map
+    uv_map: str
+    to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → these
+    is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
+
+    def to_local(self, positions):
+        """(..., 3) positions → the object's local coordinates, float32."""
+        return (positions @ np.linalg.inv(self.to_world_axes).T).astype(np.float32)
+
+    def from_local(self, positions):
+        """(..., 3) local coordinates → positions here, float32."""
+        return (positions @ self.to_world_axes.T).astype(np.float32)
+
+    def to_local_normals(self, normals):
+        """(N, 3) unit normals → unit normals in local coordinates: the inverse transpose of `to_local`."""
+        local = normals @ self.to_world_axes
+        return (local / np.linalg.norm(local, axis=-1, keepdims=True)).astype(np.float32)
+
+    def uvs(self, points):
+        """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
+        if self.corner_uvs is None:
+            return np.zeros((len(points), 2), np.float32)
+        return np.einsum("nc,ncu->nu", points.barycentric, self.corner_uvs[points.triangle]).astype(np.float32)
+
+    def swap_winding(self, points):
+        """The same points with barycentric coordinates in Blender's order of corners, or back."""
+        if not self.is_mirrored:
+            return points
+        return SurfacePoints(points.triangle, np.ascontiguousarray(points.barycentric[:, [0, 2, 1]]))
+
+
+def read_surface(surface_object, depsgraph):
+    """The evaluated mesh of an object as a `Surface`."""
+    to_world_axes = np.array(surface_object.matrix_world.to_3x3(), np.float64)
+    determinant = np.linalg.det(to_world_axes)
+    if not np.isfinite(to_world_axes).all() or abs(determinant) < 1e-30:
+        raise HairError(f'"{surface_object.name}" is scaled to nothing: set its scale to something other than zero.')
+    evaluated = surface_object.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        vertices = np.empty((len(mesh.vertices), 3), np.float32)
+        mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
+        mesh.calc_loop_triangles()
+        triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
+        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+        corner_uvs, uv_map = None, ""
+        if mesh.uv_layers.active is not None:
+            uv_map = mesh.uv_layers.active.name
+            uvs = np.empty((len(mesh.loops), 2), np.float32)
+            mesh.uv_layers.active.uv.foreach_get("vector", uvs.ravel())
+            loops = np.empty((len(triangles), 3), np.int32)
+            mesh.loop_triangles.foreach_get("loops", loops.ravel())
+            corner_uvs = uvs[loops]
+    finally:
+        evaluated.to_mesh_clear()
+    is_mirrored = bool(determinant < 0.0)
+    if is_mirrored:
+        triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
+        corner_uvs = None if corner_uvs is None else corner_uvs[:, [0, 2, 1]]
+    vertices = (vertices @ to_world_axes.T).astype(np.float32)
+    return Surface(surface_object.name, TriMesh(vertices, triangles), corner_uvs, uv_map, to_world_axes, is_mirrored)
+
+
+def read_vertex_group(surface_object, depsgraph, name):
+    """(V,) float32 weights of a vertex group on the evaluated mesh, or None for the empty name."""
+    if not name:
+        return None
+    group = surface_object.vertex_groups.get(name)
+    if group is None:
+        raise HairError(f'"{surface_object.name}" has no vertex group "{name}": pick one of its groups, or none.')
+    evaluated = surface_object.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        weights = np.zeros(len(mesh.vertices), np.float32)
+        # Blender offers no array access to vertex groups.
+        for vertex, entry in enumerate(mesh.vertices):
+            for element in entry.groups:
+                if element.group == group.index:
+                    weights[vertex] = element.weight
+    finally:
+        evaluated.to_mesh_clear()
+    return weights
+
+
+def read_lights(depsgraph):
+    """The scene's visible lights as a `uniforms.LIGHTS` record, the strongest kinds first come, first served."""
+    record = uniforms.LIGHTS.record()
+    count = 0
+    for instance in depsgraph.object_instances:
+        light_object = instance.object
+        if light_object.type != "LIGHT" or count == uniforms.LIGHT_CAPACITY:
+            continue
+        record["light"][count] = _read_light(light_object.data, np.array(instance.matrix_world))
+        count += 1
+    record["count"] = count
+    return record
+
+
+def _read_light(light, matrix):
+    record = uniforms.LIGHT.record()
+    record["kind"] = LIGHT_KINDS[light.type]
+    record["position"][:3] = matrix[:3, 3]
+    axis = -matrix[:3, 2]  # a light shines along its own -Z
+    record["axis"][:3] = axis / np.linalg.norm(axis)
+    record["power"][:3] = np.array(light.color) * light.energy * 2.0**light.exposure
+    if light.type == "SPOT":
+        record["cos_cone"] = np.cos(0.5 * light.spot_size)
+        record["blend"] = light.spot_blend
+    return record
+
+
+def read_world_radiance(scene):
+    """(3,) colour times strength of the world's background, black without a world."""
+    world = scene.world
+    if world is None:
+        return np.zeros(3)
+    background = next((n for n in world.node_tree.nodes if n.type == "BACKGROUND"), None) if world.node_tree else None
+    if background is None:
+        return np.array(world.color)
+    return np.array(background.inputs["Color"].default_value[:3]) * background.inputs["Strength"].default_value
+
+
+def curves_objects(view_layer, kind, viewport=None):
+    """The visible objects of a view layer that hold Curves of ours, of the kind GUIDES or HAIR."""
+    return [
+        o
+        for o in view_layer.objects
+        if o.type == "CURVES" and o.data.vellus.kind == kind and o.visible_get(view_layer=view_layer, viewport=viewport)
+    ]
+
+
+def read_camera(scene, depsgraph, width, height):
+    """(world to view, view to clip), each (4, 4) float64, of the scene's camera for a picture of this size."""
+    if scene.camera is None:
+        raise HairError("The scene has no camera to look through: add one.")
+    camera = scene.camera.evaluated_get(depsgraph)
+    render = scene.render
+    view_to_clip = camera.calc_matrix_camera(
+        depsgraph, x=width, y=height, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y
+    )
+    # An object's scale is no part of where its camera looks.
+    location, rotation, _scale = camera.matrix_world.decompose()
+    view_to_world = rotation.to_matrix().to_4x4()
+    view_to_world.translation = location
+    return np.array(view_to_world.inverted(), np.float64), np.array(view_to_clip, np.float64)
+
+
+@dataclass(frozen=True)
+class RenderMesh:
+    """Triangles as they are drawn: (3 F, 3) float32 corner positions [m] and unit normals in world space, colour."""
+
+    positions: np.ndarray
+    normals: np.ndarray
+    color: tuple
+
+
+def read_render_meshes(depsgraph):
+    """A `RenderMesh` for every mesh that a render of this depsgraph would show, instances included."""
+    meshes = []
+    for instance in depsgraph.object_instances:
+        if instance.object.type == "MESH" and instance.show_self and not instance.object.hide_render:
+            meshes.append(_read_render_mesh(instance.object, np.array(instance.matrix_world, np.float64)))
+    return [mesh for mesh in meshes if len(mesh.positions)]
+
+
+def _read_render_mesh(mesh_object, to_world):
+    mesh = mesh_object.to_mesh()
+    try:
+        mesh.calc_loop_triangles()
+        count = len(mesh.loop_triangles)
+        vertices = np.empty((len(mesh.vertices), 3), np.float32)
+        if count:
+            mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
+        corners = np.empty(3 * count, np.int32)
+        mesh.loop_triangles.foreach_get("vertices", corners)
+        loops = np.empty(3 * count, np.int32)
+        mesh.loop_triangles.foreach_get("loops", loops)
+        loop_normals = np.empty((len(mesh.loops), 3), np.float32)
+        mesh.corner_normals.foreach_get("vector", loop_normals.ravel())
+    finally:
+        mesh_object.to_mesh_clear()
+    positions = vertices[corners] @ to_world[:3, :3].T + to_world[:3, 3]
+    normals = loop_normals[loops] @ np.linalg.pinv(to_world[:3, :3])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return RenderMesh(positions.astype(np.float32), normals.astype(np.float32), _surface_color(mesh_object))
+
+
+def _surface_color(mesh_object):
+    """Linear RGB: the base colour of the first material's Principled BSDF, or its colour in the viewport."""
+    material = next((slot.material for slot in mesh_object.material_slots if slot.material), None)
+    if material is None:
+        return (0.8, 0.8, 0.8)
+    nodes = material.node_tree.nodes if material.node_tree else ()
+    principled = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
+    color = principled.inputs["Base Color"].default_value if principled else material.diffuse_color
+    return tuple(color[:3])

@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Uniform blocks: the text of a GLSL struct and the bytes that fill it, both from one list of members.
+
+The layout is std140 [OpenGL46, 7.6.2.2]: int and float are aligned to 4 bytes, vec3, vec4 and mat4 to 16, a struct's
+size is a multiple of 16.
+"""
+
+from functools import cache
+
+import gpu
+import numpy as np
+
+from ..core.params import declared
+
+# GLSL type → (NumPy scalar, shape, alignment in bytes). A mat4 is column-major: it is filled with a transpose.
+_TYPES = {
+    "int": ("<i4", (), 4),
+    "float": ("<f4", (), 4),
+    "vec3": ("<f4", (3,), 16),
+    "vec4": ("<f4", (4,), 16),
+    "mat4": ("<f4", (4, 4), 16),
+}
+
+
+class Block:
+    """A GLSL struct: `source` declares it, `dtype` is the NumPy record of its std140 layout."""
+
+    def __init__(self, type_name, members):
+        """members: {name: GLSL type}, or {name: (Block, count)} for an array of structs."""
+        offsets, formats, lines = [], [], []
+        end = 0
+        for name, kind in members.items():
+            if isinstance(kind, tuple):
+                block, count = kind
+                form, alignment = np.dtype((block.dtype, (count,))), 16
+                lines.append(f"  {block.type_name} {name}[{count}];")
+            else:
+                scalar, shape, alignment = _TYPES[kind]
+                form = np.dtype((scalar, shape))
+                lines.append(f"  {kind} {name};")
+            end += -end % alignment
+            offsets.append(end)
+            formats.append(form)
+            end += form.itemsize
+        self.type_name = type_name
+        self.source = f"struct {type_name} {{\n" + "\n".join(lines) + "\n};\n"
+        self.dtype = np.dtype(
+            {"names": list(members), "formats": formats, "offsets": offsets, "itemsize": end + -end % 16}
+        )
+
+    def record(self):
+        """A zeroed record to be filled by member name."""
+        return np.zeros((), self.dtype)
+
+
+LIGHT_CAPACITY = 16
+
+VIEW = Block(
+    "View",
+    {
+        "world_to_clip": "mat4",
+        "object_to_world": "mat4",
+        "eye": "vec4",  # the viewer's place, or in a parallel projection the unit direction towards the viewer
+        "world_radiance": "vec4",
+        "hair_albedo": "vec4",
+        "is_perspective": "int",
+        "point_count": "int",
+        "row_strands": "int",
+        "object_scale": "float",
+        "least_half_width": "float",
+    },
+)
+LIGHT = Block(
+    "Light",
+    {"position": "vec4", "axis": "vec4", "power": "vec4", "kind": "int", "cos_cone": "float", "blend": "float"},
+)
+LIGHTS = Block("Lights", {"light": (LIGHT, LIGHT_CAPACITY), "count": "int"})
+
+
+def _glsl_type(default, details):
+    if isinstance(default, str):
+        return "int" if details.choices else None
+    if isinstance(default, bool | int):
+        return "int"
+    return "float" if isinstance(default, float) else "vec3"
+
+
+@cache
+def settings_block(settings_class):
+    """The struct `Settings` of a shading model. An enumeration is the index of its choice; free text has no place."""
+    kinds = {name: _glsl_type(default, details) for name, default, details in declared(settings_class)}
+    return Block("Settings", {name: kind for name, kind in kinds.items() if kind})
+
+
+def fill(settings):
+    """The record of `settings_block` that holds these settings."""
+    record = settings_block(type(settings)).record()
+    for name, _default, details in declared(type(settings)):
+        if name in record.dtype.names:
+            value = getattr(settings, name)
+            choices = [choice[0] for choice in details.choices]
+            record[name] = choices.index(value) if choices else value
+    return record
+
+
+def uniform_buffer(record):
+    """A GPUUniformBuf with the bytes of a record."""
+    data = record.tobytes()
+    # A Buffer has no raw kind; unsigned bytes are copied as they are.
+    return gpu.types.GPUUniformBuf(gpu.types.Buffer("UBYTE", len(data), data))

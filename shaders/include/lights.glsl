@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Light from Blender's lights, in Blender's units: watts for point, spot and area lights, W/m² for the sun.
+
+const int LIGHT_SUN = 0;
+const int LIGHT_POINT = 1;
+const int LIGHT_SPOT = 2;
+const int LIGHT_AREA = 3;
+
+// Unit vector from `position` to the light. axis: the direction in which the light shines.
+vec3 to_light(int kind, vec3 light_position, vec3 axis, vec3 position)
+{
+  return (kind == LIGHT_SUN) ? -axis : normalize(light_position - position);
+}
+
+// How much of a spot light's beam arrives at an angle: one inside, zero outside the cone, smooth over `blend`.
+float spot_falloff(float cos_angle, float cos_cone, float blend)
+{
+  // Blender's cone: the tangent-space ellipse of the spot, smoothed over blend of its radius.
+  float inner = mix(cos_cone, 1.0, clamp(blend, 1e-4, 1.0));
+  return smoothstep(cos_cone, inner, cos_angle);
+}
+
+// Irradiance [W/m²] of a plane at `position` that faces the light. power: RGB watts, or W/m² of a sun.
+vec3 light_irradiance(
+    int kind, vec3 light_position, vec3 axis, vec3 power, float cos_cone, float blend, vec3 position)
+{
+  if (kind == LIGHT_SUN) {
+    return power;
+  }
+  vec3 offset = position - light_position;
+  float distance_squared = max(dot(offset, offset), 1e-8);
+  float cos_angle = dot(axis, offset) * inversesqrt(distance_squared);
+  if (kind == LIGHT_AREA) {
+    // A Lambertian emitter of flux P sends P/pi along its axis.
+    return power * max(cos_angle, 0.0) / (PI * distance_squared);
+  }
+  vec3 irradiance = power / (4.0 * PI * distance_squared);
+  return (kind == LIGHT_SPOT) ? irradiance * spot_falloff(cos_angle, cos_cone, blend) : irradiance;
+}

@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// [Marschner03] from baked tables: where to look, and how the lobes are put together (Eq. 14).
+
+const int AXES_ANGLES = 0;
+const int AXES_COSINES = 1;
+
+// Texture coordinates of M. ANGLES: theta_i, theta_o from -pi/2 to pi/2; COSINES: their sines from -1 to 1.
+vec2 m_coordinates(float sin_theta_i, float sin_theta_o, int axes)
+{
+  vec2 sines = clamp(vec2(sin_theta_i, sin_theta_o), vec2(-1.0), vec2(1.0));
+  return (axes == AXES_COSINES) ? 0.5 * sines + 0.5 : asin(sines) / PI + 0.5;
+}
+
+// Texture coordinates of N and N_TRT. ANGLES: |phi| / pi, COSINES: (cos(phi) + 1) / 2; both over cos(theta_d).
+vec2 n_coordinates(float phi, float cos_theta_d, int axes)
+{
+  float u = (axes == AXES_COSINES) ? 0.5 * cos(phi) + 0.5 : phi / PI;
+  return vec2(u, cos_theta_d);
+}
+
+// S = sum over p of M_p N_p / cos²(theta_d), from texels m = (M_R, M_TT, M_TRT), n = (N_TT rgb, N_R), n_trt.
+vec3 marschner_scattering(vec3 m, vec4 n, vec3 n_trt, float cos_theta_d)
+{
+  // cos(theta_d) nears zero only where light runs along the fibre; the clamp keeps half floats finite.
+  float cosine = max(cos_theta_d, 1e-3);
+  return (m.r * vec3(n.a) + m.g * n.rgb + m.b * n_trt) / (cosine * cosine);
+}

@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The main that every shading model includes: hair_bsdf() summed over the scene's lights, plus the world's light.
+//
+// vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)  light leaving the fibre towards V for unit irradiance from L, the cosine
+//                                         of theta_i included
+// vec3 hair_albedo()                      what the fibre returns of a uniform surrounding
+
+#include "include/lights.glsl"
+
+void main()
+{
+  vec3 T = normalize(strand_tangent);
+  vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - strand_position) : view.eye.xyz;
+  vec3 radiance = view.world_radiance.rgb * hair_albedo();
+  for (int index = 0; index < lights.count; index++) {
+    Light light = lights.light[index];
+    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, strand_position);
+    vec3 irradiance = light_irradiance(light.kind,
+                                       light.position.xyz,
+                                       light.axis.xyz,
+                                       light.power.rgb,
+                                       light.cos_cone,
+                                       light.blend,
+                                       strand_position);
+    radiance += irradiance * hair_bsdf(T, L, V);
+  }
+  color = vec4(radiance, 1.0);
+}

@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Strands as camera-facing strips, without vertex attributes: everything follows from the index of a vertex.
+
+// Where a vertex of the one long strip lies: strand, point, and side (-1 or +1). Each strand takes two vertices
+// a point and repeats its first and last one, so that the triangles between two strands have no area.
+void strip_vertex(int vertex, int point_count, out int strand, out int point, out float side)
+{
+  int stride = 2 * point_count + 2;
+  strand = vertex / stride;
+  int local = clamp(vertex - strand * stride - 1, 0, 2 * point_count - 1);
+  point = local / 2;
+  side = float(2 * (local - 2 * point) - 1);
+}
+
+// Texel of a point: each row of the texture holds `row_strands` whole strands.
+ivec2 strand_texel(int strand, int point, int point_count, int row_strands)
+{
+  int row = strand / row_strands;
+  return ivec2((strand - row * row_strands) * point_count + point, row);
+}
+
+// Unit vector across the strip, facing the viewer; any perpendicular where the strand points at the viewer.
+vec3 strip_side(vec3 tangent, vec3 to_view)
+{
+  vec3 side = cross(tangent, to_view);
+  float length_squared = dot(side, side);
+  if (length_squared > 1e-12) {
+    return side * inversesqrt(length_squared);
+  }
+  vec3 axis = (abs(tangent.x) < 0.5) ? vec3(1.0, 0.0, 0.0) : vec3(0.0, 1.0, 0.0);
+  return normalize(cross(tangent, axis));
+}

@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The Marschner model [Marschner03] from baked tables, [Report12] Eq. 14.
+
+#include "include/fibre.glsl"
+#include "include/marschner.glsl"
+
+vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)
+{
+  float sin_theta_i = dot(T, L);
+  float sin_theta_o = dot(T, V);
+  // From the directions, not from the table's alpha, which is off by up to 0.014 near grazing.
+  float cosine = cos_theta_d(sin_theta_i, sin_theta_o);
+  vec2 n_at = n_coordinates(relative_azimuth(T, L, V), cosine, settings.axes);
+  vec3 m = textureLod(m_table, m_coordinates(sin_theta_i, sin_theta_o, settings.axes), 0.0).rgb;
+  vec4 n = textureLod(n_table, n_at, 0.0);
+  vec3 n_trt = textureLod(n_trt_table, n_at, 0.0).rgb;
+  return marschner_scattering(m, n, n_trt, cosine) * sin_from_cos(sin_theta_i);
+}
+
+vec3 hair_albedo()
+{
+  return view.hair_albedo.rgb;
+}
+
+#include "include/shade_strand.glsl"

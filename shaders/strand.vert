@@ -1,0 +1,29 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// One vertex of the strip of a strand, pulled from the strand texture by its index.
+
+#include "include/strand.glsl"
+
+vec4 strand_point(int strand, int point)
+{
+  return texelFetch(strands, strand_texel(strand, point, view.point_count, view.row_strands), 0);
+}
+
+void main()
+{
+  int strand, point;
+  float side;
+  strip_vertex(gl_VertexID, view.point_count, strand, point, side);
+  vec4 here = strand_point(strand, point);
+  vec3 along = strand_point(strand, min(point + 1, view.point_count - 1)).xyz -
+               strand_point(strand, max(point - 1, 0)).xyz;
+
+  strand_index = strand;
+  strand_tangent = (view.object_to_world * vec4(along, 0.0)).xyz;
+  strand_position = (view.object_to_world * vec4(here.xyz, 1.0)).xyz;
+  vec3 to_view = view.is_perspective != 0 ? view.eye.xyz - strand_position : view.eye.xyz;
+  // Length under the least half width that the picture asks for, in pixels of this depth.
+  float depth = view.is_perspective != 0 ? (view.world_to_clip * vec4(strand_position, 1.0)).w : 1.0;
+  float half_width = max(here.w * view.object_scale, view.least_half_width * abs(depth));
+  vec3 offset = strip_side(normalize(strand_tangent), normalize(to_view)) * (side * half_width);
+  gl_Position = view.world_to_clip * vec4(strand_position + offset, 1.0);
+}
