@@ -162,7 +162,7 @@ def _settings_from_header(image, name):
         raise foreign from error
     try:
         return Settings(**values)
-    except HairError as error:
+    except (HairError, OverflowError) as error:
         raise HairError(f"{image.path} holds settings that cannot be: {error} Bake the tables again.") from error
 
 
