@@ -33,7 +33,7 @@ def syntax(path):
 
 
 def page_order():
-    """CONTRIBUTING.md's tree as a list: files, and folders (`core/modifiers/`) whose files are all of one rank."""
+    """CONTRIBUTING.md's tree as a list of files, top to bottom; `*.py` stands for a folder's other files."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
     tree = re.search(r"## The page order.*?```\n(.*?)```", text, re.DOTALL)[1]
     order, folders = [], []
@@ -41,13 +41,12 @@ def page_order():
         depth = (len(line) - len(line.lstrip())) // 2 - 1
         name = line.split()[0]
         folders[depth:] = [name] if name.endswith("/") else []
-        order.append("".join(folders) if name.endswith("/") else "".join(folders) + name)
+        if not name.endswith("/"):
+            order.append("".join(folders) + name)
     return order
 
 
 ORDER = page_order()
-# Folders without a list of their own: what grows without end.
-GROWING = [entry for entry in ORDER if entry.endswith("/") and sum(other.startswith(entry) for other in ORDER) == 1]
 
 
 def rank(name):
@@ -57,8 +56,8 @@ def rank(name):
         return ORDER.index(name)
     if file == "__init__.py":
         return max(place for place, entry in enumerate(ORDER) if entry.startswith(f"{folder}/"))
-    assert f"{folder}/" in GROWING, f"give {name} its line in CONTRIBUTING.md, The page order"
-    return ORDER.index(f"{folder}/")
+    assert f"{folder}/*.py" in ORDER, f"give {name} its line in CONTRIBUTING.md, The page order"
+    return ORDER.index(f"{folder}/*.py")
 
 
 def imports(path):
@@ -89,7 +88,7 @@ def test_file_has_a_place_in_the_page_order(path):
 
 
 def test_page_order_lists_only_what_exists():
-    assert [entry for entry in ORDER if not (ADDON / entry).exists()] == []
+    assert [entry for entry in ORDER if not list(ADDON.glob(entry))] == []
 
 
 @each(MODULES)
@@ -97,8 +96,8 @@ def test_imports_point_up_the_page(path):
     for line, _, target in imports(path):
         if target is None:
             continue
-        folder_tuple = path.name == "__init__.py" and target.is_relative_to(path.parent)
-        assert folder_tuple or rank(name_of(target)) < rank(name_of(path)), (
+        is_its_folder = path.name == "__init__.py" and target.is_relative_to(path.parent)
+        assert is_its_folder or rank(name_of(target)) < rank(name_of(path)), (
             f"{name_of(path)}:{line} imports {name_of(target)}, which stands below it in the page order"
         )
 
@@ -161,14 +160,15 @@ def test_a_line_knows_its_room(path, rule):
         assert lines_of(path) == [], f"{rule} belongs in {rooms}"
 
 
-@pytest.mark.parametrize("folder", GROWING)
+@pytest.mark.parametrize("folder", [entry.removesuffix("*.py") for entry in ORDER if entry.endswith("*.py")])
 def test_folder_tuple_names_every_file(folder):
     """What grows without end is found by its folder's tuple, one line each."""
-    package = ADDON / folder
-    files = {path.stem for path in package.glob("*.py")} - {"__init__"}
-    tuples = [node for node in ast.walk(syntax(package / "__init__.py")) if isinstance(node, ast.Tuple)]
-    listed = {ast.unparse(element).split(".")[0] for node in tuples for element in node.elts}
-    assert files == listed
+    files = {path.stem for path in (ADDON / folder).glob("*.py") if name_of(path) not in ORDER} - {"__init__"}
+    tree = syntax(ADDON / folder / "__init__.py")
+    imported = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    file_of = {alias.asname or alias.name: node.module or alias.name for node in imported for alias in node.names}
+    tuples = [node for node in ast.walk(tree) if isinstance(node, ast.Tuple)]
+    assert files == {file_of[ast.unparse(element)] for node in tuples for element in node.elts}
 
 
 # ------------------------------------------------------------------------------------- what runs, and what may not
