@@ -138,7 +138,7 @@ ROOMS = {
     "bpy": (lambda path: import_lines(path, "bpy", "mathutils", "bmesh", "bl_ui", "bpy_extras"), r"blender/.*"),
     "gpu": (
         lambda path: import_lines(path, "gpu", "gpu_extras"),
-        r"blender/(drawing|shaders|viewport|render|uniforms)\.py",
+        r"blender/(drawing|shaders|viewport|render|uniforms|batch)\.py",
     ),
     "bpy.props": (
         lambda path: [*attribute_lines(syntax(path), "bpy.props"), *import_lines(path, "bpy.props")],
@@ -198,7 +198,7 @@ def test_register_is_light():
         "import hair_addon\n"
         "hair_addon.register()\n"
         "seconds = time.process_time() - start\n"
-        "heavy = [name for name in ('warp', 'OpenEXR', 'scipy') if name in sys.modules]\n"
+        "heavy = [name for name in ('warp', 'scipy') if name in sys.modules]\n"
         "assert not heavy, heavy\n"
         "hair_addon.unregister()\n"
         "print(seconds)\n"

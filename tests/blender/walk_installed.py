@@ -7,6 +7,7 @@ Prints one line of JSON at the end; test_install.py says what must stand in it.
 """
 
 import json
+import math
 import sys
 from pathlib import Path
 
@@ -25,6 +26,9 @@ def install(zip_path, _folder):
 def operators(_zip_path, folder):
     """Mesh to pixels by the four operators."""
     bpy.ops.preferences.addon_enable(module=MODULE)
+    bpy.data.objects.remove(bpy.data.objects["Cube"])
+    camera = bpy.context.scene.camera
+    camera.location, camera.rotation_euler = (0.0, -0.6, 0.0), (math.radians(90.0), 0.0, 0.0)
     bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=0.1)
     results = [
         bpy.ops.vellus.distribute_guides(guide_count=30, relax_iterations=5, length=0.05),
