@@ -138,7 +138,7 @@ ROOMS = {
     "bpy": (lambda path: import_lines(path, "bpy", "mathutils", "bmesh", "bl_ui", "bpy_extras"), r"blender/.*"),
     "gpu": (
         lambda path: import_lines(path, "gpu", "gpu_extras"),
-        r"blender/(drawing|shaders|viewport|render|uniforms|batch)\.py",
+        r"blender/(uniforms|shaders|drawing|shadows|viewport|render|batch)\.py",
     ),
     "bpy.props": (
         lambda path: [*attribute_lines(syntax(path), "bpy.props"), *import_lines(path, "bpy.props")],
