@@ -22,8 +22,8 @@ from .fresnel import bravais_indices
 
 MAX_SIZE = 2048
 
-# Gauss-Legendre within a cell: attenuation is smooth in gamma, and three nodes leave less than half floats can hold.
-_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(3)
+# Gauss-Legendre within a cell: attenuation is smooth in gamma, and four nodes leave less than half floats can hold.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4)
 _ROWS_AT_ONCE = 32  # keeps a block's rays in the processor's cache
 
 

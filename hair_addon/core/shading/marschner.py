@@ -34,7 +34,7 @@ _BROWN = tuple(round(float(channel), 3) for channel in sigma_a_from_melanin(0.65
 class Settings(_Settings):
     """The optics of a fibre with a circular section."""
 
-    eta: float = param(1.55, "Refractive index of the fibre", label="IOR", above=1.0, high=3.0, soft_high=2.0)
+    eta: float = param(1.55, "Refractive index of the fibre", label="IOR", low=1.01, high=3.0, soft_high=2.0)
     sigma_a: tuple = param(
         _BROWN, "Absorption of red, green and blue light per fibre radius", label="Absorption", low=0.0, high=1000.0
     )
@@ -83,7 +83,7 @@ class Settings(_Settings):
         subtype="ANGLE",
     )
     glint_fade: float = param(
-        0.3, "How far beyond an effective index of 2 the merged glint fades, delta eta'", above=0.0, high=2.0
+        0.3, "How far beyond an effective index of 2 the merged glint fades, delta eta'", low=0.01, high=2.0
     )
     glint_limit: float = param(
         0.5, "Largest part of the fibre's width that a glint may gather, delta h", low=0.0, high=1.0
