@@ -12,6 +12,7 @@ import sys
 from pathlib import Path
 
 import bpy
+import gpu
 import numpy as np
 
 MODULE = "bl_ext.user_default.vellus"
@@ -25,6 +26,7 @@ def install(zip_path, _folder):
 
 def operators(_zip_path, folder):
     """Mesh to pixels by the four operators."""
+    gpu.init()
     bpy.ops.preferences.addon_enable(module=MODULE)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
     camera = bpy.context.scene.camera
