@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The Kajiya-Kay model [Kajiya89], [Report12] Eq. 13.
 
-#include "include/fibre.glsl"
 #include "include/kajiya_kay.glsl"
 
 vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)

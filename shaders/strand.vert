@@ -19,11 +19,13 @@ void main()
 
   strand_index = strand;
   strand_tangent = (view.object_to_world * vec4(along, 0.0)).xyz;
-  strand_position = (view.object_to_world * vec4(here.xyz, 1.0)).xyz;
-  vec3 to_view = view.is_perspective != 0 ? view.eye.xyz - strand_position : view.eye.xyz;
+  drawn_position = (view.object_to_world * vec4(here.xyz, 1.0)).xyz;
+  vec3 to_view = view.is_perspective != 0 ? view.eye.xyz - drawn_position : view.eye.xyz;
   // Length under the least half width that the picture asks for, in pixels of this depth.
-  float depth = view.is_perspective != 0 ? (view.world_to_clip * vec4(strand_position, 1.0)).w : 1.0;
-  float half_width = max(here.w * view.object_scale, view.least_half_width * abs(depth));
+  float depth = view.is_perspective != 0 ? (view.world_to_clip * vec4(drawn_position, 1.0)).w : 1.0;
+  float true_half_width = here.w * view.object_scale;
+  float half_width = max(true_half_width, view.least_half_width * abs(depth));
+  strand_coverage = true_half_width / max(half_width, 1e-20);
   vec3 offset = strip_side(normalize(strand_tangent), normalize(to_view)) * (side * half_width);
-  gl_Position = view.world_to_clip * vec4(strand_position + offset, 1.0);
+  gl_Position = view.world_to_clip * vec4(drawn_position + offset, 1.0);
 }

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The surface under the hair: matt, in the scene's light, so that the hair has something to hide and to be hidden by.
 
-#include "include/fibre.glsl"
-#include "include/lights.glsl"
+#include "include/shadow.glsl"
 
 void main()
 {
@@ -10,14 +9,15 @@ void main()
   vec3 irradiance = PI * view.world_radiance.rgb;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
-    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, surface_position);
-    irradiance += max(dot(N, L), 0.0) * light_irradiance(light.kind,
-                                                         light.position.xyz,
-                                                         light.axis.xyz,
-                                                         light.power.rgb,
-                                                         light.cos_cone,
-                                                         light.blend,
-                                                         surface_position);
+    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
+    vec3 facing = light_irradiance(light.kind,
+                                   light.position.xyz,
+                                   light.axis.xyz,
+                                   light.power.rgb,
+                                   light.cos_cone,
+                                   light.blend,
+                                   drawn_position);
+    irradiance += max(dot(N, L), 0.0) * facing * visibility(light, drawn_position, view.hair_forward.rgb);
   }
   color = vec4(surface_color * irradiance / PI, 1.0);
 }

@@ -3,6 +3,6 @@
 void main()
 {
   surface_normal = normal;
-  surface_position = position;
+  drawn_position = position;
   gl_Position = view.world_to_clip * vec4(position, 1.0);
 }

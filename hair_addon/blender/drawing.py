@@ -5,6 +5,7 @@ Strands are camera-facing strips without vertex attributes: the vertex shader pu
 costs one upload and a redraw none.
 """
 
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import gpu
@@ -27,16 +28,18 @@ class StrandsOnGPU:
     batch: gpu.types.GPUBatch
     point_count: int
     row_strands: int
+    bounds: np.ndarray  # (2, 3): least and greatest coordinates
 
 
 @dataclass(frozen=True)
 class Shading:
-    """What a shading model needs on the GPU beside the scene: program, settings, tables, response to even light."""
+    """What a fragment shader needs on the GPU beside the scene."""
 
     program: gpu.types.GPUShader
-    settings: gpu.types.GPUUniformBuf | None
-    tables: dict
-    albedo: np.ndarray = field(default_factory=lambda: np.zeros(3))  # for models that cannot tell it themselves
+    settings: gpu.types.GPUUniformBuf | None = None
+    samplers: dict = field(default_factory=dict)
+    albedo: np.ndarray = field(default_factory=lambda: np.zeros(3))  # answer to even light
+    forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # passed on to strands behind
 
 
 def upload_strands(points, radii):
@@ -55,7 +58,8 @@ def upload_strands(points, radii):
     texture.filter_mode(False)
     # Two vertices a point, and one repeated at either end so that strands do not join.
     vertex_count = strand_count * (2 * point_count + 2)
-    return StrandsOnGPU(texture, _strip(vertex_count), point_count, row_strands)
+    bounds = np.stack([points.min(axis=(0, 1)), points.max(axis=(0, 1))])
+    return StrandsOnGPU(texture, _strip(vertex_count), point_count, row_strands, bounds)
 
 
 def _strip(vertex_count, primitive="TRI_STRIP"):
@@ -64,9 +68,10 @@ def _strip(vertex_count, primitive="TRI_STRIP"):
 
 
 def kajiya_kay_shading(settings):
-    """The Kajiya-Kay model, ready to draw."""
+    """The Kajiya-Kay model, ready to draw. The cylinder is opaque: half of what it scatters goes on."""
     program = shaders.strand_program("kajiya_kay.frag", kajiya_kay.Settings)
-    return Shading(program, uniforms.uniform_buffer(uniforms.fill(settings)), {})
+    scattered = np.array(settings.diffuse_color) + np.array(settings.specular_color)
+    return Shading(program, uniforms.uniform_buffer(uniforms.fill(settings)), {}, scattered, 0.5 * scattered)
 
 
 def marschner_shading(tables):
@@ -75,12 +80,17 @@ def marschner_shading(tables):
     arrays = (tables.m, tables.n, tables.n_trt)
     textures = {name: _table_texture(array) for name, array in zip(TABLE_NAMES, arrays, strict=True)}
     settings = uniforms.uniform_buffer(uniforms.fill(tables.settings))
-    return Shading(program, settings, textures, albedo.mean_albedo(tables))
+    return Shading(program, settings, textures, albedo.mean_albedo(tables), albedo.mean_forward(tables))
 
 
 def guide_shading():
     """Guides in a colour each, unlit."""
-    return Shading(shaders.strand_program("guides.frag"), None, {})
+    return Shading(shaders.strand_program("guides.frag", shadow_samplers=()))
+
+
+def depth_only():
+    """Strands that leave nothing but their depth, in front of a pass that shades them."""
+    return Shading(shaders.strand_program("depth_only.frag", shadow_samplers=()))
 
 
 def _table_texture(array):
@@ -110,44 +120,46 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     return record
 
 
-def draw_strands(strands, shading, view, lights, object_to_world):
-    """Draw `StrandsOnGPU` with depth test and depth writes; view and lights are records of `uniforms`."""
+def draw_strands(strands, shading, view, lights, object_to_world, shadow_maps=None):
+    """Draw `StrandsOnGPU` into the bound framebuffer.
+
+    view, lights: records of `uniforms`; shadow_maps: {sampler: texture}, None for a shader that reads none.
+    """
     record = view.copy()
     record["object_to_world"] = object_to_world.T
     record["object_scale"] = abs(np.linalg.det(object_to_world[:3, :3])) ** (1.0 / 3.0)
     record["point_count"] = strands.point_count
     record["row_strands"] = strands.row_strands
     record["hair_albedo"][:3] = shading.albedo
-    program = shading.program
-    program.bind()
-    blocks = _bind_scene(program, record, lights)
-    if shading.settings is not None:
-        program.uniform_block("settings", shading.settings)
-    program.uniform_sampler("strands", strands.texture)
-    for name, texture in shading.tables.items():
-        program.uniform_sampler(name, texture)
-    with _opaque():
-        strands.batch.draw(program)
-    del blocks
+    record["hair_forward"][:3] = shading.forward
+    samplers = {"strands": strands.texture, **shading.samplers, **(shadow_maps or {})}
+    _draw(strands.batch, shading.program, record, lights, samplers, shading.settings)
 
 
-def draw_surface(triangles, color, view, lights):
-    """Draw a matt surface; triangles: a batch of `upload_surface`, color: linear RGB."""
-    program = shaders.surface_program()
+def draw_surface(surface, color, view, lights, shadow_maps):
+    """Draw a matt surface; surface: a batch of `upload_surface`, color: linear RGB."""
+    program = shaders.surface_program("surface.frag")
     program.bind()
-    blocks = _bind_scene(program, view, lights)
     program.uniform_float("surface_color", color)
-    with _opaque():
-        triangles.draw(program)
-    del blocks
+    _draw(surface, program, view, lights, shadow_maps)
 
 
-def _bind_scene(program, view, lights):
-    """Bind both blocks of the scene; they must outlive the draw call, as the program does not hold them."""
-    blocks = uniforms.uniform_buffer(view), uniforms.uniform_buffer(lights)
-    program.uniform_block("view", blocks[0])
-    program.uniform_block("lights", blocks[1])
-    return blocks
+def draw_surface_depth(surface, view, lights):
+    """Draw a surface into a shadow map's first pass."""
+    _draw(surface, shaders.surface_program("shadow_front.frag", shadow_samplers=()), view, lights, {})
+
+
+def _draw(batch, program, view, lights, samplers, settings=None):
+    program.bind()
+    # The program does not hold its blocks: they have to live until the draw call is over.
+    blocks = {"view": uniforms.uniform_buffer(view), "lights": uniforms.uniform_buffer(lights)}
+    if settings is not None:
+        blocks["settings"] = settings
+    for name, block in blocks.items():
+        program.uniform_block(name, block)
+    for name, texture in samplers.items():
+        program.uniform_sampler(name, texture)
+    batch.draw(program)
 
 
 def upload_surface(positions, normals):
@@ -168,22 +180,21 @@ def resolve(picture, samples_per_side):
     program.bind()
     program.uniform_int("samples_per_side", samples_per_side)
     program.uniform_sampler("picture", picture)
-    gpu.state.depth_test_set("NONE")
-    _strip(3, "TRIS").draw(program)
+    with gpu_state("NONE", depth_writes=False):
+        _strip(3, "TRIS").draw(program)
 
 
-class _opaque:
-    """Depth test and writes on, no blending, no culling; what was set before comes back."""
-
-    def __enter__(self):
-        self.before = gpu.state.depth_test_get(), gpu.state.depth_mask_get(), gpu.state.blend_get()
-        gpu.state.depth_test_set("LESS_EQUAL")
-        gpu.state.depth_mask_set(True)
-        gpu.state.blend_set("NONE")
-        gpu.state.face_culling_set("NONE")
-
-    def __exit__(self, *_error):
-        depth_test, depth_mask, blend = self.before
+@contextmanager
+def gpu_state(depth_test, depth_writes, blend="NONE"):
+    """Set what drawing depends on, for a while; what was set before comes back."""
+    before = gpu.state.depth_test_get(), gpu.state.depth_mask_get(), gpu.state.blend_get()
+    gpu.state.face_culling_set("NONE")
+    try:
         gpu.state.depth_test_set(depth_test)
-        gpu.state.depth_mask_set(depth_mask)
+        gpu.state.depth_mask_set(depth_writes)
         gpu.state.blend_set(blend)
+        yield
+    finally:
+        gpu.state.depth_test_set(before[0])
+        gpu.state.depth_mask_set(before[1])
+        gpu.state.blend_set(before[2])

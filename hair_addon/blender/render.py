@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import HairError
 from ..core.params import Settings, param
-from . import drawing, hair_cache, scene
+from . import drawing, hair_cache, scene, shadows
 
 
 @dataclass(frozen=True)
@@ -41,18 +41,31 @@ def draw_picture(blender_scene, view_layer, depsgraph, settings):
     lights = scene.read_lights(depsgraph)
     background = (0.0, 0.0, 0.0, 0.0) if settings.is_transparent else (*radiance, 1.0)
 
+    hair = [
+        (*hair_cache.hair_on_gpu(o.data), np.array(o.matrix_world, np.float64))
+        for o in scene.curves_objects(view_layer, "HAIR")
+    ]
+    surfaces = [
+        (drawing.upload_surface(mesh.positions, mesh.normals), mesh.color)
+        for mesh in scene.read_render_meshes(depsgraph)
+    ]
+    shadow_maps = shadows.ShadowMaps()
+    shadow_maps.draw(lights, [(strands, to_world) for strands, _, to_world in hair], [batch for batch, _ in surfaces])
+    if hair:
+        view["hair_forward"][:3] = hair[0][1].forward
+
     color = gpu.types.GPUTexture((width, height), format="RGBA16F")
     depth = gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
     framebuffer = gpu.types.GPUFrameBuffer(color_slots=color, depth_slot=depth)
-    with framebuffer.bind():
+    with framebuffer.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         framebuffer.clear(color=background, depth=1.0)
-        for surface in scene.read_render_meshes(depsgraph):
-            drawing.draw_surface(
-                drawing.upload_surface(surface.positions, surface.normals), surface.color, view, lights
-            )
-        for hair_object in scene.curves_objects(view_layer, "HAIR"):
-            strands, shading = hair_cache.hair_on_gpu(hair_object.data)
-            drawing.draw_strands(strands, shading, view, lights, np.array(hair_object.matrix_world))
+        for batch, surface_color in surfaces:
+            drawing.draw_surface(batch, surface_color, view, lights, shadow_maps.samplers)
+        # Strands overlap many times: their depth goes first, so that only what stays visible is shaded.
+        for strands, _shading, to_world in hair:
+            drawing.draw_strands(strands, drawing.depth_only(), view, lights, to_world)
+        for strands, shading, to_world in hair:
+            drawing.draw_strands(strands, shading, view, lights, to_world, shadow_maps.samplers)
     resolved = gpu.types.GPUTexture((settings.width, settings.height), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=resolved)
     with target.bind():

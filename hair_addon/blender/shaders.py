@@ -38,43 +38,50 @@ def expand(name):
     return "\n".join(text) + "\n", lines
 
 
-def _scene_blocks(info, structs=""):
+SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_front")
+
+
+def _scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS):
+    """What every shader of the scene sees: camera and lights, and the shadow maps that have been drawn so far."""
     info.typedef_source(uniforms.VIEW.source + uniforms.LIGHT.source + uniforms.LIGHTS.source + structs)
     info.uniform_buf(0, "View", "view")
     info.uniform_buf(1, "Lights", "lights")
+    for slot, name in enumerate(shadow_samplers):
+        info.sampler(slot, "FLOAT_2D_ARRAY", name)
 
 
 @cache
-def strand_program(fragment, settings_class=None, table_names=()):
-    """The program that draws strands: a shading model's .frag, the class of its settings, its table samplers."""
+def strand_program(fragment, settings_class=None, table_names=(), shadow_samplers=SHADOW_SAMPLERS):
+    """The program that draws strands: a .frag, the class of its settings, its table samplers, its shadow maps."""
     info = gpu.types.GPUShaderCreateInfo()
-    _scene_blocks(info, uniforms.settings_block(settings_class).source if settings_class else "")
+    _scene(info, uniforms.settings_block(settings_class).source if settings_class else "", shadow_samplers)
     if settings_class:
         info.uniform_buf(2, "Settings", "settings")
-    info.sampler(0, "FLOAT_2D", "strands")
-    for slot, name in enumerate(table_names, start=1):
+    first = len(SHADOW_SAMPLERS)
+    for slot, name in enumerate(("strands", *table_names), start=first):
         info.sampler(slot, "FLOAT_2D", name)
     varying = gpu.types.GPUStageInterfaceInfo("strand_varying")
-    varying.smooth("VEC3", "strand_position")
+    varying.smooth("VEC3", "drawn_position")
     varying.smooth("VEC3", "strand_tangent")
+    varying.smooth("FLOAT", "strand_coverage")
     varying.flat("INT", "strand_index")
     info.vertex_out(varying)
     return _compile(info, "strand.vert", fragment)
 
 
 @cache
-def surface_program():
+def surface_program(fragment, shadow_samplers=SHADOW_SAMPLERS):
     """The program that draws a matt surface: attributes position, normal; uniform surface_color."""
     info = gpu.types.GPUShaderCreateInfo()
-    _scene_blocks(info)
+    _scene(info, shadow_samplers=shadow_samplers)
     info.push_constant("VEC3", "surface_color")
     info.vertex_in(0, "VEC3", "position")
     info.vertex_in(1, "VEC3", "normal")
     varying = gpu.types.GPUStageInterfaceInfo("surface_varying")
-    varying.smooth("VEC3", "surface_position")
+    varying.smooth("VEC3", "drawn_position")
     varying.smooth("VEC3", "surface_normal")
     info.vertex_out(varying)
-    return _compile(info, "surface.vert", "surface.frag")
+    return _compile(info, "surface.vert", fragment)
 
 
 @cache

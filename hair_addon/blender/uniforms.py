@@ -63,16 +63,29 @@ VIEW = Block(
         "eye": "vec4",  # the viewer's place, or in a parallel projection the unit direction towards the viewer
         "world_radiance": "vec4",
         "hair_albedo": "vec4",
+        "hair_forward": "vec4",  # what one strand passes on of the light that meets it
         "is_perspective": "int",
         "point_count": "int",
         "row_strands": "int",
         "object_scale": "float",
-        "least_half_width": "float",
+        "least_half_width": "float",  # at distance one, in a perspective
+        "light_index": "int",  # the light that a shadow pass looks from
     },
 )
 LIGHT = Block(
     "Light",
-    {"position": "vec4", "axis": "vec4", "power": "vec4", "kind": "int", "cos_cone": "float", "blend": "float"},
+    {
+        "world_to_shadow": "mat4",
+        "position": "vec4",
+        "axis": "vec4",
+        "power": "vec4",
+        "kind": "int",
+        "cos_cone": "float",
+        "blend": "float",
+        "shadow_layer": "int",  # of the shadow maps, -1 without
+        "extent": "float",  # diameter of the hair [m], which the layers of a shadow are parts of
+        "surface_bias": "float",  # [m] by which a surface may stand before itself
+    },
 )
 LIGHTS = Block("Lights", {"light": (LIGHT, LIGHT_CAPACITY), "count": "int"})
 

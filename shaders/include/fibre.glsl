@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Angles of a fibre. T is the tangent from root to tip; L and V point away from the fibre; all unit vectors.
 
-const float PI = 3.14159265358979;
+#include "include/constants.glsl"
 
 // Rounding can carry a cosine past one; the root of a negative number is not a number.
 float sin_from_cos(float cosine)

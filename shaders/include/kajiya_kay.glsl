@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // [Kajiya89], as in [Report12] Eq. 11-12 with the second sine and the sign corrected: see DECISIONS.md.
 
+#include "include/fibre.glsl"
+
 // Eq. 11: a diffuse cylinder receives light in proportion to the sine between tangent and light.
 float kajiya_kay_diffuse(vec3 T, vec3 L)
 {

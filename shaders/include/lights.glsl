@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Light from Blender's lights, in Blender's units: watts for point, spot and area lights, W/m² for the sun.
 
+#include "include/constants.glsl"
+
 const int LIGHT_SUN = 0;
 const int LIGHT_POINT = 1;
 const int LIGHT_SPOT = 2;

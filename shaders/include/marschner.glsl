@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // [Marschner03] from baked tables: where to look, and how the lobes are put together (Eq. 14).
 
+#include "include/constants.glsl"
+
 const int AXES_ANGLES = 0;
 const int AXES_COSINES = 1;
 

@@ -5,24 +5,24 @@
 //                                         of theta_i included
 // vec3 hair_albedo()                      what the fibre returns of a uniform surrounding
 
-#include "include/lights.glsl"
+#include "include/shadow.glsl"
 
 void main()
 {
   vec3 T = normalize(strand_tangent);
-  vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - strand_position) : view.eye.xyz;
+  vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
   vec3 radiance = view.world_radiance.rgb * hair_albedo();
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
-    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, strand_position);
+    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
     vec3 irradiance = light_irradiance(light.kind,
                                        light.position.xyz,
                                        light.axis.xyz,
                                        light.power.rgb,
                                        light.cos_cone,
                                        light.blend,
-                                       strand_position);
-    radiance += irradiance * hair_bsdf(T, L, V);
+                                       drawn_position);
+    radiance += irradiance * visibility(light, drawn_position, view.hair_forward.rgb) * hair_bsdf(T, L, V);
   }
   color = vec4(radiance, 1.0);
 }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a fibre returns of light from everywhere: one number a channel, for the world's even light."""
+"""What a fibre returns and passes on of light from everywhere: one number a channel."""
 
 import numpy as np
 
@@ -15,26 +15,34 @@ def mean_albedo(tables):
     For one theta_o it is the integral of S cos²(theta_i) over theta_i and phi, the adjoint of the energy measure of
     [Marschner03].
     """
-    theta = np.pi * ((np.arange(_INCLINATIONS) + 0.5) / _INCLINATIONS - 0.5)
-    cell_widths = np.abs(np.diff(phi_edges(tables.settings)))
-    # Both halves of the circle: N is even in phi.
-    n_tt = 2.0 * np.einsum("hwc,w->hc", tables.n[..., :3], cell_widths)
-    n_r = 2.0 * np.einsum("hw,w->h", tables.n[..., 3], cell_widths)[:, None]
-    n_trt = 2.0 * np.einsum("hwc,w->hc", tables.n_trt, cell_widths)
+    return _mean(tables, np.ones(tables.settings.size))
 
+
+def mean_forward(tables):
+    """The part of `mean_albedo` that goes on into the half space behind the fibre, RGB (3,): a_f of [Zinke08].
+
+    With the light's azimuth anywhere in its half circle, the share |phi| / pi of light scattered by phi goes forward.
+    """
+    edges = phi_edges(tables.settings)
+    return _mean(tables, 0.5 * (edges[1:] + edges[:-1]) / np.pi)
+
+
+def _mean(tables, azimuthal_weights):
+    """Integral of S cos²(theta_i) weighted over phi (W,), the mean over view directions, RGB (3,)."""
+    theta = np.pi * ((np.arange(_INCLINATIONS) + 0.5) / _INCLINATIONS - 0.5)
+    # Twice: N is even in phi.
+    weights = 2.0 * azimuthal_weights * np.abs(np.diff(phi_edges(tables.settings)))
+    n_r = np.einsum("hwc,w->hc", tables.n[..., 3:], weights)
+    n_tt = np.einsum("hwc,w->hc", tables.n[..., :3], weights)
+    n_trt = np.einsum("hwc,w->hc", tables.n_trt, weights)
+
+    theta_h = 0.5 * (theta[:, None] + theta[None, :])  # theta_o in rows, theta_i in columns
     cosine = np.maximum(np.cos(0.5 * (theta[:, None] - theta[None, :])), LEAST_COS_THETA_D)
     rows = (np.arange(tables.settings.size) + 0.5) / tables.settings.size
-    scattered = 0.0
-    for m, n in zip(_longitudinal(tables, theta), (n_r, n_tt, n_trt), strict=True):
-        for_theta_d = np.stack([np.interp(cosine, rows, n[:, c]) for c in range(n.shape[1])], axis=-1)
-        scattered = scattered + m[..., None] * for_theta_d
-    scattered = scattered * (np.cos(theta)[None, :] / cosine)[..., None] ** 2
-    albedo = scattered.sum(axis=1) * (np.pi / _INCLINATIONS)  # over theta_i
-    solid_angle = np.cos(theta)
-    return np.average(albedo, axis=0, weights=solid_angle) * np.ones(3)
-
-
-def _longitudinal(tables, theta):
-    """M of R, TT and TRT, each (theta_o, theta_i), exactly as `lookup_tables` bakes them."""
-    theta_h = 0.5 * (theta[:, None] + theta[None, :])
-    return [m_lobe(theta_h, alpha, beta) for alpha, beta in longitudinal_lobes(tables.settings)]
+    scattered = np.zeros((*cosine.shape, 3))
+    for (alpha, beta), n in zip(longitudinal_lobes(tables.settings), (n_r, n_tt, n_trt), strict=True):
+        for_theta_d = np.stack([np.interp(cosine, rows, column) for column in n.T], axis=-1)
+        scattered += m_lobe(theta_h, alpha, beta)[..., None] * for_theta_d
+    scattered *= (np.cos(theta)[None, :] / cosine)[..., None] ** 2
+    over_theta_i = scattered.sum(axis=1) * (np.pi / _INCLINATIONS)
+    return np.average(over_theta_i, axis=0, weights=np.cos(theta))
