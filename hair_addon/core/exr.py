@@ -271,10 +271,9 @@ class _Image:
 
     def _parse(self, header_only):
         """(part count, header, {channel: Channel}) of the first part; header["channels"] is {name: sampling}."""
-        OpenEXR.setMaxImageSize(MAX_SIZE, MAX_SIZE)
-        OpenEXR.setMaxTileSize(MAX_SIZE, MAX_SIZE)
         try:
-            file = OpenEXR.File(io.BytesIO(self._data), separate_channels=True, header_only=header_only)
+            with _size_limit():
+                file = OpenEXR.File(io.BytesIO(self._data), separate_channels=True, header_only=header_only)
             # After pixels that cannot be decoded OpenEXR only warns on the console, and gives no parts.
             if not file.parts:
                 self._refuse("is truncated or damaged")
@@ -286,3 +285,16 @@ class _Image:
 
     def _refuse(self, what):
         raise HairError(f"{self.path} {what}. Bake the tables again.")
+
+
+@contextlib.contextmanager
+def _size_limit():
+    """Keeps OpenEXR from larger images than `MAX_SIZE`; the limit is the whole process's, so it is put back."""
+    image, tile = OpenEXR.getMaxImageSize(), OpenEXR.getMaxTileSize()
+    OpenEXR.setMaxImageSize(MAX_SIZE, MAX_SIZE)
+    OpenEXR.setMaxTileSize(MAX_SIZE, MAX_SIZE)
+    try:
+        yield
+    finally:
+        OpenEXR.setMaxImageSize(*image)
+        OpenEXR.setMaxTileSize(*tile)

@@ -203,6 +203,14 @@ def test_giant_claims_are_refused(tmp_path, image):
         refused(exr.read_table, tmp_path / "x.exr", CHANNELS)
 
 
+def test_reading_leaves_other_users_of_openexr_their_limits(folder):
+    before = OpenEXR.getMaxImageSize(), OpenEXR.getMaxTileSize()
+    exr.read_tables(folder)
+    (folder / "m.exr").write_bytes(b"\x76\x2f\x31\x01")
+    refused(exr.read_tables, folder)
+    assert (OpenEXR.getMaxImageSize(), OpenEXR.getMaxTileSize()) == before
+
+
 def test_other_sizes_are_refused(tmp_path, folder, image):
     exr.write_table(tmp_path / "x.exr", image, CHANNELS, {})
     assert "8 x 16" in refused(exr.read_table, tmp_path / "x.exr", CHANNELS, (16, 16))

@@ -41,7 +41,7 @@ def caustic_gamma(eta_prime):
 def trt_segments(eta_prime):
     """[(low, high, slope sign)], each (...): the intervals of gamma in which TRT's exit angle is monotone.
 
-    From eta' = 2 on the middle one is all and the others are empty: three there would count a root twice.
+    From eta' = 2 on it is monotone throughout: the middle interval is all and the others are empty.
     """
     gamma_c = caustic_gamma(eta_prime)
     rim = np.full_like(gamma_c, 0.5 * np.pi)
