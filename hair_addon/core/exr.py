@@ -67,7 +67,7 @@ def read_table(path, channels, size=None):
     """The float32 (H, W, C) array of an EXR file with exactly these channels, in their order, and its header dict.
 
     size: the (height, width) demanded; None takes any up to `MAX_SIZE`. Raises `HairError` on anything else than one
-    plain finite half-float image of that shape, and unless the pixels are at fault before memory is taken for them.
+    plain finite half-float image of that shape; all but the pixels is checked before memory is taken for them.
     """
     image = _Image(path, channels)
     image.demand_size(size)
