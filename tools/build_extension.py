@@ -6,6 +6,7 @@ platform to be there, so it is given a staged copy whose manifest lists one plat
 """
 
 import argparse
+import fnmatch
 import hashlib
 import importlib.util
 import platform
@@ -37,10 +38,11 @@ def manifest() -> dict:
     return tomllib.loads((ROOT / "blender_manifest.toml").read_text(encoding="utf-8"))
 
 
-def packaged_names() -> list[str]:
-    """Top-level files and folders of the zip: what the manifest's exclude patterns take back with a `!`."""
+def left_out(folder: str, names: list[str]) -> set[str]:
+    """The names in a folder that the manifest's patterns leave out: an `ignore` for `shutil.copytree`."""
     patterns = manifest()["build"]["paths_exclude_pattern"]
-    return [pattern.removeprefix("!/").rstrip("/") for pattern in patterns if pattern.startswith("!/")]
+    applying = [pattern.strip("/") for pattern in patterns if Path(folder) == ROOT or not pattern.startswith("/")]
+    return {name for pattern in applying for name in fnmatch.filter(names, pattern)}
 
 
 def zip_path(target: str) -> Path:
@@ -100,14 +102,10 @@ def stage(target: str) -> Path:
     """A copy of what the zip holds, with a manifest for one platform. Returns its folder."""
     folder = ROOT / "build" / f"extension-{target}"
     shutil.rmtree(folder, ignore_errors=True)
-    (folder / "wheels").mkdir(parents=True)
+    shutil.copytree(ROOT, folder, ignore=left_out)
+    (folder / "wheels").mkdir()
     for wheel in wheels_of(target):
         (folder / "wheels" / wheel.name).hardlink_to(wheel)
-    for name in packaged_names():
-        if (ROOT / name).is_dir():
-            shutil.copytree(ROOT / name, folder / name)
-        else:
-            shutil.copy2(ROOT / name, folder / name)
     text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
     text = re.sub(r"^platforms = .*$", f'platforms = ["{target}"]', text, flags=re.MULTILINE)
     lines = text.splitlines(keepends=True)
