@@ -4,6 +4,9 @@
 .PHONY: help demo test bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
+# uv trusts the certificates that the machine trusts, as pip does: some networks have their own.
+export UV_SYSTEM_CERTS = true
+
 python = .venv/bin/python
 installed = .venv/installed
 
