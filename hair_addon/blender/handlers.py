@@ -4,7 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from . import hair_cache, pipeline
+from . import hair_cache, pipeline, viewport
 
 
 @persistent
@@ -12,6 +12,7 @@ def after_depsgraph_update(_scene, depsgraph):
     """Forget what changed on the GPU and make again what its settings or inputs have outdated."""
     if depsgraph.mode != "VIEWPORT":
         return
+    viewport.forget()
     changed = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
     for datablock in changed:
         if isinstance(datablock, bpy.types.Curves):
@@ -57,6 +58,7 @@ def _is_surface_at_rest(curves):
 @persistent
 def forget_everything(*_args):
     """Undo, redo and a new file bring other data under the same names."""
+    viewport.forget()
     hair_cache.clear()
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import HairError
 from ..core.params import Settings, param
-from . import drawing, hair_cache, scene, shadows
+from . import drawing, drawn_scene, scene
 
 
 @dataclass(frozen=True)
@@ -36,36 +36,16 @@ def draw_picture(blender_scene, view_layer, depsgraph, settings):
         raise HairError(f"{width} × {height} samples do not fit this graphics driver's {largest}: use fewer.")
     world_to_view, view_to_clip = scene.read_camera(blender_scene, depsgraph, settings.width, settings.height)
     view = drawing.view_record(world_to_view, view_to_clip, height)
-    radiance = scene.read_world_radiance(blender_scene)
-    view["world_radiance"][:3] = radiance
-    lights = scene.read_lights(depsgraph)
-    background = (0.0, 0.0, 0.0, 0.0) if settings.is_transparent else (*radiance, 1.0)
-
-    hair = [
-        (*hair_cache.hair_on_gpu(o.data), np.array(o.matrix_world, np.float64))
-        for o in scene.curves_objects(view_layer, "HAIR")
-    ]
-    surfaces = [
-        (drawing.upload_surface(mesh.positions, mesh.normals), mesh.color)
-        for mesh in scene.read_render_meshes(depsgraph)
-    ]
-    shadow_maps = shadows.ShadowMaps()
-    shadow_maps.draw(lights, [(strands, to_world) for strands, _, to_world in hair], [batch for batch, _ in surfaces])
-    if hair:
-        view["hair_forward"][:3] = hair[0][1].forward
+    drawn = drawn_scene.read(blender_scene, view_layer, depsgraph)
+    background = (0.0, 0.0, 0.0, 0.0) if settings.is_transparent else (*drawn.world_radiance, 1.0)
 
     color = gpu.types.GPUTexture((width, height), format="RGBA16F")
     depth = gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
     framebuffer = gpu.types.GPUFrameBuffer(color_slots=color, depth_slot=depth)
-    with framebuffer.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+    with framebuffer.bind():
         framebuffer.clear(color=background, depth=1.0)
-        for batch, surface_color in surfaces:
-            drawing.draw_surface(batch, surface_color, view, lights, shadow_maps.samplers)
-        # Strands overlap many times: their depth goes first, so that only what stays visible is shaded.
-        for strands, _shading, to_world in hair:
-            drawing.draw_strands(strands, drawing.depth_only(), view, lights, to_world)
-        for strands, shading, to_world in hair:
-            drawing.draw_strands(strands, shading, view, lights, to_world, shadow_maps.samplers)
+        drawn_scene.draw_surfaces(drawn, view)
+        drawn_scene.draw_hair(drawn, view)
     resolved = gpu.types.GPUTexture((settings.width, settings.height), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=resolved)
     with target.bind():

@@ -169,7 +169,7 @@ def read_camera(scene, depsgraph, width, height):
 
 
 @dataclass(frozen=True)
-class RenderMesh:
+class DrawnMesh:
     """Triangles as they are drawn: (3 F, 3) float32 corner positions [m] and unit normals in world space, colour."""
 
     positions: np.ndarray
@@ -177,16 +177,17 @@ class RenderMesh:
     color: tuple
 
 
-def read_render_meshes(depsgraph):
-    """A `RenderMesh` for every mesh that a render of this depsgraph would show, instances included."""
+def read_drawn_meshes(depsgraph, for_render):
+    """A `DrawnMesh` for every visible mesh of the depsgraph, instances included; or for every one that is rendered."""
     meshes = []
     for instance in depsgraph.object_instances:
-        if instance.object.type == "MESH" and instance.show_self and not instance.object.hide_render:
-            meshes.append(_read_render_mesh(instance.object, np.array(instance.matrix_world, np.float64)))
+        is_hidden = for_render and instance.object.hide_render
+        if instance.object.type == "MESH" and instance.show_self and not is_hidden:
+            meshes.append(_read_drawn_mesh(instance.object, np.array(instance.matrix_world, np.float64)))
     return [mesh for mesh in meshes if len(mesh.positions)]
 
 
-def _read_render_mesh(mesh_object, to_world):
+def _read_drawn_mesh(mesh_object, to_world):
     mesh = mesh_object.to_mesh()
     try:
         mesh.calc_loop_triangles()
@@ -205,7 +206,7 @@ def _read_render_mesh(mesh_object, to_world):
     positions = vertices[corners] @ to_world[:3, :3].T + to_world[:3, 3]
     normals = loop_normals[loops] @ np.linalg.pinv(to_world[:3, :3])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return RenderMesh(positions.astype(np.float32), normals.astype(np.float32), _surface_color(mesh_object))
+    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), _surface_color(mesh_object))
 
 
 def _surface_color(mesh_object):

@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from . import drawing, shaders, uniforms
+from . import drawing, shaders
 
 SHADOWED_LIGHTS = 4
 SIZE = 1024  # texels along a side of each map
@@ -15,16 +15,16 @@ SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 _SURFACE_BIAS = 0.01
 _NEAREST = 0.01
 
-_FAR = 1e9  # depth of what no light meets
+_FAR = 1e4  # depth [m] of what no light meets; not more, as maps are filtered
 
 
 class ShadowMaps:
     """Textures of every shadowed light, drawn once and read until something moves."""
 
     def __init__(self):
-        self._hair_front = _array("R32F", filtered=False)
-        self._hair_layers = _array("RGBA16F", filtered=True)
-        self._surface_front = _array("R32F", filtered=False)
+        self._hair_front = _array("R32F")
+        self._hair_layers = _array("RGBA16F")
+        self._surface_front = _array("R32F")
         self._depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
 
     @property
@@ -84,9 +84,9 @@ class _cleared:
         return self.binding.__exit__(*error)
 
 
-def _array(texture_format, filtered):
+def _array(texture_format):
     texture = gpu.types.GPUTexture((SIZE, SIZE), layers=SHADOWED_LIGHTS, format=texture_format)
-    texture.filter_mode(filtered)
+    texture.filter_mode(True)
     texture.extend_mode("EXTEND")
     return texture
 

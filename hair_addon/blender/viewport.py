@@ -5,13 +5,14 @@ import bpy
 import numpy as np
 
 from ..core.errors import HairError
-from . import drawing, hair_cache, scene
+from . import drawing, drawn_scene, hair_cache, scene
 
-# Guides are lines that can be picked out at any distance; strands are never thinner than they can be drawn.
+# Pixels: guides are lines that can be picked out at any distance, strands never fall between two pixels.
 _GUIDE_WIDTH = 2.0
 _STRAND_WIDTH = 1.0
 
 _handles = []
+_drawn = {}  # viewport → DrawnScene, until something moves
 
 
 def register():
@@ -24,38 +25,42 @@ def unregister():
     """Stop drawing."""
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+    forget()
     hair_cache.clear()
 
 
+def forget():
+    """Something moved: read the scene again with the next redraw."""
+    _drawn.clear()
+
+
 def draw():
-    """Draw the context's viewport: what changed is uploaded, the rest is on the GPU already."""
+    """Draw the context's viewport. What changed since the last time is uploaded, the rest is on the GPU already."""
     context = bpy.context
-    hair = scene.curves_objects(context.view_layer, "HAIR", context.space_data)
-    guides = scene.curves_objects(context.view_layer, "GUIDES", context.space_data)
-    if not hair and not (guides and context.space_data.overlay.show_overlays):
-        return
-    depsgraph = context.evaluated_depsgraph_get()
-    region_view = context.region_data
-    world_to_view = np.array(region_view.view_matrix, np.float64)
-    view_to_clip = np.array(region_view.window_matrix, np.float64)
-    view = drawing.view_record(world_to_view, view_to_clip, context.region.height, _STRAND_WIDTH)
-    view["world_radiance"][:3] = scene.read_world_radiance(context.scene)
-    lights = scene.read_lights(depsgraph)
-    for hair_object in hair:
-        if hair_object.data.vellus.is_drawn:
-            _draw(hair_object, hair_cache.hair_on_gpu, view, lights)
-    if context.space_data.overlay.show_overlays:
+    viewport = context.space_data
+    world_to_view = np.array(context.region_data.view_matrix, np.float64)
+    view_to_clip = np.array(context.region_data.window_matrix, np.float64)
+    key = viewport.as_pointer()
+    if key not in _drawn:
+        _drawn[key] = drawn_scene.read(
+            context.scene, context.view_layer, context.evaluated_depsgraph_get(), viewport, hair_cache.refuse
+        )
+    drawn = _drawn[key]
+    drawn_scene.draw_hair(
+        drawn, drawing.view_record(world_to_view, view_to_clip, context.region.height, _STRAND_WIDTH)
+    )
+    if viewport.overlay.show_overlays:
         view = drawing.view_record(world_to_view, view_to_clip, context.region.height, _GUIDE_WIDTH)
-        for guide_object in guides:
-            _draw(guide_object, hair_cache.guides_on_gpu, view, lights)
+        for guide_object in scene.curves_objects(context.view_layer, "GUIDES", viewport):
+            _draw_guides(guide_object, view, drawn.lights)
 
 
-def _draw(curves_object, on_gpu, view, lights):
+def _draw_guides(guide_object, view, lights):
     try:
-        strands, shading = on_gpu(curves_object.data)
+        guides, shading = hair_cache.guides_on_gpu(guide_object.data)
     except HairError as error:
-        # A redraw may not write to the scene: the sentence is told once and nothing is drawn until a change.
-        hair_cache.refuse(curves_object.data, error)
+        hair_cache.refuse(guide_object.data, error)
         return
-    if strands is not None:
-        drawing.draw_strands(strands, shading, view, lights, np.array(curves_object.matrix_world, np.float64))
+    if guides is not None:
+        with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+            drawing.draw_strands(guides, shading, view, lights, np.array(guide_object.matrix_world, np.float64))

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The head that the samples and the demo grow hair on: mesh, scalp, material, camera and lights."""
+
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+HEAD = Path(__file__).with_name("head.obj")
+
+# The hairline seen from the side, as (y, z) [m] from the forehead over temple and ear to the nape; the face looks to -Y.
+_HAIRLINE = np.array(
+    [
+        (-0.170, 0.820),
+        (-0.135, 0.806),
+        (-0.105, 0.787),
+        (-0.078, 0.755),
+        (-0.068, 0.738),
+        (-0.060, 0.744),
+        (-0.030, 0.744),
+        (-0.022, 0.715),
+        (0.000, 0.690),
+        (0.040, 0.680),
+    ]
+)
+_HAIRLINE_WIDTH = 0.008  # [m] over which hair thins out at its border
+
+LOOK_AT = Vector((0.0, -0.055, 0.735))
+
+
+def build():
+    """Load the head into an empty scene, with its vertex group `scalp`; returns the object `Head`."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.obj_import(filepath=str(HEAD))
+    head = bpy.context.object
+    head.name = head.data.name = "Head"
+    # The file is Y up: turn the mesh itself, so that its coordinates are the world's.
+    head.data.transform(head.matrix_world)
+    head.matrix_world.identity()
+    head.data.shade_smooth()
+    head.data.materials.clear()
+    head.data.materials.append(_skin())
+    _add_scalp(head)
+    subdivision = head.modifiers.new("Subdivision", "SUBSURF")
+    subdivision.levels = subdivision.render_levels = 2
+    bpy.context.view_layer.update()
+    return head
+
+
+def _add_scalp(head):
+    positions = np.empty((len(head.data.vertices), 3), np.float32)
+    head.data.vertices.foreach_get("co", positions.ravel())
+    above = positions[:, 2] - np.interp(positions[:, 1], _HAIRLINE[:, 0], _HAIRLINE[:, 1])
+    weights = np.clip(above / _HAIRLINE_WIDTH, 0.0, 1.0)
+    group = head.vertex_groups.new(name="scalp")
+    for vertex in np.flatnonzero(weights > 0.0):
+        group.add([int(vertex)], float(weights[vertex]), "REPLACE")
+
+
+def _skin():
+    material = bpy.data.materials.new("Skin")
+    color = (0.52, 0.31, 0.22, 1.0)
+    material.diffuse_color = color
+    node = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
+    node.inputs["Base Color"].default_value = color
+    node.inputs["Roughness"].default_value = 0.55
+    return material
+
+
+def light():
+    """Camera and lights: a key that shows both highlights, a rim that shines through, a dim surrounding."""
+    scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens = 85.0
+    camera.data.clip_start = 0.01
+    camera.location = (0.72, -0.98, 0.86)
+    _point_at(camera, LOOK_AT)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    _add_light("Key", (-0.35, -0.95, 1.45), 9.0, (1.0, 0.95, 0.88))
+    _add_light("Rim", (-0.75, 0.85, 1.25), 16.0, (1.0, 0.93, 0.85))
+    _add_light("Fill", (1.3, -0.5, 0.8), 3.0, (0.80, 0.88, 1.0))
+    world = scene.world = bpy.data.worlds.new("World")
+    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (0.055, 0.06, 0.068, 1.0)
+    bpy.context.view_layer.update()
+
+
+def _add_light(name, location, watts, color):
+    lamp = bpy.data.lights.new(name, "AREA")
+    lamp.energy, lamp.color, lamp.size = watts, color, 0.4
+    lamp_object = bpy.data.objects.new(name, lamp)
+    lamp_object.location = location
+    _point_at(lamp_object, LOOK_AT)
+    bpy.context.scene.collection.objects.link(lamp_object)
+
+
+def _point_at(turned, target):
+    turned.rotation_euler = (target - turned.location).to_track_quat("-Z", "Y").to_euler()
+
+
+def grow(head, guide_count=200, strand_count=30_000, seed=1):
+    """Guides and hair on the scalp by Vellus' operators; returns the objects `Guides` and `Hair`."""
+    bpy.context.view_layer.objects.active = head
+    bpy.ops.vellus.distribute_guides(
+        guide_count=guide_count,
+        seed=seed,
+        density_group="scalp",
+        length=0.17,
+        length_variation=0.12,
+        tilt=math.radians(12.0),
+        gravity=0.85,
+    )
+    bpy.ops.vellus.interpolate_hair(strand_count=strand_count, seed=seed, density_group="scalp", radius=7e-5)
+    return bpy.data.objects["Guides"], bpy.data.objects["Hair"]

@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""All that a picture is drawn of, on the GPU: hair, the surfaces around it, lights and their shadow maps."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..core.errors import HairError
+from . import drawing, hair_cache, scene
+from .shadows import ShadowMaps
+
+
+@dataclass(frozen=True)
+class DrawnScene:
+    """Read once by `read`, drawn from any number of views until something moves."""
+
+    hair: list  # (StrandsOnGPU, Shading, object to world)
+    surfaces: list  # (batch of triangles, linear RGB)
+    lights: np.ndarray  # uniforms.LIGHTS
+    world_radiance: np.ndarray
+    shadow_maps: ShadowMaps
+
+
+def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, shadow_maps=None):
+    """Bring a scene to the GPU and draw its shadow maps.
+
+    viewport: the 3-D viewport whose visibility counts, None for a render; refused: called with the datablock and the
+    `HairError` of hair that cannot be drawn, which otherwise is raised; shadow_maps: some to draw over.
+    """
+    hair = []
+    for hair_object in scene.curves_objects(view_layer, "HAIR", viewport):
+        if viewport is not None and not hair_object.data.vellus.is_drawn:
+            continue
+        try:
+            strands, shading = hair_cache.hair_on_gpu(hair_object.data)
+        except HairError as error:
+            if refused is None:
+                raise
+            refused(hair_object.data, error)
+            continue
+        if strands is not None:
+            hair.append((strands, shading, np.array(hair_object.matrix_world, np.float64)))
+    surfaces = [
+        (drawing.upload_surface(mesh.positions, mesh.normals), mesh.color)
+        for mesh in scene.read_drawn_meshes(depsgraph, for_render=viewport is None)
+    ]
+    lights = scene.read_lights(depsgraph)
+    shadow_maps = shadow_maps or ShadowMaps()
+    shadow_maps.draw(lights, [(strands, to_world) for strands, _, to_world in hair], [batch for batch, _ in surfaces])
+    return DrawnScene(hair, surfaces, lights, scene.read_world_radiance(blender_scene), shadow_maps)
+
+
+def draw_hair(drawn, view):
+    """Draw all hair with depth test into the bound framebuffer; view: a `uniforms.VIEW` record."""
+    view["world_radiance"][:3] = drawn.world_radiance
+    samplers = drawn.shadow_maps.samplers
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        # Strands overlap many times: their depth goes first, so that only what stays visible is shaded.
+        for strands, _shading, to_world in drawn.hair:
+            drawing.draw_strands(strands, drawing.depth_only(), view, drawn.lights, to_world)
+        for strands, shading, to_world in drawn.hair:
+            drawing.draw_strands(strands, shading, view, drawn.lights, to_world, samplers)
+
+
+def draw_surfaces(drawn, view):
+    """Draw all surfaces with depth test into the bound framebuffer."""
+    view["world_radiance"][:3] = drawn.world_radiance
+    # The hair's shadow on a surface takes the first hair's colour: one colour a draw call.
+    view["hair_forward"][:3] = drawn.hair[0][1].forward if drawn.hair else 0.0
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        for batch, color in drawn.surfaces:
+            drawing.draw_surface(batch, color, view, drawn.lights, drawn.shadow_maps.samplers)
