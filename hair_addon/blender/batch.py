@@ -48,10 +48,7 @@ def bake_tables(settings, folder):
 
 def render(path, settings, out):
     """Draw a .blend file's hair from its camera into a picture file. Raises `HairError`."""
-    import gpu
-
     open_file(path)
-    gpu.init()
     context = bpy.context
     pixels = offscreen.draw_picture(context.scene, context.view_layer, context.evaluated_depsgraph_get(), settings)
     offscreen.write_picture(pixels, out, context.scene)

@@ -39,5 +39,6 @@ def _fill(node, material, settings):
     node.inputs["IOR"].default_value = settings.eta
     node.inputs["Offset"].default_value = settings.tilt
     node.inputs["Roughness"].default_value = principled.roughness_from_beta_r(settings.beta_r)
-    node.inputs["Color"].default_value = color  # what EEVEE shows, which knows no hair
+    # What EEVEE shows, which knows no hair. By identifier: the socket is disabled, and cannot be looked up by name.
+    next(s for s in node.inputs if s.identifier == "Color").default_value = color
     material.diffuse_color = color

@@ -6,7 +6,7 @@ import bpy
 from ..core.groom import GuideSettings, HairSettings
 from ..core.params import declared
 from ..core.shading import kajiya_kay, lookup_tables, marschner
-from .operators.selection import active_of_kind, guides_of, surface_of
+from .selection import active_of_kind, guides_of, surface_of
 
 
 class _HairTab:

@@ -4,7 +4,7 @@
 import bpy
 
 # The add-on's module: the extension's package, or hair_addon itself where it runs from a checkout.
-ADDON_MODULE = __package__.partition(".hair_addon.")[0].partition(".blender")[0]
+ADDON_MODULE = __package__.removesuffix(".blender").removesuffix(".hair_addon")
 
 
 class VellusPreferences(bpy.types.AddonPreferences):
@@ -21,6 +21,10 @@ class VellusPreferences(bpy.types.AddonPreferences):
 
 
 def device():
-    """Name of the Warp device that the user chose; the processor where the preferences do not exist."""
+    """Name of the Warp device that the user chose; the processor where there is no choice, or no such device."""
     addon = bpy.context.preferences.addons.get(ADDON_MODULE)
-    return addon.preferences.device if addon and addon.preferences else "cpu"
+    if addon is None or addon.preferences is None or addon.preferences.device == "cpu":
+        return "cpu"
+    import warp as wp  # late: it takes longer to import than Blender may take to start
+
+    return "cuda" if wp.is_cuda_available() else "cpu"

@@ -29,6 +29,7 @@ class PictureSettings(Settings):
 
 def draw_picture(blender_scene, view_layer, depsgraph, settings):
     """(height, width, 4) float32: scene-linear, premultiplied, first row at the bottom. Raises `HairError`."""
+    _start_gpu()
     samples = settings.samples_per_side
     width, height = settings.width * samples, settings.height * samples
     largest = gpu.capabilities.max_texture_size_get()
@@ -52,6 +53,15 @@ def draw_picture(blender_scene, view_layer, depsgraph, settings):
         drawing.resolve(color, samples)
         pixels = target.read_color(0, 0, settings.width, settings.height, 4, 0, "FLOAT")
     return np.array(pixels, np.float32).reshape(settings.height, settings.width, 4)
+
+
+def _start_gpu():
+    """In background Blender has no graphics until somebody asks."""
+    if bpy.app.background:
+        try:
+            gpu.init()
+        except SystemError as error:
+            raise HairError(f"Nothing can be drawn here: this machine has no OpenGL driver ({error}).") from error
 
 
 def write_picture(pixels, path, blender_scene):

@@ -16,9 +16,8 @@ _drawn = {}  # viewport → DrawnScene, until something moves
 
 
 def register():
-    """Start drawing; in background there is nothing to draw in."""
-    if not bpy.app.background:
-        _handles.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW"))
+    """Start drawing in every 3-D viewport that there is."""
+    _handles.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW"))
 
 
 def unregister():

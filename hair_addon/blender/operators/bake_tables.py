@@ -7,7 +7,7 @@ from ...core import exr
 from ...core.errors import HairError
 from ...core.shading import lookup_tables
 from .. import files, properties
-from .selection import active_of_kind
+from ..selection import active_of_kind
 
 
 class VELLUS_OT_bake_tables(bpy.types.Operator):

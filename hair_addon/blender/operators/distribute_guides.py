@@ -6,7 +6,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.groom import GuideSettings
 from .. import pipeline, properties
-from .selection import active_of_kind, surface_of
+from ..selection import active_of_kind, surface_of
 
 
 class VELLUS_OT_distribute_guides(bpy.types.Operator):

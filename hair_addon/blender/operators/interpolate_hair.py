@@ -6,7 +6,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.groom import HairSettings
 from .. import pipeline, properties
-from .selection import active_of_kind, guides_of
+from ..selection import active_of_kind, guides_of
 
 
 class VELLUS_OT_interpolate_hair(bpy.types.Operator):

@@ -1,0 +1,38 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Builds each sample .blend from code: make samples."""
+
+import sys
+from pathlib import Path
+
+import bpy
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import head  # beside this file
+
+import hair_addon
+
+FOLDER = Path(__file__).resolve().parent
+
+
+def build_head():
+    """The head with 200 guides and 30,000 strands."""
+    head.grow(head.build())
+    head.light()
+
+
+SAMPLES = {"head": build_head}
+
+
+def main():
+    """Build the samples named on the command line, or all."""
+    hair_addon.register()
+    for name in sys.argv[1:] or SAMPLES:
+        SAMPLES[name]()
+        path = FOLDER / f"{name}.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)
+        print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB")
+
+
+if __name__ == "__main__":
+    main()

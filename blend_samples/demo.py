@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""make demo: the report's pictures and its two results tables, made on this machine.
+
+Writes head.blend, kajiya_kay.png, marschner.png and tables/{m,n,n_trt}.exr to a folder.
+"""
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import gpu
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import head  # beside this file
+
+import hair_addon
+from hair_addon.blender import drawing, drawn_scene, scene
+from hair_addon.core import bspline
+
+MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
+REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
+REPORT_FRAMES = {("Marschner", 10_000): 25, ("Kajiya-Kay", 10_000): 36}
+
+
+def main():
+    """Make everything; the exit status is 0 only if all of it was made."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("out/demo"))
+    out = parser.parse_args().out.resolve()
+    out.mkdir(parents=True, exist_ok=True)
+    started = time.perf_counter()
+    hair_addon.register()
+    gpu.init()
+    head_object = head.build()
+    guides, hair = head.grow(head_object)
+    head.light()
+    print(f"{len(guides.data.curves)} guides, {len(hair.data.curves)} strands in {time.perf_counter() - started:.1f} s")
+    bpy.ops.vellus.bake_tables(directory=str(out / "tables"), **_marschner_of(hair))
+    bpy.ops.wm.save_as_mainfile(filepath=str(out / "head.blend"), compress=True)
+    for model in MODELS.values():
+        hair.data.vellus.model = model
+        bpy.ops.vellus.render_picture(filepath=str(out / f"{model.lower()}.png"))
+    print_spline_table()
+    print_frame_table(guides, hair)
+    print(f"\nmade in {time.perf_counter() - started:.1f} s: {out}")
+
+
+def _marschner_of(hair):
+    """The operator's arguments for the settings that the hair has."""
+    return {name: getattr(hair.data.vellus.marschner, name) for name in ("eta", "sigma_a", "tilt", "beta_r")}
+
+
+def print_spline_table():
+    """The report's first table: 200 curves of 6 control points to 41 points."""
+    controls = np.random.default_rng(1).random((200, 6, 3))
+    ways = {
+        "recursion": lambda: bspline.evaluate_recursive(controls, np.linspace(0.0, 1.0, 41)),
+        "subdivision": lambda: bspline.subdivide(controls, levels=3),
+        "matrix": lambda: bspline.evaluate(controls, 41).numpy(),
+    }
+    print("\n200 curves, 6 control points, 41 points      report [ms]   here [ms]")
+    for name, way in ways.items():
+        way()  # compiles and fills caches
+        best = min(_seconds(way) for _ in range(5))
+        reported = REPORT_MILLISECONDS[name]
+        print(f"  {name:42} {reported if reported else '-':>10}  {1e3 * best:10.3f}")
+
+
+def print_frame_table(guides, hair):
+    """The report's second table: frames a second of 10,000 and 30,000 strands, one sample a pixel, at 1280 × 720."""
+    print(f"\n1280 × 720 on {gpu.platform.renderer_get()}      report [frames/s]   here [frames/s]")
+    for strand_count in (10_000, 30_000):
+        bpy.context.view_layer.objects.active = guides
+        hair.data.vellus.hair.strand_count = strand_count
+        bpy.context.view_layer.update()
+        for label, model in MODELS.items():
+            hair.data.vellus.model = model
+            reported = REPORT_FRAMES.get((label, strand_count), "-")
+            print(f"  {strand_count:6} strands, {label:30} {reported:>10} {_frames_per_second():17.1f}")
+
+
+def _frames_per_second(width=1280, height=720, frame_count=4):
+    context = bpy.context
+    depsgraph = context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
+    view = drawing.view_record(*scene.read_camera(context.scene, depsgraph, width, height), height, least_width=1.0)
+    color = gpu.types.GPUTexture((width, height), format="RGBA16F")
+    depth = gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
+    framebuffer = gpu.types.GPUFrameBuffer(color_slots=color, depth_slot=depth)
+
+    def draw():
+        framebuffer.clear(color=(0.0, 0.0, 0.0, 1.0), depth=1.0)
+        drawn_scene.draw_surfaces(drawn, view)
+        drawn_scene.draw_hair(drawn, view)
+        framebuffer.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # waits until the frame is drawn
+
+    with framebuffer.bind():
+        draw()
+        return frame_count / _seconds(lambda: [draw() for _ in range(frame_count)])
+
+
+def _seconds(work):
+    started = time.perf_counter()
+    work()
+    return time.perf_counter() - started
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    # Blender's module may crash while it is torn down after drawing; all files are closed by now.
+    os._exit(0)
