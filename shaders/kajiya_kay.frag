@@ -7,13 +7,12 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)
 {
   // The integral of sin(T, L) over the sphere is pi², so this diffuse part has the albedo diffuse_color.
   vec3 diffuse = settings.diffuse_color * kajiya_kay_diffuse(T, L) / (PI * PI);
-  float specular = kajiya_kay_specular_gain(settings.exponent) * kajiya_kay_specular(T, L, V, settings.exponent);
-  return diffuse + settings.specular_color * specular;
+  return diffuse + settings.specular_color * kajiya_kay_specular(T, L, V, settings.exponent);
 }
 
 vec3 hair_albedo()
 {
-  return settings.diffuse_color + settings.specular_color;
+  return settings.diffuse_color + settings.specular_color * kajiya_kay_specular_albedo(settings.exponent);
 }
 
 #include "include/shade_strand.glsl"

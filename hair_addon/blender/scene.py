@@ -125,11 +125,31 @@ def _read_light(light, matrix):
     record["position"][:3] = matrix[:3, 3]
     axis = -matrix[:3, 2]  # a light shines along its own -Z
     record["axis"][:3] = axis / np.linalg.norm(axis)
-    record["power"][:3] = np.array(light.color) * light.energy * 2.0**light.exposure
+    temperature = light.temperature_color if light.use_temperature else (1.0, 1.0, 1.0)
+    record["power"][:3] = np.array(light.color) * temperature * light.energy * 2.0**light.exposure
+    if not light.normalize:
+        record["power"][:3] *= _emitting_area(light, matrix)
     if light.type == "SPOT":
         record["cos_cone"] = np.cos(0.5 * light.spot_size)
         record["blend"] = light.spot_blend
+    elif light.type == "AREA":
+        record["cos_cone"] = np.cos(0.5 * light.spread)
     return record
+
+
+def _emitting_area(light, matrix):
+    """What multiplies the power of a light that is not normalised: its area [m²], or a sun's on the unit sphere.
+
+    As Cycles does it, which takes the disk of a point without size for one.
+    """
+    if light.type == "AREA":
+        width, height = light.size, light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
+        x_scale, y_scale = np.linalg.norm(matrix[:3, :2], axis=0)
+        part = 0.25 * np.pi if light.shape in {"DISK", "ELLIPSE"} else 1.0
+        return part * width * x_scale * height * y_scale
+    if light.type == "SUN":
+        return np.pi * np.sin(0.5 * light.angle) ** 2 or 1.0
+    return 4.0 * (np.pi * light.shadow_soft_size**2 or 1.0)
 
 
 def read_world_radiance(scene):

@@ -3,10 +3,11 @@
 
 #include "include/constants.glsl"
 
-// Rounding can carry a cosine past one; the root of a negative number is not a number.
+// Rounding can carry a cosine past one; the root of a negative number is not a number. The product of both factors
+// keeps the digits that 1 - cosine² loses near one.
 float sin_from_cos(float cosine)
 {
-  return sqrt(max(0.0, 1.0 - cosine * cosine));
+  return sqrt(max(0.0, (1.0 - cosine) * (1.0 + cosine)));
 }
 
 // cos((theta_o - theta_i) / 2) from the sines of both inclinations: exact, by the half-angle formula.
@@ -21,9 +22,8 @@ float relative_azimuth(vec3 T, vec3 L, vec3 V)
 {
   vec3 l = L - dot(T, L) * T;
   vec3 v = V - dot(T, V) * T;
-  float lengths = sqrt(dot(l, l) * dot(v, v));
-  if (lengths < 1e-9) {
-    return 0.0;
-  }
-  return acos(clamp(dot(l, v) / lengths, -1.0, 1.0));
+  float across = abs(dot(T, cross(l, v)));
+  float along = dot(l, v);
+  // An arc cosine would lose half of the digits at 0 and pi, and drivers' own is good for 1e-3 at best.
+  return (max(across, abs(along)) < 1e-12) ? 0.0 : atan(across, along);
 }

@@ -18,8 +18,10 @@ float kajiya_kay_specular(vec3 T, vec3 L, vec3 V, float exponent)
   return pow(max(0.0, cone), exponent);
 }
 
-// Makes the highlight's energy one for light across the fibre, within 0.5 %.
-float kajiya_kay_specular_gain(float exponent)
+// What the highlight returns of a uniform surrounding, the mean over all directions of view: with s = theta_i + theta_o
+// it is pi/2 times the integral of cos(s)^exponent ((pi - |s|) cos(s) + sin|s|), and close to pi²/2 times that of
+// cos(s)^(exponent + 1). Within 0.5 % for an exponent of 10 and more, 5 % for 1.
+float kajiya_kay_specular_albedo(float exponent)
 {
-  return sqrt((exponent + 2.5) / (2.0 * PI)) / (2.0 * PI);
+  return 0.5 * PI * PI * sqrt(2.0 * PI / (exponent + 1.5));
 }

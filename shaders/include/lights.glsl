@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Light from Blender's lights, in Blender's units: watts for point, spot and area lights, W/m² for the sun.
 
-#include "include/constants.glsl"
+#include "include/fibre.glsl"
 
 const int LIGHT_SUN = 0;
 const int LIGHT_POINT = 1;
@@ -14,12 +14,24 @@ vec3 to_light(int kind, vec3 light_position, vec3 axis, vec3 position)
   return (kind == LIGHT_SUN) ? -axis : normalize(light_position - position);
 }
 
-// How much of a spot light's beam arrives at an angle: one inside, zero outside the cone, smooth over `blend`.
+// How much of a spot light's beam arrives at an angle: one inside, zero outside the cone, smooth over the part
+// `blend` of the way, in cosines, from the cone to the axis.
 float spot_falloff(float cos_angle, float cos_cone, float blend)
 {
-  // Blender's cone: the tangent-space ellipse of the spot, smoothed over blend of its radius.
   float inner = mix(cos_cone, 1.0, clamp(blend, 1e-4, 1.0));
   return smoothstep(cos_cone, inner, cos_angle);
+}
+
+// Radiance of an area light towards an angle, one without a spread: it is linear in the tangent, zero outside the cone,
+// and lets the light keep its power. cos_cone: of half the spread, 0 for the half sphere.
+float area_falloff(float cos_angle, float cos_cone)
+{
+  if (cos_cone < 1e-3) {
+    return 1.0;
+  }
+  float tan_cone = sin_from_cos(cos_cone) / cos_cone;
+  float tan_angle = sin_from_cos(cos_angle) / max(cos_angle, 1e-6);
+  return max(0.0, tan_cone - tan_angle) / (tan_cone - atan(tan_cone));
 }
 
 // Irradiance [W/m²] of a plane at `position` that faces the light. power: RGB watts, or W/m² of a sun.
@@ -34,7 +46,7 @@ vec3 light_irradiance(
   float cos_angle = dot(axis, offset) * inversesqrt(distance_squared);
   if (kind == LIGHT_AREA) {
     // A Lambertian emitter of flux P sends P/pi along its axis.
-    return power * max(cos_angle, 0.0) / (PI * distance_squared);
+    return power * max(cos_angle, 0.0) * area_falloff(cos_angle, cos_cone) / (PI * distance_squared);
   }
   vec3 irradiance = power / (4.0 * PI * distance_squared);
   return (kind == LIGHT_SPOT) ? irradiance * spot_falloff(cos_angle, cos_cone, blend) : irradiance;
