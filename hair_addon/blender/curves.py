@@ -51,6 +51,13 @@ def new_object(name, surface_object):
     return curves_object
 
 
+def draw_natively(curves, is_shown):
+    """Let Blender draw Curves in viewports as they are, or as their bounding box: selectable, rendered, and cheap."""
+    for user in bpy.data.objects:
+        if user.data == curves:
+            user.display_type = "TEXTURED" if is_shown else "BOUNDS"
+
+
 def write_strands(curves, surface, points, roots, radii, guide_index):
     """Fill Curves with strands.
 
@@ -58,6 +65,8 @@ def write_strands(curves, surface, points, roots, radii, guide_index):
     guide_index: (S,) int32, the guide that each strand follows first.
     """
     strand_count, point_count, _xyz = points.shape
+    if strand_count == 0:
+        raise ValueError("no strands: an empty list of curves would crash Blender")
     _resize(curves, strand_count, point_count)
     local = surface.to_local(points)
     scale = abs(np.linalg.det(surface.to_world_axes)) ** (1.0 / 3.0)
@@ -83,7 +92,7 @@ def _resize(curves, strand_count, point_count):
             return
     if len(curves.curves):
         curves.remove_curves()
-    # Plain integers only; an empty list would crash Blender, so nobody calls this with no strands.
+    # Plain integers only.
     curves.add_curves([int(point_count)] * int(strand_count))
     curves.set_types(type="POLY")
 

@@ -48,7 +48,7 @@ def interpolate_hair(guide_curves, settings, depsgraph, target=None):
     radii = groom.strand_radii(settings, hair.points.shape[1])
     nearest = binding.guide_weights.indices.numpy()[:, 0]
     curves.write_strands(target, surface, hair.numpy(), hair.roots, radii, nearest)
-    materials.write_hair_material(target)
+    evaluate_shading(target)
     return target
 
 
@@ -90,8 +90,9 @@ def evaluate(target, depsgraph):
 
 
 def evaluate_shading(target):
-    """Bring a hair's material in line with its settings."""
+    """Bring a hair's material in line with its settings, and what Blender draws with who draws it."""
     target.vellus.is_shading_stale = False
+    curves.draw_natively(target, not target.vellus.is_drawn)
     try:
         materials.write_hair_material(target)
     except HairError as error:

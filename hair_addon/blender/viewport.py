@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 
 from ..core.errors import HairError
-from . import drawing, drawn_scene, hair_cache, scene
+from . import curves, drawing, drawn_scene, hair_cache, scene
 
 # Pixels: guides are lines that can be picked out at any distance, strands never fall between two pixels.
 _GUIDE_WIDTH = 2.0
@@ -21,7 +21,10 @@ def register():
 
 
 def unregister():
-    """Stop drawing."""
+    """Stop drawing, and leave hair to Blender's own drawing."""
+    for datablock in bpy.data.hair_curves:
+        if datablock.vellus.kind == "HAIR":
+            curves.draw_natively(datablock, True)
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
     forget()

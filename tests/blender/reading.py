@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What tests look at and move: Blender's data as arrays, read here without the add-on's help."""
+
+import bpy
+import numpy as np
+
+
+def vertex_positions(mesh_object):
+    """(V, 3) float32 of a mesh object's own vertices."""
+    positions = np.empty((len(mesh_object.data.vertices), 3), np.float32)
+    mesh_object.data.vertices.foreach_get("co", positions.ravel())
+    return positions
+
+
+def points(curves_object):
+    """(S, P, 3) float32 in local coordinates."""
+    curves = curves_object.data
+    positions = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", positions.ravel())
+    return positions.reshape(len(curves.curves), -1, 3)
+
+
+def write_points(curves_object, positions):
+    """Move the points of Curves as a brush does, and let Blender notice."""
+    flat = np.ascontiguousarray(positions, np.float32).ravel()
+    curves_object.data.attributes["position"].data.foreach_set("vector", flat)
+    curves_object.data.update_tag()
+    bpy.context.view_layer.update()
+
+
+def attribute(curves_object, name, width=1):
+    """(N,) or (N, width) values of a curves attribute."""
+    data = curves_object.data.attributes[name].data
+    kind = np.int32 if curves_object.data.attributes[name].data_type == "INT" else np.float32
+    values = np.empty((len(data), width), kind)
+    data.foreach_get("vector" if width > 1 else "value", values.ravel())
+    return values if width > 1 else values[:, 0]
+
+
+def snapshot():
+    """Names of all that an operator could leave behind in the file."""
+    return {
+        "objects": sorted(bpy.data.objects.keys()),
+        "curves": sorted(bpy.data.hair_curves.keys()),
+        "meshes": sorted(bpy.data.meshes.keys()),
+        "materials": sorted(bpy.data.materials.keys()),
+        "images": sorted(bpy.data.images.keys()),
+    }

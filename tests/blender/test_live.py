@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair follows what it was made from: settings, guides, surface; and is kept where somebody's hand was in it."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender import properties
+from hair_addon.core.groom import GuideSettings, HairSettings
+from hair_addon.core.shading import kajiya_kay, lookup_tables
+from tests.blender.reading import attribute, points, write_points
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+def test_a_changed_setting_makes_hair_again(hair):
+    hair.data.vellus.hair.strand_count = 200
+    hair.data.vellus.hair.seed = 9
+    update()
+    assert len(hair.data.curves) == 200
+    again = points(hair)
+    bpy.ops.vellus.interpolate_hair(strand_count=200, seed=9, radius=0.004)
+    assert np.array_equal(points(hair), again)
+
+
+def test_a_changed_guide_setting_makes_guides_and_their_hair_again(hair):
+    guides = bpy.data.objects["Guides"]
+    before = points(hair)
+    guides.data.vellus.guides.length = 0.8
+    update()
+    lengths = np.linalg.norm(np.diff(points(guides), axis=1), axis=-1).sum(axis=1)
+    assert lengths.mean() == pytest.approx(0.8, rel=0.1)
+    assert not np.array_equal(points(hair), before)
+
+
+def test_hair_follows_a_combed_guide(hair):
+    guides = bpy.data.objects["Guides"]
+    before, combed = points(hair), points(guides)
+    combed[0] += np.linspace(0.0, 0.3, 41)[:, None] * np.array([0.0, 0.0, 1.0], np.float32)
+    write_points(guides, combed)
+    moved = np.abs(points(hair) - before).max(axis=(1, 2)) > 1e-6
+    near = np.linalg.norm(before[:, 0] - combed[0, 0], axis=1)
+    assert moved.any() and not moved.all()
+    assert near[moved].max() < near[~moved].max()
+    assert np.array_equal(points(hair)[:, 0], before[:, 0])
+
+
+def test_a_combed_guide_is_not_taken_away_by_a_slider(hair):
+    guides = bpy.data.objects["Guides"]
+    combed = points(guides)
+    combed[:, -1] += 0.1
+    write_points(guides, combed)
+    guides.data.vellus.guides.guide_count = 10
+    update()
+    assert np.array_equal(points(guides), combed)
+    assert "combed" in guides.data.vellus.status
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.vellus.distribute_guides(guide_count=10)
+    assert len(guides.data.curves) == 10 and guides.data.vellus.status == ""
+
+
+def test_a_moved_surface_vertex_moves_the_roots(hair, sphere):
+    sphere.data.transform(((2, 0, 0, 0), (0, 2, 0, 0), (0, 0, 2, 0), (0, 0, 0, 1)))
+    sphere.data.update()
+    update()
+    np.testing.assert_allclose(np.linalg.norm(points(hair)[:, 0], axis=1), 2.0, atol=0.01)
+
+
+def test_nothing_is_made_again_while_live_is_off(hair):
+    hair.data.vellus.is_live = False
+    hair.data.vellus.hair.strand_count = 200
+    update()
+    assert len(hair.data.curves) == 500
+    hair.data.vellus.is_live = True
+    hair.data.update_tag()
+    update()
+    assert len(hair.data.curves) == 200
+
+
+def test_a_setting_that_is_not_a_number_keeps_the_hair_and_says_so(hair):
+    before = points(hair)
+    hair.data.vellus.hair.automatic_influence = False
+    hair.data.vellus.hair.influence_distance = math.nan
+    update()
+    assert np.array_equal(points(hair), before)
+    assert "Influence distance" in hair.data.vellus.status
+
+
+def test_an_update_that_changes_nothing_makes_nothing_again(hair):
+    hair.data.attributes["radius"].data[0].value = 0.123
+    bpy.data.objects["Sphere"].location.x = 3.0
+    update()
+    update()
+    assert attribute(hair, "radius")[0] == pytest.approx(0.123)
+
+
+def test_undo_brings_back_settings_and_hair_together(hair):
+    bpy.ops.ed.undo_push(message="made")
+    before = points(hair)
+    hair.data.vellus.hair.strand_count = 200
+    update()
+    bpy.ops.ed.undo_push(message="fewer")
+    bpy.ops.ed.undo()
+    update()
+    hair = bpy.data.objects["Hair"]
+    assert hair.data.vellus.hair.strand_count == 500
+    assert np.array_equal(points(hair), before)
+
+
+def test_everything_survives_save_and_load(hair, tmp_path):
+    hair.data.vellus.marschner.tilt = 0.12
+    hair.data.vellus.model = "KAJIYA_KAY"
+    update()
+    made, guides_made = points(hair), points(bpy.data.objects["Guides"])
+    path = str(tmp_path / "groom with spaces.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    update()
+    hair = bpy.data.objects["Hair"]
+    assert np.array_equal(points(hair), made)
+    assert np.array_equal(points(bpy.data.objects["Guides"]), guides_made)
+    assert hair.data.vellus.guide_curves == bpy.data.objects["Guides"].data
+    assert properties.to_settings(hair.data.vellus.hair, HairSettings) == HairSettings(strand_count=500, radius=0.004)
+    assert hair.data.vellus.marschner.tilt == pytest.approx(0.12)
+    assert hair.data.vellus.model == "KAJIYA_KAY"
+
+
+@pytest.mark.parametrize(
+    ("group", "settings_class"),
+    [
+        ("guides", GuideSettings),
+        ("hair", HairSettings),
+        ("kajiya_kay", kajiya_kay.Settings),
+        ("marschner", lookup_tables.Settings),
+    ],
+)
+def test_a_fresh_datablock_has_the_declared_defaults(scene, group, settings_class):
+    state = bpy.data.hair_curves.new("Fresh").vellus
+    assert properties.to_settings(getattr(state, group), settings_class) == settings_class()
+
+
+def test_the_material_follows_the_shading_settings(hair):
+    node = next(n for n in hair.data.materials[0].node_tree.nodes if n.bl_idname == "ShaderNodeBsdfHairPrincipled")
+    hair.data.vellus.marschner.sigma_a = (0.1, 0.2, 0.3)
+    hair.data.vellus.marschner.eta = 1.4
+    update()
+    np.testing.assert_allclose(node.inputs["Absorption Coefficient"].default_value, (0.1, 0.2, 0.3), rtol=1e-6)
+    assert node.inputs["IOR"].default_value == pytest.approx(1.4)
+
+
+def test_a_deleted_surface_is_said_and_nothing_crashes(hair):
+    bpy.data.objects.remove(bpy.data.objects["Sphere"])
+    hair.data.vellus.hair.strand_count = 100
+    update()
+    assert "mesh" in hair.data.vellus.status
+    assert len(hair.data.curves) == 500

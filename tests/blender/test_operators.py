@@ -1,0 +1,226 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every operator: what it makes, its undo, its refusals, and that a refusal leaves nothing behind."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender import properties
+from hair_addon.core import exr
+from hair_addon.core.groom import GuideSettings, HairSettings
+from hair_addon.core.shading import lookup_tables
+from tests.blender.reading import attribute, points, snapshot
+
+
+def refusal(operator, **arguments):
+    """The sentence with which an operator refuses; it must leave the file as it was."""
+    before = snapshot()
+    with pytest.raises(RuntimeError) as caught:
+        operator(**arguments)
+    assert snapshot() == before
+    return str(caught.value)
+
+
+@pytest.fixture
+def camera(scene):
+    """The scene's camera, four metres in front of the origin."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -6.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    return camera
+
+
+def test_guides_and_hair_are_made_as_asked(hair):
+    guides = bpy.data.objects["Guides"]
+    assert points(guides).shape == (60, 41, 3)
+    assert points(hair).shape == (500, 41, 3)
+    assert hair.data.vellus.guide_curves == guides.data
+    nearest = attribute(hair, "guide_curve_index")
+    assert nearest.min() >= 0 and nearest.max() < 60
+
+
+def test_settings_stay_with_what_they_made(hair):
+    settings = properties.to_settings(hair.data.vellus.hair, HairSettings)
+    assert settings == HairSettings(strand_count=500, radius=0.004)
+    settings = properties.to_settings(bpy.data.objects["Guides"].data.vellus.guides, GuideSettings)
+    assert settings == GuideSettings(guide_count=60, length=0.5)
+
+
+def test_same_seed_same_strands(hair):
+    first = points(hair)
+    bpy.ops.vellus.interpolate_hair(strand_count=500, radius=0.004, seed=2)
+    other = points(hair)
+    bpy.ops.vellus.interpolate_hair(strand_count=500, radius=0.004, seed=1)
+    assert np.array_equal(points(hair), first)
+    assert not np.array_equal(other, first)
+
+
+def test_operators_run_again_on_what_they_made(guides):
+    bpy.ops.vellus.distribute_guides(guide_count=30)
+    assert [c.name for c in bpy.data.hair_curves] == ["Guides"]
+    assert len(guides.data.curves) == 30
+
+
+def test_a_mesh_may_carry_several_systems(sphere):
+    bpy.ops.vellus.distribute_guides(guide_count=10)
+    bpy.ops.vellus.distribute_guides(guide_count=20)
+    assert sorted(len(c.curves) for c in bpy.data.hair_curves) == [10, 20]
+
+
+def test_density_keeps_guides_and_strands_in_their_group(sphere):
+    bpy.ops.vellus.distribute_guides(guide_count=40, density_group="top")
+    bpy.ops.vellus.interpolate_hair(strand_count=300, density_group="top")
+    lowest = 0.2  # one ring of faces below the group's border, where its weight runs out
+    for name in ("Guides", "Hair"):
+        assert points(bpy.data.objects[name])[:, 0, 2].min() > -lowest
+
+
+def test_undo_takes_guides_away_and_redo_brings_them_back(sphere):
+    bpy.ops.vellus.distribute_guides("EXEC_DEFAULT", True, guide_count=25)
+    made = points(bpy.data.objects["Guides"])
+    bpy.ops.ed.undo()
+    assert "Guides" not in bpy.data.objects
+    bpy.ops.ed.redo()
+    assert np.array_equal(points(bpy.data.objects["Guides"]), made)
+
+
+def test_nothing_is_done_without_a_mesh(scene):
+    assert not bpy.ops.vellus.distribute_guides.poll()
+    assert not bpy.ops.vellus.interpolate_hair.poll()
+    assert not bpy.ops.vellus.render_picture.poll()
+
+
+def test_a_light_is_no_surface(scene):
+    light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    scene.collection.objects.link(light)
+    bpy.context.view_layer.objects.active = light
+    assert not bpy.ops.vellus.distribute_guides.poll()
+
+
+def use_mesh(scene, vertices, faces):
+    mesh = bpy.data.meshes.new("Bad")
+    mesh.from_pydata(vertices, [], faces)
+    bad = bpy.data.objects.new("Bad", mesh)
+    scene.collection.objects.link(bad)
+    bpy.context.view_layer.objects.active = bad
+    return bad
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "said"),
+    [
+        ([], [], "no faces"),
+        ([(0, 0, 0), (1, 0, 0)], [], "no faces"),
+        ([(0, 0, 0), (1, 0, 0), (2, 0, 0)], [(0, 1, 2)], "zero area"),
+        ([(0, 0, 0), (1, 0, 0), (0, math.nan, 0)], [(0, 1, 2)], "not finite"),
+        ([(0, 0, 0), (1, 0, 0), (0, math.inf, 0)], [(0, 1, 2)], "not finite"),
+    ],
+)
+def test_a_mesh_that_cannot_grow_hair_is_refused(scene, vertices, faces, said):
+    use_mesh(scene, vertices, faces)
+    assert said in refusal(bpy.ops.vellus.distribute_guides)
+
+
+def test_a_scale_of_zero_is_refused(sphere):
+    sphere.scale = (0.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    assert "scale" in refusal(bpy.ops.vellus.distribute_guides)
+
+
+def test_a_density_of_zero_is_refused(sphere):
+    sphere.vertex_groups.new(name="empty")
+    assert "zero on every face" in refusal(bpy.ops.vellus.distribute_guides, density_group="empty")
+    assert "no vertex group" in refusal(bpy.ops.vellus.distribute_guides, density_group="missing")
+
+
+@pytest.mark.parametrize(("name", "value"), [("length", math.nan), ("tilt", math.nan), ("gravity", math.nan)])
+def test_what_is_not_a_number_is_refused_for_guides(sphere, name, value):
+    assert "must be" in refusal(bpy.ops.vellus.distribute_guides, **{name: value})
+
+
+def test_what_is_not_a_number_is_refused_for_hair(guides):
+    said = refusal(bpy.ops.vellus.interpolate_hair, influence_distance=math.nan, automatic_influence=False)
+    assert "Influence distance" in said
+
+
+@pytest.mark.parametrize(
+    ("operator", "name"), [("distribute_guides", "guide_count"), ("interpolate_hair", "strand_count")]
+)
+@pytest.mark.parametrize("count", [0, -5])
+def test_a_count_below_one_cannot_be_given(guides, operator, name, count):
+    """Blender holds an operator's properties to their range: one hair is the least."""
+    getattr(bpy.ops.vellus, operator)(**{name: count})
+    made = max(bpy.data.hair_curves, key=lambda c: c.session_uid) if operator == "interpolate_hair" else guides.data
+    assert len(made.curves) == 1
+
+
+def test_hair_without_guides_is_refused(guides):
+    guides.data.remove_curves()
+    assert "no guides" in refusal(bpy.ops.vellus.interpolate_hair)
+
+
+def test_a_lost_surface_is_refused(guides):
+    guides.data.surface = None
+    assert "mesh" in refusal(bpy.ops.vellus.interpolate_hair)
+
+
+def test_tables_are_baked_and_used(hair, tmp_path):
+    bpy.ops.vellus.bake_tables(directory=str(tmp_path), size=32, tilt=0.1)
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["m.exr", "n.exr", "n_trt.exr"]
+    tables = exr.read_tables(tmp_path)
+    assert tables.settings == lookup_tables.Settings(size=32, tilt=0.1)
+    assert properties.to_settings(hair.data.vellus.marschner, lookup_tables.Settings) == tables.settings
+    assert hair.data.vellus.table_folder == str(tmp_path)
+
+
+def test_a_folder_that_cannot_be_written_is_refused(hair, tmp_path):
+    in_the_way = tmp_path / "file"
+    in_the_way.write_text("here first")
+    assert str(in_the_way) in refusal(bpy.ops.vellus.bake_tables, directory=str(in_the_way))
+    assert in_the_way.read_text() == "here first"
+    assert "No file or folder" in refusal(bpy.ops.vellus.bake_tables, directory="")
+
+
+def test_a_path_beside_an_unsaved_file_is_refused(hair):
+    assert "save" in refusal(bpy.ops.vellus.bake_tables, directory="//tables")
+
+
+def test_a_picture_is_written(hair, camera, tmp_path):
+    path = tmp_path / "hair.png"
+    bpy.ops.vellus.render_picture(filepath=str(path), width=64, height=48, samples_per_side=2)
+    image = bpy.data.images.load(str(path))
+    assert tuple(image.size) == (64, 48)
+    assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("name", ["hair.jpg", "hair", "folder/in/the/way/../../file/hair.png"])
+def test_a_picture_that_cannot_be_written_is_refused(hair, camera, tmp_path, name):
+    (tmp_path / "folder" / "in").mkdir(parents=True)
+    (tmp_path / "folder" / "in" / "file").write_text("here first")
+    refusal(bpy.ops.vellus.render_picture, filepath=str(tmp_path / name), width=8, height=8, samples_per_side=1)
+
+
+def test_a_damaged_table_is_refused_by_the_picture(hair, camera, tmp_path):
+    bpy.ops.vellus.bake_tables(directory=str(tmp_path), size=32)
+    table = tmp_path / "n.exr"
+    table.write_bytes(table.read_bytes()[:300])
+    said = refusal(bpy.ops.vellus.render_picture, filepath=str(tmp_path / "p.png"), width=8, height=8)
+    assert "n.exr" in said
+    assert not (tmp_path / "p.png").exists()
+
+
+def test_tables_of_other_settings_are_not_used(hair, camera, tmp_path):
+    """A folder of blond tables must not turn brown hair blond: the picture is that of the hair's own settings."""
+
+    def picture(name):
+        path = tmp_path / name
+        bpy.ops.vellus.render_picture(filepath=str(path), width=32, height=32, samples_per_side=1)
+        return path.read_bytes()
+
+    own = picture("own.exr")
+    exr.write_tables(tmp_path / "blond", lookup_tables.bake(lookup_tables.Settings(sigma_a=(0.0, 0.0, 0.0))), "0")
+    hair.data.vellus.table_folder = str(tmp_path / "blond")
+    assert picture("other.exr") == own
