@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .mesh import SurfacePoints, check_mesh, normals, positions
+from .errors import HairError
+from .mesh import SurfacePoints, check_mesh, check_points, normals, positions
 from .params import Settings, param
 from .strands import Strands
 
@@ -84,17 +85,66 @@ def distribute_guides(mesh, settings, *, density=None, device="cpu") -> Strands:
 
     mesh: `TriMesh` [m]; settings: `GuideSettings`; density: (V,) per vertex, at least 0, or None for uniform.
     """
-    raise NotImplementedError
+    from . import bspline, cvt, guides, sampling
+
+    check_mesh(mesh)
+    roots = sampling.sample_surface(mesh, settings.guide_count, settings.seed, density)
+    roots = cvt.relax(mesh, roots, settings.relax_iterations, density, device).sites
+    controls = guides.grow(
+        mesh,
+        roots,
+        length=settings.length,
+        length_variation=settings.length_variation,
+        tilt=settings.tilt,
+        gravity=settings.gravity,
+        seed=settings.seed,
+        control_point_count=CONTROL_POINT_COUNT,
+        device=device,
+    )
+    return Strands(bspline.evaluate(controls, POINT_COUNT, device), roots)
 
 
 def bind_hair(mesh, guides, settings, *, density=None, device="cpu") -> HairBinding:
-    """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape."""
-    raise NotImplementedError
+    """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape.
+
+    Arguments as in `generate_hair`.
+    """
+    import warp as wp
+
+    from . import interpolation, sampling
+
+    check_mesh(mesh)
+    check_points(mesh, guides.roots)
+    roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)
+
+    def on_device(vectors):
+        return wp.array(vectors, dtype=wp.vec3, device=device, copy=False)
+
+    guide_positions = on_device(positions(mesh, guides.roots))
+    guide_normals = on_device(normals(mesh, guides.roots))
+    root_positions = on_device(positions(mesh, roots))
+    root_normals = on_device(normals(mesh, roots))
+    distance = settings.influence_distance
+    if settings.automatic_influence:
+        distance = interpolation.automatic_influence_distance(guide_positions)
+    guide_weights = interpolation.find_guides(
+        root_positions, root_normals, guide_positions, guide_normals, distance, settings.neighbour_limit
+    )
+    return HairBinding(roots, root_positions, root_normals, guide_normals, guide_weights)
 
 
 def follow_guides(binding, guides) -> Strands:
     """Strands of a binding for the guides as they are combed now: no search, this is what live editing repeats."""
-    raise NotImplementedError
+    from . import interpolation
+
+    if len(guides) != len(binding.guide_normals):
+        raise HairError(
+            f"The hair was bound to {len(binding.guide_normals)} guides and there are {len(guides)} now: bind it again."
+        )
+    points = interpolation.interpolate(
+        binding.positions, binding.normals, guides.points, binding.guide_normals, binding.guide_weights
+    )
+    return Strands(points, binding.roots)
 
 
 def generate_hair(mesh, guides, settings, *, density=None, device="cpu") -> Strands:

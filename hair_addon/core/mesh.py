@@ -92,14 +92,35 @@ def check_mesh(mesh):
             f"{bad_count} of the surface's {len(mesh.vertices)} vertices are not finite numbers: "
             "repair the mesh or the modifier that makes them."
         )
+    largest = float(np.abs(mesh.vertices).max())
+    if largest > 1e15:  # squares of single-precision lengths must stay finite
+        raise HairError(f"The surface reaches {largest:g} m from the origin: check the object's scale.")
     if not np.any(mesh.areas > 0.0):
         raise HairError("Every face of the surface has zero area: check the object's shape and scale.")
 
 
+def check_points(mesh, points):
+    """Raise `HairError` unless the points are on the mesh: read from a file, they may belong to another one."""
+    triangle, barycentric = points.triangle, points.barycentric
+    if len(points) == 0:
+        raise HairError("There are no guides to follow: distribute guides first.")
+    on_mesh = (triangle >= 0) & (triangle < len(mesh.triangles)) & np.isfinite(barycentric).all(axis=1)
+    if not on_mesh.all():
+        raise HairError(
+            f"{np.count_nonzero(~on_mesh)} guides are rooted on faces that the surface does not have: "
+            "distribute guides again."
+        )
+
+
 def interpolate(values, mesh, points):
     """Per-vertex values (V,) or (V, K) → (N,) or (N, K) float32 at the points, linear inside each triangle."""
-    corner_values = np.asarray(values)[mesh.triangles[points.triangle]]
-    return np.einsum("nc,nc...->n...", points.barycentric, corner_values, dtype=np.float64).astype(np.float32)
+    values = np.asarray(values, dtype=np.float32)
+    corners = mesh.triangles[points.triangle]
+    total = 0.0
+    for corner in range(3):
+        weights = points.barycentric[:, corner]
+        total += weights.reshape((-1,) + (1,) * (values.ndim - 1)) * values[corners[:, corner]]
+    return total
 
 
 def positions(mesh, points):
@@ -111,8 +132,10 @@ def normals(mesh, points):
     """(N, 3) float32: unit normals, smooth over the surface; the triangle's own where the smooth one vanishes."""
     smooth = interpolate(mesh.vertex_normals, mesh, points)
     lengths = np.linalg.norm(smooth, axis=1, keepdims=True)
-    flat = _unit(mesh.scaled_normals[points.triangle])
-    return np.where(lengths > 1e-6, smooth / np.maximum(lengths, 1e-6), flat).astype(np.float32)
+    vanishing = np.flatnonzero(lengths < 1e-6)
+    smooth[vanishing] = _unit(mesh.scaled_normals[points.triangle[vanishing]])
+    lengths[vanishing] = 1.0
+    return smooth / lengths
 
 
 def _unit(vectors):

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides grown from roots: control points of a smooth arc that leaves along the normal and gives in to gravity."""
+
+import numpy as np
+import warp as wp
+
+from .bspline import greville_abscissae
+from .mesh import normals, positions
+
+wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
+
+STEP_COUNT = 48  # straight steps that a guide's arc is made of
+TURNING = 10.0  # how far full gravity bends a guide: the angle to the ground, as tan(angle / 2), shrinks by exp(-10)
+CLEARANCE = 0.03  # how far above the surface a guide slides, by its length
+DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
+
+
+def grow(mesh, roots, *, length, length_variation, tilt, gravity, seed, control_point_count, device="cpu"):
+    """Control points (G, control_point_count, 3) float32 [m] of guides on a checked mesh.
+
+    length [m]; length_variation: each guide's length is multiplied by a random number within 1 ± this; tilt [rad]:
+    largest random angle to the smooth normal; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z).
+    A guide keeps its length while it bends, and slides over the surface where it would sink into it.
+    """
+    random = np.random.Generator(np.random.PCG64(seed)).random((len(roots), 3))
+    root_normals = normals(mesh, roots)
+    lengths = length * (1.0 + length_variation * (2.0 * random[:, 0] - 1.0))
+    directions = _tilted(root_normals, tilt, random[:, 1], random[:, 2])
+    solid = np.flatnonzero(mesh.areas > 0.0)  # Warp's queries go wrong on triangles that are points
+    surface = wp.Mesh(
+        points=wp.array(mesh.vertices, dtype=wp.vec3, device=device),
+        indices=wp.array(mesh.triangles[solid].ravel(), dtype=int, device=device),
+    )
+    path = wp.empty((len(roots), STEP_COUNT + 1), dtype=wp.vec3, device=device)
+    wp.launch(
+        _march,
+        dim=len(roots),
+        inputs=[
+            surface.id,
+            wp.array(mesh.vertex_normals, dtype=wp.vec3, device=device),
+            wp.array(positions(mesh, roots), dtype=wp.vec3, device=device),
+            wp.array(directions, dtype=wp.vec3, device=device),
+            wp.array(lengths, dtype=float, device=device),
+            gravity,
+        ],
+        outputs=[path],
+        device=device,
+    )
+    return _along(path.numpy(), greville_abscissae(control_point_count))
+
+
+def _tilted(directions, largest, random_angle, random_turn):
+    """Unit (G, 3) turned away by up to an angle [rad], evenly over the spherical cap."""
+    cosine = 1.0 - random_angle * (1.0 - np.cos(largest))
+    sine, turn = np.sqrt(1.0 - cosine**2), 2.0 * np.pi * random_turn
+    # Any two directions across will do, so take the axis farthest from each one to start from.
+    across = np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=1)])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    along = np.cross(directions, across)
+    sideways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * along
+    return cosine[:, None] * directions + sine[:, None] * sideways
+
+
+def _along(path, fractions):
+    """Points of paths (G, steps + 1, 3), made of equal steps, at fractions (n,) of their lengths → (G, n, 3)."""
+    places = fractions * (path.shape[1] - 1)
+    before = np.minimum(places.astype(int), path.shape[1] - 2)
+    share = (places - before)[:, None].astype(np.float32)
+    return (1.0 - share) * path[:, before] + share * path[:, before + 1]
+
+
+@wp.kernel
+def _march(
+    surface: wp.uint64,
+    vertex_normals: wp.array[wp.vec3],
+    roots: wp.array[wp.vec3],
+    directions: wp.array[wp.vec3],
+    lengths: wp.array[float],
+    gravity: float,
+    # outputs
+    out_path: wp.array2d[wp.vec3],
+):
+    guide = wp.tid()
+    steps = out_path.shape[1] - 1
+    step = lengths[guide] / float(steps)
+    clearance = CLEARANCE * lengths[guide]
+    indices = wp.mesh_get(surface).indices
+    position = roots[guide]
+    direction = directions[guide]
+    out_path[guide, 0] = position
+    for i in range(steps):
+        # The quickest turn downwards, as strong as gravity's lever: d(angle)/ds = -k sin(angle).
+        bend = TURNING * gravity / float(steps)
+        direction = wp.normalize(direction + bend * (DOWN - wp.dot(direction, DOWN) * direction))
+        ahead = position + step * direction
+        # A guide comes out of the surface by itself at first, and later keeps a distance that has grown with it.
+        wanted = wp.min(clearance, float(i + 1) * step * 0.5)
+        query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * clearance + step)
+        if query.result:
+            face = query.face
+            u = query.u
+            v = query.v
+            w = 1.0 - u - v
+            normal = wp.normalize(
+                u * vertex_normals[indices[3 * face]]
+                + v * vertex_normals[indices[3 * face + 1]]
+                + w * vertex_normals[indices[3 * face + 2]]
+            )
+            away = ahead - wp.mesh_eval_position(surface, face, u, v)
+            height = wp.dot(away, normal)
+            # Beyond the border of an open surface the nearest point lies sideways: nothing to slide on there.
+            sideways = wp.length(away - height * normal)
+            if height < wanted and height > -2.0 * step - clearance and sideways < 0.5 * wp.abs(height) + 0.1 * step:
+                direction = wp.normalize(ahead + (wanted - height) * normal - position)
+        position += step * direction
+        out_path[guide, i + 1] = position

@@ -1,0 +1,203 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands between guides: Gaussian-weighted means of guides' offsets  ([Report12] section 2.4, Eq. 8-10).
+
+Weights do not depend on the point, so the recursion of Eq. 10 is a sum: p'_i = q + sum_j w_j R_j (P_j,i - P_j,0), where
+R_j turns the surface at guide j's root into the surface at the strand's. `find_guides` searches and weighs, which
+depends on roots alone; `interpolate` is what combing repeats.
+
+R_j is the least rotation that takes the guide's normal to the strand's: it needs no UV map and is continuous wherever
+normals are. With a frame F (tangent, bitangent, normal) at either root it is F_strand Z F_guide^T, Z being a turn about
+the normal. So guides are put into their frames once, a neighbour costs five multiplications a point instead of nine,
+and the strand's frame is applied to the sum.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from . import hash_grid
+
+wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
+
+BLOCK = 16  # points that one vector holds
+block = wp.types.vector(length=BLOCK, dtype=float)
+
+
+@dataclass(frozen=True)
+class GuideWeights:
+    """The guides that each strand follows, nearest first: (S, k) arrays on one device.
+
+    indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
+    cosine and sine of the angle about the normal from the guide's frame to the strand's.
+    """
+
+    indices: "wp.array2d[int]"
+    weights: "wp.array2d[float]"
+    turns: "wp.array2d[wp.vec2]"
+
+
+def automatic_influence_distance(guide_roots):
+    """Twice the mean distance [m] from a guide's root to the next one's; guide_roots (G,) vec3 [m].
+
+    Evenly placed guides then have about eleven in reach of any root. A lone guide is followed from anywhere: 1 m will do.
+    """
+    extent = float(np.linalg.norm(np.ptp(guide_roots.numpy(), axis=0)))
+    if extent == 0.0:
+        return 1.0
+    _, distances = hash_grid.neighbours(guide_roots, guide_roots, 2.0 * extent, 2)
+    return 2.0 * float(distances.numpy()[:, 1].mean())
+
+
+def find_guides(roots, normals, guide_roots, guide_normals, influence_distance, neighbour_limit):
+    """`GuideWeights` of strands at roots (S,) [m] with unit normals (S,), for guides (G,) likewise; all vec3 arrays.
+
+    A guide counts when its root is nearer than the influence distance [m]; of those, the `neighbour_limit` nearest. A
+    root with none in reach follows the nearest one alone.
+    """
+    indices, distances = hash_grid.neighbours(guide_roots, roots, influence_distance, neighbour_limit)
+    weights = wp.empty_like(distances)
+    turns = wp.empty(indices.shape, dtype=wp.vec2, device=roots.device)
+    wp.launch(
+        _weigh,
+        dim=len(roots),
+        inputs=[indices, distances, normals, guide_normals, influence_distance],
+        outputs=[weights, turns],
+        device=roots.device,
+    )
+    return GuideWeights(indices, weights, turns)
+
+
+def interpolate(roots, normals, guide_points, guide_normals, guide_weights):
+    """(S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,) that follow guides (G, P) [m], normals (G,)."""
+    guide_count, point_count = guide_points.shape
+    blocks = wp.empty((guide_count, -(-point_count // BLOCK), 3), dtype=block, device=roots.device)
+    wp.launch(
+        _framed_offsets,
+        dim=blocks.shape[:2],
+        inputs=[guide_points, guide_normals],
+        outputs=[blocks],
+        device=roots.device,
+    )
+    points = wp.empty((len(roots), point_count), dtype=wp.vec3, device=roots.device)
+    wp.launch(
+        _interpolate,
+        dim=len(roots),
+        inputs=[roots, normals, blocks, guide_weights.indices, guide_weights.weights, guide_weights.turns],
+        outputs=[points],
+        device=roots.device,
+    )
+    return points
+
+
+@wp.func
+def _frame(normal: wp.vec3):
+    """Tangent and bitangent of a unit normal, without a branch or a pole [Duff17]."""
+    sign = wp.where(normal[2] >= 0.0, 1.0, -1.0)
+    a = -1.0 / (sign + normal[2])
+    b = normal[0] * normal[1] * a
+    tangent = wp.vec3(1.0 + sign * normal[0] * normal[0] * a, sign * b, -sign * normal[0])
+    return tangent, wp.vec3(b, sign + normal[1] * normal[1] * a, -normal[1])
+
+
+@wp.func
+def _turn(guide_normal: wp.vec3, normal: wp.vec3):
+    """Cosine and sine of Z: where the least rotation from one normal to the other leaves the guide's tangent."""
+    guide_tangent, _guide_bitangent = _frame(guide_normal)
+    tangent, bitangent = _frame(normal)
+    # For t across a: R t = t - (t·b) (a + b) / (1 + a·b). Opposite normals have no least rotation: any will do.
+    lean = wp.dot(guide_tangent, normal) / wp.max(1.0 + wp.dot(guide_normal, normal), 1.0e-6)
+    turned = guide_tangent - lean * (guide_normal + normal)
+    return wp.normalize(wp.vec2(wp.dot(tangent, turned), wp.dot(bitangent, turned)))
+
+
+@wp.kernel
+def _weigh(
+    indices: wp.array2d[int],
+    distances: wp.array2d[float],
+    normals: wp.array[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    influence_distance: float,
+    # outputs
+    out_weights: wp.array2d[float],
+    out_turns: wp.array2d[wp.vec2],
+):
+    strand = wp.tid()
+    sigma = 0.5 * influence_distance  # Eq. 9
+    nearest = distances[strand, 0]
+    total = float(0.0)
+    for slot in range(indices.shape[1]):
+        weight = float(0.0)
+        turn = wp.vec2(1.0, 0.0)
+        guide = indices[strand, slot]
+        if guide >= 0:
+            distance = distances[strand, slot]
+            # Relative to the nearest guide's, which cancels in Eq. 10: no weight of a far root is lost to rounding.
+            weight = wp.exp((nearest * nearest - distance * distance) / (2.0 * sigma * sigma))
+            turn = _turn(guide_normals[guide], normals[strand])
+        out_weights[strand, slot] = weight
+        out_turns[strand, slot] = turn
+        total += weight
+    for slot in range(indices.shape[1]):
+        out_weights[strand, slot] = out_weights[strand, slot] / total
+
+
+@wp.kernel
+def _framed_offsets(
+    guide_points: wp.array2d[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    # outputs
+    out_blocks: wp.array3d[block],
+):
+    guide, part = wp.tid()
+    normal = guide_normals[guide]
+    tangent, bitangent = _frame(normal)
+    x = block(0.0)
+    y = block(0.0)
+    z = block(0.0)
+    first = BLOCK * part
+    for point in range(wp.min(BLOCK, guide_points.shape[1] - first)):
+        offset = guide_points[guide, first + point] - guide_points[guide, 0]  # the sum of Eq. 7's offsets
+        x[point] = wp.dot(tangent, offset)
+        y[point] = wp.dot(bitangent, offset)
+        z[point] = wp.dot(normal, offset)
+    out_blocks[guide, part, 0] = x
+    out_blocks[guide, part, 1] = y
+    out_blocks[guide, part, 2] = z
+
+
+@wp.kernel
+def _interpolate(
+    roots: wp.array[wp.vec3],
+    normals: wp.array[wp.vec3],
+    blocks: wp.array3d[block],
+    indices: wp.array2d[int],
+    weights: wp.array2d[float],
+    turns: wp.array2d[wp.vec2],
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    strand = wp.tid()
+    root = roots[strand]
+    normal = normals[strand]
+    tangent, bitangent = _frame(normal)
+    row = out_points[strand]
+    for part in range(blocks.shape[1]):
+        # A block of points at once, coordinate by coordinate: that is what fills vector registers.
+        x = block(0.0)
+        y = block(0.0)
+        z = block(0.0)
+        for slot in range(indices.shape[1]):
+            guide = indices[strand, slot]
+            if guide >= 0:
+                weight = weights[strand, slot]
+                cosine = weight * turns[strand, slot][0]
+                sine = weight * turns[strand, slot][1]
+                guide_x = blocks[guide, part, 0]
+                guide_y = blocks[guide, part, 1]
+                x += cosine * guide_x - sine * guide_y
+                y += sine * guide_x + cosine * guide_y
+                z += weight * blocks[guide, part, 2]
+        first = BLOCK * part
+        for point in range(wp.min(BLOCK, row.shape[0] - first)):
+            row[first + point] = root + x[point] * tangent + y[point] * bitangent + z[point] * normal  # Eq. 10
