@@ -111,7 +111,7 @@ LIGHTS = {
     "disk": ("AREA", ABOVE, {"shape": "DISK"}),
     "ellipse": ("AREA", ABOVE, {"shape": "ELLIPSE"}),
     "square, not normalised": ("AREA", ABOVE, {"shape": "SQUARE", "normalize": False}),
-    "rectangle, stretched": ("AREA", ABOVE @ Matrix.Diagonal((2, 1, 3, 1)), {"shape": "RECTANGLE", "normalize": False}),
+    "rectangle, stretched": ("AREA", ABOVE @ Matrix.Diagonal((2, 3, 5, 1)), {"shape": "RECTANGLE", "normalize": False}),
     "disk, not normalised": ("AREA", ABOVE, {"shape": "DISK", "normalize": False}),
     "ellipse, not normalised": ("AREA", ABOVE, {"shape": "ELLIPSE", "normalize": False}),
     "square, gathered": ("AREA", ABOVE, {"shape": "SQUARE", "spread": math.radians(100.0)}),
