@@ -16,6 +16,8 @@ void main()
   vec4 here = strand_point(strand, point);
   vec3 along = strand_point(strand, min(point + 1, view.point_count - 1)).xyz -
                strand_point(strand, max(point - 1, 0)).xyz;
+  // A strand that turns back on itself has no tangent there; any will do, as long as it is one.
+  along = (dot(along, along) > 0.0) ? along : vec3(0.0, 0.0, 1.0);
 
   strand_index = strand;
   strand_tangent = (view.object_to_world * vec4(along, 0.0)).xyz;

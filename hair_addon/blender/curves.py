@@ -132,15 +132,22 @@ def read_roots(curves, surface, first_points):
     """
     stored = _stored_roots(curves, surface)
     if stored is None:
-        return closest_points(surface.mesh, first_points)
+        return _nearest_roots(surface, first_points)
     distance = np.linalg.norm(mesh_math.positions(surface.mesh, stored) - first_points, axis=1)
     extent = np.ptp(surface.mesh.vertices, axis=0).max()
     stale = np.flatnonzero(~(distance <= _ROOT_TOLERANCE * extent))
     if len(stale):
-        found = closest_points(surface.mesh, first_points[stale])
+        found = _nearest_roots(surface, first_points[stale])
         stored.triangle[stale] = found.triangle
         stored.barycentric[stale] = found.barycentric
     return stored
+
+
+def _nearest_roots(surface, places):
+    from ..core.surface_query import SurfaceQuery  # Warp takes longer to import than the add-on may take to start
+
+    mesh_math.check_mesh(surface.mesh)
+    return SurfaceQuery(surface.mesh).nearest(places)
 
 
 def _stored_roots(curves, surface):

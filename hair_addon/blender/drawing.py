@@ -70,7 +70,7 @@ def _strip(vertex_count, primitive="TRI_STRIP"):
 def kajiya_kay_shading(settings):
     """The Kajiya-Kay model, ready to draw. The cylinder is opaque: half of what it scatters goes on."""
     program = shaders.strand_program("kajiya_kay.frag", kajiya_kay.Settings)
-    scattered = np.array(settings.diffuse_color) + np.array(settings.specular_color)
+    scattered = kajiya_kay.mean_albedo(settings)
     return Shading(program, uniforms.uniform_buffer(uniforms.fill(settings)), {}, scattered, 0.5 * scattered)
 
 

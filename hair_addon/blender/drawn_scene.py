@@ -44,7 +44,7 @@ def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, shad
         (drawing.upload_surface(mesh.positions, mesh.normals), mesh.color)
         for mesh in scene.read_drawn_meshes(depsgraph, for_render=viewport is None)
     ]
-    lights = scene.read_lights(depsgraph)
+    lights = scene.read_lights(depsgraph, for_render=viewport is None)
     shadow_maps = shadow_maps or ShadowMaps()
     shadow_maps.draw(lights, [(strands, to_world) for strands, _, to_world in hair], [batch for batch, _ in surfaces])
     return DrawnScene(hair, surfaces, lights, scene.read_world_radiance(blender_scene), shadow_maps)

@@ -1,10 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""bpy.app.handlers: what became stale, learned from depsgraph updates, never by looking at the data."""
+"""bpy.app.handlers: what became stale, learned from depsgraph updates."""
 
 import bpy
+import numpy as np
 from bpy.app.handlers import persistent
 
+from . import curves as curves_door
 from . import hair_cache, pipeline, viewport
+
+# Guides as they were when their geometry was last reported: session_uid → (N, 3) points. Blender reports the geometry
+# of Curves as updated when no more than their surface's place has changed.
+_guide_points = {}
 
 
 @persistent
@@ -17,10 +23,18 @@ def after_depsgraph_update(_scene, depsgraph):
     for datablock in changed:
         if isinstance(datablock, bpy.types.Curves):
             hair_cache.forget(datablock.session_uid)
-            _mark_followers(datablock)
+            if datablock.vellus.kind == "GUIDES" and _has_moved(datablock):
+                _mark_followers(datablock)
         elif isinstance(datablock, bpy.types.Mesh):
             _mark_grown_on(datablock)
     _evaluate_stale(depsgraph)
+
+
+def _has_moved(guide_curves):
+    points = curves_door.read_points(guide_curves)
+    before = _guide_points.get(guide_curves.session_uid)
+    _guide_points[guide_curves.session_uid] = points
+    return before is None or not np.array_equal(before, points)
 
 
 def _mark_followers(guide_curves):
@@ -60,6 +74,7 @@ def forget_everything(*_args):
     """Undo, redo and a new file bring other data under the same names."""
     viewport.forget()
     hair_cache.clear()
+    _guide_points.clear()
 
 
 _HANDLERS = (
@@ -80,3 +95,4 @@ def unregister():
     """Stop listening."""
     for handlers, handler in _HANDLERS:
         handlers.remove(handler)
+    _guide_points.clear()

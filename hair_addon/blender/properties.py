@@ -14,6 +14,8 @@ from ..core.groom import GuideSettings, HairSettings
 from ..core.params import declared, label_of
 from ..core.shading import kajiya_kay, lookup_tables
 
+_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
+
 MODELS = (
     ("KAJIYA_KAY", "Kajiya-Kay", "An opaque cylinder: a diffuse part and one highlight"),
     ("MARSCHNER", "Marschner", "A glass fibre: reflection, transmission and internal reflection from baked tables"),
@@ -55,18 +57,18 @@ def _limits(details, is_integer):
 
 def to_settings(owner, settings_class):
     """The `Settings` that an operator or property group holds. Raises `HairError` for what the range forbids."""
-    return settings_class(
-        **{name: _plain(getattr(owner, name)) for name, _default, _details in declared(settings_class)}
-    )
+    values = {name: _plain(getattr(owner, name), default) for name, default, _details in declared(settings_class)}
+    return settings_class(**values)
 
 
-def _plain(value):
-    if isinstance(value, float):
-        # Properties are single precision: 0.15 comes back as 0.15000000596. The shortest decimal is what was meant.
-        return float(str(np.float32(value)))
-    if isinstance(value, str | bool | int):
-        return value
-    return tuple(_plain(float(component)) for component in value)
+def _plain(value, default):
+    """A property's value as it was meant: single precision gives 0.15 back as 0.15000000596."""
+    if isinstance(default, float):
+        # The shortest decimal is what somebody typed; a default such as 15° in radians has no short one.
+        return default if np.float32(default) == np.float32(value) else float(str(np.float32(value)))
+    if isinstance(default, tuple):
+        return tuple(_plain(float(component), meant) for component, meant in zip(value, default, strict=True))
+    return value
 
 
 def assign(owner, settings):
@@ -138,6 +140,7 @@ class VellusCurves(bpy.types.PropertyGroup):
         name="Table Folder",
         description="Folder with baked tables; they are used while their settings are those of this hair",
         subtype="DIR_PATH",
+        options=_RELATIVE,
         update=_mark_shading,
     )
     is_drawn: bpy.props.BoolProperty(
@@ -181,9 +184,9 @@ def copy(source, target, settings_class):
 
 def folder(description):
     """The `directory` property that a file browser fills."""
-    return bpy.props.StringProperty(name="Folder", description=description, subtype="DIR_PATH")
+    return bpy.props.StringProperty(name="Folder", description=description, subtype="DIR_PATH", options=_RELATIVE)
 
 
 def file(description):
     """The `filepath` property that a file browser fills."""
-    return bpy.props.StringProperty(name="File", description=description, subtype="FILE_PATH")
+    return bpy.props.StringProperty(name="File", description=description, subtype="FILE_PATH", options=_RELATIVE)

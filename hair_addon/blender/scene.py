@@ -61,8 +61,7 @@ def read_surface(surface_object, depsgraph):
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        vertices = np.empty((len(mesh.vertices), 3), np.float32)
-        mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
+        vertices = _vertex_positions(mesh)
         mesh.calc_loop_triangles()
         triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
         mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
@@ -80,8 +79,17 @@ def read_surface(surface_object, depsgraph):
     if is_mirrored:
         triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
         corner_uvs = None if corner_uvs is None else corner_uvs[:, [0, 2, 1]]
-    vertices = (vertices @ to_world_axes.T).astype(np.float32)
+    with np.errstate(invalid="ignore"):  # what is not finite is refused where the mesh is checked
+        vertices = (vertices @ to_world_axes.T).astype(np.float32)
     return Surface(surface_object.name, TriMesh(vertices, triangles), corner_uvs, uv_map, to_world_axes, is_mirrored)
+
+
+def _vertex_positions(mesh):
+    """(V, 3) float32; a mesh without vertices has no attribute of positions either."""
+    vertices = np.empty((len(mesh.vertices), 3), np.float32)
+    if len(vertices):
+        mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
+    return vertices
 
 
 def read_vertex_group(surface_object, depsgraph, name):
@@ -105,17 +113,16 @@ def read_vertex_group(surface_object, depsgraph, name):
     return weights
 
 
-def read_lights(depsgraph):
-    """The scene's visible lights as a `uniforms.LIGHTS` record, the strongest kinds first come, first served."""
+def read_lights(depsgraph, for_render):
+    """The visible lights, or those that are rendered, as a `uniforms.LIGHTS` record: its capacity of the first."""
+    lights = [
+        _read_light(instance.object.data, np.array(instance.matrix_world))
+        for instance in depsgraph.object_instances
+        if instance.object.type == "LIGHT" and not (for_render and instance.object.hide_render)
+    ][: uniforms.LIGHT_CAPACITY]
     record = uniforms.LIGHTS.record()
-    count = 0
-    for instance in depsgraph.object_instances:
-        light_object = instance.object
-        if light_object.type != "LIGHT" or count == uniforms.LIGHT_CAPACITY:
-            continue
-        record["light"][count] = _read_light(light_object.data, np.array(instance.matrix_world))
-        count += 1
-    record["count"] = count
+    record["light"][: len(lights)] = lights
+    record["count"] = len(lights)
     return record
 
 
@@ -212,9 +219,7 @@ def _read_drawn_mesh(mesh_object, to_world):
     try:
         mesh.calc_loop_triangles()
         count = len(mesh.loop_triangles)
-        vertices = np.empty((len(mesh.vertices), 3), np.float32)
-        if count:
-            mesh.attributes["position"].data.foreach_get("vector", vertices.ravel())
+        vertices = _vertex_positions(mesh)
         corners = np.empty(3 * count, np.int32)
         mesh.loop_triangles.foreach_get("vertices", corners)
         loops = np.empty(3 * count, np.int32)

@@ -48,9 +48,7 @@ def draw():
             context.scene, context.view_layer, context.evaluated_depsgraph_get(), viewport, hair_cache.refuse
         )
     drawn = _drawn[key]
-    drawn_scene.draw_hair(
-        drawn, drawing.view_record(world_to_view, view_to_clip, context.region.height, _STRAND_WIDTH)
-    )
+    drawn_scene.draw_hair(drawn, drawing.view_record(world_to_view, view_to_clip, context.region.height, _STRAND_WIDTH))
     if viewport.overlay.show_overlays:
         view = drawing.view_record(world_to_view, view_to_clip, context.region.height, _GUIDE_WIDTH)
         for guide_object in scene.curves_objects(context.view_layer, "GUIDES", viewport):

@@ -41,9 +41,9 @@ def test_curves_carry_what_blender_expects(kind, request, sphere):
 def test_roots_lie_on_the_surface_with_its_normal_and_uv(hair, sphere):
     roots = points(hair)[:, 0]
     normals = attribute(hair, "surface_normal", 3)
-    # An icosphere of four subdivisions lies within 0.3 % of the sphere, its smooth normals within a degree.
-    np.testing.assert_allclose(np.linalg.norm(roots, axis=1), 1.0, atol=4e-3)
-    np.testing.assert_allclose((normals * roots).sum(axis=1), 1.0, atol=4e-3)
+    # An icosphere of four subdivisions lies within half a per cent of the sphere, its smooth normals within a degree.
+    np.testing.assert_allclose(np.linalg.norm(roots, axis=1), 1.0, atol=5e-3)
+    np.testing.assert_allclose((normals * roots).sum(axis=1), 1.0, atol=5e-3)
     surface = read_surface(sphere)
     first = attribute(hair, "root_triangle")
     uvs = attribute(hair, "surface_uv_coordinate", 2)

@@ -128,7 +128,7 @@ def test_irradiance_equals_cycles(wall, tmp_path, name):
         settings = {"size": SMALL, "size_y": 2.0 * SMALL, **settings}
     add_light(wall, kind, matrix, **settings)
     rendered = cycles_irradiance(wall, tmp_path)
-    lights = door.read_lights(bpy.context.evaluated_depsgraph_get())
+    lights = door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)
     assert lights["count"] == 1
     computed = shader_irradiance(lights)
     assert rendered.max() > 0.0
@@ -138,4 +138,4 @@ def test_irradiance_equals_cycles(wall, tmp_path, name):
 
 
 def test_a_scene_without_lights_is_dark(wall):
-    assert door.read_lights(bpy.context.evaluated_depsgraph_get())["count"] == 0
+    assert door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)["count"] == 0

@@ -53,3 +53,18 @@ def kajiya_kay(tangent, to_light, to_view, settings):
     specular = kajiya_kay_specular(tangent, to_light, to_view, settings.exponent)[..., None]
     # The integral of sin(T, L) over the sphere is pi^2: divided by it, the diffuse colour is an albedo.
     return np.asarray(settings.diffuse_color) * diffuse / np.pi**2 + np.asarray(settings.specular_color) * specular
+
+
+def kajiya_kay_specular_albedo(exponent):
+    """What a highlight of peak one returns of a uniform surrounding, the mean over all directions of view.
+
+    The exact value is pi / 2 times the integral of cos^n(s) ((pi - |s|) cos(s) + sin(|s|)) over s = theta_i + theta_o;
+    this is within 0.5 % of it from the exponent 10 on, 4 % at 1.
+    """
+    return 0.5 * np.pi**2 * np.sqrt(2.0 * np.pi / (exponent + 1.5))
+
+
+def mean_albedo(settings):
+    """Radiance in a uniform surrounding of radiance one, RGB (3,), as `albedo.mean_albedo` for the Marschner model."""
+    specular = np.asarray(settings.specular_color) * kajiya_kay_specular_albedo(settings.exponent)
+    return np.asarray(settings.diffuse_color) + specular

@@ -6,7 +6,7 @@ The numbers are those of Blender's Principled Hair, so that a viewport and a Cyc
 
 import numpy as np
 
-# Absorption of unit concentrations for red, green and blue [dEon11], in the scale of Cycles.
+# Absorption of unit concentrations for red, green and blue [DEon11], in the scale of Cycles.
 _EUMELANIN = np.array([0.506, 0.841, 1.653])
 _PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 

@@ -37,7 +37,7 @@ def test_more_melanin_absorbs_more_and_blue_most(melanin, redness):
 
 @pytest.mark.parametrize(("melanin", "concentration"), [(0.220, 0.3), (0.659, 1.3), (0.9987, 8.0)])
 def test_blond_brown_and_black_have_the_published_eumelanin(melanin, concentration):
-    """Concentrations of [dEon11] with the absorption given there, which Cycles' scale exceeds by 1.207."""
+    """Concentrations of [DEon11] with the absorption given there, which Cycles' scale exceeds by 1.207."""
     published = concentration * np.array([0.419, 0.697, 1.37])
     np.testing.assert_allclose(pigment.sigma_a_from_melanin(melanin, 0.0), published, rtol=0.01)
 
