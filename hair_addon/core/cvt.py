@@ -66,7 +66,9 @@ def relax(mesh, sites, iterations, density=None, device="cpu"):
     for iteration in range(iterations):
         places = positions(pieces.mesh, sites)
         energies[iteration] = pieces.assign(places)
-        sites = ground.move(sites, places, pieces.centroids(places))
+        # The last iteration ends at the centroids, so that nothing is left swinging about them.
+        reach = 1.0 if iteration == iterations - 1 else OVER_RELAXATION
+        sites = ground.move(sites, places, pieces.centroids(places), reach)
     energies[iterations] = pieces.assign(positions(pieces.mesh, sites))
     return Relaxation(sites, energies * pieces.size**4)
 
@@ -135,13 +137,14 @@ class _Ground:
             indices=wp.array(mesh.triangles[self.triangles].ravel(), dtype=int, device=device),
         )
 
-    def move(self, sites, places, centroids):
-        """Sites at places (n, 3) moved past their centroids (n, 3), or to them, as long as that costs their cells less.
+    def move(self, sites, places, centroids, reach):
+        """Sites at places (n, 3) moved `reach` times the way to their centroids (n, 3), or just to these.
 
-        A cell's cost is mass × |s - c|², so |s - c| decides; where the surface bends, farther is not always better.
+        A cell's cost is mass × |s - c|². A site moves only to where that is less than at its old place: far beyond the
+        centroid it need not be where the surface bends.
         """
         squares = np.sum((places - centroids) ** 2, axis=1)
-        for target in (centroids, places + OVER_RELAXATION * (centroids - places)):
+        for target in (centroids, places + reach * (centroids - places)):
             moved = self._nearest(target)
             better = np.sum((positions(self.mesh, moved) - centroids) ** 2, axis=1) < squares
             better &= interpolate(self.density, self.mesh, moved) > 0.0

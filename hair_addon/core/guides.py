@@ -4,7 +4,7 @@
 import numpy as np
 import warp as wp
 
-from .bspline import greville_abscissae
+from .bspline import basis, greville_abscissae
 from .mesh import normals, positions
 
 wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
@@ -46,7 +46,9 @@ def grow(mesh, roots, *, length, length_variation, tilt, gravity, seed, control_
         outputs=[path],
         device=device,
     )
-    return _along(path.numpy(), greville_abscissae(control_point_count))
+    # Controls whose curve runs through the arc itself, so that it is neither shorter nor nearer to the surface.
+    abscissae = greville_abscissae(control_point_count)
+    return np.linalg.inv(basis(abscissae, control_point_count)).astype(np.float32) @ _along(path.numpy(), abscissae)
 
 
 def _tilted(directions, largest, random_angle, random_turn):

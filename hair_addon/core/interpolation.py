@@ -40,7 +40,7 @@ class GuideWeights:
 def automatic_influence_distance(guide_roots):
     """Twice the mean distance [m] from a guide's root to the next one's; guide_roots (G,) vec3 [m].
 
-    Evenly placed guides then have about eleven in reach of any root. A lone guide is followed from anywhere: 1 m will do.
+    Any root then has about eleven evenly placed guides in reach. A lone guide is followed from anywhere: 1 m will do.
     """
     extent = float(np.linalg.norm(np.ptp(guide_roots.numpy(), axis=0)))
     if extent == 0.0:

@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""200 curves of 6 controls evaluated at 41 points ([Report12] section 5), ours beside scipy in the same run."""
+
+import time
+
+import numpy as np
+from scipy.interpolate import BSpline
+
+from hair_addon.core import bspline
+
+
+def medians(ways, repetitions=200):
+    """Median time [s] of each way, called in turns so that all meet the same machine."""
+    times = {name: [] for name in ways}
+    for _ in range(repetitions):
+        for name, way in ways.items():
+            start = time.perf_counter()
+            way()
+            times[name].append(time.perf_counter() - start)
+    return {name: float(np.median(measured[repetitions // 10 :])) for name, measured in times.items()}
+
+
+def test_matrix_is_no_slower_than_scipy(rng):
+    controls = rng.random((200, 6, 3), dtype=np.float32)
+    parameters = np.linspace(0.0, 1.0, 41)
+    knots = bspline.clamped_knots(6)
+    made = BSpline(knots, controls, 3, axis=1)
+    times = medians(
+        {
+            "scipy, evaluation alone": lambda: made(parameters),
+            "scipy": lambda: BSpline(knots, controls, 3, axis=1)(parameters),
+            "recursion": lambda: bspline.evaluate_recursive(controls, parameters),
+            "subdivision": lambda: bspline.subdivide(controls, 3),
+            "matrix, Warp kernel": lambda: bspline.evaluate_on_warp(controls, 41),
+            "matrix": lambda: bspline.evaluate(controls, 41),
+        }
+    )
+    for name, seconds in times.items():
+        print(f"{name:24} {1e6 * seconds:8.1f} µs   {seconds / times['scipy']:6.2f} × scipy")
+    assert times["matrix"] <= times["scipy, evaluation alone"]
