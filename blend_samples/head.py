@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 from mathutils import Vector
+from mathutils.bvhtree import BVHTree
 
 HEAD = Path(__file__).with_name("head.obj")
 
@@ -27,7 +28,10 @@ _HAIRLINE = np.array(
 )
 _HAIRLINE_WIDTH = 0.008  # [m] over which hair thins out at its border
 
-LOOK_AT = Vector((0.0, -0.055, 0.735))
+PARTING = 0.018  # [m] left of the middle
+CHESTNUT = (0.11, 0.27, 0.70)  # absorption per fibre radius
+
+LOOK_AT = Vector((0.012, -0.04, 0.715))
 
 
 def build():
@@ -73,18 +77,19 @@ def light():
     """Camera and lights: a key that shows both highlights, a rim that shines through, a dim surrounding."""
     scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.lens = 85.0
+    camera.data.lens = 78.0
     camera.data.clip_start = 0.01
-    camera.location = (0.72, -0.98, 0.86)
+    camera.location = (0.80, -1.12, 0.80)
     _point_at(camera, LOOK_AT)
     scene.collection.objects.link(camera)
     scene.camera = camera
-    _add_light("Key", (-0.35, -0.95, 1.45), 9.0, (1.0, 0.95, 0.88))
-    _add_light("Rim", (-0.75, 0.85, 1.25), 16.0, (1.0, 0.93, 0.85))
-    _add_light("Fill", (1.3, -0.5, 0.8), 3.0, (0.80, 0.88, 1.0))
+    _add_light("Key", (1.35, -0.80, 1.10), 26.0, (1.0, 0.95, 0.88))
+    _add_light("Rim", (-0.35, 1.05, 1.25), 40.0, (1.0, 0.93, 0.85))
+    _add_light("Fill", (-0.9, -1.2, 0.9), 4.0, (0.80, 0.88, 1.0))
+    scene.view_settings.look = "AgX - Medium High Contrast"
     world = scene.world = bpy.data.worlds.new("World")
     background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.055, 0.06, 0.068, 1.0)
+    background.inputs["Color"].default_value = (0.030, 0.033, 0.038, 1.0)
     bpy.context.view_layer.update()
 
 
@@ -102,16 +107,63 @@ def _point_at(turned, target):
 
 
 def grow(head, guide_count=200, strand_count=30_000, seed=1):
-    """Guides and hair on the scalp by Vellus' operators; returns the objects `Guides` and `Hair`."""
+    """Guides on the scalp, combed, and hair between them; returns the objects `Guides` and `Hair`."""
     bpy.context.view_layer.objects.active = head
     bpy.ops.vellus.distribute_guides(
         guide_count=guide_count,
         seed=seed,
         density_group="scalp",
-        length=0.17,
-        length_variation=0.12,
-        tilt=math.radians(12.0),
+        length=0.22,
+        length_variation=0.10,
+        tilt=math.radians(8.0),
         gravity=0.85,
     )
-    bpy.ops.vellus.interpolate_hair(strand_count=strand_count, seed=seed, density_group="scalp", radius=7e-5)
-    return bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    guides = bpy.data.objects["Guides"]
+    comb(guides, head)
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.vellus.interpolate_hair(strand_count=strand_count, seed=seed, density_group="scalp", radius=6e-5)
+    hair = bpy.data.objects["Hair"]
+    hair.data.vellus.marschner.sigma_a = CHESTNUT
+    hair.data.vellus.kajiya_kay.diffuse_color = (0.25, 0.13, 0.06)
+    return guides, hair
+
+
+def comb(guides, head):
+    """Comb guides off the face, to both sides of a parting: what an artist does with a brush in sculpt mode."""
+    curves = guides.data
+    points = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", points.ravel())
+    strands = points.reshape(len(curves.curves), -1, 3)
+    surface = BVHTree.FromObject(head, bpy.context.evaluated_depsgraph_get())
+    for strand in strands:
+        strand[:] = _combed(strand, surface)
+    curves.attributes["position"].data.foreach_set("vector", points.ravel())
+    curves.update_tag()
+    bpy.context.view_layer.update()
+
+
+def _combed(strand, surface):
+    """(P, 3) points of the same length as before: from the root sideways and back, then down, clear of the skin."""
+    step = float(np.linalg.norm(np.diff(strand, axis=0), axis=1).mean())
+    position = Vector(strand[0])
+    _near, normal, _face, _distance = surface.find_nearest(position)
+    side = math.copysign(1.0, position.x - PARTING)
+    in_front = max(0.0, min(1.0, (-0.02 - position.y) / 0.10))
+    sweep = Vector((side * (0.30 + 0.55 * in_front), 0.30 + 0.75 * in_front, -0.45 + 0.30 * in_front)).normalized()
+    combed = [position.copy()]
+    direction = (0.7 * normal + 1.2 * sweep).normalized()
+    for i in range(1, len(strand)):
+        t = i / (len(strand) - 1)
+        fall = min(1.0, max(0.0, (t - 0.12) / 0.5))
+        aim = sweep.lerp(Vector((-side * 0.04, -0.02, -1.0)), fall)
+        direction = (direction + 0.28 * aim).normalized()
+        ahead = position + step * direction
+        near, normal, _face, _distance = surface.find_nearest(ahead)
+        clearance = 0.004 + 0.016 * min(1.0, 3.0 * t)
+        height = (ahead - near).dot(normal)
+        if height < clearance:
+            ahead += (clearance - height) * normal
+            direction = (ahead - position).normalized()
+        position = position + step * direction
+        combed.append(position.copy())
+    return np.array(combed, np.float32)

@@ -10,9 +10,10 @@ vec4 strand_point(int strand, int point)
 
 void main()
 {
-  int strand, point;
+  int strand, drawn_point;
   float side;
-  strip_vertex(gl_VertexID, view.point_count, strand, point, side);
+  strip_vertex(gl_VertexID, view.drawn_points, strand, drawn_point, side);
+  int point = (drawn_point * (view.point_count - 1)) / (view.drawn_points - 1);
   vec4 here = strand_point(strand, point);
   vec3 along = strand_point(strand, min(point + 1, view.point_count - 1)).xyz -
                strand_point(strand, max(point - 1, 0)).xyz;

@@ -17,7 +17,7 @@ void main()
                                    light.cos_cone,
                                    light.blend,
                                    drawn_position);
-    irradiance += max(dot(N, L), 0.0) * facing * visibility(light, drawn_position, view.hair_forward.rgb);
+    irradiance += max(dot(N, L), 0.0) * facing * visibility(light, drawn_position, view.hair_forward.rgb, 2);
   }
   color = vec4(surface_color * irradiance / PI, 1.0);
 }

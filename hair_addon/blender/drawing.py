@@ -26,6 +26,7 @@ class StrandsOnGPU:
 
     texture: gpu.types.GPUTexture
     batch: gpu.types.GPUBatch
+    strand_count: int
     point_count: int
     row_strands: int
     bounds: np.ndarray  # (2, 3): least and greatest coordinates
@@ -56,10 +57,14 @@ def upload_strands(points, radii):
         data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel()),
     )
     texture.filter_mode(False)
-    # Two vertices a point, and one repeated at either end so that strands do not join.
-    vertex_count = strand_count * (2 * point_count + 2)
+    vertex_count = _vertex_count(strand_count, point_count)
     bounds = np.stack([points.min(axis=(0, 1)), points.max(axis=(0, 1))])
-    return StrandsOnGPU(texture, _strip(vertex_count), point_count, row_strands, bounds)
+    return StrandsOnGPU(texture, _strip(vertex_count), strand_count, point_count, row_strands, bounds)
+
+
+def _vertex_count(strand_count, drawn_points):
+    """Two vertices a point, and one repeated at either end so that strands do not join."""
+    return strand_count * (2 * drawn_points + 2)
 
 
 def _strip(vertex_count, primitive="TRI_STRIP"):
@@ -120,20 +125,24 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     return record
 
 
-def draw_strands(strands, shading, view, lights, object_to_world, shadow_maps=None):
+def draw_strands(strands, shading, view, lights, object_to_world, shadow_maps=None, point_step=1):
     """Draw `StrandsOnGPU` into the bound framebuffer.
 
-    view, lights: records of `uniforms`; shadow_maps: {sampler: texture}, None for a shader that reads none.
+    view, lights: records of `uniforms`; shadow_maps: {sampler: texture}, None for a shader that reads none;
+    point_step: every how many-th point is drawn, for pictures too coarse to show them all.
     """
+    drawn_points = max(2, -(-strands.point_count // point_step))
     record = view.copy()
     record["object_to_world"] = object_to_world.T
     record["object_scale"] = abs(np.linalg.det(object_to_world[:3, :3])) ** (1.0 / 3.0)
     record["point_count"] = strands.point_count
+    record["drawn_points"] = drawn_points
     record["row_strands"] = strands.row_strands
     record["hair_albedo"][:3] = shading.albedo
     record["hair_forward"][:3] = shading.forward
     samplers = {"strands": strands.texture, **shading.samplers, **(shadow_maps or {})}
-    _draw(strands.batch, shading.program, record, lights, samplers, shading.settings)
+    vertex_count = _vertex_count(strands.strand_count, drawn_points)
+    _draw(strands.batch, shading.program, record, lights, samplers, shading.settings, vertex_count)
 
 
 def draw_surface(surface, color, view, lights, shadow_maps):
@@ -149,7 +158,7 @@ def draw_surface_depth(surface, view, lights):
     _draw(surface, shaders.surface_program("shadow_front.frag", shadow_samplers=()), view, lights, {})
 
 
-def _draw(batch, program, view, lights, samplers, settings=None):
+def _draw(batch, program, view, lights, samplers, settings=None, vertex_count=0):
     program.bind()
     # The program does not hold its blocks: they have to live until the draw call is over.
     blocks = {"view": uniforms.uniform_buffer(view), "lights": uniforms.uniform_buffer(lights)}
@@ -159,7 +168,7 @@ def _draw(batch, program, view, lights, samplers, settings=None):
         program.uniform_block(name, block)
     for name, texture in samplers.items():
         program.uniform_sampler(name, texture)
-    batch.draw(program)
+    batch.draw_range(program, elem_count=vertex_count)  # zero: all there are
 
 
 def upload_surface(positions, normals):

@@ -25,7 +25,7 @@ _SHADING_CAPACITY = 8
 def hair_on_gpu(datablock):
     """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`."""
     strands_there = strands_on_gpu(datablock)
-    return strands_there, strands_there and _shading_of(datablock.vellus)
+    return strands_there, strands_there and shading_of(datablock)
 
 
 def strands_on_gpu(datablock):
@@ -72,7 +72,9 @@ def _read(datablock):
     return strands.resample(points, starts, most), np.repeat(mean_radii[:, None], most, axis=1)
 
 
-def _shading_of(state):
+def shading_of(datablock):
+    """`Shading` of a hair Curves datablock: its model, ready to draw. Raises `HairError`."""
+    state = datablock.vellus
     if state.model == "KAJIYA_KAY":
         return _kept(properties.to_settings(state.kajiya_kay, kajiya_kay.Settings), drawing.kajiya_kay_shading)
     settings = properties.to_settings(state.marschner, lookup_tables.Settings)

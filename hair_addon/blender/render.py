@@ -36,7 +36,8 @@ def draw_picture(blender_scene, view_layer, depsgraph, settings):
     if max(width, height) > largest:
         raise HairError(f"{width} × {height} samples do not fit this graphics driver's {largest}: use fewer.")
     world_to_view, view_to_clip = scene.read_camera(blender_scene, depsgraph, settings.width, settings.height)
-    view = drawing.view_record(world_to_view, view_to_clip, height)
+    # No strand is thinner than one of a pixel's samples: it would break into dots.
+    view = drawing.view_record(world_to_view, view_to_clip, height, least_width=1.0)
     drawn = drawn_scene.read(blender_scene, view_layer, depsgraph)
     background = (0.0, 0.0, 0.0, 0.0) if settings.is_transparent else (*drawn.world_radiance, 1.0)
 
@@ -46,7 +47,7 @@ def draw_picture(blender_scene, view_layer, depsgraph, settings):
     with framebuffer.bind():
         framebuffer.clear(color=background, depth=1.0)
         drawn_scene.draw_surfaces(drawn, view)
-        drawn_scene.draw_hair(drawn, view)
+        drawn_scene.draw_hair(drawn, view, depth_first=True)
     resolved = gpu.types.GPUTexture((settings.width, settings.height), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=resolved)
     with target.bind():

@@ -7,13 +7,15 @@ import numpy as np
 from . import drawing, shaders
 
 SHADOWED_LIGHTS = 4
-SIZE = 1024  # texels along a side of each map
+SIZE = 512  # texels along a side of each map: on a head, 0.8 mm
 
 SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 
 # Parts of the hair's diameter: how far apart a surface and itself may be, and how near a light may stand.
 _SURFACE_BIAS = 0.01
 _NEAREST = 0.01
+
+_POINT_STEP = 2  # a shadow's outline needs half the points
 
 _FAR = 1e4  # depth [m] of what no light meets; not more, as maps are filtered
 
@@ -57,13 +59,15 @@ class ShadowMaps:
                 drawing.draw_surface_depth(surface, view, lights)
         with self._target(self._hair_front, layer, _FAR), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             for strands, to_world in hair:
-                drawing.draw_strands(strands, front, view, lights, to_world)
+                drawing.draw_strands(strands, front, view, lights, to_world, point_step=_POINT_STEP)
         with (
             self._target(self._hair_layers, layer, 0.0),
             drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"),
         ):
             for strands, to_world in hair:
-                drawing.draw_strands(strands, layers, view, lights, to_world, {"hair_front": self._hair_front})
+                drawing.draw_strands(
+                    strands, layers, view, lights, to_world, {"hair_front": self._hair_front}, _POINT_STEP
+                )
 
     def _target(self, texture, layer, value):
         framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer}, depth_slot=self._depth)

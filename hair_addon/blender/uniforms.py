@@ -66,6 +66,7 @@ VIEW = Block(
         "hair_forward": "vec4",  # what one strand passes on of the light that meets it
         "is_perspective": "int",
         "point_count": "int",
+        "drawn_points": "int",  # of each strand's points, evenly chosen: at least two
         "row_strands": "int",
         "object_scale": "float",
         "least_half_width": "float",  # at distance one, in a perspective

@@ -22,7 +22,7 @@ void main()
                                        light.cos_cone,
                                        light.blend,
                                        drawn_position);
-    radiance += irradiance * visibility(light, drawn_position, view.hair_forward.rgb) * hair_bsdf(T, L, V);
+    radiance += irradiance * visibility(light, drawn_position, view.hair_forward.rgb, 0) * hair_bsdf(T, L, V);
   }
   color = vec4(radiance, 1.0);
 }

@@ -3,18 +3,33 @@
 
 #include "include/opacity.glsl"
 
-// Part of a light that arrives at a point, through strands and past surfaces. forward: what a strand passes on.
-vec3 visibility(Light light, vec3 position, vec3 forward)
+// What arrives at a depth, read at one place of a light's maps.
+vec3 visibility_at(vec3 at, float depth, Light light, vec3 forward)
+{
+  // Half a bias either side: a soft step that neither stripes a surface nor lets it shine through itself.
+  float behind_surface = depth - light.surface_bias - textureLod(surface_front, at, 0.0).r;
+  float lit = 1.0 - smoothstep(-0.5, 0.5, behind_surface / light.surface_bias);
+  float behind_hair = max(0.0, depth - textureLod(hair_front, at, 0.0).r) / light.extent;
+  return lit * transmitted(strands_in_front(textureLod(hair_layers, at, 0.0), behind_hair), forward);
+}
+
+// Part of a light that arrives at a point, through strands and past surfaces: the mean over (2 reach + 1)² texels.
+// forward: what one strand passes on.
+vec3 visibility(Light light, vec3 position, vec3 forward, int reach)
 {
   if (light.shadow_layer < 0) {
     return vec3(1.0);
   }
   vec4 clip = light.world_to_shadow * vec4(position, 1.0);
-  vec3 at = vec3(0.5 * clip.xy / clip.w + 0.5, float(light.shadow_layer));
+  vec2 centre = 0.5 * clip.xy / clip.w + 0.5;
   float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, position);
-  // Half a bias either side: a soft step that neither stripes a surface nor lets it shine through itself.
-  float behind_surface = depth - light.surface_bias - textureLod(surface_front, at, 0.0).r;
-  float lit = 1.0 - smoothstep(-0.5, 0.5, behind_surface / light.surface_bias);
-  float behind = max(0.0, depth - textureLod(hair_front, at, 0.0).r) / light.extent;
-  return lit * transmitted(strands_in_front(textureLod(hair_layers, at, 0.0), behind), forward);
+  float texel = 1.0 / float(textureSize(hair_front, 0).x);
+  vec3 total = vec3(0.0);
+  for (int y = -reach; y <= reach; y++) {
+    for (int x = -reach; x <= reach; x++) {
+      vec3 at = vec3(centre + vec2(float(x), float(y)) * texel, float(light.shadow_layer));
+      total += visibility_at(at, depth, light, forward);
+    }
+  }
+  return total / float((2 * reach + 1) * (2 * reach + 1));
 }
