@@ -11,7 +11,7 @@ from mathutils.bvhtree import BVHTree
 
 HEAD = Path(__file__).with_name("head.obj")
 
-# The hairline seen from the side, as (y, z) [m] from the forehead over temple and ear to the nape; the face looks to -Y.
+# The hairline from the side, (y, z) [m], from the forehead over temple and ear to the nape; the face looks to -Y.
 _HAIRLINE = np.array(
     [
         (-0.170, 0.820),

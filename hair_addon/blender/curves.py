@@ -46,6 +46,7 @@ def new_object(name, surface_object):
     curves.surface = surface_object
     curves_object = bpy.data.objects.new(name, curves)
     curves_object.parent = surface_object
+    surface_object.add_rest_position_attribute = True  # what Blender's own nodes find roots on a moving surface by
     collections = surface_object.users_collection or (bpy.context.scene.collection,)
     collections[0].objects.link(curves_object)
     return curves_object
