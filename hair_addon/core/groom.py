@@ -28,7 +28,13 @@ class GuideSettings(Settings):
     density_group: str = param("", "Vertex group that guides follow; empty: the whole surface")
     relax_iterations: int = param(30, "Rounds of relaxation that even out the guides", low=0, high=1000, soft_high=100)
     length: float = param(
-        0.15, "Length of the guides from root to tip", above=0.0, soft_high=1.0, unit="LENGTH", subtype="DISTANCE"
+        0.15,
+        "Length of the guides from root to tip",
+        above=0.0,
+        high=1e6,
+        soft_high=1.0,
+        unit="LENGTH",
+        subtype="DISTANCE",
     )
     length_variation: float = param(0.2, "Random part of the length", low=0.0, high=1.0, subtype="FACTOR")
     tilt: float = param(
@@ -56,13 +62,14 @@ class HairSettings(Settings):
         0.03,
         "Guides nearer to a root than this shape its strand",
         above=0.0,
+        high=1e6,
         soft_high=1.0,
         unit="LENGTH",
         subtype="DISTANCE",
     )
     neighbour_limit: int = param(8, "Most guides that one strand follows: the nearest", low=1, high=32)
     radius: float = param(
-        0.00008, "Radius of a strand at its root", above=0.0, soft_high=0.01, unit="LENGTH", precision=6
+        0.00008, "Radius of a strand at its root", above=0.0, high=1e3, soft_high=0.01, unit="LENGTH", precision=6
     )
     tip_taper: float = param(
         0.2, "Radius at the tip as a part of the radius at the root", low=0.0, high=1.0, subtype="FACTOR"

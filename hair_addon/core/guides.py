@@ -110,9 +110,8 @@ def _march(
             )
             away = ahead - wp.mesh_eval_position(surface, face, u, v)
             height = wp.dot(away, normal)
-            # Beyond the border of an open surface the nearest point lies sideways: nothing to slide on there.
-            sideways = wp.length(away - height * normal)
-            if height < wanted and height > -2.0 * step - clearance and sideways < 0.5 * wp.abs(height) + 0.1 * step:
+            # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
+            if height < wanted and wp.length(away - height * normal) < 0.5 * wanted:
                 direction = wp.normalize(ahead + (wanted - height) * normal - position)
         position += step * direction
         out_path[guide, i + 1] = position

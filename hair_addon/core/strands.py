@@ -77,10 +77,8 @@ def resample(points, starts, point_count):
         raise HairError("Some points of the curves are not finite numbers: delete those curves.")
     if len(counts) == 0:
         return np.empty((0, point_count, 3), np.float32)
-    # One running arc length over all polylines; the jump from a tip to the next root counts as nothing.
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1)
-    steps[starts[1:-1] - 1] = 0.0
-    along = np.concatenate([[0.0], np.cumsum(steps)])
+    # One running length over all polylines and the jumps between them, which no segment below is.
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     first, last = starts[:-1], starts[1:] - 1
     wanted = along[first, None] + np.linspace(0.0, 1.0, point_count) * (along[last] - along[first])[:, None]
     # The segment that holds each wanted length, kept inside its own polyline.

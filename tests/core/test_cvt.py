@@ -63,6 +63,15 @@ def test_sites_do_not_leave_their_islands(square):
     assert np.all(density[square.triangles[sites.triangle]].any(axis=1))
 
 
+def test_sites_do_not_stop_where_density_ends(square):
+    """The centroid of a ring is in its hole, and the nearest place on the ring is its border: density zero."""
+    radius = np.linalg.norm(square.vertices[:, :2] - 0.5, axis=1)
+    ring = ((radius > 0.25) & (radius < 0.45)).astype(float)
+    for seed in range(5):
+        site = relaxed(square, 1, 20, ring, seed).sites
+        assert mesh_math.interpolate(ring, square, site).min() > 0.0
+
+
 def test_energy_is_the_integral(sphere):
     """Against a sum over a million random points, each with the nearest site found another way."""
     sites = sample_surface(sphere, 50, seed=3)
