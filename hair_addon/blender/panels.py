@@ -6,7 +6,7 @@ import bpy
 from ..core.groom import GuideSettings, HairSettings
 from ..core.params import declared
 from ..core.shading import kajiya_kay, lookup_tables, marschner
-from .selection import active_of_kind, guides_of, surface_of
+from .selection import active_of_kind, guides_again, guides_of, surface_of
 
 
 class _HairTab:
@@ -34,9 +34,10 @@ class VELLUS_PT_guides(_HairTab, bpy.types.Panel):
         layout.use_property_decorate = False
         surface = surface_of(context.object)
         layout.label(text=surface.name if surface else "Select a mesh to grow hair on", icon="MESH_DATA")
-        guides = active_of_kind(context.object, "GUIDES")
-        if guides is None:
+        guides = guides_of(context.object)
+        if guides_again(context.object) is None:
             layout.operator("vellus.distribute_guides", icon="OUTLINER_OB_CURVES")
+        if guides is None:
             return
         _draw_status(layout, guides)
         group = guides.vellus.guides
@@ -44,7 +45,8 @@ class VELLUS_PT_guides(_HairTab, bpy.types.Panel):
             layout.prop_search(group, "density_group", surface, "vertex_groups")
         self.rows(layout, group, GuideSettings, skip=("density_group",))
         layout.prop(guides.vellus, "is_live")
-        layout.operator("vellus.distribute_guides", text="Distribute Again", icon="FILE_REFRESH")
+        if guides_again(context.object) is not None:
+            layout.operator("vellus.distribute_guides", text="Distribute Again", icon="FILE_REFRESH")
 
 
 class VELLUS_PT_interpolation(_HairTab, bpy.types.Panel):

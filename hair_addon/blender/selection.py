@@ -20,13 +20,15 @@ def surface_of(active):
     return active.data.surface if active.type == "CURVES" else None
 
 
+def guides_again(active):
+    """The guides that distributing again would replace: the active ones, or the active hair's; None on a mesh."""
+    hair = active_of_kind(active, "HAIR")
+    return active_of_kind(active, "GUIDES") if hair is None else hair.vellus.guide_curves
+
+
 def guides_of(active):
     """The active guides, the active hair's guides, or the newest guides on the active mesh; None if there are none."""
-    hair = active_of_kind(active, "HAIR")
-    if hair is not None:
-        return hair.vellus.guide_curves
-    guides = active_of_kind(active, "GUIDES")
-    if guides is not None or active is None:
-        return guides
+    if active is None or active.type != "MESH":
+        return guides_again(active)
     on_mesh = [c for c in bpy.data.hair_curves if c.vellus.kind == "GUIDES" and c.surface == active]
     return max(on_mesh, key=lambda curves: curves.session_uid, default=None)

@@ -6,7 +6,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.groom import GuideSettings
 from .. import pipeline, properties
-from ..selection import active_of_kind, surface_of
+from ..selection import guides_again, surface_of
 
 
 class VELLUS_OT_distribute_guides(bpy.types.Operator):
@@ -23,7 +23,7 @@ class VELLUS_OT_distribute_guides(bpy.types.Operator):
         return surface_of(context.object) is not None
 
     def invoke(self, context, _event):
-        guides = active_of_kind(context.object, "GUIDES")
+        guides = guides_again(context.object)
         if guides is not None:
             properties.copy(guides.vellus.guides, self, GuideSettings)
         return self.execute(context)
@@ -31,7 +31,7 @@ class VELLUS_OT_distribute_guides(bpy.types.Operator):
     def execute(self, context):
         try:
             settings = properties.to_settings(self, GuideSettings)
-            target = active_of_kind(context.object, "GUIDES")
+            target = guides_again(context.object)
             depsgraph = context.evaluated_depsgraph_get()
             guides = pipeline.distribute_guides(surface_of(context.object), settings, depsgraph, target)
         except HairError as error:
