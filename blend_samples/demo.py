@@ -14,6 +14,7 @@ from pathlib import Path
 import bpy
 import gpu
 import numpy as np
+import warp as wp
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
@@ -38,6 +39,7 @@ def main():
     started = time.perf_counter()
     hair_addon.register()
     gpu.init()
+    wp.config.log_level = wp.LOG_WARNING
     head_object = head.build()
     guides, hair = head.grow(head_object)
     head.light()

@@ -84,8 +84,11 @@ def _settings(options, settings_class):
 def _groom(options):
     # Refuse what is wrong with the settings before Blender starts.
     guide_settings, hair_settings = _settings(options, GuideSettings), _settings(options, HairSettings)
+    import warp as wp
+
     from .blender import batch
 
+    wp.config.log_level = wp.LOG_WARNING  # which kernels it loads is nothing that a command's output should hold
     batch.groom(options.input, options.surface, guide_settings, hair_settings, options.out)
 
 

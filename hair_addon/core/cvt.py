@@ -20,6 +20,7 @@ import warp as wp
 from . import hash_grid
 from .mesh import SurfacePoints, TriMesh, interpolate, positions
 from .sampling import check_density, corner_masses
+from .surface_query import SurfaceQuery
 
 wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
 
@@ -131,11 +132,7 @@ class _Ground:
 
     def __init__(self, mesh, density, device):
         self.mesh, self.density = mesh, density
-        self.triangles = np.flatnonzero(corner_masses(mesh, density).any(axis=1)).astype(np.int32)
-        self._queries = wp.Mesh(
-            points=wp.array(mesh.vertices, dtype=wp.vec3, device=device),
-            indices=wp.array(mesh.triangles[self.triangles].ravel(), dtype=int, device=device),
-        )
+        self._query = SurfaceQuery(mesh, np.flatnonzero(corner_masses(mesh, density).any(axis=1)), device)
 
     def move(self, sites, places, centroids, reach):
         """Sites at places (n, 3) moved `reach` times the way to their centroids (n, 3), or just to these.
@@ -145,7 +142,7 @@ class _Ground:
         """
         squares = np.sum((places - centroids) ** 2, axis=1)
         for target in (centroids, places + reach * (centroids - places)):
-            moved = self._nearest(target)
+            moved = self._query.nearest(target)
             better = np.sum((positions(self.mesh, moved) - centroids) ** 2, axis=1) < squares
             better &= interpolate(self.density, self.mesh, moved) > 0.0
             sites = SurfacePoints(
@@ -153,21 +150,6 @@ class _Ground:
                 np.where(better[:, None], moved.barycentric, sites.barycentric),
             )
         return sites
-
-    def _nearest(self, places):
-        """Places (n, 3) in space → the nearest `SurfacePoints`."""
-        device = self._queries.device
-        places = wp.array(places, dtype=wp.vec3, device=device)
-        faces = wp.empty(len(places), dtype=int, device=device)
-        barycentric = wp.empty(len(places), dtype=wp.vec3, device=device)
-        wp.launch(
-            _nearest_on_surface,
-            dim=len(places),
-            inputs=[self._queries.id, places],
-            outputs=[faces, barycentric],
-            device=device,
-        )
-        return SurfacePoints(self.triangles[faces.numpy()], barycentric.numpy())
 
 
 def _cut(mesh, density, piece_count):
@@ -229,17 +211,3 @@ def _nearest_sites(
                 distance = other_distance
     out_cells[piece] = nearest
     out_squares[piece] = distance * distance
-
-
-@wp.kernel
-def _nearest_on_surface(
-    surface: wp.uint64,
-    places: wp.array[wp.vec3],
-    # outputs
-    out_faces: wp.array[int],
-    out_barycentric: wp.array[wp.vec3],
-):
-    place = wp.tid()
-    query = wp.mesh_query_point_no_sign(surface, places[place], 2.0 * EVERYWHERE)
-    out_faces[place] = query.face
-    out_barycentric[place] = wp.vec3(query.u, query.v, 1.0 - query.u - query.v)

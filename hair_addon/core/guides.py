@@ -6,6 +6,7 @@ import warp as wp
 
 from .bspline import basis, greville_abscissae
 from .mesh import normals, positions
+from .surface_query import SurfaceQuery
 
 wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
 
@@ -26,11 +27,7 @@ def grow(mesh, roots, *, length, length_variation, tilt, gravity, seed, control_
     root_normals = normals(mesh, roots)
     lengths = length * (1.0 + length_variation * (2.0 * random[:, 0] - 1.0))
     directions = _tilted(root_normals, tilt, random[:, 1], random[:, 2])
-    solid = np.flatnonzero(mesh.areas > 0.0)  # Warp's queries go wrong on triangles that are points
-    surface = wp.Mesh(
-        points=wp.array(mesh.vertices, dtype=wp.vec3, device=device),
-        indices=wp.array(mesh.triangles[solid].ravel(), dtype=int, device=device),
-    )
+    surface = SurfaceQuery(mesh, device=device).mesh
     path = wp.empty((len(roots), STEP_COUNT + 1), dtype=wp.vec3, device=device)
     wp.launch(
         _march,

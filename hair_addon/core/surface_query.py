@@ -9,6 +9,9 @@ from .mesh import SurfacePoints
 wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
 
 
+FARTHEST = 1.0e15  # [m]: its square is still a float
+
+
 class SurfaceQuery:
     """A checked `TriMesh`, or some of its triangles, ready to be asked. Triangles without an area take no part."""
 
@@ -17,6 +20,7 @@ class SurfaceQuery:
         chosen = np.arange(len(mesh.triangles)) if triangles is None else np.asarray(triangles)
         # Warp's queries go wrong on triangles that are points.
         self._triangles = chosen[mesh.areas[chosen] > 0.0].astype(np.int32)
+        # Kernels query this, whose faces are those of the triangles that take part.
         self.mesh = wp.Mesh(
             points=wp.array(mesh.vertices, dtype=wp.vec3, device=device),
             indices=wp.array(mesh.triangles[self._triangles].ravel(), dtype=int, device=device),
@@ -41,6 +45,6 @@ def _nearest(
     out_barycentric: wp.array[wp.vec3],
 ):
     place = wp.tid()
-    query = wp.mesh_query_point_no_sign(surface, places[place], 1.0e30)
+    query = wp.mesh_query_point_no_sign(surface, places[place], FARTHEST)
     out_faces[place] = query.face
     out_barycentric[place] = wp.vec3(query.u, query.v, 1.0 - query.u - query.v)
