@@ -91,7 +91,7 @@ def print_frame_table(guides, hair):
             print(f"  {strand_count:6} strands, {label:30} {reported:>10} {_frames_per_second(shaded):17.1f}")
 
 
-def _frames_per_second(drawn, width=1280, height=720, frame_count=3):
+def _frames_per_second(drawn, width=1280, height=720, frame_count=2):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
     view = drawing.view_record(*camera, height, least_width=1.0)

@@ -10,14 +10,17 @@ void main()
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
-    vec3 facing = light_irradiance(light.kind,
-                                   light.position.xyz,
-                                   light.axis.xyz,
-                                   light.power.rgb,
-                                   light.cos_cone,
-                                   light.blend,
-                                   drawn_position);
-    irradiance += max(dot(N, L), 0.0) * facing * visibility(light, drawn_position, view.hair_forward.rgb, 2);
+    float cosine = dot(N, L);
+    if (cosine > 0.0) {
+      vec3 facing = light_irradiance(light.kind,
+                                     light.position.xyz,
+                                     light.axis.xyz,
+                                     light.power.rgb,
+                                     light.cos_cone,
+                                     light.blend,
+                                     drawn_position);
+      irradiance += cosine * facing * visibility(light, drawn_position, view.hair_forward.rgb, 1);
+    }
   }
   color = vec4(surface_color * irradiance / PI, 1.0);
 }

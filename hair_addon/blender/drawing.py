@@ -14,7 +14,11 @@ import numpy as np
 from ..core.shading import albedo, kajiya_kay, lookup_tables
 from . import shaders, uniforms
 
-TABLE_NAMES = ("m_table", "n_table", "n_trt_table")
+# What the two modes of the Marschner model read; in the energy-conserving one M is evaluated.
+_TABLES = {
+    "classic": ("marschner.frag", ("m", "n", "n_trt")),
+    "energy": ("energy_conserving.frag", ("n", "n_trt", "n_res")),
+}
 
 # Widest row of the strand texture; every driver takes 16384 texels.
 _TEXTURE_WIDTH = 16384
@@ -81,9 +85,9 @@ def kajiya_kay_shading(settings):
 
 def marschner_shading(tables):
     """The Marschner model from baked `lookup_tables.Tables`, ready to draw."""
-    program = shaders.strand_program("marschner.frag", lookup_tables.Settings, TABLE_NAMES)
-    arrays = (tables.m, tables.n, tables.n_trt)
-    textures = {name: _table_texture(array) for name, array in zip(TABLE_NAMES, arrays, strict=True)}
+    fragment, names = _TABLES[tables.settings.mode]
+    textures = {f"{name}_table": _table_texture(getattr(tables, name)) for name in names}
+    program = shaders.strand_program(fragment, lookup_tables.Settings, tuple(textures))
     settings = uniforms.uniform_buffer(uniforms.fill(tables.settings))
     return Shading(program, settings, textures, albedo.mean_albedo(tables), albedo.mean_forward(tables))
 

@@ -50,17 +50,22 @@ def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, shad
     return DrawnScene(hair, surfaces, lights, scene.read_world_radiance(blender_scene), shadow_maps)
 
 
-def draw_hair(drawn, view, depth_first=False):
-    """Draw all hair with depth test into the bound framebuffer; view: a `uniforms.VIEW` record.
+def draw_hair_depth(drawn, view):
+    """Draw the depth of all hair into the bound framebuffer, before anything is shaded.
 
-    depth_first: strands overlap many times, so with many samples a pixel it pays to draw their depth first and shade
-    only what stays visible; with one sample a pixel the second pass over the strands costs more than it saves.
+    Strands overlap many times, so with many samples a pixel it pays to shade only what stays visible; with one sample a
+    pixel a second pass over the strands costs more than it saves.
     """
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        for strands, _shading, to_world in drawn.hair:
+            drawing.draw_strands(strands, drawing.depth_only(), view, drawn.lights, to_world)
+
+
+def draw_hair(drawn, view):
+    """Draw all hair with depth test into the bound framebuffer; view: a `uniforms.VIEW` record."""
     view["world_radiance"][:3] = drawn.world_radiance
     samplers = drawn.shadow_maps.samplers
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for strands, _shading, to_world in drawn.hair if depth_first else ():
-            drawing.draw_strands(strands, drawing.depth_only(), view, drawn.lights, to_world)
         for strands, shading, to_world in drawn.hair:
             drawing.draw_strands(strands, shading, view, drawn.lights, to_world, samplers)
 

@@ -46,8 +46,9 @@ def draw_picture(blender_scene, view_layer, depsgraph, settings):
     framebuffer = gpu.types.GPUFrameBuffer(color_slots=color, depth_slot=depth)
     with framebuffer.bind():
         framebuffer.clear(color=background, depth=1.0)
+        drawn_scene.draw_hair_depth(drawn, view)
         drawn_scene.draw_surfaces(drawn, view)
-        drawn_scene.draw_hair(drawn, view, depth_first=True)
+        drawn_scene.draw_hair(drawn, view)
     resolved = gpu.types.GPUTexture((settings.width, settings.height), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=resolved)
     with target.bind():

@@ -7,6 +7,8 @@
 
 #include "include/shadow.glsl"
 
+const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not seen beside any light
+
 void main()
 {
   vec3 T = normalize(strand_tangent);
@@ -22,7 +24,11 @@ void main()
                                        light.cos_cone,
                                        light.blend,
                                        drawn_position);
-    radiance += irradiance * visibility(light, drawn_position, view.hair_forward.rgb, 0) * hair_bsdf(T, L, V);
+    irradiance *= visibility(light, drawn_position, view.hair_forward.rgb, 0);
+    // Most of a head of hair lies in the shadow of the rest, where nothing is left to scatter.
+    if (max(irradiance.r, max(irradiance.g, irradiance.b)) > LEAST_IRRADIANCE) {
+      radiance += irradiance * hair_bsdf(T, L, V);
+    }
   }
   color = vec4(radiance, 1.0);
 }

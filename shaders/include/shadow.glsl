@@ -22,6 +22,10 @@ vec3 visibility(Light light, vec3 position, vec3 forward, int reach)
   }
   vec4 clip = light.world_to_shadow * vec4(position, 1.0);
   vec2 centre = 0.5 * clip.xy / clip.w + 0.5;
+  // The maps hold the hair and what is near it; nothing is known of a surface further off.
+  if (clip.w <= 0.0 || centre != clamp(centre, vec2(0.0), vec2(1.0))) {
+    return vec3(1.0);
+  }
   float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, position);
   float texel = 1.0 / float(textureSize(hair_front, 0).x);
   vec3 total = vec3(0.0);

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The offscreen picture: hair is where it should be, surfaces hide it, and light is lost on the way through it."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender import drawing, drawn_scene, pipeline, render, scene, shadows, uniforms
+from hair_addon.core.shading import kajiya_kay
+from tests.blender.reading import points
+
+
+@pytest.fixture
+def lit(hair):
+    """The hairy sphere with a camera in front of it and a sun over the camera's shoulder."""
+    blender_scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -8.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 3.0, (math.pi / 3, 0.0, 0.0)
+    for new in (camera, sun):
+        blender_scene.collection.objects.link(new)
+    blender_scene.camera = camera
+    return hair
+
+
+def picture(**settings):
+    """(H, W, 4) linear pixels, first row at the bottom."""
+    settings = {"width": 96, "height": 96, "samples_per_side": 2, "is_transparent": True} | settings
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    return render.draw_picture(bpy.context.scene, bpy.context.view_layer, depsgraph, render.PictureSettings(**settings))
+
+
+def test_hair_is_drawn_where_its_strands_are(lit):
+    bpy.data.objects["Sphere"].hide_render = True
+    drawn = picture()[..., 3] > 0.0
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    world_to_view, view_to_clip = scene.read_camera(bpy.context.scene, depsgraph, 96, 96)
+    strands = points(lit).reshape(-1, 3)
+    clip = np.c_[strands, np.ones(len(strands))] @ (view_to_clip @ world_to_view).T
+    pixels = ((0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * 96).astype(int)
+    assert drawn[pixels[:, 1], pixels[:, 0]].mean() > 0.97
+    near = np.zeros_like(drawn)
+    for dy in (-2, -1, 0, 1, 2):
+        for dx in (-2, -1, 0, 1, 2):
+            near[np.clip(pixels[:, 1] + dy, 0, 95), np.clip(pixels[:, 0] + dx, 0, 95)] = True
+    assert not (drawn & ~near).any()
+
+
+def test_a_surface_hides_the_hair_behind_it(lit):
+    alone = picture()
+    bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, -4.0, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
+    hidden = picture()
+    assert (hidden[..., 3] == 1.0).all()
+    lit.hide_set(True)
+    np.testing.assert_allclose(picture(), hidden, atol=1e-3)
+    assert not np.allclose(alone, hidden, atol=1e-3)
+
+
+def test_no_light_arrives_behind_a_surface(lit):
+    """A plane between sun and hair, out of the camera's sight: what is left is the world's light, here none."""
+    bright = picture()[..., :3].max()
+    bpy.ops.mesh.primitive_plane_add(size=8.0, location=(0.0, -3.6, 2.1), rotation=(math.pi / 3, 0.0, 0.0))
+    bpy.context.object.visible_camera = True
+    bpy.data.objects["Sphere"].hide_render = True
+    camera = bpy.context.scene.camera
+    camera.location, camera.rotation_euler = (0.0, 8.0, 0.0), (math.pi / 2, 0.0, math.pi)
+    behind = picture()
+    hair_pixels = behind[..., 3] > 0.9
+    assert bright > 0.05
+    assert np.median(behind[hair_pixels][:, :3].max(axis=1)) < 0.05 * bright
+
+
+def test_the_picture_is_the_same_twice(lit):
+    assert np.array_equal(picture(), picture())
+
+
+def test_supersampling_keeps_the_mean(lit):
+    one, many = picture(samples_per_side=1), picture(samples_per_side=6)
+    assert one.mean() == pytest.approx(many.mean(), rel=0.15)
+    assert picture(samples_per_side=4).mean() == pytest.approx(many.mean(), rel=0.05)
+
+
+def test_more_than_the_driver_holds_is_refused(lit):
+    with pytest.raises(pipeline.HairError, match="use fewer"):
+        picture(width=16384, height=16384, samples_per_side=8)
+
+
+def curtain(distance, count=400, width=1.0, radius=0.001):
+    """`count` vertical strands side by side over `width` metres, at a distance along +Y: (S, 3, 3) points, radii."""
+    x = (np.arange(count) + 0.5) / count * width - 0.5 * width
+    z = np.linspace(-0.5 * width, 0.5 * width, 3)
+    strands = np.stack(np.broadcast_arrays(x[:, None], distance, z[None, :]), axis=-1).astype(np.float32)
+    return strands, np.full(strands.shape[:2], radius, np.float32)
+
+
+@pytest.mark.parametrize("sheets", [0, 1, 3])
+def test_light_through_curtains_falls_exponentially(scene, sheets):
+    """Each curtain covers n = count × 2 radius / width on average; behind them exp(-n (1 - a)) of the light is left."""
+    coverage = 400 * 0.002 / 1.0
+    settings = kajiya_kay.Settings(specular_color=(0.0, 0.0, 0.0), diffuse_color=(0.8, 0.4, 0.1))
+    shading = drawing.kajiya_kay_shading(settings)
+    lights = uniforms.LIGHTS.record()
+    lights["count"] = 1
+    lights["light"][0]["kind"] = 0
+    lights["light"][0]["axis"][:3] = (0.0, 1.0, 0.0)
+    lights["light"][0]["power"][:3] = np.pi**2
+    hair = [drawing.upload_strands(*curtain(0.1 + 0.1 * i)) for i in range(sheets)]
+    # Too thin to count among its own curtains: a strand lies in a layer that it darkens too.
+    receiver = drawing.upload_strands(*curtain(0.6, radius=0.00002))
+    maps = shadows.ShadowMaps()
+    maps.draw(lights, [(strands, np.eye(4)) for strands in (*hair, receiver)], [])
+    radiance = seen_from_behind(drawn_scene.DrawnScene([(receiver, shading, np.eye(4))], [], lights, np.zeros(3), maps))
+    depth = -np.log(radiance / np.array(settings.diffuse_color))
+    expected = sheets * coverage * (1.0 - 0.5 * np.array(settings.diffuse_color))
+    np.testing.assert_allclose(depth, expected, rtol=0.06, atol=0.01)
+
+
+def seen_from_behind(drawn):
+    """Mean radiance of a curtain's middle, looked at along the light's way back."""
+    import gpu
+
+    world_to_view = np.array([[-1, 0, 0, 0], [0, 0, 1, 0], [0, 1, 0, -2.0], [0, 0, 0, 1.0]])
+    view_to_clip = np.array([[4.0, 0, 0, 0], [0, 4.0, 0, 0], [0, 0, -0.2, 0], [0, 0, 0, 1.0]])
+    view = drawing.view_record(world_to_view, view_to_clip, 64, least_width=1.0)
+    color = gpu.types.GPUTexture((64, 64), format="RGBA32F")
+    depth = gpu.types.GPUTexture((64, 64), format="DEPTH_COMPONENT32F")
+    framebuffer = gpu.types.GPUFrameBuffer(color_slots=color, depth_slot=depth)
+    with framebuffer.bind():
+        framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+        drawn_scene.draw_hair(drawn, view)
+        pixels = np.array(framebuffer.read_color(0, 0, 64, 64, 4, 0, "FLOAT")).reshape(-1, 4)
+    return pixels[pixels[:, 3] > 0.0][:, :3].mean(axis=0)
