@@ -22,17 +22,25 @@ from .errors import HairError
 from .params import declared
 from .shading.lookup_tables import MAX_SIZE, Settings, Tables, to_half
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2
 
 _MAX_BYTES = 64 * 2**20
 _MAX_SETTINGS_LENGTH = 10_000
 _MAGIC = b"\x76\x2f\x31\x01"
 _PREFIX = "vellus."  # of our header attributes
 
-_CHANNELS = {
-    "m": {"R": "M_R", "G": "M_TT", "B": "M_TRT", "A": "cos(theta_d)"},
+_N_CHANNELS = {
     "n": {"R": "N_TT red", "G": "N_TT green", "B": "N_TT blue", "A": "N_R"},
     "n_trt": {"R": "N_TRT red", "G": "N_TRT green", "B": "N_TRT blue"},
+}
+# {mode: {table: {channel: meaning}}}
+_CHANNELS = {
+    "classic": {"m": {"R": "M_R", "G": "M_TT", "B": "M_TRT", "A": "cos(theta_d)"}, **_N_CHANNELS},
+    "energy": {
+        "m": {"R": "M_R", "G": "M_TT", "B": "M_TRT", "A": "M of the residual"},
+        **_N_CHANNELS,
+        "n_res": {"R": "N of the residual, red", "G": "N of the residual, green", "B": "N of the residual, blue"},
+    },
 }
 
 _LONGITUDINAL_AXES = {
@@ -51,7 +59,10 @@ _AZIMUTHAL_COLUMNS = {
     "COSINES": "column k of W, left to right: (cos(phi) + 1) / 2 = (k + 0.5) / W, phi the azimuth between light and "
     "viewer; each texel is the mean over its cell of phi",
 }
-_AZIMUTHAL_ROWS = "row j of H, top to bottom: cos(theta_d) = (j + 0.5) / H, theta_d = (theta_o - theta_i) / 2"
+_AZIMUTHAL_ROWS = {
+    "classic": "row j of H, top to bottom: cos(theta_d) = (j + 0.5) / H, theta_d = (theta_o - theta_i) / 2",
+    "energy": "row j of H, top to bottom: cos(theta_o) = (j + 0.5) / H, theta_o the inclination of the viewer",
+}
 
 
 def write_table(path, array, channels, header):
@@ -75,14 +86,14 @@ def read_table(path, channels, size=None):
 
 
 def write_tables(folder, tables, version):
-    """`Tables` → m.exr, n.exr and n_trt.exr in a folder, made if missing. Returns their paths.
+    """`Tables` → m.exr, n.exr, n_trt.exr and, if there is a residual, n_res.exr in a folder, made if missing.
 
-    All three are on disk before the first takes its place. version: of the project, for the header. Raises
-    `HairError` when the folder cannot be written.
+    Returns their paths. All are on disk before the first takes its place. version: of the project, for the header.
+    Raises `HairError` when the folder cannot be written.
     """
     folder = Path(folder)
     files = {}
-    for name, meanings in _CHANNELS.items():
+    for name, meanings in _CHANNELS[tables.settings.mode].items():
         half = to_half(getattr(tables, name))
         files[folder / f"{name}.exr"] = _encode(half, meanings, _table_header(name, half, tables.settings, version))
     try:
@@ -98,14 +109,15 @@ def read_tables(folder):
 
     Raises `HairError` when a file is missing, damaged, foreign, or belongs to another bake.
     """
-    arrays, settings = {}, None
-    for name, meanings in _CHANNELS.items():
-        image = _Image(Path(folder) / f"{name}.exr", meanings)
-        baked_with = _settings_from_header(image, name)
-        if baked_with != (settings or baked_with):
+    folder = Path(folder)
+    # n has the same channels in both modes: its header says which other tables there are.
+    settings = _settings_from_header(_Image(folder / "n.exr", _N_CHANNELS["n"]), "n")
+    arrays = {}
+    for name, meanings in _CHANNELS[settings.mode].items():
+        image = _Image(folder / f"{name}.exr", meanings)
+        if _settings_from_header(image, name) != settings:
             raise HairError(f"{image.path} and the tables beside it are of different bakes. Bake the tables again.")
-        settings = baked_with
-        image.demand_size((settings.size, settings.size))
+        image.demand_size((settings.size, 1 if name == "n_res" else settings.size))
         half = image.pixels()
         if image.header.get(_PREFIX + "sha256") != _digest(half, image.header[_PREFIX + "settings"]):
             raise HairError(f"{image.path} was changed after it was baked. Bake the tables again.")
@@ -117,8 +129,7 @@ def read_tables(folder):
 
 
 def _table_header(name, half, settings, version):
-    azimuthal_axes = (_AZIMUTHAL_COLUMNS[settings.axes], _AZIMUTHAL_ROWS)
-    x_axis, y_axis = _LONGITUDINAL_AXES[settings.axes] if name == "m" else azimuthal_axes
+    x_axis, y_axis = _axes(name, settings)
     exact = json.dumps(asdict(settings))
     header = {
         "table": name,
@@ -126,7 +137,9 @@ def _table_header(name, half, settings, version):
         "version": version,
         "xAxis": x_axis,
         "yAxis": y_axis,
-        "channelMeaning": "; ".join(f"{channel}: {meaning}" for channel, meaning in _CHANNELS[name].items()),
+        "channelMeaning": "; ".join(
+            f"{channel}: {meaning}" for channel, meaning in _CHANNELS[settings.mode][name].items()
+        ),
         "settings": exact,
         "sha256": _digest(half, exact),
     }
@@ -134,6 +147,14 @@ def _table_header(name, half, settings, version):
         value = getattr(settings, key)
         header["settings." + key] = tuple(map(float, value)) if isinstance(default, tuple) else type(default)(value)
     return {_PREFIX + key: value for key, value in header.items()}
+
+
+def _axes(name, settings):
+    """What the columns and the rows of a table stand for."""
+    if name == "m":
+        return _LONGITUDINAL_AXES[settings.axes]
+    rows = _AZIMUTHAL_ROWS[settings.mode]
+    return ("the one column stands for every phi" if name == "n_res" else _AZIMUTHAL_COLUMNS[settings.axes]), rows
 
 
 def _digest(half, settings_text):

@@ -57,13 +57,15 @@ def refused(call, *arguments):
 # What is read is what was written.
 
 
-@pytest.mark.parametrize("details", [{}, {"axes": "COSINES"}, {"size": 33}, {"sigma_a": (0, 1, 1000)}, {"eta": 2}])
+@pytest.mark.parametrize(
+    "details", [{}, {"axes": "COSINES"}, {"size": 33}, {"sigma_a": (0, 1, 1000)}, {"eta": 2}, {"mode": "energy"}]
+)
 def test_tables_survive_to_the_last_bit_of_a_half_float(tmp_path, details):
     baked = lookup_tables.bake(replace(SETTINGS, **details))
     exr.write_tables(tmp_path, baked, "1.2.3")
     back = exr.read_tables(tmp_path)
     assert back.settings == baked.settings
-    for name in ("m", "n", "n_trt"):
+    for name in ("m", "n", "n_trt", "n_res") if "mode" in details else ("m", "n", "n_trt"):
         half = lookup_tables.to_half(getattr(baked, name))
         np.testing.assert_array_equal(getattr(back, name), half.astype(np.float32))
         assert getattr(back, name).dtype == np.float32
@@ -162,6 +164,17 @@ def test_missing_files_and_folders_are_refused(folder):
     refused(exr.read_table, "null\0character", CHANNELS)
     (folder / "n.exr").unlink()
     assert "n.exr" in refused(exr.read_tables, folder)
+
+
+def test_tables_of_the_other_mode_are_not_mixed_in(folder, tmp_path_factory):
+    """A folder that has held both modes is one bake or a refusal, never a mixture."""
+    other = tmp_path_factory.mktemp("other")
+    exr.write_tables(other, lookup_tables.bake(replace(SETTINGS, mode="energy")), "1.2.3")
+    for name in ("m", "n_trt", "n_res"):
+        os.replace(other / f"{name}.exr", folder / f"{name}.exr")
+    assert "different bakes" in refused(exr.read_tables, folder)
+    os.replace(other / "n.exr", folder / "n.exr")
+    assert exr.read_tables(folder).settings.mode == "energy"
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes on this system")
@@ -302,7 +315,7 @@ def test_headers_with_impossible_settings_are_refused(folder, key, value):
 def test_a_rewritten_table_is_read_only_while_it_is_the_one_that_was_baked(folder):
     rewrite(folder / "n.exr", version="9")
     assert exr.read_tables(folder).settings == SETTINGS
-    rewrite(folder / "n.exr", format=2)
+    rewrite(folder / "n.exr", format=1)
     assert "this version" in refused(exr.read_tables, folder)
 
 

@@ -32,8 +32,19 @@ _BROWN = tuple(round(float(channel), 3) for channel in sigma_a_from_melanin(0.65
 
 @dataclass(frozen=True)
 class Settings(_Settings):
-    """The optics of a fibre with a circular section."""
+    """The optics of a fibre with a circular section.
 
+    Both modes share index, absorption and tilt; what follows is of the energy-conserving mode, then of the classic one.
+    """
+
+    mode: str = param(
+        "classic",
+        "Which of Marschner's models",
+        choices=(
+            ("classic", "Classic", "Gaussian lobes of a smooth fibre, with glints [Marschner03]"),
+            ("energy", "Energy Conserving", "A rough fibre that loses nothing, as Cycles has it [Chiang16]"),
+        ),
+    )
     eta: float = param(1.55, "Refractive index of the fibre", label="IOR", low=1.01, high=3.0, soft_high=2.0)
     sigma_a: tuple = param(
         _BROWN, "Absorption of red, green and blue light per fibre radius", label="Absorption", low=0.0, high=1000.0
@@ -55,6 +66,11 @@ class Settings(_Settings):
             ("CYCLES", "As Cycles", "-1, 1/2 and 2 times the tilt, close to a traced fibre"),
             ("PUBLISHED", "As published", "-1, 1/2 and 3/2 times the tilt [Marschner03]"),
         ),
+    )
+    roughness: float = param(0.3, "Spread of light along the fibre", low=0.0, high=1.0, subtype="FACTOR")
+    radial_roughness: float = param(0.3, "Spread of light around the fibre", low=0.0, high=1.0, subtype="FACTOR")
+    coat: float = param(
+        0.0, "How much smoother the fibre's surface is than its inside", low=0.0, high=1.0, subtype="FACTOR"
     )
     beta_r: float = param(
         math.radians(7.5),
@@ -145,7 +161,7 @@ def n_trt(phi, cos_theta_d, eta, sigma_a):
 def n_trt_caustic(phi, cos_theta_d, settings):
     """N_TRT (..., C) with the caustic taken out and a glint of finite width put in its place [Marschner03]."""
     phi, cos_theta_d = np.broadcast_arrays(np.abs(phi), cos_theta_d)
-    caustic = Caustic.at(cos_theta_d, settings)
+    caustic = Caustic.at(cos_theta_d, settings, settings.sigma_a)
     smooth = n_trt(phi, cos_theta_d, settings.eta, settings.sigma_a) * caustic.kept(phi)[..., None]
     return smooth + caustic.glint(phi)
 
@@ -160,7 +176,7 @@ class Caustic:
     width: float
 
     @classmethod
-    def at(cls, cos_theta_d, settings):
+    def at(cls, cos_theta_d, settings, sigma_a):
         eta_prime, _ = bravais_indices(cos_theta_d, settings.eta)
         exists = eta_prime < 2.0
         gamma_c = np.where(exists, paths.caustic_gamma(eta_prime), 0.0)
@@ -172,7 +188,7 @@ class Caustic:
         # 1 - smoothstep: the printed smoothstep would jump from 1 to 0 at eta' = 2.
         x = np.clip((eta_prime - 2.0) / settings.glint_fade, 0.0, 1.0)
         fade = 1.0 - x * x * (3.0 - 2.0 * x)
-        attenuated = paths.path_attenuation(paths.TRT, gamma_c, cos_theta_d, settings.eta, settings.sigma_a)
+        attenuated = paths.path_attenuation(paths.TRT, gamma_c, cos_theta_d, settings.eta, sigma_a)
         area = (fade * settings.glint_gain * interval)[..., None] * attenuated
         return cls(
             np.where(exists, paths.exit_angle(paths.TRT, gamma_c, eta_prime), 0.0), fade, area, settings.glint_width

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Rays through a smooth cylinder, flattened into its normal plane by the Bravais indices [Marschner03].
 
-A path p crosses the inside p times: R, TT, TRT. A ray is named by gamma, its angle of incidence in the normal plane;
-h = sin(gamma) is its offset from the axis. Lengths are in fibre radii. cos_theta_d (...) in (0, 1].
+A path p crosses the inside p times: R, TT, TRT; RESIDUAL stands for all the longer ones together. A ray is named by
+gamma, its angle of incidence in the normal plane; h = sin(gamma) is its offset from the axis. Lengths are in fibre
+radii. cos_theta_d (...) in (0, 1].
 """
 
 import numpy as np
 
 from .fresnel import bravais_indices, bravais_reflectance
 
-R, TT, TRT = 0, 1, 2
+R, TT, TRT, RESIDUAL = 0, 1, 2, 3
 
 
 def exit_angle(p, gamma, eta_prime):
@@ -72,6 +73,12 @@ def attenuation(fresnel, transmittance):
     return fresnel, through, through * fresnel * transmittance
 
 
+def residual_attenuation(fresnel, transmittance):
+    """What all longer paths carry out together: the geometric series after TRT, for fresnel < 1 [Chiang16]."""
+    turned = fresnel * transmittance
+    return np.square((1.0 - fresnel) * turned) * transmittance / (1.0 - turned)
+
+
 def crossing_transmittance(gamma, cos_theta_d, eta, sigma_a):
     """T (..., C): what absorption leaves of light that crosses the inside once; sigma_a (C,) per radius.
 
@@ -90,4 +97,6 @@ def path_attenuation(p, gamma, cos_theta_d, eta, sigma_a):
     cos_gamma_t = np.sqrt(1.0 - np.square(np.sin(gamma) / eta_prime))
     fresnel = bravais_reflectance(np.cos(gamma), cos_gamma_t, eta_prime, eta_double_prime)[..., None]
     transmittance = 1.0 if p == R else crossing_transmittance(gamma, cos_theta_d, eta, sigma_a)
+    if p == RESIDUAL:
+        return residual_attenuation(fresnel, transmittance)
     return attenuation(fresnel, transmittance)[p]

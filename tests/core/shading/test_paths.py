@@ -19,6 +19,14 @@ def test_only_the_later_bounces_are_missing():
     np.testing.assert_allclose(r + tt + trt, 1.0 - (1.0 - fresnel) * fresnel**2, rtol=1e-14)
 
 
+@given(st.floats(0.0, 0.98), st.floats(0.0, 1.0))
+def test_the_residual_is_every_later_bounce(fresnel, transmittance):
+    later = sum((1.0 - fresnel) ** 2 * fresnel ** (p - 1) * transmittance**p for p in range(3, 2000))
+    assert paths.residual_attenuation(fresnel, transmittance) == pytest.approx(later, rel=1e-9, abs=1e-15)
+    total = sum(paths.attenuation(fresnel, 1.0)) + paths.residual_attenuation(fresnel, 1.0)
+    assert total == pytest.approx(1.0)
+
+
 @given(st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_no_ray_gains_light(fresnel, transmittance):
     lobes = paths.attenuation(fresnel, transmittance)
