@@ -69,8 +69,15 @@ def azimuthal_lobes(settings, sigma_a):
     if settings.mode == "classic":
         return *smooth, None
     spread = roughening(edges, scale_from_radial_roughness(settings.radial_roughness)).astype(np.float32)
-    rough = [np.matmul(spread, lobe) for lobe in smooth]
+    rough = [_spread(lobe, spread) for lobe in smooth]
     return *rough, residual(cosines, settings.eta, sigma_a)[:, None].astype(np.float32)
+
+
+def _spread(lobe, spread):
+    """Cell means (H, W, C) with their columns mixed by a matrix (W, W), as one product of plain matrices."""
+    height, width, channel_count = lobe.shape
+    rows = lobe.swapaxes(1, 2).reshape(-1, width) @ spread.T
+    return rows.reshape(height, channel_count, width).swapaxes(1, 2)
 
 
 def row_cosines(settings):

@@ -10,6 +10,9 @@ import numpy as np
 _EUMELANIN = np.array([0.506, 0.841, 1.653])
 _PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
+# What full melanin lets through of light: its absorption is finite.
+LEAST_LIGHT = 1e-4
+
 # Colours are held off 0 and 1: black would need infinite absorption, and white fibres scatter for ever.
 _DARKEST = 1e-4
 _BRIGHTEST = 0.9999
@@ -17,7 +20,7 @@ _BRIGHTEST = 0.9999
 
 def sigma_a_from_melanin(melanin, redness):
     """Amount of pigment and its red share, both (...) in [0, 1] → sigma_a (..., 3) per fibre radius."""
-    concentration = -np.log(np.maximum(1.0 - np.asarray(melanin, float), 1e-4))[..., None]
+    concentration = -np.log(np.maximum(1.0 - np.asarray(melanin, float), LEAST_LIGHT))[..., None]
     redness = np.asarray(redness, float)[..., None]
     return concentration * ((1.0 - redness) * _EUMELANIN + redness * _PHEOMELANIN)
 

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Named looks of hair, as data: {identifier: (label, Appearance)} in the order of a menu.
+
+Water lies on a wet fibre in place of air: it fills the gaps between the cuticle's scales, which leaves one smooth
+surface (narrow highlights, no tilt, a coat), and lowers the index that light inside the hair meets: 1.55 / 1.33.
+"""
+
+from dataclasses import replace
+from math import radians
+
+from .appearance import Appearance
+
+_WET = {"roughness": 0.16, "coat": 0.4, "cuticle_angle": radians(0.5), "ior": 1.38}
+
+_BLACK = Appearance(melanin=0.985, redness=0.1, roughness=0.25, random_color=0.02)
+_DARK_BROWN = Appearance(melanin=0.88, redness=0.25, random_color=0.05)
+_BROWN = Appearance(melanin=0.66, redness=0.25, random_color=0.08)
+_LIGHT_BROWN = Appearance(melanin=0.48, redness=0.3, random_color=0.1, random_roughness=0.1)
+_BLOND = Appearance(melanin=0.22, redness=0.3, random_color=0.15, random_roughness=0.1)
+_AUBURN = Appearance(melanin=0.68, redness=0.8, random_color=0.1)
+
+PRESETS = {
+    "BLACK": ("Black", _BLACK),
+    "DARK_BROWN": ("Dark Brown", _DARK_BROWN),
+    "BROWN": ("Brown", _BROWN),
+    "LIGHT_BROWN": ("Light Brown", _LIGHT_BROWN),
+    "DARK_BLOND": ("Dark Blond", replace(_BLOND, melanin=0.34)),
+    "BLOND": ("Blond", _BLOND),
+    "PLATINUM": ("Platinum Blond", replace(_BLOND, melanin=0.08, random_color=0.1)),
+    "SUN_BLEACHED": ("Sun-Bleached", replace(_LIGHT_BROWN, tip_absorption=0.4, gradient_start=0.2)),
+    "AUBURN": ("Auburn", _AUBURN),
+    "GINGER": ("Ginger", Appearance(melanin=0.42, redness=0.97, random_color=0.12)),
+    # Grey hair is white and dark strands side by side, coarser than what grew before.
+    "GREY": ("Grey", Appearance(melanin=0.3, redness=0.0, roughness=0.35, random_color=1.0, random_roughness=0.2)),
+    "WHITE": ("White", Appearance(melanin=0.02, redness=0.2, roughness=0.35, random_color=0.2)),
+    "DYED_BLUE": ("Dyed Blue", Appearance(melanin=0.03, redness=0.3, tint=(0.02, 0.08, 0.6), random_color=0.1)),
+    "DYED_PINK": (
+        "Pink Tips",
+        Appearance(melanin=0.22, redness=0.3, tip_absorption=0.4, tip_tint=(0.8, 0.12, 0.35), gradient_end=0.8),
+    ),
+    "WET_BLACK": ("Wet Black", replace(_BLACK, **_WET)),
+    "WET_BROWN": ("Wet Brown", replace(_BROWN, **_WET)),
+    "WET_BLOND": ("Wet Blond", replace(_BLOND, **_WET)),
+}

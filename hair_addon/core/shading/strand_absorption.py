@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Absorption that differs from strand to strand and from root to tip.
+
+    sigma_a = (pigment k(random) + dye) (1 + (tip_absorption - 1) g) + tip_dye g
+
+where g rises smoothly from 0 to 1 along the strand, and k is the strand's part of the pigment.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..params import Settings as _Settings
+from ..params import param
+from .pigment import LEAST_LIGHT
+
+
+@dataclass(frozen=True)
+class Settings(_Settings):
+    """What a shader needs to know a point's absorption; `appearance` makes it from what artists set."""
+
+    pigment: tuple = param((0.0, 0.0, 0.0), "Absorption per radius that varies from strand to strand", low=0.0)
+    dye: tuple = param((0.0, 0.0, 0.0), "Absorption per radius that all strands share", low=0.0)
+    melanin: float = param(0.0, "Amount of melanin that varies; 0: the pigment itself varies", low=0.0, high=1.0)
+    random_color: float = param(0.0, "Greatest relative change from strand to strand", low=0.0, high=1.0)
+    tip_absorption: float = param(1.0, "Absorption at the tip, relative to that at the root", low=0.0)
+    tip_dye: tuple = param((0.0, 0.0, 0.0), "Absorption per radius that is added at the tip", low=0.0)
+    gradient_start: float = param(0.0, "Part of the length at which the tip's colour begins", low=0.0, high=1.0)
+    gradient_end: float = param(1.0, "Part of the length at which the tip's colour is reached", low=0.0, high=1.0)
+
+    @property
+    def is_even(self):
+        """Whether all strands are alike from root to tip: the tables of one sigma_a do."""
+        return self.random_color == 0.0 and self.tip_absorption == 1.0 and not any(self.tip_dye)
+
+
+def strand_sigma_a(settings, random, position):
+    """sigma_a (..., 3) of strands with random numbers (...) in [0, 1], at positions (...) from root 0 to tip 1."""
+    pigment = pigment_factor(settings.melanin, settings.random_color, random)[..., None] * settings.pigment
+    gradient = tip_gradient(settings.gradient_start, settings.gradient_end, position)[..., None]
+    at_root = pigment + np.asarray(settings.dye)
+    return at_root * (1.0 + (settings.tip_absorption - 1.0) * gradient) + gradient * settings.tip_dye
+
+
+def pigment_factor(melanin, random_color, random):
+    """k (...): how the amount of pigment changes with a strand's random number (...), as Cycles changes melanin."""
+    factor = 1.0 + 2.0 * (np.asarray(random, float) - 0.5) * random_color
+    if melanin < 1e-4:  # where concentration is proportional to melanin, and its logarithm has lost its digits
+        return factor
+    concentrations = [np.log(np.maximum(1.0 - amount, LEAST_LIGHT)) for amount in (melanin * factor, melanin)]
+    return concentrations[0] / concentrations[1]
+
+
+def tip_gradient(start, end, position):
+    """g (...): a smooth step between two parts of the length; a sharp one where they are the same."""
+    x = np.clip((np.asarray(position, float) - start) / np.maximum(end - start, 1e-4), 0.0, 1.0)
+    return x * x * (3.0 - 2.0 * x)
+
+
+def absorption_range(settings):
+    """(least, greatest) sigma_a of any channel anywhere on any strand."""
+    extremes = strand_sigma_a(settings, *np.meshgrid([0.0, 1.0], [0.0, 1.0]))
+    return float(extremes.min()), float(extremes.max())

@@ -1,0 +1,178 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""One set of settings for every model, and the looks that are named."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hair_addon.core.errors import HairError
+from hair_addon.core.params import declared
+from hair_addon.core.shading import albedo, appearance, kajiya_kay, lookup_tables, presets, strand_absorption
+from hair_addon.core.shading.appearance import Appearance
+
+# Of a freshly made Principled Hair BSDF.
+SOCKETS = {
+    "Roughness": 0.3,
+    "Radial Roughness": 0.3,
+    "Coat": 0.0,
+    "IOR": 1.55,
+    "Offset": np.radians(2.0),
+    "Random Roughness": 0.0,
+}
+
+appearances = st.builds(
+    Appearance,
+    **{
+        name: st.sampled_from([choice[0] for choice in details.choices])
+        if details.choices
+        else st.tuples(*[st.floats(details.low, min(details.high, 50.0))] * 3)
+        if isinstance(default, tuple)
+        else st.floats(details.low, details.high)
+        for name, default, details in declared(Appearance)
+    },
+)
+
+
+def test_defaults_are_those_of_principled_hair():
+    sockets = appearance.principled_sockets(Appearance())
+    assert {name: sockets[name] for name in SOCKETS} == pytest.approx(SOCKETS)
+
+
+@given(appearances)
+def test_every_appearance_is_one_that_every_model_takes(look):
+    appearance.kajiya_kay_settings(look)
+    strands = appearance.strand_settings(look)
+    assert appearance.table_settings(look).sigma_a == appearance.sigma_a(look)
+    least, greatest = strand_absorption.absorption_range(strands)
+    assert 0.0 <= least <= greatest < np.inf
+
+
+def test_the_same_hair_may_be_described_in_three_ways():
+    by_melanin = Appearance(melanin=0.4, redness=0.3)
+    sigma_a = appearance.sigma_a(by_melanin)
+    by_absorption = replace(by_melanin, parametrization="ABSORPTION", absorption=sigma_a)
+    color = appearance.kajiya_kay_settings(by_melanin).diffuse_color
+    by_color = replace(by_melanin, parametrization="COLOR", color=color)
+    for other in (by_absorption, by_color):
+        np.testing.assert_allclose(appearance.sigma_a(other), sigma_a, rtol=1e-6)
+
+
+def test_a_white_dye_is_none_and_another_only_darkens():
+    plain, dyed = Appearance(melanin=0.1), Appearance(melanin=0.1, tint=(1.0, 0.5, 0.2))
+    np.testing.assert_allclose(appearance.sigma_a(plain), strand_absorption.strand_sigma_a(
+        appearance.strand_settings(plain), 0.5, 1.0))  # fmt: skip
+    added = np.subtract(appearance.sigma_a(dyed), appearance.sigma_a(plain))
+    assert added[0] == 0.0 < added[1] < added[2]
+
+
+def test_roughness_means_one_width_in_both_modes():
+    """Marschner's Gaussian is of theta_h, half of theta_i + theta_o."""
+    settings = appearance.table_settings(Appearance(roughness=0.2))
+    assert np.degrees(settings.beta_r) == pytest.approx(5.09, abs=0.01)
+
+
+@pytest.mark.parametrize("roughness", [0.15, 0.3, 0.5])
+def test_kajiya_kay_s_highlight_has_the_energy_of_the_first_reflection(roughness):
+    look = Appearance(roughness=roughness, parametrization="ABSORPTION", absorption=(1000.0, 1000.0, 1000.0))
+    reflected = albedo.mean_albedo(lookup_tables.bake(appearance.table_settings(look, size=128)))
+    settings = appearance.kajiya_kay_settings(look)
+    highlight = kajiya_kay.kajiya_kay_specular_albedo(settings.exponent) * np.array(settings.specular_color)
+    np.testing.assert_allclose(highlight, reflected, rtol=0.02)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"melanin": 1.5},
+        {"roughness": -0.1},
+        {"radial_roughness": np.nan},
+        {"ior": 1.0},
+        {"absorption": (-1.0, 0.0, 0.0)},
+        {"color": (0.5, 0.5)},
+        {"tip_absorption": -1.0},
+        {"parametrization": "PAINT"},
+    ],
+)
+def test_impossible_looks_are_refused(wrong):
+    with pytest.raises(HairError):
+        Appearance(**wrong)
+
+
+# Presets
+
+
+def color_of(name, **changes):
+    """What a groom of this look returns, RGB."""
+    look = replace(presets.PRESETS[name][1], **changes)
+    return np.array(appearance.kajiya_kay_settings(look).diffuse_color)
+
+
+def test_natural_hair_darkens_in_the_order_of_its_names():
+    names = ["WHITE", "PLATINUM", "BLOND", "DARK_BLOND", "LIGHT_BROWN", "BROWN", "DARK_BROWN", "BLACK"]
+    luminances = [color_of(name) @ [0.2126, 0.7152, 0.0722] for name in names]
+    assert (np.diff(luminances) < 0.0).all()
+
+
+@pytest.mark.parametrize("name", ["AUBURN", "GINGER"])
+def test_red_hair_is_redder_than_as_much_brown(name):
+    red, green, _blue = color_of(name) / color_of(name, redness=0.25)
+    assert red > 1.1 * green
+
+
+def test_dyed_hair_has_the_colour_of_its_dye():
+    red, green, blue = color_of("DYED_BLUE")
+    assert blue > 2.0 * green > 2.0 * red
+    pink = strand_absorption.strand_sigma_a(appearance.strand_settings(presets.PRESETS["DYED_PINK"][1]), 0.5, 1.0)
+    assert pink[0] < pink[2] < pink[1]
+
+
+def test_wet_hair_differs_in_its_optics_and_not_in_its_pigment():
+    for name in ("BLACK", "BROWN", "BLOND"):
+        dry, wet = presets.PRESETS[name][1], presets.PRESETS[f"WET_{name}"][1]
+        assert appearance.sigma_a(wet) == appearance.sigma_a(dry)
+        assert wet.roughness < dry.roughness and wet.ior < dry.ior
+
+
+# From strand to strand and from root to tip
+
+
+def strands_of(**details):
+    return appearance.strand_settings(Appearance(**details))
+
+
+def test_even_hair_says_so():
+    assert strands_of().is_even
+    for varied in ({"random_color": 0.1}, {"tip_absorption": 0.9}, {"tip_tint": (1.0, 0.9, 1.0)}):
+        assert not strands_of(**varied).is_even
+
+
+@given(st.floats(0.05, 0.9), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_random_strands_are_hair_of_other_melanin(melanin, spread, random):
+    """As Cycles varies it: the amount of melanin times 1 + 2 (random - ½) spread."""
+    found = strand_absorption.strand_sigma_a(strands_of(melanin=melanin, random_color=spread), random, 0.0)
+    other = min(melanin * (1.0 + 2.0 * (random - 0.5) * spread), 1.0)
+    np.testing.assert_allclose(found, appearance.sigma_a(Appearance(melanin=other)), rtol=1e-9, atol=1e-12)
+
+
+@given(st.floats(0.0, 1.0))
+def test_tips_begin_and_end_where_they_are_told(position):
+    strands = strands_of(tip_absorption=0.25, gradient_start=0.4, gradient_end=0.6, melanin=0.5)
+    part = strand_absorption.strand_sigma_a(strands, 0.5, position) / np.array(
+        appearance.sigma_a(Appearance(melanin=0.5))
+    )
+    assert (part <= 1.0 + 1e-12).all() and (part >= 0.25 - 1e-12).all()
+    if position <= 0.4:
+        np.testing.assert_allclose(part, 1.0)
+    if position >= 0.6:
+        np.testing.assert_allclose(part, 0.25)
+
+
+@given(appearances, st.floats(0.0, 1.0), st.floats(0.0, 1.0))
+def test_the_range_holds_every_strand(look, random, position):
+    strands = appearance.strand_settings(look)
+    least, greatest = strand_absorption.absorption_range(strands)
+    sigma_a = strand_absorption.strand_sigma_a(strands, random, position)
+    assert least * (1.0 - 1e-9) <= sigma_a.min() and sigma_a.max() <= greatest * (1.0 + 1e-9)
