@@ -32,11 +32,11 @@ class Slices:
     settings: lookup_tables.Settings
 
 
-def bake(settings, sigma_a_range, slice_count=SLICE_COUNT):
+def bake(settings, sigma_a_range, slice_count=SLICE_COUNT, device="cpu"):
     """`lookup_tables.Settings`, (least, greatest) sigma_a → `Slices`. The settings' own sigma_a is not used."""
     low, high = np.sqrt(sigma_a_range)
     sigma_a = np.square(np.linspace(low, high, slice_count))
-    n_r, n_tt, n_trt, n_res = lookup_tables.azimuthal_lobes(settings, sigma_a)
+    n_r, n_tt, n_trt, n_res = lookup_tables.azimuthal_lobes(settings, sigma_a, device)
     n = np.zeros((slice_count, settings.size, settings.size, 4), np.float32)
     n[..., 0] = np.moveaxis(n_tt, -1, 0)
     n[..., 1] = np.moveaxis(n_trt, -1, 0)

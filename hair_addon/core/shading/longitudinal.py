@@ -8,8 +8,8 @@ theta_o and every variance, where Marschner's Gaussian loses what falls beyond t
 import numpy as np
 
 # [Abramowitz64, 9.8.1-2]: I0(x) in (x / 3.75)², and sqrt(x) exp(-x) I0(x) in 3.75 / x.
-_NEAR = (1.0, 3.5156229, 3.0899424, 1.2067492, 0.2659732, 0.0360768, 0.0045813)
-_FAR = (
+BESSEL_NEAR = (1.0, 3.5156229, 3.0899424, 1.2067492, 0.2659732, 0.0360768, 0.0045813)
+BESSEL_FAR = (
     *(0.39894228, 0.01328592, 0.00225319, -0.00157565, 0.00916281),
     *(-0.02057706, 0.02635537, -0.01647633, 0.00392377),
 )
@@ -18,9 +18,9 @@ _FAR = (
 def i0e(x):
     """exp(-x) I0(x), x >= 0 (...): the modified Bessel function without its overflow; within 5e-7 of it."""
     t = np.asarray(x) / 3.75
-    near = np.exp(-np.minimum(x, 3.75)) * np.polynomial.polynomial.polyval(np.square(np.minimum(t, 1.0)), _NEAR)
+    near = np.exp(-np.minimum(x, 3.75)) * np.polynomial.polynomial.polyval(np.square(np.minimum(t, 1.0)), BESSEL_NEAR)
     far_t = np.maximum(t, 1.0)
-    far = np.polynomial.polynomial.polyval(1.0 / far_t, _FAR) / np.sqrt(3.75 * far_t)
+    far = np.polynomial.polynomial.polyval(1.0 / far_t, BESSEL_FAR) / np.sqrt(3.75 * far_t)
     return np.where(t <= 1.0, near, far)
 
 

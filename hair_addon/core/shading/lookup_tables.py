@@ -56,21 +56,27 @@ class Tables:
     n_res: np.ndarray | None = None  # (H, 1, 3), of the energy-conserving mode
 
 
-def bake(settings):
-    """`Settings` → `Tables`."""
-    n_r, n_tt, n_trt, n_res = azimuthal_lobes(settings, settings.sigma_a)
-    return Tables(_longitudinal(settings), np.concatenate([n_tt, n_r], axis=-1), n_trt, settings, n_res)
+def bake(settings, device="cpu"):
+    """`Settings` → `Tables`; device: a Warp device such as "cuda:0", or the processor."""
+    n_r, n_tt, n_trt, n_res = azimuthal_lobes(settings, settings.sigma_a, device)
+    m = _longitudinal(settings, device)
+    return Tables(m, np.concatenate([n_tt, n_r], axis=-1), n_trt, settings, n_res)
 
 
-def azimuthal_lobes(settings, sigma_a):
+def azimuthal_lobes(settings, sigma_a, device="cpu"):
     """N_R (H, W, 1), N_TT and N_TRT (H, W, C) and the residual's N (H, 1, C) or None, for sigma_a (C,); float32."""
     edges, cosines = phi_edges(settings), row_cosines(settings)
+    is_rough = settings.mode == "energy"
+    n_res = residual(cosines, settings.eta, sigma_a)[:, None].astype(np.float32) if is_rough else None
+    spread = None
+    if is_rough:
+        spread = roughening(edges, scale_from_radial_roughness(settings.radial_roughness)).astype(np.float32)
+    if device != "cpu":
+        from . import texel_kernels
+
+        return *texel_kernels.azimuthal_means(edges, cosines, settings, sigma_a, spread, device), n_res
     smooth = smooth_means(edges, cosines, settings, sigma_a)
-    if settings.mode == "classic":
-        return *smooth, None
-    spread = roughening(edges, scale_from_radial_roughness(settings.radial_roughness)).astype(np.float32)
-    rough = [_spread(lobe, spread) for lobe in smooth]
-    return *rough, residual(cosines, settings.eta, sigma_a)[:, None].astype(np.float32)
+    return *(smooth if spread is None else [_spread(lobe, spread) for lobe in smooth]), n_res
 
 
 def _spread(lobe, spread):
@@ -91,9 +97,13 @@ def phi_edges(settings):
     return np.arccos(2.0 * u - 1.0) if settings.axes == "COSINES" else np.pi * u
 
 
-def _longitudinal(settings):
+def _longitudinal(settings, device):
     centres = row_cosines(settings)
     theta = np.arcsin(2.0 * centres - 1.0) if settings.axes == "COSINES" else np.pi * (centres - 0.5)
+    if device != "cpu":
+        from . import texel_kernels
+
+        return texel_kernels.longitudinal_texels(theta, settings, device)
     theta_o, theta_i = theta[:, None], theta[None, :]
     if settings.mode == "energy":
         return energy_conserving.m_lobes(theta_i, theta_o, settings).astype(np.float32)

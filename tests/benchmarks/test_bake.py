@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baking 256 × 256 tables of every lobe: both modes and the slices, NumPy beside Warp's processor and GPUs."""
+
+import time
+
+import numpy as np
+import pytest
+import warp as wp
+
+from hair_addon.core.shading import absorption_slices, lookup_tables, texel_kernels
+
+
+def median_time(way, repetitions=7):
+    """Median time [s] after a first call, which compiles."""
+    way()
+    times = []
+    for _ in range(repetitions):
+        start = time.perf_counter()
+        way()
+        times.append(time.perf_counter() - start)
+    return float(np.median(times))
+
+
+def devices():
+    return ["cpu", *(str(device) for device in wp.get_cuda_devices())]
+
+
+@pytest.mark.parametrize("mode", ["classic", "energy"])
+def test_bake(mode, monkeypatch):
+    """Printed: times and their ratio to NumPy's. Asserted: how often kernels are launched, whatever the size."""
+    settings = lookup_tables.Settings(mode=mode)
+    numpy_time = median_time(lambda: lookup_tables.bake(settings))
+    for device in devices():
+        tables = median_time(lambda device=device: lookup_tables.bake(settings, device))
+        slices = median_time(lambda device=device: absorption_slices.bake(settings, (0.0, 9.0), device=device), 3)
+        name = "NumPy" if device == "cpu" else device
+        print(f"\n{mode:8} {name:8} tables {1e3 * tables:7.1f} ms  {tables / numpy_time:5.2f} × NumPy", end="")
+        print(f"   {absorption_slices.SLICE_COUNT} slices {1e3 * slices:7.1f} ms", end="")
+
+    launches = []
+    launch = wp.launch
+    monkeypatch.setattr(wp, "launch", lambda *args, **kwargs: (launches.append(args), launch(*args, **kwargs)))
+    edges, cosines = lookup_tables.phi_edges(settings), lookup_tables.row_cosines(settings)
+    spread = np.eye(settings.size, dtype=np.float32) if mode == "energy" else None
+    texel_kernels.azimuthal_means(edges, cosines, settings, settings.sigma_a, spread, "cpu")
+    assert len(launches) == (1 if mode == "classic" else 4)
