@@ -20,6 +20,8 @@ import OpenEXR
 
 from .errors import HairError
 from .params import declared
+from .shading import table_axes
+from .shading.dual_scattering import DualTables
 from .shading.lookup_tables import MAX_SIZE, Settings, Tables, to_half
 
 FORMAT_VERSION = 2
@@ -28,42 +30,6 @@ _MAX_BYTES = 64 * 2**20
 _MAX_SETTINGS_LENGTH = 10_000
 _MAGIC = b"\x76\x2f\x31\x01"
 _PREFIX = "vellus."  # of our header attributes
-
-_N_CHANNELS = {
-    "n": {"R": "N_TT red", "G": "N_TT green", "B": "N_TT blue", "A": "N_R"},
-    "n_trt": {"R": "N_TRT red", "G": "N_TRT green", "B": "N_TRT blue"},
-}
-# {mode: {table: {channel: meaning}}}
-_CHANNELS = {
-    "classic": {"m": {"R": "M_R", "G": "M_TT", "B": "M_TRT", "A": "cos(theta_d)"}, **_N_CHANNELS},
-    "energy": {
-        "m": {"R": "M_R", "G": "M_TT", "B": "M_TRT", "A": "M of the residual"},
-        **_N_CHANNELS,
-        "n_res": {"R": "N of the residual, red", "G": "N of the residual, green", "B": "N of the residual, blue"},
-    },
-}
-
-_LONGITUDINAL_AXES = {
-    "ANGLES": (
-        "column k of W, left to right: theta_i = ((k + 0.5) / W - 0.5) pi, the inclination of the light",
-        "row j of H, top to bottom: theta_o = ((j + 0.5) / H - 0.5) pi, the inclination of the viewer",
-    ),
-    "COSINES": (
-        "column k of W, left to right: sin(theta_i) = 2 (k + 0.5) / W - 1, theta_i the inclination of the light",
-        "row j of H, top to bottom: sin(theta_o) = 2 (j + 0.5) / H - 1, theta_o the inclination of the viewer",
-    ),
-}
-_AZIMUTHAL_COLUMNS = {
-    "ANGLES": "column k of W, left to right: phi / pi = (k + 0.5) / W, phi the azimuth between light and viewer; "
-    "each texel is the mean over phi / pi from k / W to (k + 1) / W",
-    "COSINES": "column k of W, left to right: (cos(phi) + 1) / 2 = (k + 0.5) / W, phi the azimuth between light and "
-    "viewer; each texel is the mean over its cell of phi",
-}
-_AZIMUTHAL_ROWS = {
-    "classic": "row j of H, top to bottom: cos(theta_d) = (j + 0.5) / H, theta_d = (theta_o - theta_i) / 2",
-    "energy": "row j of H, top to bottom: cos(theta_o) = (j + 0.5) / H, theta_o the inclination of the viewer",
-}
-
 
 def write_table(path, array, channels, header):
     """(H, W, C) array → a half-float EXR file at `path`, which is either written whole or left as it was.
@@ -91,11 +57,40 @@ def write_tables(folder, tables, version):
     Returns their paths. All are on disk before the first takes its place. version: of the project, for the header.
     Raises `HairError` when the folder cannot be written.
     """
+    names = table_axes.tables_of(tables.settings.mode)
+    return _write_set(folder, {name: getattr(tables, name) for name in names}, tables.settings, version)
+
+
+def write_dual_tables(folder, dual, version):
+    """`DualTables` → dual.exr, n_g.exr and n_g_trt.exr in a folder, as `write_tables`."""
+    arrays = {"dual": dual.theta, "n_g": dual.n_g, "n_g_trt": dual.n_g_trt}
+    return _write_set(folder, arrays, dual.settings, version)
+
+
+def read_tables(folder):
+    """`Tables` from a folder that `write_tables` filled, with the settings that they were baked with.
+
+    Raises `HairError` when a file is missing, damaged, foreign, or belongs to another bake.
+    """
+    settings = _settings_of_folder(folder, "n")
+    arrays = _read_set(folder, table_axes.tables_of(settings.mode), settings)
+    return Tables(**arrays, settings=settings)
+
+
+def read_dual_tables(folder):
+    """`DualTables` from a folder that `write_dual_tables` filled. Raises `HairError` as `read_tables`."""
+    settings = _settings_of_folder(folder, "dual")
+    arrays = _read_set(folder, table_axes.DUAL_TABLES, settings)
+    return DualTables(arrays["dual"], arrays["n_g"], arrays["n_g_trt"], settings)
+
+
+def _write_set(folder, arrays, settings, version):
     folder = Path(folder)
     files = {}
-    for name, meanings in _CHANNELS[tables.settings.mode].items():
-        half = to_half(getattr(tables, name))
-        files[folder / f"{name}.exr"] = _encode(half, meanings, _table_header(name, half, tables.settings, version))
+    for name, array in arrays.items():
+        half = to_half(array)
+        channels = table_axes.channels(name, settings.mode)
+        files[folder / f"{name}.exr"] = _encode(half, channels, _table_header(name, half, settings, version))
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except (OSError, ValueError) as error:  # ValueError: a path with a null character
@@ -104,32 +99,32 @@ def write_tables(folder, tables, version):
     return list(files)
 
 
-def read_tables(folder):
-    """`Tables` from a folder that `write_tables` filled, with the settings that they were baked with.
+def _settings_of_folder(folder, name):
+    """The settings in the header of a table whose channels are the same in both modes."""
+    image = _Image(Path(folder) / f"{name}.exr", table_axes.channels(name, "classic"))
+    return _settings_from_header(image, name)
 
-    Raises `HairError` when a file is missing, damaged, foreign, or belongs to another bake.
-    """
-    folder = Path(folder)
-    # n has the same channels in both modes: its header says which other tables there are.
-    settings = _settings_from_header(_Image(folder / "n.exr", _N_CHANNELS["n"]), "n")
+
+def _read_set(folder, names, settings):
     arrays = {}
-    for name, meanings in _CHANNELS[settings.mode].items():
-        image = _Image(folder / f"{name}.exr", meanings)
+    for name in names:
+        image = _Image(Path(folder) / f"{name}.exr", table_axes.channels(name, settings.mode))
         if _settings_from_header(image, name) != settings:
             raise HairError(f"{image.path} and the tables beside it are of different bakes. Bake the tables again.")
-        image.demand_size((settings.size, 1 if name == "n_res" else settings.size))
+        image.demand_size(table_axes.shape(name, settings))
         half = image.pixels()
         if image.header.get(_PREFIX + "sha256") != _digest(half, image.header[_PREFIX + "settings"]):
             raise HairError(f"{image.path} was changed after it was baked. Bake the tables again.")
         arrays[name] = half.astype(np.float32)
-    return Tables(**arrays, settings=settings)
+    return arrays
 
 
 # What a header says.
 
 
 def _table_header(name, half, settings, version):
-    x_axis, y_axis = _axes(name, settings)
+    x_axis, y_axis = table_axes.axes(name, settings)
+    channels = table_axes.channels(name, settings.mode)
     exact = json.dumps(asdict(settings))
     header = {
         "table": name,
@@ -137,9 +132,7 @@ def _table_header(name, half, settings, version):
         "version": version,
         "xAxis": x_axis,
         "yAxis": y_axis,
-        "channelMeaning": "; ".join(
-            f"{channel}: {meaning}" for channel, meaning in _CHANNELS[settings.mode][name].items()
-        ),
+        "channelMeaning": "; ".join(f"{channel}: {meaning}" for channel, meaning in channels.items()),
         "settings": exact,
         "sha256": _digest(half, exact),
     }
@@ -147,14 +140,6 @@ def _table_header(name, half, settings, version):
         value = getattr(settings, key)
         header["settings." + key] = tuple(map(float, value)) if isinstance(default, tuple) else type(default)(value)
     return {_PREFIX + key: value for key, value in header.items()}
-
-
-def _axes(name, settings):
-    """What the columns and the rows of a table stand for."""
-    if name == "m":
-        return _LONGITUDINAL_AXES[settings.axes]
-    rows = _AZIMUTHAL_ROWS[settings.mode]
-    return ("the one column stands for every phi" if name == "n_res" else _AZIMUTHAL_COLUMNS[settings.axes]), rows
 
 
 def _digest(half, settings_text):

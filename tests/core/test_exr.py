@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from hair_addon.core import exr
 from hair_addon.core.errors import HairError
-from hair_addon.core.shading import lookup_tables
+from hair_addon.core.shading import dual_scattering, lookup_tables
 
 SETTINGS = lookup_tables.Settings(eta=1.6, sigma_a=(0.1, 0.2, 0.3), tilt=0.0123456789, size=16, caustic="exact")
 CHANNELS = ["R", "G", "B"]
@@ -69,6 +69,28 @@ def test_tables_survive_to_the_last_bit_of_a_half_float(tmp_path, details):
         half = lookup_tables.to_half(getattr(baked, name))
         np.testing.assert_array_equal(getattr(back, name), half.astype(np.float32))
         assert getattr(back, name).dtype == np.float32
+
+
+@pytest.mark.parametrize("mode", ["classic", "energy"])
+def test_dual_tables_survive_and_stand_beside_the_others(tmp_path, mode):
+    baked = lookup_tables.bake(replace(SETTINGS, mode=mode))
+    dual = dual_scattering.bake(baked)
+    exr.write_tables(tmp_path, baked, "1.2.3")
+    exr.write_dual_tables(tmp_path, dual, "1.2.3")
+    back = exr.read_dual_tables(tmp_path)
+    assert back.settings == exr.read_tables(tmp_path).settings == baked.settings
+    for name in ("theta", "n_g", "n_g_trt"):
+        np.testing.assert_array_equal(getattr(back, name), lookup_tables.to_half(getattr(dual, name)))
+    _, header = exr.read_table(tmp_path / "dual.exr", CHANNELS, (9, 128))
+    assert "a_f, a_b" in header["vellus.yAxis"]
+
+
+def test_dual_tables_of_another_bake_are_refused(tmp_path):
+    for number, eta in enumerate((1.4, 1.5)):
+        dual = dual_scattering.bake(lookup_tables.bake(replace(SETTINGS, eta=eta)))
+        exr.write_dual_tables(tmp_path / str(number), dual, "1")
+    os.replace(tmp_path / "0" / "n_g.exr", tmp_path / "1" / "n_g.exr")
+    assert "different bakes" in refused(exr.read_dual_tables, tmp_path / "1")
 
 
 def test_header_says_what_the_file_is(folder):

@@ -18,31 +18,39 @@ def trimmed_logistic(phi, scale):
 def roughening(edges, scale):
     """(W, W) matrix that turns the cell means of a smooth N over phi (..., W) into those of a rough one.
 
-    edges: W + 1 monotone values of phi from 0 to pi or back. N is even in phi, so light comes from both sides. Each
-    element is the exact mean of D_s over two cells, and each column spreads exactly what it was given.
+    edges: W + 1 monotone values of phi from 0 to pi or back; scale s [rad].
+    """
+    return _spreading(edges, lambda x: _logistic_antiderivative(x, scale))
+
+
+def half_circle_mean(edges):
+    """(W, W) matrix that averages N over the half circle around each phi: N^G of [Zinke08], light from all in front."""
+    return _spreading(edges, lambda x: np.where(x < 0.5 * np.pi, 0.5 * x * x, 0.5 * np.pi * (x - 0.25 * np.pi)) / np.pi)
+
+
+def _spreading(edges, second_antiderivative):
+    """The matrix of a convolution over the circle with an even density D on [-pi, pi], for means over cells.
+
+    N is even in phi, so light comes from both sides. Each element is the exact mean of D over two cells, and each
+    column spreads exactly what it was given. second_antiderivative: G on [0, pi] with G'' = D, G(0) = G'(0) = 0.
     """
     # D(x - y) over the cell of y is D(x + y) over its mirror image.
-    spread = _cell_integrals(edges, -edges, scale) + _cell_integrals(edges, edges, scale)
+    spread = sum(_cell_integrals(edges, image, second_antiderivative) for image in (-edges, edges))
     spread = np.maximum(spread, 0.0)  # rounding of the second differences
     widths = np.abs(np.diff(edges))
     return spread * (widths / spread.sum(axis=0)) / widths[:, None]
 
 
-def _cell_integrals(x_edges, y_edges, scale):
-    """Integrals (W, W) of D(x + y) over pairs of cells: second differences of its second antiderivative."""
-    values = _second_antiderivative(x_edges[:, None] + y_edges[None, :], scale)
+def _cell_integrals(x_edges, y_edges, second_antiderivative):
+    """Integrals (W, W) of D(x + y) over pairs of cells: second differences of G, continued around the circle."""
+    x = np.abs(x_edges[:, None] + y_edges[None, :])  # up to 2 pi
+    beyond = np.maximum(x - np.pi, 0.0)
+    # From pi on D is its mirror image, so G is the area under 1 - C where C, the integral of D, was.
+    values = beyond + second_antiderivative(np.where(x > np.pi, np.pi - beyond, x))
     return np.abs(np.diff(np.diff(values, axis=0), axis=1))
 
 
-def _second_antiderivative(x, scale):
-    """G (...) with G'' = D_s, continued around the circle, for x in [-pi, 2 pi]."""
-    x = np.abs(x)
-    beyond = np.maximum(x - np.pi, 0.0)
-    # From pi on D is its mirror image, so G is the area under 1 - C where C was.
-    return np.where(x > np.pi, beyond + _within(np.pi - beyond, scale), _within(x, scale))
-
-
-def _within(x, scale):
+def _logistic_antiderivative(x, scale):
     """Integral of C(x) = tanh(x / 2s) / (2 tanh(pi / 2s)), itself the integral of D_s, from 0 to x in [0, pi]."""
     half = 0.5 * x / scale
     log_cosh = half + np.log1p(np.exp(-2.0 * half)) - np.log(2.0)

@@ -76,10 +76,10 @@ def azimuthal_lobes(settings, sigma_a, device="cpu"):
 
         return *texel_kernels.azimuthal_means(edges, cosines, settings, sigma_a, spread, device), n_res
     smooth = smooth_means(edges, cosines, settings, sigma_a)
-    return *(smooth if spread is None else [_spread(lobe, spread) for lobe in smooth]), n_res
+    return *(smooth if spread is None else [spread_columns(lobe, spread) for lobe in smooth]), n_res
 
 
-def _spread(lobe, spread):
+def spread_columns(lobe, spread):
     """Cell means (H, W, C) with their columns mixed by a matrix (W, W), as one product of plain matrices."""
     height, width, channel_count = lobe.shape
     rows = lobe.swapaxes(1, 2).reshape(-1, width) @ spread.T

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light among many fibres: the tables of dual scattering [Zinke08], from those of one fibre.
+
+Light that reaches a strand through n others is a_f^n of what it was, spread by n beta_f²; what the strands behind send
+back is A_b, shifted by Delta_b and spread by sigma_b. All are per colour channel, over the inclination of the light.
+Front and back are the two halves of the circle of phi; the light's azimuth may be anywhere in its half, so of light
+scattered by phi the share |phi| / pi goes forward.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import energy_conserving, lookup_tables, marschner
+from .azimuthal import half_circle_mean
+from .longitudinal import d_eon_lobe
+
+SAMPLE_COUNT = 128  # over theta
+
+# Rows of `DualTables.theta`, in order.
+QUANTITIES = ("a_f", "a_b", "alpha_f", "alpha_b", "beta_f", "beta_b", "back", "back_shift", "back_width")
+
+_WHITEST = 0.99  # the series over scattering events must end
+
+
+@dataclass(frozen=True, eq=False)
+class DualTables:
+    """Float32 arrays, and the settings that they belong to.
+
+    theta: rows as in `QUANTITIES`, column k of K at theta = ((k + 0.5) / K - 0.5) pi, the light's inclination; angles
+    are of theta_h. n_g, n_g_trt: means of N over the half circle around phi, with the axes and channels of n, n_trt.
+    """
+
+    theta: np.ndarray  # (9, K, 3)
+    n_g: np.ndarray  # (H, W, 4)
+    n_g_trt: np.ndarray  # (H, W, 3)
+    settings: lookup_tables.Settings
+
+    def at(self, quantity, theta):
+        """A quantity (..., 3) at inclinations (...), as a texture unit reads it."""
+        row = self.theta[QUANTITIES.index(quantity)][None]
+        u = np.asarray(theta) / np.pi + 0.5
+        return lookup_tables.sample(row, u, np.full_like(u, 0.5))
+
+
+def bake(tables):
+    """`lookup_tables.Tables` → `DualTables`."""
+    theta = np.pi * ((np.arange(SAMPLE_COUNT) + 0.5) / SAMPLE_COUNT - 0.5)
+    forward, backward = scattered_parts(tables, theta)
+    a_f, a_b = (np.minimum(parts.sum(axis=0), _WHITEST) for parts in (forward, backward))
+    alpha, beta = _centres_and_widths(tables.settings)
+    alpha_f, alpha_b = (_weighted(alpha, parts) for parts in (forward, backward))
+    beta_f, beta_b = (np.sqrt(_weighted(np.square(beta), parts)) for parts in (forward, backward))
+    back = back_scattering(a_f, a_b, alpha_f, alpha_b, beta_f, beta_b)
+    rows = np.stack([a_f, a_b, alpha_f, alpha_b, beta_f, beta_b, *back]).astype(np.float32)
+    mean = half_circle_mean(lookup_tables.phi_edges(tables.settings)).astype(np.float32)
+    n_g, n_g_trt = (lookup_tables.spread_columns(table, mean) for table in (tables.n, tables.n_trt))
+    return DualTables(rows, n_g, n_g_trt, tables.settings)
+
+
+def scattered_parts(tables, theta):
+    """(forward, backward), each (4, T, 3): what R, TT, TRT and the residual scatter of light inclined by theta (T,)."""
+    edges = lookup_tables.phi_edges(tables.settings)
+    widths = 2.0 * np.abs(np.diff(edges))  # twice: N is even in phi
+    ahead = 0.5 * (edges[1:] + edges[:-1]) / np.pi
+    return tuple(_lobe_albedos(tables, widths * share, theta) for share in (ahead, 1.0 - ahead))
+
+
+def _lobe_albedos(tables, weights, theta):
+    n_r, n_tt, n_trt = (
+        np.einsum("hwc,w->hc", table, weights) for table in (tables.n[..., 3:], tables.n[..., :3], tables.n_trt)
+    )
+    settings = tables.settings
+    rows = lookup_tables.row_cosines(settings)
+    if settings.mode == "energy":
+        # M is of unit area, whatever its width.
+        lobes = (np.repeat(n_r, 3, axis=1), n_tt, n_trt, tables.n_res[:, 0] * weights.sum())
+        return np.stack([_interpolated(np.cos(theta), rows, lobe) for lobe in lobes])
+    out = np.pi * ((np.arange(361) + 0.5) / 361 - 0.5)
+    theta_h, theta_d = 0.5 * (theta[:, None] + out), 0.5 * (theta[:, None] - out)
+    cosine = np.maximum(np.cos(theta_d), marschner.LEAST_COS_THETA_D)
+    measure = np.square(np.cos(out) / cosine) * np.pi / 361
+    albedos = np.zeros((4, len(theta), 3))
+    for index, ((alpha, beta), n) in enumerate(
+        zip(marschner.longitudinal_lobes(settings), (n_r, n_tt, n_trt), strict=True)
+    ):
+        lobe = marschner.m_lobe(theta_h, alpha, beta) * measure
+        albedos[index] = np.einsum("to,toc->tc", lobe, _interpolated(cosine, rows, n))
+    return albedos
+
+
+def _interpolated(cosine, rows, values):
+    return np.stack([np.interp(cosine, rows, column) for column in values.T], axis=-1)
+
+
+def _centres_and_widths(settings):
+    """alpha and beta of the four lobes, (4,), in theta_h."""
+    if settings.mode == "energy":
+        shift, v = np.transpose(energy_conserving.lobes(settings))
+        return 0.5 * shift, 0.5 * np.sqrt(v)
+    alpha, beta = np.transpose(marschner.longitudinal_lobes(settings))
+    return np.append(alpha, 0.0), np.append(beta, 0.0)
+
+
+def _weighted(values, parts):
+    """Mean (T, 3) of one value a lobe (4,), weighted by what each scatters (4, T, 3)."""
+    return np.einsum("p,ptc->tc", values, parts) / np.maximum(parts.sum(axis=0), 1e-12)
+
+
+def back_scattering(a_f, a_b, alpha_f, alpha_b, beta_f, beta_b):
+    """(A_b, Delta_b, sigma_b) (...): light sent back after one or three backward events and any number forward.
+
+    The moments are summed exactly over the numbers of events; [Zinke08] expands them for small a_b.
+    """
+    x = np.square(a_f)
+    once, thrice = a_b * x / (1.0 - x), np.power(a_b, 3) * x / np.power(1.0 - x, 3)
+    # Mean numbers of forward events in each.
+    events_once, events_thrice = 2.0 / (1.0 - x), 2.0 * (1.0 + 2.0 * x) / (1.0 - x)
+    total = once + thrice
+    shift = once * (alpha_b + events_once * alpha_f) + thrice * (3.0 * alpha_b + events_thrice * alpha_f)
+    variance = once * (beta_b**2 + events_once * beta_f**2) + thrice * (3.0 * beta_b**2 + events_thrice * beta_f**2)
+    least = np.maximum(total, 1e-30)
+    return total, shift / least, np.sqrt(variance / least)
+
+
+def back_azimuth(phi):
+    """How what comes back from behind a strand is spread over phi (...), 1 at the light, with the integral pi."""
+    return 1.0 - np.abs(phi) / np.pi
+
+
+def spread_back_azimuth(phi):
+    """The same for light from a half circle: the mean of `back_azimuth` over the half circle around phi (...)."""
+    phi = np.abs(phi)
+    return np.where(phi < 0.5 * np.pi, 0.75 - (phi / np.pi) ** 2, 0.25 + (1.0 - phi / np.pi) ** 2)
+
+
+def sample_radiance(tables, dual, angles, strand_count, *, density=0.7, gain=1.0):
+    """Radiance per irradiance (..., 3) of a strand with `strand_count` (...) others before it, energy-conserving mode.
+
+    density: d_f = d_b of [Zinke08], the part of the surroundings that is hair; gain: of what comes back from behind,
+    to be calibrated. What a shader computes from the tables; the irradiance is that outside the hair.
+    """
+    settings = tables.settings
+    count = np.asarray(strand_count, float)[..., None]
+    a_f, beta_f, back, back_shift, back_width = (
+        dual.at(name, angles.theta_i) for name in ("a_f", "beta_f", "back", "back_shift", "back_width")
+    )
+    spread = count * np.square(beta_f)
+    direct = np.clip(1.0 - count, 0.0, 1.0)
+    transmitted = (1.0 - direct) * density * np.power(a_f, count)
+
+    u, v = lookup_tables.n_coordinates(angles.phi, np.cos(angles.theta_o), settings.axes)
+    n_res = lookup_tables.sample(tables.n_res, np.full_like(v, 0.5), v)
+    n_g, n_g_trt = (lookup_tables.sample(table, u, v) for table in (dual.n_g, dual.n_g_trt))
+    sin_i, cos_i = np.sin(angles.theta_i)[..., None], np.cos(angles.theta_i)[..., None]
+
+    def lobe(shift, variance):
+        theta_o = angles.theta_o[..., None] - shift
+        return d_eon_lobe(sin_i, cos_i, np.sin(theta_o), np.abs(np.cos(theta_o)), variance)
+
+    # Variances of theta_h are quarters of those of theta_i + theta_o.
+    m = [lobe(shift, variance + 4.0 * spread) for shift, variance in energy_conserving.lobes(settings)]
+    through = m[0] * n_g[..., 3:] + m[1] * n_g[..., :3] + m[2] * n_g_trt + m[3] * n_res
+    behind = density * gain * back / np.pi
+    back_direct = behind * lobe(2.0 * back_shift, 4.0 * back_width**2)
+    back_spread = behind * lobe(2.0 * back_shift, 4.0 * (back_width**2 + spread))
+    phi = np.asarray(angles.phi)[..., None]
+    one = lookup_tables.sample_radiance(tables, angles)
+    return direct * (one + back_azimuth(phi) * back_direct) + transmitted * (
+        through + spread_back_azimuth(phi) * back_spread
+    )
