@@ -42,11 +42,15 @@ def _read_attribute(curves, name, width):
 
 def new_object(name, surface_object):
     """An empty Curves object on a surface, in the surface's collection."""
+    if not surface_object.add_rest_position_attribute:
+        # What Blender's own nodes find roots on a moving surface by. It counts as a change of the mesh: let Blender
+        # take note of it before there is hair that would be made again for it.
+        surface_object.add_rest_position_attribute = True
+        bpy.context.view_layer.update()
     curves = bpy.data.hair_curves.new(name)
     curves.surface = surface_object
     curves_object = bpy.data.objects.new(name, curves)
     curves_object.parent = surface_object
-    surface_object.add_rest_position_attribute = True  # what Blender's own nodes find roots on a moving surface by
     collections = surface_object.users_collection or (bpy.context.scene.collection,)
     collections[0].objects.link(curves_object)
     return curves_object

@@ -12,13 +12,20 @@ from . import hair_cache, pipeline, viewport
 # of Curves as updated when no more than their surface's place has changed.
 _guide_points = {}
 
+# Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
+_is_opening = False
+
 
 @persistent
 def after_depsgraph_update(_scene, depsgraph):
     """Forget what changed on the GPU and make again what its settings or inputs have outdated."""
     if depsgraph.mode != "VIEWPORT":
         return
+    global _is_opening
     viewport.forget()
+    if _is_opening:
+        _is_opening = False
+        return
     changed = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
     for datablock in changed:
         if isinstance(datablock, bpy.types.Curves):
@@ -70,6 +77,14 @@ def _is_surface_at_rest(curves):
 
 
 @persistent
+def after_load(*_args):
+    """Hair in a file is as it was saved; without a window Blender reports nothing of it."""
+    global _is_opening
+    _is_opening = not bpy.app.background
+    forget_everything()
+
+
+@persistent
 def forget_everything(*_args):
     """Undo, redo and a new file bring other data under the same names."""
     viewport.forget()
@@ -81,7 +96,7 @@ _HANDLERS = (
     (bpy.app.handlers.depsgraph_update_post, after_depsgraph_update),
     (bpy.app.handlers.undo_post, forget_everything),
     (bpy.app.handlers.redo_post, forget_everything),
-    (bpy.app.handlers.load_post, forget_everything),
+    (bpy.app.handlers.load_post, after_load),
 )
 
 

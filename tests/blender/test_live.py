@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender import properties
+from hair_addon.core import groom
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.shading import kajiya_kay, lookup_tables
 from tests.blender.reading import attribute, points, write_points
@@ -159,3 +160,27 @@ def test_a_deleted_surface_is_said_and_nothing_crashes(hair):
     update()
     assert "mesh" in hair.data.vellus.status
     assert len(hair.data.curves) == 500
+
+
+def test_an_operator_computes_once(sphere, monkeypatch):
+    """What an operator itself changes must not count as a change of its inputs."""
+    calls = {"distribute_guides": 0, "bind_hair": 0}
+
+    def counted(name):
+        real = getattr(groom, name)
+
+        def wrapper(*args, **kwargs):
+            calls[name] += 1
+            return real(*args, **kwargs)
+
+        return wrapper
+
+    for name in calls:
+        monkeypatch.setattr(groom, name, counted(name))
+    bpy.ops.vellus.distribute_guides(guide_count=20)
+    bpy.ops.vellus.interpolate_hair(strand_count=100)
+    update()
+    assert calls == {"distribute_guides": 1, "bind_hair": 1}
+    sphere.location.x = 2.0  # hair is parented: it moves along
+    update()
+    assert calls == {"distribute_guides": 1, "bind_hair": 1}
