@@ -14,7 +14,7 @@ from .core.params import declared, label_of
 from .core.shading import lookup_tables
 
 # Settings that the two stages share, or that a shorter word names better on a command line.
-_GROOM_OPTIONS = {"guide_count": "--guides", "strand_count": "--strands"}
+_OPTIONS = {"guide_count": "--guides", "strand_count": "--strands", "eta": "--ior"}
 
 
 def main(arguments=None):
@@ -44,7 +44,8 @@ def _parser():
     groom.set_defaults(run=_groom)
 
     bake = verbs.add_parser("bake-tables", help="bake the Marschner model's tables to OpenEXR")
-    bake.add_argument("--out", type=Path, required=True, help="folder for m.exr, n.exr and n_trt.exr")
+    bake.add_argument("--out", type=Path, required=True, help="folder for the tables: m.exr, n.exr, n_trt.exr, …")
+    bake.add_argument("--plot", action="store_true", help="write a picture of each table too, with labelled axes")
     _add_settings(bake, lookup_tables.Settings)
     bake.set_defaults(run=_bake)
 
@@ -64,7 +65,7 @@ def _add_settings(parser, settings_class, skip=()):
     for name, default, details in declared(settings_class):
         if name in skip:
             continue
-        option = _GROOM_OPTIONS.get(name, "--" + name.replace("_", "-"))
+        option = _OPTIONS.get(name, "--" + name.replace("_", "-"))
         described = {"dest": name, "default": default, "help": f"{label_of(name, details)}: {details.description}"}
         if isinstance(default, bool):
             parser.add_argument(option, action=argparse.BooleanOptionalAction, **described)
@@ -96,7 +97,7 @@ def _bake(options):
     settings = _settings(options, lookup_tables.Settings)
     from .blender import batch
 
-    batch.bake_tables(settings, options.out)
+    batch.bake_tables(settings, options.out, options.plot)
 
 
 def _render(options):

@@ -6,12 +6,13 @@ import tempfile
 from pathlib import Path
 
 import bpy
+import imbuf
 import numpy as np
 
 from ..core import exr
 from ..core.errors import HairError
-from ..core.shading import lookup_tables
-from . import files, pipeline, scene
+from ..core.shading import dual_scattering, lookup_tables
+from . import files, pipeline, scene, table_plots
 from . import render as offscreen
 
 _IMPORTERS = {
@@ -41,9 +42,20 @@ def groom(path, surface_name, guide_settings, hair_settings, out):
         _write_whole(out, lambda partial: np.savez(partial, roots=arrays["strand_points"][:, 0], **arrays))
 
 
-def bake_tables(settings, folder):
-    """Bake the Marschner model's tables into a folder. Raises `HairError`."""
-    exr.write_tables(folder, lookup_tables.bake(settings), files.addon_version())
+def bake_tables(settings, folder, has_plots=False):
+    """Bake the Marschner model's tables and dual scattering's into a folder; with plots: a picture of each beside it.
+
+    Raises `HairError`.
+    """
+    tables = lookup_tables.bake(settings)
+    dual = dual_scattering.bake(tables)
+    exr.write_tables(folder, tables, files.addon_version())
+    exr.write_dual_tables(folder, dual, files.addon_version())
+    if has_plots:
+        for name, picture in table_plots.plot_tables(tables, dual).items():
+            _write_whole(
+                folder / f"{name}.png", lambda partial, picture=picture: imbuf.write(picture, filepath=partial)
+            )
 
 
 def render(path, settings, out):

@@ -38,7 +38,12 @@ def _fill(node, material, settings):
     node.inputs["Absorption Coefficient"].default_value = settings.sigma_a
     node.inputs["IOR"].default_value = settings.eta
     node.inputs["Offset"].default_value = settings.tilt
-    node.inputs["Roughness"].default_value = principled.roughness_from_beta_r(settings.beta_r)
+    if settings.mode == "energy":
+        node.inputs["Roughness"].default_value = settings.roughness
+        node.inputs["Radial Roughness"].default_value = settings.radial_roughness
+        node.inputs["Coat"].default_value = settings.coat
+    else:
+        node.inputs["Roughness"].default_value = principled.roughness_from_beta_r(settings.beta_r)
     # What EEVEE shows, which knows no hair. By identifier: the socket is disabled, and cannot be looked up by name.
     next(s for s in node.inputs if s.identifier == "Color").default_value = color
     material.diffuse_color = color

@@ -58,6 +58,15 @@ def test_tables_are_baked(tmp_path):
     assert settings == lookup_tables.Settings(size=32, sigma_a=(0.1, 0.2, 0.3), axes="COSINES")
 
 
+def test_tables_of_the_energy_conserving_mode_are_baked_and_plotted(tmp_path):
+    bake = ("bake-tables", "--mode", "energy", "--roughness", 0.2, "--ior", 1.5, "--size", 32, "--plot")
+    assert run(*bake, "--out", tmp_path / "t")[0] == 0
+    expected = lookup_tables.Settings(mode="energy", roughness=0.2, eta=1.5, size=32)
+    assert exr.read_tables(tmp_path / "t").settings == exr.read_dual_tables(tmp_path / "t").settings == expected
+    tables, pictures = ({path.stem for path in (tmp_path / "t").glob(f"*.{ending}")} for ending in ("exr", "png"))
+    assert tables == pictures == {"m", "n", "n_trt", "n_res", "dual", "n_g", "n_g_trt"}
+
+
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
@@ -71,7 +80,9 @@ def test_tables_are_baked(tmp_path):
         (["groom", HEAD, "--influence-distance", -1, "--out", "x.npz"], "Influence distance must be"),
         (["groom", HEAD, "--density-group", "scalp", "--out", "x.npz"], 'no vertex group "scalp"'),
         (["bake-tables", "--out", "pyproject.toml/tables"], "pyproject.toml"),
-        (["bake-tables", "--eta", 0.9, "--out", "x"], "IOR must be"),
+        (["bake-tables", "--ior", 0.9, "--out", "x"], "IOR must be"),
+        (["bake-tables", "--sigma-a", -1, 0, 0, "--out", "x"], "Absorption must be"),
+        (["bake-tables", "--mode", "energy", "--roughness", 1.5, "--out", "x"], "Roughness must be"),
         (["render", "missing.blend", "--out", "x.png"], "missing.blend is not there"),
     ],
 )

@@ -67,8 +67,12 @@ class Settings(_Settings):
             ("PUBLISHED", "As published", "-1, 1/2 and 3/2 times the tilt [Marschner03]"),
         ),
     )
-    roughness: float = param(0.3, "Spread of light along the fibre", low=0.0, high=1.0, subtype="FACTOR")
-    radial_roughness: float = param(0.3, "Spread of light around the fibre", low=0.0, high=1.0, subtype="FACTOR")
+    roughness: float = param(
+        0.3, "Spread of light along a fibre of the energy-conserving mode", low=0.0, high=1.0, subtype="FACTOR"
+    )
+    radial_roughness: float = param(
+        0.3, "Spread of light around a fibre of the energy-conserving mode", low=0.0, high=1.0, subtype="FACTOR"
+    )
     coat: float = param(
         0.0, "How much smoother the fibre's surface is than its inside", low=0.0, high=1.0, subtype="FACTOR"
     )
