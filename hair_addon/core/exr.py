@@ -31,6 +31,7 @@ _MAX_SETTINGS_LENGTH = 10_000
 _MAGIC = b"\x76\x2f\x31\x01"
 _PREFIX = "vellus."  # of our header attributes
 
+
 def write_table(path, array, channels, header):
     """(H, W, C) array → a half-float EXR file at `path`, which is either written whole or left as it was.
 
