@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hair_addon.core.shading import azimuthal, dual_scattering, lookup_tables, marschner
+from hair_addon.core.shading import azimuthal, dual_scattering, lookup_tables, marschner, principled
 from hair_addon.core.shading.angles import FibreAngles
 from hair_addon.core.shading.pigment import sigma_a_from_melanin
 
@@ -166,3 +166,36 @@ def test_a_white_strand_deep_in_white_hair_passes_on_what_it_receives():
     radiance = dual_scattering.sample_radiance(tables, unit, at, np.full(at.phi.shape, 4.0), density=1.0, gain=0.0)
     returned = 2.0 * np.pi * np.sum(radiance[..., 0].mean(axis=1) * np.cos(theta_i[:, 0]) * weights * 0.5 * np.pi)
     assert returned == pytest.approx(1.0, abs=2e-3)
+
+
+def moments(theta, radiance):
+    """(energy over theta and phi, mean, deviation) of radiance (T, F) that falls on every phi in [0, pi]."""
+    weights = radiance.mean(axis=1) * np.cos(theta)
+    mean = np.average(theta, weights=weights)
+    energy = 2.0 * np.pi * weights.sum() * (theta[1] - theta[0])
+    return energy, mean, np.sqrt(np.average((theta - mean) ** 2, weights=weights))
+
+
+@pytest.mark.parametrize("strand_count", [0.0, 3.0])
+def test_lobes_are_as_bright_as_wide_and_as_shifted_as_the_tables_say(strand_count):
+    """One lobe at a time: R of a black fibre, and what comes back from behind, with the same numbers for all lights."""
+    tables, dual = baked(sigma_a=(100.0, 100.0, 100.0), tilt=0.0, roughness=0.1)
+    numbers = {"a_f": 0.8, "beta_f": 0.05, "back": 0.3, "back_shift": 0.04, "back_width": 0.06}
+    for name, number in numbers.items():
+        dual.theta[dual_scattering.QUANTITIES.index(name)] = number
+    theta_i, phi = np.linspace(-1.2, 1.2, 2001), (np.arange(64) + 0.5) / 64 * np.pi
+    at = FibreAngles(*np.broadcast_arrays(theta_i[:, None], 0.0, phi[None, :]))
+    count = np.full(at.phi.shape, strand_count)
+    alone, with_back = (
+        dual_scattering.sample_radiance(tables, dual, at, count, density=0.7, gain=gain)[..., 0] for gain in (0.0, 1.0)
+    )
+    _energy, mean, deviation = moments(theta_i, alone)
+    variance_r = principled.variance_from_roughness(0.1)
+    assert mean == pytest.approx(0.0, abs=1e-3)
+    assert deviation == pytest.approx(np.sqrt(variance_r + 4.0 * strand_count * 0.05**2), rel=0.02)
+
+    energy, mean, deviation = moments(theta_i, with_back - alone)
+    received = 1.0 if strand_count == 0.0 else 0.7 * 0.8**strand_count
+    assert energy == pytest.approx(received * 0.7 * 0.3, rel=0.01)
+    assert mean == pytest.approx(0.08, rel=0.05)
+    assert deviation == pytest.approx(2.0 * np.sqrt(0.06**2 + strand_count * 0.05**2), rel=0.03)

@@ -111,6 +111,16 @@ def test_the_first_highlight_turns_to_the_root_and_a_coat_sharpens_it_alone():
     assert coated[:, 0].max() > 1.5 * plain[:, 0].max()
 
 
+def test_transmitted_light_is_half_as_wide_and_inner_reflections_twice():
+    """As Marschner's lobes, measured: the deviation of theta_i + theta_o from the lobe's centre."""
+    settings = energy_settings(roughness=0.15, tilt=0.05)
+    theta_i = np.linspace(-1.5, 1.5, 6001)
+    weights = energy_conserving.m_lobes(theta_i, 0.0, settings) * np.cos(theta_i)[:, None]
+    centres = np.array([-0.1, 0.05, 0.2, 0.0])
+    deviations = np.sqrt([np.average((theta_i - c) ** 2, weights=w) for c, w in zip(centres, weights.T, strict=True)])
+    np.testing.assert_allclose(deviations / deviations[0], [1.0, 0.5, 2.0, 2.0], rtol=0.04)
+
+
 def test_more_absorption_never_brightens():
     pale, dark = (lookup_tables.bake(energy_settings(sigma_a=sigma_a)) for sigma_a in (SIGMA_A, (0.2, 0.8, 3.0)))
     for name in ("n", "n_trt", "n_res"):

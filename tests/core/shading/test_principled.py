@@ -17,3 +17,18 @@ def test_roughness_survives_the_way_there_and_back(roughness):
     assert principled.roughness_from_beta_r(principled.beta_r_from_roughness(roughness)) == pytest.approx(
         roughness, abs=1e-5
     )
+
+
+def test_roughness_is_the_published_variance_and_scale():
+    """Of [Chiang16] at 0.3 and 1; in theta_i + theta_o twice the deviation in theta_h."""
+    assert principled.variance_from_roughness(0.3) == pytest.approx(0.0846, abs=1e-4)
+    assert principled.variance_from_roughness(0.3) == pytest.approx((2.0 * principled.beta_r_from_roughness(0.3)) ** 2)
+    assert principled.scale_from_radial_roughness(0.3) == pytest.approx(0.1172, abs=1e-4)
+    assert principled.scale_from_radial_roughness(1.0) == pytest.approx(4.281, abs=1e-3)
+
+
+def test_smooth_fibres_keep_a_width_that_single_precision_can_hold():
+    roughness = np.linspace(0.0, 1.0, 101)
+    for width in (principled.variance_from_roughness, principled.scale_from_radial_roughness):
+        assert width(0.0) > 0.0
+        assert (np.diff(width(roughness)) >= 0.0).all()
