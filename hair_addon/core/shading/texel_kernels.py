@@ -13,6 +13,8 @@ from .cell_means import NODES, WEIGHTS
 from .longitudinal import BESSEL_FAR, BESSEL_NEAR
 from .marschner import Caustic, longitudinal_lobes
 
+wp.set_module_options({"enable_backward": False})  # no gradients: half as long to compile
+
 F = wp.float64
 
 _PI = wp.constant(wp.float64(np.pi))
