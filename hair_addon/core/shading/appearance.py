@@ -2,7 +2,7 @@
 """What artists set, once, for the viewport's models and for Cycles: names, units and defaults are Principled Hair's."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -117,10 +117,14 @@ def _dye(tint, radial_roughness):
     )
 
 
-def table_settings(appearance, size=256):
-    """`Appearance` → `lookup_tables.Settings` of an average strand at its root."""
+def table_settings(appearance, base=None):
+    """`Appearance` → `lookup_tables.Settings` of an average strand at its root.
+
+    base: settings that the rest is taken from: size and axes of the tables, shifts, glints of the classic mode.
+    """
     width = next(details for name, _default, details in declared(lookup_tables.Settings) if name == "beta_r")
-    return lookup_tables.Settings(
+    return replace(
+        base or lookup_tables.Settings(),
         mode=appearance.mode,
         eta=appearance.ior,
         sigma_a=sigma_a(appearance),
@@ -128,8 +132,7 @@ def table_settings(appearance, size=256):
         roughness=appearance.roughness,
         radial_roughness=appearance.radial_roughness,
         coat=appearance.coat,
-        beta_r=min(max(beta_r_from_roughness(appearance.roughness), width.low), width.high),
-        size=size,
+        beta_r=float(min(max(beta_r_from_roughness(appearance.roughness), width.low), width.high)),
     )
 
 

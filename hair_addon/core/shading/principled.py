@@ -28,6 +28,11 @@ def scale_from_radial_roughness(roughness):
     return np.maximum(scale, LEAST_SCALE)
 
 
+def varied_roughness(roughness, amount, random):
+    """Roughness (...) of strands with random numbers (...) in [0, 1], as Cycles varies it: up to `amount` of it."""
+    return np.clip(roughness * (1.0 + 2.0 * (np.asarray(random) - 0.5) * amount), 0.0, 1.0)
+
+
 def beta_r_from_roughness(roughness):
     """Longitudinal roughness in [0, 1] → beta_R [rad], the deviation in theta_h, half that in theta_i + theta_o."""
     return 0.5 * deviation_from_roughness(roughness)

@@ -50,6 +50,13 @@ def test_every_appearance_is_one_that_every_model_takes(look):
     assert 0.0 <= least <= greatest < np.inf
 
 
+def test_what_artists_do_not_set_stays_as_it_was():
+    base = lookup_tables.Settings(size=32, axes="COSINES", glint_gain=3.0, shifts="PUBLISHED", caustic="exact")
+    found = appearance.table_settings(Appearance(mode="classic"), base)
+    assert (found.size, found.axes, found.glint_gain) == (32, "COSINES", 3.0)
+    assert (found.shifts, found.caustic, found.mode) == ("PUBLISHED", "exact", "classic")
+
+
 def test_the_same_hair_may_be_described_in_three_ways():
     by_melanin = Appearance(melanin=0.4, redness=0.3)
     sigma_a = appearance.sigma_a(by_melanin)
@@ -77,7 +84,9 @@ def test_roughness_means_one_width_in_both_modes():
 @pytest.mark.parametrize("roughness", [0.15, 0.3, 0.5])
 def test_kajiya_kay_s_highlight_has_the_energy_of_the_first_reflection(roughness):
     look = Appearance(roughness=roughness, parametrization="ABSORPTION", absorption=(1000.0, 1000.0, 1000.0))
-    reflected = albedo.mean_albedo(lookup_tables.bake(appearance.table_settings(look, size=128)))
+    reflected = albedo.mean_albedo(
+        lookup_tables.bake(appearance.table_settings(look, lookup_tables.Settings(size=128)))
+    )
     settings = appearance.kajiya_kay_settings(look)
     highlight = kajiya_kay.kajiya_kay_specular_albedo(settings.exponent) * np.array(settings.specular_color)
     np.testing.assert_allclose(highlight, reflected, rtol=0.02)

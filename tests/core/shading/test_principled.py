@@ -32,3 +32,10 @@ def test_smooth_fibres_keep_a_width_that_single_precision_can_hold():
     for width in (principled.variance_from_roughness, principled.scale_from_radial_roughness):
         assert width(0.0) > 0.0
         assert (np.diff(width(roughness)) >= 0.0).all()
+
+
+def test_random_roughness_keeps_its_mean_and_its_range():
+    random = (np.arange(1000) + 0.5) / 1000
+    assert principled.varied_roughness(0.3, 0.5, random).mean() == pytest.approx(0.3)
+    np.testing.assert_allclose(principled.varied_roughness(0.4, 0.25, np.array([0.0, 0.5, 1.0])), [0.3, 0.4, 0.5])
+    assert principled.varied_roughness(0.9, 1.0, random).max() == 1.0
