@@ -15,4 +15,5 @@ vec3 hair_albedo()
   return settings.diffuse_color + settings.specular_color * kajiya_kay_specular_albedo(settings.exponent);
 }
 
+#include "include/single_scattering.glsl"
 #include "include/shade_strand.glsl"

@@ -22,4 +22,5 @@ vec3 hair_albedo()
   return view.hair_albedo.rgb;
 }
 
+#include "include/single_scattering.glsl"
 #include "include/shade_strand.glsl"

@@ -19,7 +19,7 @@ void main()
                                      light.cos_cone,
                                      light.blend,
                                      drawn_position);
-      irradiance += cosine * facing * visibility(light, drawn_position, view.hair_forward.rgb, 1);
+      irradiance += cosine * facing * surface_visibility(light, drawn_position, view.hair_forward.rgb);
     }
   }
   color = vec4(surface_color * irradiance / PI, 1.0);

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import gpu
 import numpy as np
 
-from ..core.shading import albedo, kajiya_kay, lookup_tables
+from ..core.shading import albedo, dual_scattering, kajiya_kay, lookup_tables
 from . import shaders, uniforms
 
 # What the two modes of the Marschner model read; in the energy-conserving one M is evaluated.
@@ -87,6 +87,13 @@ def marschner_shading(tables):
     """The Marschner model from baked `lookup_tables.Tables`, ready to draw."""
     fragment, names = _TABLES[tables.settings.mode]
     textures = {f"{name}_table": _table_texture(getattr(tables, name)) for name in names}
+    if tables.settings.mode == "energy":
+        dual = dual_scattering.bake(tables)
+        textures |= {
+            "dual_table": _table_texture(dual.theta),
+            "n_g_table": _table_texture(dual.n_g),
+            "n_g_trt_table": _table_texture(dual.n_g_trt),
+        }
     program = shaders.strand_program(fragment, lookup_tables.Settings, tuple(textures))
     settings = uniforms.uniform_buffer(uniforms.fill(tables.settings))
     return Shading(program, settings, textures, albedo.mean_albedo(tables), albedo.mean_forward(tables))

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The main that every shading model includes: hair_bsdf() summed over the scene's lights, plus the world's light.
 //
-// vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)  light leaving the fibre towards V for unit irradiance from L, the cosine
-//                                         of theta_i included
-// vec3 hair_albedo()                      what the fibre returns of a uniform surrounding
+// vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count)  light leaving the fibre towards V for unit irradiance from L
+//                                                          outside the hair, with a mean of `count` strands between
+// vec3 hair_albedo()                                       what the fibre returns of a uniform surrounding
 
 #include "include/shadow.glsl"
 
@@ -24,10 +24,17 @@ void main()
                                        light.cos_cone,
                                        light.blend,
                                        drawn_position);
-    irradiance *= visibility(light, drawn_position, view.hair_forward.rgb, 0);
+    vec3 at;
+    float depth;
+    float count = 0.0;
+    if (shadow_place(light, drawn_position, at, depth)) {
+      irradiance *= lit_part(light, at, depth);
+      count = crossed_strands(light, at, depth);
+    }
     // Most of a head of hair lies in the shadow of the rest, where nothing is left to scatter.
-    if (max(irradiance.r, max(irradiance.g, irradiance.b)) > LEAST_IRRADIANCE) {
-      radiance += irradiance * hair_bsdf(T, L, V);
+    vec3 arriving = irradiance * transmitted(count, view.hair_forward.rgb);
+    if (max(arriving.r, max(arriving.g, arriving.b)) > LEAST_IRRADIANCE) {
+      radiance += irradiance * hair_radiance(T, L, V, count);
     }
   }
   color = vec4(radiance, 1.0);

@@ -3,37 +3,50 @@
 
 #include "include/opacity.glsl"
 
-// What arrives at a depth, read at one place of a light's maps.
-vec3 visibility_at(vec3 at, float depth, Light light, vec3 forward)
+// Texel of a point in a light's maps, and its depth along the light; false where the maps do not reach: they hold the
+// hair and what is near it.
+bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
 {
-  // Half a bias either side: a soft step that neither stripes a surface nor lets it shine through itself.
-  float behind_surface = depth - light.surface_bias - textureLod(surface_front, at, 0.0).r;
-  float lit = 1.0 - smoothstep(-0.5, 0.5, behind_surface / light.surface_bias);
-  float behind_hair = max(0.0, depth - textureLod(hair_front, at, 0.0).r) / light.extent;
-  return lit * transmitted(strands_in_front(textureLod(hair_layers, at, 0.0), behind_hair), forward);
-}
-
-// Part of a light that arrives at a point, through strands and past surfaces: the mean over (2 reach + 1)² texels.
-// forward: what one strand passes on.
-vec3 visibility(Light light, vec3 position, vec3 forward, int reach)
-{
+  at = vec3(0.0);
+  depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, position);
   if (light.shadow_layer < 0) {
-    return vec3(1.0);
+    return false;
   }
   vec4 clip = light.world_to_shadow * vec4(position, 1.0);
-  vec2 centre = 0.5 * clip.xy / clip.w + 0.5;
-  // The maps hold the hair and what is near it; nothing is known of a surface further off.
-  if (clip.w <= 0.0 || centre != clamp(centre, vec2(0.0), vec2(1.0))) {
+  at = vec3(0.5 * clip.xy / clip.w + 0.5, float(light.shadow_layer));
+  return clip.w > 0.0 && at.xy == clamp(at.xy, vec2(0.0), vec2(1.0));
+}
+
+// Part of the light that gets past surfaces.
+float lit_part(Light light, vec3 at, float depth)
+{
+  // Half a bias either side: a soft step that neither stripes a surface nor lets it shine through itself.
+  float behind = depth - light.surface_bias - textureLod(surface_front, at, 0.0).r;
+  return 1.0 - smoothstep(-0.5, 0.5, behind / light.surface_bias);
+}
+
+// Mean number of strands that the light has crossed.
+float crossed_strands(Light light, vec3 at, float depth)
+{
+  float behind = max(0.0, depth - textureLod(hair_front, at, 0.0).r) / light.extent;
+  return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
+}
+
+// Part of a light that arrives at a surface: the mean over 3 × 3 texels. forward: what one strand passes on.
+vec3 surface_visibility(Light light, vec3 position, vec3 forward)
+{
+  vec3 at;
+  float depth;
+  if (!shadow_place(light, position, at, depth)) {
     return vec3(1.0);
   }
-  float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, position);
   float texel = 1.0 / float(textureSize(hair_front, 0).x);
   vec3 total = vec3(0.0);
-  for (int y = -reach; y <= reach; y++) {
-    for (int x = -reach; x <= reach; x++) {
-      vec3 at = vec3(centre + vec2(float(x), float(y)) * texel, float(light.shadow_layer));
-      total += visibility_at(at, depth, light, forward);
+  for (int y = -1; y <= 1; y++) {
+    for (int x = -1; x <= 1; x++) {
+      vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
+      total += lit_part(light, near, depth) * transmitted(crossed_strands(light, near, depth), forward);
     }
   }
-  return total / float((2 * reach + 1) * (2 * reach + 1));
+  return total / 9.0;
 }

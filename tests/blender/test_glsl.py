@@ -6,7 +6,15 @@ import pytest
 from scipy.stats import poisson
 
 from hair_addon.blender import drawing, uniforms
-from hair_addon.core.shading import angles, energy_conserving, kajiya_kay, longitudinal, lookup_tables, marschner
+from hair_addon.core.shading import (
+    angles,
+    dual_scattering,
+    energy_conserving,
+    kajiya_kay,
+    longitudinal,
+    lookup_tables,
+    marschner,
+)
 from hair_addon.core.shading.principled import variance_from_roughness
 from tests.blender import glsl
 
@@ -204,6 +212,21 @@ def test_energy_conserving_reflection_is_read_from_the_tables(fibres, axes):
     python = lookup_tables.sample_radiance(halves, at)
     regular = np.minimum(np.cos(at.theta_i), np.cos(at.theta_o)) > 0.02
     np.testing.assert_allclose(shader[regular], python[regular], rtol=5e-3, atol=1e-4)
+    assert np.isfinite(shader).all() and (shader >= 0.0).all()
+
+
+def test_dual_scattering_is_read_from_the_tables(fibres, rng):
+    settings = lookup_tables.Settings(mode="energy", size=64, roughness=0.4, sigma_a=(0.1, 0.3, 0.8))
+    tables = lookup_tables.bake(settings)
+    textures = drawing.marschner_shading(tables).samplers
+    count = rng.uniform(0.0, 6.0, len(fibres["T"])).astype(np.float32)
+    expression = "hair_radiance(T, L, V, count)"
+    shader = shading_model("energy_conserving.frag", settings, expression, textures=textures, count=count, **fibres)
+    halves = lookup_tables.Tables(*map(texels, (tables.m, tables.n, tables.n_trt)), settings, texels(tables.n_res))
+    at = angles.fibre_angles(*doubles(fibres))
+    python = dual_scattering.sample_radiance(halves, dual_scattering.bake(tables), at, count.astype(np.float64))
+    regular = np.minimum(np.cos(at.theta_i), np.cos(at.theta_o)) > 0.05
+    np.testing.assert_allclose(shader[regular], python[regular], rtol=1e-2, atol=2e-4)
     assert np.isfinite(shader).all() and (shader >= 0.0).all()
 
 

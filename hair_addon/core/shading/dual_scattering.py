@@ -134,38 +134,46 @@ def spread_back_azimuth(phi):
     return np.where(phi < 0.5 * np.pi, 0.75 - (phi / np.pi) ** 2, 0.25 + (1.0 - phi / np.pi) ** 2)
 
 
-def sample_radiance(tables, dual, angles, strand_count, *, density=0.7, gain=1.0):
-    """Radiance per irradiance (..., 3) of a strand with `strand_count` (...) others before it, energy-conserving mode.
+def direct_part(count):
+    """Part (...) of light that meets no strand where a mean of `count` (...), Poisson distributed, stand in its way."""
+    return np.exp(-np.asarray(count, float))
 
-    density: d_f = d_b of [Zinke08], the part of the surroundings that is hair; gain: of what comes back from behind,
-    to be calibrated. What a shader computes from the tables; the irradiance is that outside the hair.
+
+def scattered_part(count, a_f):
+    """Part (..., 3) that arrives through one strand or more, each passing on a_f (..., 3): the mean of a_f^k, k >= 1."""
+    count = np.asarray(count, float)[..., None]
+    return np.exp(-count * (1.0 - a_f)) - np.exp(-count)
+
+
+def sample_radiance(tables, dual, angles, strand_count, *, gain=1.0):
+    """Radiance per irradiance (..., 3) of a strand with a mean of `strand_count` (...) others before it.
+
+    Energy-conserving mode; what the shader computes from the tables. The irradiance is that outside the hair; gain: of
+    what comes back from behind. Shifts and widths are the mean over the channels, which differ little in them.
     """
     settings = tables.settings
-    count = np.asarray(strand_count, float)[..., None]
-    a_f, beta_f, back, back_shift, back_width = (
-        dual.at(name, angles.theta_i) for name in ("a_f", "beta_f", "back", "back_shift", "back_width")
+    a_f, back = (dual.at(name, angles.theta_i) for name in ("a_f", "back"))
+    beta_f, back_shift, back_width = (
+        dual.at(name, angles.theta_i).mean(axis=-1) for name in ("beta_f", "back_shift", "back_width")
     )
-    spread = count * np.square(beta_f)
-    direct = np.clip(1.0 - count, 0.0, 1.0)
-    transmitted = (1.0 - direct) * density * np.power(a_f, count)
+    spread = np.asarray(strand_count, float) * np.square(beta_f)
 
     u, v = lookup_tables.n_coordinates(angles.phi, np.cos(angles.theta_o), settings.axes)
     n_res = lookup_tables.sample(tables.n_res, np.full_like(v, 0.5), v)
     n_g, n_g_trt = (lookup_tables.sample(table, u, v) for table in (dual.n_g, dual.n_g_trt))
-    sin_i, cos_i = np.sin(angles.theta_i)[..., None], np.cos(angles.theta_i)[..., None]
 
     def lobe(shift, variance):
-        theta_o = angles.theta_o[..., None] - shift
-        return d_eon_lobe(sin_i, cos_i, np.sin(theta_o), np.abs(np.cos(theta_o)), variance)
+        turned = angles.theta_o - shift
+        return d_eon_lobe(
+            np.sin(angles.theta_i), np.cos(angles.theta_i), np.sin(turned), np.abs(np.cos(turned)), variance
+        )
 
     # Variances of theta_h are quarters of those of theta_i + theta_o.
     m = [lobe(shift, variance + 4.0 * spread) for shift, variance in energy_conserving.lobes(settings)]
-    through = m[0] * n_g[..., 3:] + m[1] * n_g[..., :3] + m[2] * n_g_trt + m[3] * n_res
-    behind = density * gain * back / np.pi
-    back_direct = behind * lobe(2.0 * back_shift, 4.0 * back_width**2)
-    back_spread = behind * lobe(2.0 * back_shift, 4.0 * (back_width**2 + spread))
-    phi = np.asarray(angles.phi)[..., None]
-    one = lookup_tables.sample_radiance(tables, angles)
-    return direct * (one + back_azimuth(phi) * back_direct) + transmitted * (
-        through + spread_back_azimuth(phi) * back_spread
-    )
+    through = energy_conserving.lobe_sum(np.stack(m, axis=-1), n_g, n_g_trt, n_res)
+    back = back * gain / np.pi
+    back_direct = back_azimuth(angles.phi) * lobe(2.0 * back_shift, 4.0 * back_width**2)
+    back_spread = spread_back_azimuth(angles.phi) * lobe(2.0 * back_shift, 4.0 * (back_width**2 + spread))
+    direct = lookup_tables.sample_radiance(tables, angles) + back * back_direct[..., None]
+    indirect = through + back * back_spread[..., None]
+    return direct_part(strand_count)[..., None] * direct + scattered_part(strand_count, a_f) * indirect

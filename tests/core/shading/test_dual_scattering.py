@@ -133,7 +133,7 @@ def directions(rng, count):
 def test_a_lone_strand_is_lit_as_one(rng):
     tables, dual = baked(size=64)
     at = directions(rng, 200)
-    found = dual_scattering.sample_radiance(tables, dual, at, np.zeros(200), density=0.0)
+    found = dual_scattering.sample_radiance(tables, dual, at, np.zeros(200), gain=0.0)
     np.testing.assert_allclose(found, lookup_tables.sample_radiance(tables, at), rtol=1e-12)
 
 
@@ -163,7 +163,7 @@ def test_a_white_strand_deep_in_white_hair_passes_on_what_it_receives():
     theta_i = 0.5 * np.pi * nodes[:, None]
     phi = (np.arange(128) + 0.5) / 128 * np.pi
     at = FibreAngles(*np.broadcast_arrays(theta_i, 0.4, phi[None, :]))
-    radiance = dual_scattering.sample_radiance(tables, unit, at, np.full(at.phi.shape, 4.0), density=1.0, gain=0.0)
+    radiance = dual_scattering.sample_radiance(tables, unit, at, np.full(at.phi.shape, 4.0), gain=0.0)
     returned = 2.0 * np.pi * np.sum(radiance[..., 0].mean(axis=1) * np.cos(theta_i[:, 0]) * weights * 0.5 * np.pi)
     assert returned == pytest.approx(1.0, abs=2e-3)
 
@@ -187,15 +187,26 @@ def test_lobes_are_as_bright_as_wide_and_as_shifted_as_the_tables_say(strand_cou
     at = FibreAngles(*np.broadcast_arrays(theta_i[:, None], 0.0, phi[None, :]))
     count = np.full(at.phi.shape, strand_count)
     alone, with_back = (
-        dual_scattering.sample_radiance(tables, dual, at, count, density=0.7, gain=gain)[..., 0] for gain in (0.0, 1.0)
+        dual_scattering.sample_radiance(tables, dual, at, count, gain=gain)[..., 0] for gain in (0.0, 1.0)
     )
+    # Light that met no strand is as narrow as ever, the rest is spread by each of those it met.
+    direct, scattered = np.exp(-strand_count), np.exp(-0.2 * strand_count) - np.exp(-strand_count)
+    spread = 4.0 * strand_count * 0.05**2 * scattered / (direct + scattered)
     _energy, mean, deviation = moments(theta_i, alone)
-    variance_r = principled.variance_from_roughness(0.1)
     assert mean == pytest.approx(0.0, abs=1e-3)
-    assert deviation == pytest.approx(np.sqrt(variance_r + 4.0 * strand_count * 0.05**2), rel=0.02)
+    assert deviation == pytest.approx(np.sqrt(principled.variance_from_roughness(0.1) + spread), rel=0.02)
 
     energy, mean, deviation = moments(theta_i, with_back - alone)
-    received = 1.0 if strand_count == 0.0 else 0.7 * 0.8**strand_count
-    assert energy == pytest.approx(received * 0.7 * 0.3, rel=0.01)
+    assert energy == pytest.approx((direct + scattered) * 0.3, rel=0.01)
     assert mean == pytest.approx(0.08, rel=0.05)
-    assert deviation == pytest.approx(2.0 * np.sqrt(0.06**2 + strand_count * 0.05**2), rel=0.03)
+    assert deviation == pytest.approx(np.sqrt(4.0 * 0.06**2 + spread), rel=0.03)
+
+
+@pytest.mark.parametrize("count", [0.0, 0.3, 2.0, 7.0])
+def test_light_through_strands_is_the_mean_over_poisson_distributed_numbers(count):
+    a_f = np.array([0.9, 0.5, 0.0])
+    k = np.arange(60)
+    chance = np.exp(-count) * np.cumprod(np.concatenate([[1.0], np.full(59, count) / k[1:]]))
+    assert dual_scattering.direct_part(count) == pytest.approx(chance[0])
+    expected = (chance[1:, None] * a_f ** k[1:, None]).sum(axis=0)
+    np.testing.assert_allclose(dual_scattering.scattered_part(count, a_f), expected, atol=1e-12)

@@ -1,0 +1,9 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// For models that know one fibre only: light is dimmed on its way through strands, and keeps its direction.
+
+#include "include/opacity.glsl"
+
+vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count)
+{
+  return transmitted(count, view.hair_forward.rgb) * hair_bsdf(T, L, V);
+}
