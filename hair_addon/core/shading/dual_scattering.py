@@ -140,7 +140,7 @@ def direct_part(count):
 
 
 def scattered_part(count, a_f):
-    """Part (..., 3) that arrives through one strand or more, each passing on a_f (..., 3): the mean of a_f^k, k >= 1."""
+    """Part (..., 3) that arrives through one strand or more, each passing on a_f (..., 3): the mean of a_f^k, k > 0."""
     count = np.asarray(count, float)[..., None]
     return np.exp(-count * (1.0 - a_f)) - np.exp(-count)
 
