@@ -2,11 +2,12 @@
 // The surface under the hair: matt, in the scene's light, so that the hair has something to hide and to be hidden by.
 
 #include "include/shadow.glsl"
+#include "include/world.glsl"
 
 void main()
 {
   vec3 N = normalize(gl_FrontFacing ? surface_normal : -surface_normal);
-  vec3 irradiance = PI * view.world_radiance.rgb;
+  vec3 irradiance = PI * world_light(drawn_position, max(N, 0.0), max(-N, 0.0), view.hair_forward.rgb);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);

@@ -33,7 +33,8 @@ class StrandsOnGPU:
     strand_count: int
     point_count: int
     row_strands: int
-    bounds: np.ndarray  # (2, 3): least and greatest coordinates
+    points: np.ndarray  # (S, P, 3) as they were uploaded, for what is computed on the processor
+    radii: np.ndarray  # (S, P)
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,7 @@ def upload_strands(points, radii):
     )
     texture.filter_mode(False)
     vertex_count = _vertex_count(strand_count, point_count)
-    bounds = np.stack([points.min(axis=(0, 1)), points.max(axis=(0, 1))])
-    return StrandsOnGPU(texture, _strip(vertex_count), strand_count, point_count, row_strands, bounds)
+    return StrandsOnGPU(texture, _strip(vertex_count), strand_count, point_count, row_strands, points, radii)
 
 
 def _vertex_count(strand_count, drawn_points):

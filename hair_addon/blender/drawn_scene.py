@@ -5,9 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..core import hair_volume
 from ..core.errors import HairError
+from ..core.mesh import TriMesh, positions
+from ..core.sampling import sample_surface
 from . import drawing, hair_cache, scene
 from .shadows import ShadowMaps
+
+_VOLUME_STRANDS = 20_000
+_VOLUME_POINTS = 41
+_PLACES_PER_MESH = 50_000
 
 
 @dataclass(frozen=True)
@@ -40,14 +47,50 @@ def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, shad
             continue
         if strands is not None:
             hair.append((strands, shading, np.array(hair_object.matrix_world, np.float64)))
-    surfaces = [
-        (drawing.upload_surface(mesh.positions, mesh.normals), mesh.color)
-        for mesh in scene.read_drawn_meshes(depsgraph, for_render=viewport is None)
-    ]
+    meshes = scene.read_drawn_meshes(depsgraph, for_render=viewport is None)
+    surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
     lights = scene.read_lights(depsgraph, for_render=viewport is None)
     shadow_maps = shadow_maps or ShadowMaps()
-    shadow_maps.draw(lights, [(strands, to_world) for strands, _, to_world in hair], [batch for batch, _ in surfaces])
+    placed = [(strands, to_world) for strands, _, to_world in hair]
+    shadow_maps.draw(lights, placed, [batch for batch, _ in surfaces])
+    if placed:
+        shadow_maps.fill_volume(lights, _volume(placed, meshes))
     return DrawnScene(hair, surfaces, lights, scene.read_world_radiance(blender_scene), shadow_maps)
+
+
+def _volume(placed, meshes):
+    """`HairVolume` of [(StrandsOnGPU, object to world)] among meshes."""
+    points, radii = [], []
+    for strands, to_world in placed:
+        # A part of the strands, each as thick as all that it stands for, is as good a cloud.
+        step = -(-strands.strand_count // _VOLUME_STRANDS)
+        chosen = strands.points[::step]
+        scale = abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
+        points.append(_to_count(chosen @ to_world[:3, :3].T + to_world[:3, 3]))
+        radii.append(_to_count((strands.radii[::step] * (scale * strands.strand_count / len(chosen)))[..., None]))
+    solid = [_places_on(mesh) for mesh in meshes]
+    return hair_volume.measure(
+        np.concatenate(points), np.concatenate(radii)[..., 0], np.concatenate(solid) if solid else np.empty((0, 3))
+    )
+
+
+def _to_count(values):
+    """(S, P, K) along strands → (S, 41, K): strands of different point counts have to stand in one array."""
+    count = values.shape[1]
+    if count == _VOLUME_POINTS:
+        return values
+    places = np.linspace(0, count - 1, _VOLUME_POINTS)
+    below = np.minimum(places.astype(int), max(count - 2, 0))
+    share = (places - below)[:, None]
+    return (1.0 - share) * values[:, below] + share * values[:, np.minimum(below + 1, count - 1)]
+
+
+def _places_on(mesh):
+    """(M, 3) places all over a `DrawnMesh`, close enough together to leave no hole in a volume's cells."""
+    triangles = TriMesh(mesh.positions, np.arange(len(mesh.positions), dtype=np.int32).reshape(-1, 3))
+    if not np.any(triangles.areas > 0.0):
+        return np.empty((0, 3))
+    return positions(triangles, sample_surface(triangles, _PLACES_PER_MESH, seed=0))
 
 
 def draw_hair_depth(drawn, view):

@@ -39,6 +39,7 @@ def expand(name):
 
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_front")
+VOLUME_SAMPLERS = ("volume_x_y", "volume_z")  # see shaders/include/world.glsl
 
 
 def _scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS):
@@ -48,6 +49,9 @@ def _scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS):
     info.uniform_buf(1, "Lights", "lights")
     for slot, name in enumerate(shadow_samplers):
         info.sampler(slot, "FLOAT_2D_ARRAY", name)
+    if shadow_samplers == SHADOW_SAMPLERS:
+        for slot, name in enumerate(VOLUME_SAMPLERS, start=len(SHADOW_SAMPLERS)):
+            info.sampler(slot, "FLOAT_3D", name)
 
 
 @cache
@@ -57,7 +61,7 @@ def strand_program(fragment, settings_class=None, table_names=(), shadow_sampler
     _scene(info, uniforms.settings_block(settings_class).source if settings_class else "", shadow_samplers)
     if settings_class:
         info.uniform_buf(2, "Settings", "settings")
-    first = len(SHADOW_SAMPLERS)
+    first = len(SHADOW_SAMPLERS) + len(VOLUME_SAMPLERS)
     for slot, name in enumerate(("strands", *table_names), start=first):
         info.sampler(slot, "FLOAT_2D", name)
     varying = gpu.types.GPUStageInterfaceInfo("strand_varying")

@@ -21,19 +21,26 @@ _FAR = 1e4  # depth [m] of what no light meets; not more, as maps are filtered
 
 
 class ShadowMaps:
-    """Textures of every shadowed light, drawn once and read until something moves."""
+    """Textures of every shadowed light and of the world's, made once and read until something moves."""
 
     def __init__(self):
         self._hair_front = _array("R32F")
         self._hair_layers = _array("RGBA16F")
         self._surface_front = _array("R32F")
+        self._volume = _volume_textures(np.zeros((1, 1, 1, 6), np.float32))
         self._depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
 
     @property
     def samplers(self):
         """{sampler: texture} for the shaders that receive shadows."""
         textures = (self._hair_front, self._hair_layers, self._surface_front)
-        return dict(zip(shaders.SHADOW_SAMPLERS, textures, strict=True))
+        return dict(zip((*shaders.SHADOW_SAMPLERS, *shaders.VOLUME_SAMPLERS), (*textures, *self._volume), strict=True))
+
+    def fill_volume(self, lights, volume):
+        """Take over a `hair_volume.HairVolume`, and write its box into the lights' record."""
+        lights["volume_low"][:3] = volume.low
+        lights["volume_size"][:3] = volume.high - volume.low
+        self._volume = _volume_textures(volume.counts)
 
     def draw(self, lights, hair, surfaces):
         """Draw the maps and write each light's part in them into its record.
@@ -95,11 +102,27 @@ def _array(texture_format):
     return texture
 
 
+def _volume_textures(counts):
+    """(D, H, W, 6) counts → textures of the sides along x and y, and along z."""
+    depth, height, width, _sides = counts.shape
+    along_z = np.zeros((depth, height, width, 4), np.float32)
+    along_z[..., :2] = counts[..., 4:]
+    textures = []
+    for texels in (np.ascontiguousarray(counts[..., :4]), along_z):
+        data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+        texture = gpu.types.GPUTexture((width, height, depth), format="RGBA16F", data=data)
+        texture.filter_mode(True)
+        texture.extend_mode("EXTEND")
+        textures.append(texture)
+    return textures
+
+
 def bounding_sphere(hair):
     """Centre (3,) and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)]."""
     corners = []
     for strands, to_world in hair:
-        box = np.array(np.meshgrid(*strands.bounds.T)).reshape(3, -1).T
+        bounds = np.stack([strands.points.min(axis=(0, 1)), strands.points.max(axis=(0, 1))])
+        box = np.array(np.meshgrid(*bounds.T)).reshape(3, -1).T
         corners.append(box @ to_world[:3, :3].T + to_world[:3, 3])
     corners = np.concatenate(corners)
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))

@@ -88,7 +88,15 @@ LIGHT = Block(
         "surface_bias": "float",  # [m] by which a surface may stand before itself
     },
 )
-LIGHTS = Block("Lights", {"light": (LIGHT, LIGHT_CAPACITY), "count": "int"})
+LIGHTS = Block(
+    "Lights",
+    {
+        "light": (LIGHT, LIGHT_CAPACITY),
+        "volume_low": "vec4",  # the box of the hair volume [m]
+        "volume_size": "vec4",
+        "count": "int",
+    },
+)
 
 
 def _glsl_type(default, details):

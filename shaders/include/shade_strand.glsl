@@ -5,7 +5,9 @@
 //                                                          outside the hair, with a mean of `count` strands between
 // vec3 hair_albedo()                                       what the fibre returns of a uniform surrounding
 
+#include "include/fibre.glsl"
 #include "include/shadow.glsl"
+#include "include/world.glsl"
 
 const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not seen beside any light
 
@@ -13,7 +15,9 @@ void main()
 {
   vec3 T = normalize(strand_tangent);
   vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
-  vec3 radiance = view.world_radiance.rgb * hair_albedo();
+  // A fibre receives light in proportion to its sine with the direction, from either end alike.
+  vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
+  vec3 radiance = world_light(drawn_position, sides, sides, view.hair_forward.rgb) * hair_albedo();
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);

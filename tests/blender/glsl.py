@@ -11,7 +11,7 @@ _WIDTH = 64  # of the picture; rows as needed
 _COMPONENTS = {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 
 # The parts of a shading model that are no function of their arguments.
-_MAIN = ("include/shade_strand.glsl", "include/shadow.glsl")
+_MAIN = ("include/shade_strand.glsl", "include/shadow.glsl", "include/world.glsl")
 
 
 def source(*names):
