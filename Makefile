@@ -1,7 +1,7 @@
 # make demo, make test: from a bare clone, everything that they need is installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
-.PHONY: help demo test bench build lint lock samples clean
+.PHONY: help demo compare test bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
 # uv trusts the certificates that the machine trusts, as pip does: some networks have their own.
@@ -21,6 +21,9 @@ test: $(installed) ## every test but the long benchmarks
 
 bench: $(installed) ## the benchmarks, with their figures
 	$(python) -m pytest tests/benchmarks -s $(ARGS)
+
+compare: $(installed) ## the head by Cycles and by Vellus: mean colours, and both pictures, in out/compare
+	$(python) blend_samples/compare.py --out out/compare $(ARGS)
 
 build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
 	$(python) tools/build_extension.py $(PLATFORM)

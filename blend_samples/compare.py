@@ -72,7 +72,9 @@ def main():
             print(f"{color:8}{light:8}{texts[0]:>26}{texts[1]:>26}{texts[2]:>24}", flush=True)
             columns.append(np.concatenate([pictures[1], pictures[0]]))  # rows run upwards: Cycles on top
         rows.append(np.concatenate(columns, axis=1))
-    render.write_picture(np.concatenate(rows[::-1]), options.out / "compare.png", bpy.context.scene)
+    sheet = np.concatenate(rows[::-1])
+    sheet += (1.0 - sheet[..., 3:]) * np.array([0.05, 0.05, 0.05, 1.0])
+    render.write_picture(sheet, options.out / "compare.png", bpy.context.scene)
 
 
 def _only_a_sun():

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """make demo: the report's pictures and its two results tables, made on this machine.
 
-Writes head.blend, kajiya_kay.png, marschner.png and tables/{m,n,n_trt}.exr to a folder.
+Writes head.blend, kajiya_kay.png, marschner.png, dual_scattering.png and tables/{m,n,n_trt}.exr to a folder.
 """
 
 import argparse
@@ -49,6 +49,10 @@ def main():
     for model in MODELS.values():
         hair.data.vellus.model = model
         bpy.ops.vellus.render_picture(filepath=str(out / f"{model.lower()}.png"))
+    hair.data.vellus.marschner.mode = "energy"
+    hair.data.vellus.marschner.sigma_a = head.AUBURN
+    bpy.ops.vellus.render_picture(filepath=str(out / "dual_scattering.png"))
+    hair.data.vellus.marschner.mode = "classic"
     print_spline_table()
     print_frame_table(guides, hair)
     print(f"\nmade in {time.perf_counter() - started:.1f} s: {out}")

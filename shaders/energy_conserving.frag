@@ -5,7 +5,7 @@
 #include "include/marschner.glsl"
 
 // Of what comes back from behind: calibrated against Cycles, see DECISIONS.md.
-const float BACK_GAIN = 1.0;
+const float BACK_GAIN = 2.0;
 
 vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)
 {
