@@ -4,6 +4,8 @@
 import numpy as np
 import pytest
 
+from tests.devices import DEVICE
+
 
 @pytest.fixture
 def rng():
@@ -14,4 +16,4 @@ def rng():
 @pytest.fixture
 def device():
     """The Warp device that the tests compute on."""
-    return "cpu"
+    return DEVICE

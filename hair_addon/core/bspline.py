@@ -10,7 +10,8 @@ from functools import lru_cache
 import numpy as np
 import warp as wp
 
-wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 def clamped_knots(control_count, degree=3):

@@ -22,7 +22,8 @@ from .mesh import SurfacePoints, TriMesh, interpolate, positions
 from .sampling import check_density, corner_masses
 from .surface_query import SurfaceQuery
 
-wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 PIECES_PER_SITE = 256
 MOST_PIECES = 400_000  # unless the mesh has more triangles: each is a piece at least

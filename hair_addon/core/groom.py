@@ -148,8 +148,10 @@ def follow_guides(binding, guides) -> Strands:
         raise HairError(
             f"The hair was bound to {len(binding.guide_normals)} guides and there are {len(guides)} now: bind it again."
         )
+    # A kernel that is handed memory of another device reads rubbish, or ends all work on its own.
+    guide_points = guides.points.to(binding.positions.device)
     points = interpolation.interpolate(
-        binding.positions, binding.normals, guides.points, binding.guide_normals, binding.guide_weights
+        binding.positions, binding.normals, guide_points, binding.guide_normals, binding.guide_weights
     )
     return Strands(points, binding.roots)
 

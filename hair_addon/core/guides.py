@@ -8,7 +8,8 @@ from .bspline import basis, greville_abscissae
 from .mesh import normals, positions
 from .surface_query import SurfaceQuery
 
-wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 STEP_COUNT = 48  # straight steps that a guide's arc is made of
 TURNING = 10.0  # how far full gravity bends a guide: the angle to the ground, as tan(angle / 2), shrinks by exp(-10)

@@ -11,7 +11,8 @@ import warp as wp
 
 from .errors import HairError
 
-wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 GRID_SIZE = 32  # cells along each axis; farther ones wrap around and share a bucket, which costs time, never truth
 CELLS_PER_RADIUS = 2.0  # cell width / first search radius: fewer cells to visit beats fewer points to compare

@@ -6,7 +6,8 @@ import warp as wp
 
 from .mesh import SurfacePoints
 
-wp.set_module_options({"enable_backward": False})  # nothing differentiates these kernels
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 FARTHEST = 1.0e15  # [m]: its square is still a float

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Laws of Lloyd's relaxation: the energy never rises, sites stay on their surface, and end up evenly placed."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
@@ -9,10 +11,14 @@ from hair_addon.core import cvt
 from hair_addon.core import mesh as mesh_math
 from hair_addon.core.mesh import SurfacePoints, TriMesh
 from hair_addon.core.sampling import sample_surface
+from tests.devices import DEVICE
+
+relax = partial(cvt.relax, device=DEVICE)
+measure = partial(cvt.measure, device=DEVICE)
 
 
 def relaxed(mesh, count, iterations, density=None, seed=1):
-    return cvt.relax(mesh, sample_surface(mesh, count, seed, density), iterations, density)
+    return relax(mesh, sample_surface(mesh, count, seed, density), iterations, density)
 
 
 def on_square(places):
@@ -77,27 +83,27 @@ def test_energy_is_the_integral(sphere):
     sites = sample_surface(sphere, 50, seed=3)
     points = mesh_math.positions(sphere, sample_surface(sphere, 1_000_000, seed=4))
     distances, _ = cKDTree(mesh_math.positions(sphere, sites)).query(points)
-    energy = cvt.relax(sphere, sites, 0).energies[0]
+    energy = relax(sphere, sites, 0).energies[0]
     np.testing.assert_allclose(energy, sphere.areas.sum() * np.mean(distances**2), rtol=5e-3)
 
 
 def test_energy_of_a_square_lattice():
     """A square's second moment is a sixth of its area squared: 3.9 % above the hexagon's; all cells are equal."""
     middles = (np.indices((12, 12)).reshape(2, -1).T + 0.5) / 12.0
-    quality = cvt.measure(*on_square(middles))
+    quality = measure(*on_square(middles))
     np.testing.assert_allclose(quality.relative_energy, (1.0 / 6.0) / (5.0 / (18.0 * 3.0**0.5)), rtol=5e-3)
     assert quality.share_variation < 0.02
 
 
 def test_one_site_goes_to_the_centre():
     mesh, site = on_square([(0.1, 0.2)])
-    centre = mesh_math.positions(mesh, cvt.relax(mesh, site, 5).sites)
+    centre = mesh_math.positions(mesh, relax(mesh, site, 5).sites)
     np.testing.assert_allclose(centre, [(0.5, 0.5, 0.0)], atol=1e-5)
 
 
 def test_four_sites_share_a_square():
     mesh, sites = on_square([(0.2, 0.3), (0.6, 0.1), (0.7, 0.8), (0.1, 0.9)])
-    places = mesh_math.positions(mesh, cvt.relax(mesh, sites, 100).sites)
+    places = mesh_math.positions(mesh, relax(mesh, sites, 100).sites)
     np.testing.assert_allclose(places[:, :2], [(0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75)], atol=0.02)
 
 
@@ -111,8 +117,8 @@ def test_converged_sites_are_even(surfaces, name, energy, variation):
     """
     mesh, density = surfaces[name]
     start = sample_surface(mesh, 200, 1, density)
-    before = cvt.measure(mesh, start, density)
-    after = cvt.measure(mesh, cvt.relax(mesh, start, 100, density).sites, density)
+    before = measure(mesh, start, density)
+    after = measure(mesh, relax(mesh, start, 100, density).sites, density)
     assert before.relative_energy > 1.8 and before.share_variation > 0.4
     assert after.relative_energy < energy and after.share_variation < variation
 
@@ -126,7 +132,7 @@ def test_sites_follow_the_density(square):
 
 def test_relaxed_sites_rest(sphere):
     first = relaxed(sphere, 100, 200)
-    again = cvt.relax(sphere, first.sites, 10)
+    again = relax(sphere, first.sites, 10)
     assert again.energies[-1] > 0.998 * first.energies[-1]
 
 
@@ -152,7 +158,7 @@ def test_a_site_with_an_empty_cell_keeps_its_place(sphere):
     sites = SurfacePoints(
         np.concatenate([twins.triangle, others.triangle]), np.concatenate([twins.barycentric, others.barycentric])
     )
-    moved = cvt.relax(sphere, sites, 1).sites
+    moved = relax(sphere, sites, 1).sites
     np.testing.assert_array_equal(moved.barycentric[1:40], twins.barycentric[1:])
     assert np.any(moved.barycentric[0] != twins.barycentric[0])
 
@@ -160,9 +166,9 @@ def test_a_site_with_an_empty_cell_keeps_its_place(sphere):
 def test_cells_do_not_depend_on_how_far_neighbours_are_known(head, scalp, monkeypatch):
     """With two known neighbours a site the rest must be found by looking at all."""
     sites = sample_surface(head, 150, 5, scalp)
-    expected = cvt.relax(head, sites, 5, scalp).energies
+    expected = relax(head, sites, 5, scalp).energies
     monkeypatch.setattr(cvt, "SITES_AROUND", 2)
-    np.testing.assert_allclose(cvt.relax(head, sites, 5, scalp).energies, expected, rtol=1e-6)
+    np.testing.assert_allclose(relax(head, sites, 5, scalp).energies, expected, rtol=1e-6)
 
 
 def test_triangles_without_area_are_passed_over(sphere):

@@ -9,6 +9,7 @@ from hair_addon.core import mesh as mesh_math
 from hair_addon.core.mesh import TriMesh
 from hair_addon.core.sampling import sample_surface
 from hair_addon.core.strands import lengths, segment_lengths
+from tests.devices import DEVICE
 
 STRAIGHT = {
     "length": 0.5,
@@ -22,7 +23,7 @@ STRAIGHT = {
 
 def grown(mesh, roots, **settings):
     """Points (G, 41, 3) of the curves."""
-    return bspline.evaluate(guides.grow(mesh, roots, **STRAIGHT | settings), 41).numpy()
+    return bspline.evaluate(guides.grow(mesh, roots, **STRAIGHT | settings, device=DEVICE), 41, DEVICE).numpy()
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from hair_addon.core import hash_grid
 from hair_addon.core.errors import HairError
+from tests.devices import DEVICE
 
 
-def found(points, queries, distance, limit, device="cpu"):
+def found(points, queries, distance, limit, device=DEVICE):
     """What `neighbours` returns, as NumPy arrays."""
     points, queries = (wp.array(np.float32(a), dtype=wp.vec3, device=device) for a in (points, queries))
     return [a.numpy() for a in hash_grid.neighbours(points, queries, distance, limit)]

@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from hair_addon.core import interpolation
 from hair_addon.core.strands import offsets
+from tests.devices import DEVICE
 
 
-def vectors(array, device="cpu"):
+def vectors(array, device=DEVICE):
     return wp.array(np.float32(array), dtype=wp.vec3, device=device)
 
 

@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What drawing hair costs: milliseconds for upload, shadow maps and a frame, one sample a pixel, on the sample head.
+
+.venv/bin/python tests/benchmarks/draw_frames.py --strands 10000 100000
+"""
+
+import argparse
+import os
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import bpy
+import gpu
+import numpy as np
+import warp as wp
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
+
+import head  # the samples' scene
+
+import hair_addon
+from hair_addon.blender import drawing, drawn_scene, pipeline, scene
+from hair_addon.core import groom
+from hair_addon.core.shading import kajiya_kay, lookup_tables
+
+REPETITIONS = 15
+
+
+def median_milliseconds(work, repetitions=REPETITIONS):
+    """Median time of one call [ms], after two that compile and warm up."""
+    times = []
+    for _ in range(repetitions + 2):
+        started = time.perf_counter()
+        work()
+        times.append(1e3 * (time.perf_counter() - started))
+    return float(np.median(times[2:]))
+
+
+class Frame:
+    """A framebuffer of one sample a pixel, and the view of the scene's camera into it."""
+
+    def __init__(self, width, height):
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
+        self.view = drawing.view_record(*camera, height, least_width=1.0)
+        self._color = gpu.types.GPUTexture((width, height), format="RGBA16F")
+        self._depth = gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
+        self._framebuffer = gpu.types.GPUFrameBuffer(color_slots=self._color, depth_slot=self._depth)
+
+    def draw(self, drawn):
+        """Draw a `DrawnScene` and wait until that is done."""
+        with self._framebuffer.bind():
+            self._framebuffer.clear(color=(0.0, 0.0, 0.0, 1.0), depth=1.0)
+            drawn_scene.draw_surfaces(drawn, self.view)
+            drawn_scene.draw_hair(drawn, self.view)
+            self.wait()
+
+    def wait(self):
+        """Wait until all that was drawn before is done: what is read has to be there."""
+        with self._framebuffer.bind():
+            self._framebuffer.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
+
+
+def strands_between(guides, strand_count, device):
+    """(S, 41, 3) local points and (S, 41) radii, float32, as the operator would make them."""
+    surface_object = guides.data.surface
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    surface = scene.read_surface(surface_object, depsgraph)
+    density = scene.read_vertex_group(surface_object, depsgraph, "scalp")
+    settings = groom.HairSettings(strand_count=strand_count, radius=6e-5)
+    rooted = pipeline.read_guides(guides.data, surface)
+    hair = groom.generate_hair(surface.mesh, rooted, settings, density=density, device=device)
+    points = surface.to_local(hair.numpy())
+    radii = np.broadcast_to(groom.strand_radii(settings, points.shape[1]), points.shape[:2])
+    return points, radii
+
+
+def measure(drawn, frame, points, radii):
+    """{what: milliseconds} of these strands in place of the scene's hair."""
+    _strands, _shading, to_world = drawn.hair[0]
+    uploaded = [drawing.upload_strands(points, radii)]
+
+    def upload():
+        uploaded.clear()  # not two of them at a time
+        uploaded.append(drawing.upload_strands(points, radii))
+        frame.wait()
+
+    def draw_shadows():
+        drawn.shadow_maps.draw(drawn.lights, [(uploaded[0], to_world)], [batch for batch, _ in drawn.surfaces])
+        frame.wait()
+
+    found = {"upload": median_milliseconds(upload, 3), "shadow maps": median_milliseconds(draw_shadows)}
+    for label, shading in shadings().items():
+        shown = replace(drawn, hair=[(uploaded[0], shading, to_world)])
+        found[label] = median_milliseconds(lambda shown=shown: frame.draw(shown))
+    return found
+
+
+def shadings():
+    """{model: `Shading`} of the models that are timed."""
+    tables = lookup_tables.bake(lookup_tables.Settings(sigma_a=head.CHESTNUT))
+    return {
+        "Kajiya-Kay": drawing.kajiya_kay_shading(kajiya_kay.Settings()),
+        "Marschner": drawing.marschner_shading(tables),
+    }
+
+
+def main():
+    """Print a row of milliseconds for each number of strands."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--strands", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
+    parser.add_argument("--size", type=int, nargs=2, default=[1920, 1080], metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--device", default="cpu", help="the Warp device that makes the strands")
+    options = parser.parse_args()
+    hair_addon.register()
+    gpu.init()
+    wp.config.log_level = wp.LOG_WARNING
+    guides, _hair = head.grow(head.build(), strand_count=1000)
+    head.light()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+    frame = Frame(*options.size)
+    print(
+        "{} × {} on {}, {}, median [ms]".format(
+            *options.size, gpu.platform.renderer_get(), gpu.platform.backend_type_get()
+        )
+    )
+    for strand_count in options.strands:
+        found = measure(drawn, frame, *strands_between(guides, strand_count, options.device))
+        print(f"{strand_count:9} strands", *(f"  {name} {value:8.2f}" for name, value in found.items()), flush=True)
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    # Blender's module may crash while it is torn down after drawing.
+    os._exit(0)

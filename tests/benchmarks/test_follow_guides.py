@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What combing repeats, 41 points a strand: `follow_guides` beside filling as much memory, on every device."""
+
+import time
+
+import numpy as np
+import pytest
+import warp as wp
+
+from hair_addon.core import groom
+from tests.core.conftest import HEAD, read_obj
+
+
+def devices():
+    return ["cpu", *(str(device) for device in wp.get_cuda_devices())]
+
+
+def median_time(work, device, repetitions=9):
+    """Median time [s] of one call, the device's part included, after a first call, which compiles."""
+    times = []
+    for _ in range(repetitions + 1):
+        wp.synchronize_device(device)
+        started = time.perf_counter()
+        work()
+        wp.synchronize_device(device)
+        times.append(time.perf_counter() - started)
+    return float(np.median(times[1:]))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("strand_count", [30_000, 100_000, 1_000_000])
+@pytest.mark.parametrize("device", devices())
+def test_follow_guides(strand_count, device):
+    """Printed: times. Asserted: on a GPU, following guides costs no more than a few times filling the same memory."""
+    head = read_obj(HEAD)
+    density = np.clip((head.vertices[:, 2] - 0.755) / 0.01, 0.0, 1.0)
+    guides = groom.distribute_guides(head, groom.GuideSettings(), density=density, device=device)
+    settings = groom.HairSettings(strand_count=strand_count)
+    binding = groom.bind_hair(head, guides, settings, density=density, device=device)
+    points = wp.empty((strand_count, groom.POINT_COUNT), dtype=wp.vec3, device=device)
+    ways = {
+        "bind": lambda: groom.bind_hair(head, guides, settings, density=density, device=device),
+        "follow": lambda: groom.follow_guides(binding, guides),
+        "follow, to the host": lambda: groom.follow_guides(binding, guides).numpy(),
+        "fill as much": lambda: points.fill_(wp.vec3(1.0, 2.0, 3.0)),
+    }
+    times = {name: median_time(way, device) for name, way in ways.items()}
+    print(f"\n{strand_count:9} strands, {device:7}", *(f"  {name} {1e3 * t:8.3f} ms" for name, t in times.items()))
+    if device != "cpu" and strand_count == 1_000_000:
+        assert times["follow"] < 8.0 * times["fill as much"]

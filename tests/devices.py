@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Warp device that the mathematics is tested on: the processor, unless VELLUS_TEST_DEVICE names another."""
+
+import os
+
+DEVICE = os.environ.get("VELLUS_TEST_DEVICE", "cpu")
