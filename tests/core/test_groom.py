@@ -69,7 +69,7 @@ def test_the_same_seed_gives_the_same_hair(head, scalp, guides, hair, hair_setti
 @pytest.mark.skipif(DEVICE == "cpu", reason="needs VELLUS_TEST_DEVICE")
 @pytest.mark.parametrize("seed", [1, 2, 3])
 def test_every_device_makes_the_same_hair(head, scalp, seed):
-    """Roots to the last bit: which site a piece is nearer to may not hang on how a device rounds. Points to rounding."""
+    """Roots to the last bit, as which site a piece is nearer to may not hang on rounding; points to rounding."""
     settings = GuideSettings(seed=seed)
     guides = distribute_guides(head, settings, density=scalp)
     expected = groom.distribute_guides(head, settings, density=scalp)
