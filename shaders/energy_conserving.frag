@@ -4,9 +4,6 @@
 #include "include/dual_scattering.glsl"
 #include "include/marschner.glsl"
 
-// Of what comes back from behind: calibrated against Cycles, see DECISIONS.md.
-const float BACK_GAIN = 2.0;
-
 vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)
 {
   float sin_theta_o = dot(T, V);
@@ -42,7 +39,7 @@ vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count)
   float phi = relative_azimuth(T, L, V);
 
   float beta_f = mean(dual(4, theta_i));
-  vec3 back = dual(6, theta_i) * (BACK_GAIN / PI);
+  vec3 back = dual(6, theta_i) * (view.back_gain / PI);
   float back_shift = mean(dual(7, theta_i));
   float back_width = mean(dual(8, theta_i));
   float spread = count * beta_f * beta_f;

@@ -87,8 +87,10 @@ def marschner_shading(tables):
     """The Marschner model from baked `lookup_tables.Tables`, ready to draw."""
     fragment, names = _TABLES[tables.settings.mode]
     textures = {f"{name}_table": _table_texture(getattr(tables, name)) for name in names}
+    returned = albedo.mean_albedo(tables)
     if tables.settings.mode == "energy":
         dual = dual_scattering.bake(tables)
+        returned = returned + dual_scattering.BACK_GAIN * dual_scattering.mean_back(dual)
         textures |= {
             "dual_table": _table_texture(dual.theta),
             "n_g_table": _table_texture(dual.n_g),
@@ -96,7 +98,7 @@ def marschner_shading(tables):
         }
     program = shaders.strand_program(fragment, lookup_tables.Settings, tuple(textures))
     settings = uniforms.uniform_buffer(uniforms.fill(tables.settings))
-    return Shading(program, settings, textures, albedo.mean_albedo(tables), albedo.mean_forward(tables))
+    return Shading(program, settings, textures, returned, albedo.mean_forward(tables))
 
 
 def guide_shading():
@@ -136,11 +138,12 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     return record
 
 
-def draw_strands(strands, shading, view, lights, object_to_world, shadow_maps=None, point_step=1):
+def draw_strands(strands, shading, view, lights, object_to_world, shadow_maps=None, point_step=1, surface_color=0.0):
     """Draw `StrandsOnGPU` into the bound framebuffer.
 
     view, lights: records of `uniforms`; shadow_maps: {sampler: texture}, None for a shader that reads none;
-    point_step: every how many-th point is drawn, for pictures too coarse to show them all.
+    point_step: every how many-th point is drawn, for pictures too coarse to show them all; surface_color: linear RGB of
+    what the hair grows on.
     """
     drawn_points = max(2, -(-strands.point_count // point_step))
     record = view.copy()
@@ -151,6 +154,8 @@ def draw_strands(strands, shading, view, lights, object_to_world, shadow_maps=No
     record["row_strands"] = strands.row_strands
     record["hair_albedo"][:3] = shading.albedo
     record["hair_forward"][:3] = shading.forward
+    record["surface_color"][:3] = surface_color
+    record["back_gain"] = dual_scattering.BACK_GAIN
     samplers = {"strands": strands.texture, **shading.samplers, **(shadow_maps or {})}
     vertex_count = _vertex_count(strands.strand_count, drawn_points)
     _draw(strands.batch, shading.program, record, lights, samplers, shading.settings, vertex_count)

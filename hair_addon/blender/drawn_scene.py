@@ -21,7 +21,7 @@ _PLACES_PER_MESH = 50_000
 class DrawnScene:
     """Read once by `read`, drawn from any number of views until something moves."""
 
-    hair: list  # (StrandsOnGPU, Shading, object to world)
+    hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on)
     surfaces: list  # (batch of triangles, linear RGB)
     lights: np.ndarray  # uniforms.LIGHTS
     world_radiance: np.ndarray
@@ -46,12 +46,13 @@ def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, shad
             refused(hair_object.data, error)
             continue
         if strands is not None:
-            hair.append((strands, shading, np.array(hair_object.matrix_world, np.float64)))
+            color = scene.surface_color(hair_object.data.surface)
+            hair.append((strands, shading, np.array(hair_object.matrix_world, np.float64), color))
     meshes = scene.read_drawn_meshes(depsgraph, for_render=viewport is None)
     surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
     lights = scene.read_lights(depsgraph, for_render=viewport is None)
     shadow_maps = shadow_maps or ShadowMaps()
-    placed = [(strands, to_world) for strands, _, to_world in hair]
+    placed = [(strands, to_world) for strands, _, to_world, _ in hair]
     shadow_maps.draw(lights, placed, [batch for batch, _ in surfaces])
     if placed:
         shadow_maps.fill_volume(lights, _volume(placed, meshes))
@@ -100,7 +101,7 @@ def draw_hair_depth(drawn, view):
     pixel a second pass over the strands costs more than it saves.
     """
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for strands, _shading, to_world in drawn.hair:
+        for strands, _shading, to_world, _color in drawn.hair:
             drawing.draw_strands(strands, drawing.depth_only(), view, drawn.lights, to_world)
 
 
@@ -109,8 +110,8 @@ def draw_hair(drawn, view):
     view["world_radiance"][:3] = drawn.world_radiance
     samplers = drawn.shadow_maps.samplers
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for strands, shading, to_world in drawn.hair:
-            drawing.draw_strands(strands, shading, view, drawn.lights, to_world, samplers)
+        for strands, shading, to_world, color in drawn.hair:
+            drawing.draw_strands(strands, shading, view, drawn.lights, to_world, samplers, surface_color=color)
 
 
 def draw_surfaces(drawn, view):

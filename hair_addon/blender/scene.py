@@ -231,11 +231,13 @@ def _read_drawn_mesh(mesh_object, to_world):
     positions = vertices[corners] @ to_world[:3, :3].T + to_world[:3, 3]
     normals = loop_normals[loops] @ np.linalg.pinv(to_world[:3, :3])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), _surface_color(mesh_object))
+    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), surface_color(mesh_object))
 
 
-def _surface_color(mesh_object):
-    """Linear RGB: the base colour of the first material's Principled BSDF, or its colour in the viewport."""
+def surface_color(mesh_object):
+    """Linear RGB: the base colour of the first material's Principled BSDF, or its colour in the viewport; None: black."""
+    if mesh_object is None:
+        return (0.0, 0.0, 0.0)
     material = next((slot.material for slot in mesh_object.material_slots if slot.material), None)
     if material is None:
         return (0.8, 0.8, 0.8)

@@ -64,12 +64,14 @@ VIEW = Block(
         "world_radiance": "vec4",
         "hair_albedo": "vec4",
         "hair_forward": "vec4",  # what one strand passes on of the light that meets it
+        "surface_color": "vec4",  # of what the hair grows on
         "is_perspective": "int",
         "point_count": "int",
         "drawn_points": "int",  # of each strand's points, evenly chosen: at least two
         "row_strands": "int",
         "object_scale": "float",
         "least_half_width": "float",  # at distance one, in a perspective
+        "back_gain": "float",  # of what comes back from behind a strand
         "light_index": "int",  # the light that a shadow pass looks from
     },
 )

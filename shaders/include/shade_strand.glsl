@@ -34,6 +34,7 @@ void main()
     if (shadow_place(light, drawn_position, at, depth)) {
       irradiance *= lit_part(light, at, depth);
       count = crossed_strands(light, at, depth);
+      radiance += irradiance * surface_bounce(light, at, depth, count) * hair_albedo();
     }
     // Most of a head of hair lies in the shadow of the rest, where nothing is left to scatter.
     vec3 arriving = irradiance * transmitted(count, view.hair_forward.rgb);

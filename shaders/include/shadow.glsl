@@ -32,6 +32,20 @@ float crossed_strands(Light light, vec3 at, float depth)
   return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
 }
 
+// What the surface under the hair sends back to a strand from below, for unit irradiance of the light: through the rest
+// of the hair, off a matt surface, and through the hair again. Nothing where the light meets no surface.
+vec3 surface_bounce(Light light, vec3 at, float depth, float count)
+{
+  float surface = textureLod(surface_front, at, 0.0).r;
+  if (surface > depth + light.extent) {
+    return vec3(0.0);
+  }
+  float under = max(0.0, crossed_strands(light, at, surface) - count);
+  vec3 way = transmitted(count + 2.0 * under, view.hair_forward.rgb);
+  // The mean cosine of a surface that is lit is 2/3, and it fills half of what a strand sees.
+  return view.surface_color.rgb * way * (2.0 / 3.0) * 0.5 / PI;
+}
+
 // Part of a light that arrives at a surface: the mean over 3 × 3 texels. forward: what one strand passes on.
 vec3 surface_visibility(Light light, vec3 position, vec3 forward)
 {

@@ -133,7 +133,9 @@ def test_kajiya_kay_albedo_is_the_mean_answer_to_a_uniform_surrounding(exponent,
 def shading_model(fragment, settings, expression, textures=None, **inputs):
     """A function of a .frag, with its settings in a uniform block as when hair is drawn."""
     structs = uniforms.VIEW.source + uniforms.settings_block(type(settings)).source
-    blocks = {"view": ("View", uniforms.VIEW.record()), "settings": ("Settings", uniforms.fill(settings))}
+    view = uniforms.VIEW.record()
+    view["back_gain"] = dual_scattering.BACK_GAIN
+    blocks = {"view": ("View", view), "settings": ("Settings", uniforms.fill(settings))}
     text = glsl.source(fragment)
     return glsl.evaluate(text, "vec3", expression, structs=structs, blocks=blocks, textures=textures, **inputs)
 
@@ -224,7 +226,7 @@ def test_dual_scattering_is_read_from_the_tables(fibres, rng):
     shader = shading_model("energy_conserving.frag", settings, expression, textures=textures, count=count, **fibres)
     halves = lookup_tables.Tables(*map(texels, (tables.m, tables.n, tables.n_trt)), settings, texels(tables.n_res))
     at = angles.fibre_angles(*doubles(fibres))
-    python = dual_scattering.sample_radiance(halves, dual_scattering.bake(tables), at, count.astype(np.float64), gain=2.0)
+    python = dual_scattering.sample_radiance(halves, dual_scattering.bake(tables), at, count.astype(np.float64))
     regular = np.minimum(np.cos(at.theta_i), np.cos(at.theta_o)) > 0.05
     np.testing.assert_allclose(shader[regular], python[regular], rtol=1e-2, atol=2e-4)
     assert np.isfinite(shader).all() and (shader >= 0.0).all()

@@ -112,7 +112,9 @@ def test_light_through_curtains_falls_exponentially(scene, sheets):
     receiver = drawing.upload_strands(*curtain(0.6, radius=0.00002))
     maps = shadows.ShadowMaps()
     maps.draw(lights, [(strands, np.eye(4)) for strands in (*hair, receiver)], [])
-    radiance = seen_from_behind(drawn_scene.DrawnScene([(receiver, shading, np.eye(4))], [], lights, np.zeros(3), maps))
+    radiance = seen_from_behind(
+        drawn_scene.DrawnScene([(receiver, shading, np.eye(4), np.zeros(3))], [], lights, np.zeros(3), maps)
+    )
     depth = -np.log(radiance / np.array(settings.diffuse_color))
     expected = sheets * coverage * (1.0 - 0.5 * np.array(settings.diffuse_color))
     np.testing.assert_allclose(depth, expected, rtol=0.06, atol=0.01)

@@ -20,6 +20,8 @@ SAMPLE_COUNT = 128  # over theta
 # Rows of `DualTables.theta`, in order.
 QUANTITIES = ("a_f", "a_b", "alpha_f", "alpha_b", "beta_f", "beta_b", "back", "back_shift", "back_width")
 
+BACK_GAIN = 1.35  # of what comes back from behind a strand: calibrated against Cycles, see DECISIONS.md
+
 _WHITEST = 0.99  # the series over scattering events must end
 
 
@@ -145,7 +147,13 @@ def scattered_part(count, a_f):
     return np.exp(-count * (1.0 - a_f)) - np.exp(-count)
 
 
-def sample_radiance(tables, dual, angles, strand_count, *, gain=1.0):
+def mean_back(dual):
+    """What the strands behind send back of light from everywhere, RGB (3,), the mean over all directions."""
+    theta = np.pi * ((np.arange(SAMPLE_COUNT) + 0.5) / SAMPLE_COUNT - 0.5)
+    return np.average(dual.theta[QUANTITIES.index("back")], axis=0, weights=np.cos(theta))
+
+
+def sample_radiance(tables, dual, angles, strand_count, *, gain=BACK_GAIN):
     """Radiance per irradiance (..., 3) of a strand with a mean of `strand_count` (...) others before it.
 
     Energy-conserving mode; what the shader computes from the tables. The irradiance is that outside the hair; gain: of
