@@ -22,7 +22,6 @@ import head  # beside this file
 
 import hair_addon
 from hair_addon.blender import drawing, drawn_scene, render, scene
-from hair_addon.core.shading import pigment
 
 WIDTH, HEIGHT, SAMPLES_PER_SIDE = 480, 270, 4
 CYCLES_SAMPLES = 96
@@ -58,9 +57,9 @@ def main():
     print(f"{'hair':8}{'light':8}{'Cycles':>26}{'Vellus':>26}{'ratio':>24}")
     rows = []
     for color in options.colors:
-        settings = hair.data.vellus.marschner
-        settings.mode, settings.tilt = "energy", math.radians(2.0)
-        settings.sigma_a = pigment.sigma_a_from_melanin(*COLORS[color])
+        look = hair.data.vellus.appearance
+        look.mode, look.roughness, look.cuticle_angle = "energy", 0.3, math.radians(2.0)
+        look.parametrization, (look.melanin, look.redness) = "MELANIN", COLORS[color]
         bpy.context.view_layer.update()
         columns = []
         for light in LIGHTS:

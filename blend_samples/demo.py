@@ -8,7 +8,7 @@ import argparse
 import os
 import sys
 import time
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import bpy
@@ -21,9 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import head  # beside this file
 
 import hair_addon
-from hair_addon.blender import drawing, drawn_scene, hair_cache, properties, scene
+from hair_addon.blender import drawing, drawn_scene, hair_cache, scene
 from hair_addon.core import bspline
-from hair_addon.core.shading import lookup_tables
 
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
 REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
@@ -44,23 +43,20 @@ def main():
     guides, hair = head.grow(head_object)
     head.light()
     print(f"{len(guides.data.curves)} guides, {len(hair.data.curves)} strands in {time.perf_counter() - started:.1f} s")
-    bpy.ops.vellus.bake_tables(directory=str(out / "tables"), **_marschner_of(hair))
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.vellus.bake_tables(directory=str(out / "tables"))
     bpy.ops.wm.save_as_mainfile(filepath=str(out / "head.blend"), compress=True)
     for model in MODELS.values():
         hair.data.vellus.model = model
         bpy.ops.vellus.render_picture(filepath=str(out / f"{model.lower()}.png"))
-    hair.data.vellus.marschner.mode = "energy"
-    hair.data.vellus.marschner.sigma_a = head.AUBURN
+    look = hair.data.vellus.appearance
+    classic_roughness = look.roughness
+    look.mode, look.absorption, look.roughness = "energy", head.AUBURN, 0.3
     bpy.ops.vellus.render_picture(filepath=str(out / "dual_scattering.png"))
-    hair.data.vellus.marschner.mode = "classic"
+    look.mode, look.roughness = "classic", classic_roughness
     print_spline_table()
     print_frame_table(guides, hair)
     print(f"\nmade in {time.perf_counter() - started:.1f} s: {out}")
-
-
-def _marschner_of(hair):
-    """The operator's arguments for the settings that the hair has."""
-    return asdict(properties.to_settings(hair.data.vellus.marschner, lookup_tables.Settings))
 
 
 def print_spline_table():
@@ -89,8 +85,8 @@ def print_frame_table(guides, hair):
         drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
         for label, model in MODELS.items():
             hair.data.vellus.model = model
-            (strands, _shading, to_world), *_ = drawn.hair
-            shaded = replace(drawn, hair=[(strands, hair_cache.shading_of(hair.data), to_world)])
+            (strands, _shading, *placed), *_ = drawn.hair
+            shaded = replace(drawn, hair=[(strands, hair_cache.shading_of(hair.data), *placed)])
             reported = REPORT_FRAMES.get((label, strand_count), "-")
             print(f"  {strand_count:6} strands, {label:30} {reported:>10} {_frames_per_second(shaded):17.1f}")
 

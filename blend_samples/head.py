@@ -9,6 +9,8 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
+from hair_addon.core.shading.principled import roughness_from_beta_r
+
 HEAD = Path(__file__).with_name("head.obj")
 
 # The hairline from the side, (y, z) [m], from the forehead over temple and ear to the nape; the face looks to -Y.
@@ -124,8 +126,10 @@ def grow(head, guide_count=200, strand_count=30_000, seed=1):
     bpy.context.view_layer.objects.active = guides
     bpy.ops.vellus.interpolate_hair(strand_count=strand_count, seed=seed, density_group="scalp", radius=6e-5)
     hair = bpy.data.objects["Hair"]
-    hair.data.vellus.marschner.sigma_a = CHESTNUT
-    hair.data.vellus.kajiya_kay.diffuse_color = (0.25, 0.13, 0.06)
+    look = hair.data.vellus.appearance
+    look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", CHESTNUT
+    # As in [Marschner03]: scales that tilt by 5 degrees, a first highlight 7.5 degrees wide.
+    look.cuticle_angle, look.roughness = math.radians(5.0), roughness_from_beta_r(math.radians(7.5))
     return guides, hair
 
 

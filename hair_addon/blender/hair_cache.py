@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core import exr, strands
 from ..core.errors import HairError
-from ..core.shading import kajiya_kay, lookup_tables
+from ..core.shading import appearance, lookup_tables
 from . import curves, drawing, properties
 
 _strands = {}  # session_uid → StrandsOnGPU, or None where the datablock cannot be drawn
@@ -76,9 +76,13 @@ def shading_of(datablock):
     """`Shading` of a hair Curves datablock: its model, ready to draw. Raises `HairError`."""
     state = datablock.vellus
     if state.model == "KAJIYA_KAY":
-        return _kept(properties.to_settings(state.kajiya_kay, kajiya_kay.Settings), drawing.kajiya_kay_shading)
-    settings = properties.to_settings(state.marschner, lookup_tables.Settings)
+        return _kept(properties.look_of(state), _kajiya_kay_shading)
+    settings = properties.table_settings_of(state)
     return _kept(settings, lambda wanted: drawing.marschner_shading(_tables(wanted, state.table_folder)))
+
+
+def _kajiya_kay_shading(look):
+    return drawing.kajiya_kay_shading(appearance.kajiya_kay_settings(look))
 
 
 def _kept(settings, make):

@@ -3,14 +3,14 @@
 
 import bpy
 
-from ..core.shading import lookup_tables, pigment, principled
+from ..core.shading import appearance
 from . import properties
 
 HAIR_NODE = "ShaderNodeBsdfHairPrincipled"
 
 
 def write_hair_material(curves):
-    """Give Curves a Principled Hair material of their Marschner settings; an artist's own material is left alone."""
+    """Give Curves a Principled Hair material of their appearance; an artist's own material is left alone."""
     material = next((m for m in curves.materials if m is not None), None)
     if material is None:
         material = bpy.data.materials.new(curves.name)
@@ -19,7 +19,7 @@ def write_hair_material(curves):
     else:
         node = next((n for n in material.node_tree.nodes if n.bl_idname == HAIR_NODE), None)
     if node is not None:
-        _fill(node, material, properties.to_settings(curves.vellus.marschner, lookup_tables.Settings))
+        _fill(node, material, properties.look_of(curves.vellus))
 
 
 def _hair_node(tree):
@@ -33,17 +33,11 @@ def _hair_node(tree):
     return node
 
 
-def _fill(node, material, settings):
-    color = (*pigment.color_from_sigma_a(settings.sigma_a), 1.0)
-    node.inputs["Absorption Coefficient"].default_value = settings.sigma_a
-    node.inputs["IOR"].default_value = settings.eta
-    node.inputs["Offset"].default_value = settings.tilt
-    if settings.mode == "energy":
-        node.inputs["Roughness"].default_value = settings.roughness
-        node.inputs["Radial Roughness"].default_value = settings.radial_roughness
-        node.inputs["Coat"].default_value = settings.coat
-    else:
-        node.inputs["Roughness"].default_value = principled.roughness_from_beta_r(settings.beta_r)
-    # What EEVEE shows, which knows no hair. By identifier: the socket is disabled, and cannot be looked up by name.
-    next(s for s in node.inputs if s.identifier == "Color").default_value = color
+def _fill(node, material, look):
+    color = (*appearance.kajiya_kay_settings(look).diffuse_color, 1.0)
+    # By identifier: a socket that the node's parametrization disables cannot be looked up by name.
+    sockets = {socket.identifier: socket for socket in node.inputs}
+    # EEVEE knows no hair: it shows the colour.
+    for name, value in {**appearance.principled_sockets(look), "Color": color}.items():
+        sockets[name].default_value = value
     material.diffuse_color = color

@@ -5,7 +5,8 @@ import bpy
 
 from ..core.groom import GuideSettings, HairSettings
 from ..core.params import declared
-from ..core.shading import kajiya_kay, lookup_tables, marschner
+from ..core.shading import appearance, lookup_tables
+from ..core.shading.appearance import Appearance
 from .selection import active_of_kind, guides_again, guides_of, surface_of
 
 
@@ -78,6 +79,10 @@ class VELLUS_PT_interpolation(_HairTab, bpy.types.Panel):
         layout.operator("vellus.interpolate_hair", text="Interpolate Again", icon="FILE_REFRESH")
 
 
+# The classic mode's alone, of the tables' settings.
+_GLINTS = ("caustic", "glint_gain", "glint_width", "glint_fade", "glint_limit")
+
+
 class _OfHair(_HairTab):
     @classmethod
     def poll(cls, context):
@@ -97,10 +102,15 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
         state = context.object.data.vellus
         layout.prop(state, "is_drawn")
         layout.prop(state, "model")
+        look = state.appearance
+        # The viewport draws every strand as the average one at its root: what would change nothing is not offered.
+        hidden = [*appearance.STRAND_FIELDS]
+        hidden += [
+            name for kind, names in appearance.COLOR_FIELDS.items() if kind != look.parametrization for name in names
+        ]
         if state.model == "KAJIYA_KAY":
-            self.rows(layout, state.kajiya_kay, kajiya_kay.Settings)
-        else:
-            self.rows(layout, state.marschner, marschner.Settings)
+            hidden.append("mode")
+        self.rows(layout, look, Appearance, skip=hidden)
 
 
 class VELLUS_PT_tables(_OfHair, bpy.types.Panel):
@@ -114,8 +124,8 @@ class VELLUS_PT_tables(_OfHair, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         state = context.object.data.vellus
-        inherited = [name for name, _default, _details in declared(marschner.Settings)]
-        self.rows(layout, state.marschner, lookup_tables.Settings, skip=inherited)
+        hidden = (*appearance.TABLE_FIELDS, *(_GLINTS if state.appearance.mode == "energy" else ()))
+        self.rows(layout, state.marschner, lookup_tables.Settings, skip=hidden)
         layout.prop(state, "table_folder")
         layout.operator("vellus.bake_tables", icon="RENDER_STILL")
 

@@ -6,13 +6,15 @@ that sets ten properties pays for one evaluation, and an undo step never holds h
 """
 
 import math
+from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from ..core.groom import GuideSettings, HairSettings
 from ..core.params import declared, label_of
-from ..core.shading import kajiya_kay, lookup_tables
+from ..core.shading import appearance, lookup_tables
+from ..core.shading.appearance import Appearance
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
 
@@ -22,9 +24,13 @@ MODELS = (
 )
 
 
-def annotations(settings_class, update=None):
-    """{name: bpy property} for the fields of a `Settings` class; `update` as in bpy.props."""
-    return {name: _property(name, default, details, update) for name, default, details in declared(settings_class)}
+def annotations(settings_class, update=None, skip=()):
+    """{name: bpy property} for the fields of a `Settings` class but those of `skip`; `update` as in bpy.props."""
+    return {
+        name: _property(name, default, details, update)
+        for name, default, details in declared(settings_class)
+        if name not in skip
+    }
 
 
 def _property(name, default, details, update):
@@ -55,20 +61,49 @@ def _limits(details, is_integer):
     return {key: int(value) for key, value in finite.items()} if is_integer else finite
 
 
-def to_settings(owner, settings_class):
-    """The `Settings` that an operator or property group holds. Raises `HairError` for what the range forbids."""
-    values = {name: _plain(getattr(owner, name), default) for name, default, _details in declared(settings_class)}
+def to_settings(owner, settings_class, skip=()):
+    """The `Settings` that an operator or property group holds, those of `skip` at their defaults.
+
+    Raises `HairError` for what the range forbids.
+    """
+    values = {
+        name: _plain(getattr(owner, name), default, details)
+        for name, default, details in declared(settings_class)
+        if name not in skip
+    }
     return settings_class(**values)
 
 
-def _plain(value, default):
+def _plain(value, default, details):
     """A property's value as it was meant: single precision gives 0.15 back as 0.15000000596."""
     if isinstance(default, float):
-        # The shortest decimal is what somebody typed; a default such as 15° in radians has no short one.
-        return default if np.float32(default) == np.float32(value) else float(str(np.float32(value)))
+        # A default or a limit such as 15° in radians has no short decimal, and rounded up it would be out of range.
+        for meant in (default, details.low, details.high):
+            if np.float32(meant) == np.float32(value):
+                return meant
+        return float(str(np.float32(value)))  # the shortest decimal is what somebody typed
     if isinstance(default, tuple):
-        return tuple(_plain(float(component), meant) for component, meant in zip(value, default, strict=True))
+        return tuple(_plain(float(part), meant, details) for part, meant in zip(value, default, strict=True))
     return value
+
+
+def look_of(state):
+    """The `Appearance` of a hair; state: its `VellusCurves`. Raises `HairError`."""
+    return to_settings(state.appearance, Appearance)
+
+
+def table_settings_of(state):
+    """The `lookup_tables.Settings` that the Marschner model shades a hair with. Raises `HairError`."""
+    base = to_settings(state.marschner, lookup_tables.Settings, skip=appearance.TABLE_FIELDS)
+    settings = appearance.table_settings(look_of(state), base)
+    # As an operator's properties hold them, so that tables it baked of these settings have the same ones.
+    return replace(
+        settings,
+        **{
+            name: _plain(getattr(settings, name), default, details)
+            for name, default, details in declared(lookup_tables.Settings)
+        },
+    )
 
 
 def assign(owner, settings):
@@ -99,16 +134,16 @@ class VellusHairSettings(bpy.types.PropertyGroup):
     __annotations__ = annotations(HairSettings, _mark_geometry)
 
 
-class VellusKajiyaKaySettings(bpy.types.PropertyGroup):
-    """How the Kajiya-Kay model shades hair"""
+class VellusAppearance(bpy.types.PropertyGroup):
+    """How hair looks, in the viewport and in Cycles"""
 
-    __annotations__ = annotations(kajiya_kay.Settings, _mark_shading)
+    __annotations__ = annotations(Appearance, _mark_shading)
 
 
 class VellusMarschnerSettings(bpy.types.PropertyGroup):
-    """How the Marschner model shades hair, and how its tables are baked"""
+    """How the Marschner model's tables are baked, beside what the appearance says"""
 
-    __annotations__ = annotations(lookup_tables.Settings, _mark_shading)
+    __annotations__ = annotations(lookup_tables.Settings, _mark_shading, skip=appearance.TABLE_FIELDS)
 
 
 class VellusCurves(bpy.types.PropertyGroup):
@@ -132,9 +167,13 @@ class VellusCurves(bpy.types.PropertyGroup):
     guides: bpy.props.PointerProperty(type=VellusGuideSettings)
     hair: bpy.props.PointerProperty(type=VellusHairSettings)
     model: bpy.props.EnumProperty(
-        name="Shading Model", description="How strands scatter light", items=MODELS, default="MARSCHNER"
+        name="Shading Model",
+        description="How strands scatter light in the viewport",
+        items=MODELS,
+        default="MARSCHNER",
+        update=_mark_shading,
     )
-    kajiya_kay: bpy.props.PointerProperty(type=VellusKajiyaKaySettings)
+    appearance: bpy.props.PointerProperty(type=VellusAppearance)
     marschner: bpy.props.PointerProperty(type=VellusMarschnerSettings)
     table_folder: bpy.props.StringProperty(
         name="Table Folder",
@@ -160,7 +199,7 @@ class VellusCurves(bpy.types.PropertyGroup):
 CLASSES = (
     VellusGuideSettings,
     VellusHairSettings,
-    VellusKajiyaKaySettings,
+    VellusAppearance,
     VellusMarschnerSettings,
     VellusCurves,
 )

@@ -10,7 +10,9 @@ import pytest
 from hair_addon.blender import properties
 from hair_addon.core import groom
 from hair_addon.core.groom import GuideSettings, HairSettings
-from hair_addon.core.shading import kajiya_kay, lookup_tables
+from hair_addon.core.params import declared
+from hair_addon.core.shading import appearance, lookup_tables
+from hair_addon.core.shading.appearance import Appearance
 from tests.blender.reading import attribute, points, write_points
 
 
@@ -113,7 +115,8 @@ def test_undo_brings_back_settings_and_hair_together(hair):
 
 
 def test_everything_survives_save_and_load(hair, tmp_path):
-    hair.data.vellus.marschner.tilt = 0.12
+    hair.data.vellus.appearance.cuticle_angle = 0.12
+    hair.data.vellus.marschner.size = 128
     hair.data.vellus.model = "KAJIYA_KAY"
     update()
     made, guides_made = points(hair), points(bpy.data.objects["Guides"])
@@ -127,7 +130,8 @@ def test_everything_survives_save_and_load(hair, tmp_path):
     assert np.array_equal(points(bpy.data.objects["Guides"]), guides_made)
     assert hair.data.vellus.guide_curves == bpy.data.objects["Guides"].data
     assert properties.to_settings(hair.data.vellus.hair, HairSettings) == HairSettings(strand_count=500, radius=0.004)
-    assert hair.data.vellus.marschner.tilt == pytest.approx(0.12)
+    assert properties.look_of(hair.data.vellus) == Appearance(cuticle_angle=0.12)
+    assert hair.data.vellus.marschner.size == 128
     assert hair.data.vellus.model == "KAJIYA_KAY"
 
 
@@ -136,8 +140,7 @@ def test_everything_survives_save_and_load(hair, tmp_path):
     [
         ("guides", GuideSettings),
         ("hair", HairSettings),
-        ("kajiya_kay", kajiya_kay.Settings),
-        ("marschner", lookup_tables.Settings),
+        ("appearance", Appearance),
     ],
 )
 def test_a_fresh_datablock_has_the_declared_defaults(scene, group, settings_class):
@@ -145,13 +148,84 @@ def test_a_fresh_datablock_has_the_declared_defaults(scene, group, settings_clas
     assert properties.to_settings(getattr(state, group), settings_class) == settings_class()
 
 
-def test_the_material_follows_the_shading_settings(hair):
-    node = next(n for n in hair.data.materials[0].node_tree.nodes if n.bl_idname == "ShaderNodeBsdfHairPrincipled")
-    hair.data.vellus.marschner.sigma_a = (0.1, 0.2, 0.3)
-    hair.data.vellus.marschner.eta = 1.4
+@pytest.mark.parametrize(
+    ("group", "settings_class", "skip"),
+    [
+        ("guides", GuideSettings, ()),
+        ("hair", HairSettings, ()),
+        ("appearance", Appearance, ()),
+        ("marschner", lookup_tables.Settings, appearance.TABLE_FIELDS),
+    ],
+)
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_a_slider_at_its_end_is_within_the_range(scene, group, settings_class, skip, end):
+    """15 degrees in single precision are a little more than 15 degrees, which the range would forbid."""
+    owner = getattr(bpy.data.hair_curves.new("Fresh").vellus, group)
+    for name, default, details in declared(settings_class):
+        limit = getattr(details, end)
+        if name not in skip and isinstance(default, float) and math.isfinite(limit):
+            setattr(owner, name, limit)
+            assert getattr(properties.to_settings(owner, settings_class, skip), name) == limit
+
+
+def hair_node(hair):
+    return next(n for n in hair.data.materials[0].node_tree.nodes if n.bl_idname == "ShaderNodeBsdfHairPrincipled")
+
+
+def assert_material_is(hair, look):
+    """Every socket of the hair's material is what a look asks for."""
+    sockets = hair_node(hair).inputs
+    for name, value in appearance.principled_sockets(look).items():
+        np.testing.assert_allclose(np.array(sockets[name].default_value), value, rtol=1e-6, err_msg=name)
+
+
+# Every field differs from its default.
+LOOKS = [
+    {"melanin": 0.2, "redness": 0.3, "tint": (0.5, 0.4, 0.9), "random_roughness": 0.2},
+    {"parametrization": "COLOR", "color": (0.5, 0.2, 0.1), "roughness": 0.5, "radial_roughness": 0.6},
+    {"parametrization": "ABSORPTION", "absorption": (0.1, 0.2, 0.3), "ior": 1.4, "coat": 0.5, "cuticle_angle": 0.1},
+]
+
+
+@pytest.mark.parametrize("changes", LOOKS)
+def test_material_and_viewport_follow_the_same_look(hair, changes):
+    state = hair.data.vellus
+    assert_material_is(hair, Appearance())
+    for name, value in changes.items():
+        setattr(state.appearance, name, value)
     update()
-    np.testing.assert_allclose(node.inputs["Absorption Coefficient"].default_value, (0.1, 0.2, 0.3), rtol=1e-6)
-    assert node.inputs["IOR"].default_value == pytest.approx(1.4)
+    look = Appearance(**changes)
+    assert_material_is(hair, look)
+    assert properties.look_of(state) == look
+    asked, found = appearance.table_settings(look), properties.table_settings_of(state)
+    for name in appearance.TABLE_FIELDS:
+        if name != "mode":
+            np.testing.assert_allclose(getattr(found, name), getattr(asked, name), rtol=1e-6, err_msg=name)
+    np.testing.assert_allclose(
+        hair.data.materials[0].diffuse_color[:3], appearance.kajiya_kay_settings(look).diffuse_color, rtol=1e-6
+    )
+
+
+def test_tables_differ_by_what_artists_do_not_set(hair):
+    state = hair.data.vellus
+    state.marschner.size, state.marschner.glint_gain = 64, 2.0
+    state.appearance.mode = "classic"
+    found = properties.table_settings_of(state)
+    assert (found.mode, found.size, found.glint_gain) == ("classic", 64, 2.0)
+
+
+def test_a_node_of_another_parametrization_is_filled_too(hair):
+    hair_node(hair).parametrization = "MELANIN"
+    hair.data.vellus.appearance.ior = 1.4
+    update()
+    assert hair_node(hair).inputs["IOR"].default_value == pytest.approx(1.4)
+
+
+def test_a_look_that_is_not_a_number_keeps_the_material_and_says_so(hair):
+    hair.data.vellus.appearance.roughness = math.nan
+    update()
+    assert_material_is(hair, Appearance())
+    assert "Roughness" in hair.data.vellus.status
 
 
 def test_a_deleted_surface_is_said_and_nothing_crashes(hair):

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender import properties
+from hair_addon.blender import hair_cache, properties
 from hair_addon.core import exr
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.shading import lookup_tables
@@ -167,13 +167,35 @@ def test_a_lost_surface_is_refused(guides):
     assert "mesh" in refusal(bpy.ops.vellus.interpolate_hair)
 
 
-def test_tables_are_baked_and_used(hair, tmp_path):
+def test_tables_are_baked_without_any_hair(scene, tmp_path):
     bpy.ops.vellus.bake_tables(directory=str(tmp_path), size=32, tilt=0.1)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["m.exr", "n.exr", "n_trt.exr"]
-    tables = exr.read_tables(tmp_path)
-    assert tables.settings == lookup_tables.Settings(size=32, tilt=0.1)
-    assert properties.to_settings(hair.data.vellus.marschner, lookup_tables.Settings) == tables.settings
-    assert hair.data.vellus.table_folder == str(tmp_path)
+    assert exr.read_tables(tmp_path).settings == lookup_tables.Settings(size=32, tilt=0.1)
+
+
+@pytest.mark.parametrize("look", [{}, {"mode": "classic", "roughness": 1.0, "tint": (0.3, 0.7, 0.9)}])
+def test_tables_of_the_hair_are_baked_and_used(hair, tmp_path, monkeypatch, look):
+    state = hair.data.vellus
+    state.marschner.size = 32
+    for name, value in look.items():
+        setattr(state.appearance, name, value)
+    bpy.ops.vellus.bake_tables(directory=str(tmp_path))
+    assert exr.read_tables(tmp_path).settings == properties.table_settings_of(state)
+    assert state.table_folder == str(tmp_path)
+    monkeypatch.setattr(lookup_tables, "bake", None)  # whoever bakes now fails
+    hair_cache.clear()
+    assert hair_cache.shading_of(hair.data).samplers
+
+
+def test_tables_of_other_settings_leave_the_look_alone(hair, tmp_path):
+    state = hair.data.vellus
+    before = properties.look_of(state), properties.table_settings_of(state)
+    bpy.ops.vellus.bake_tables(directory=str(tmp_path), size=32, mode="classic", sigma_a=(0.1, 0.2, 0.3))
+    found = exr.read_tables(tmp_path).settings
+    assert (found.mode, found.sigma_a, found.size) == ("classic", (0.1, 0.2, 0.3), 32)
+    assert found.radial_roughness == before[1].radial_roughness  # what was not asked for is the hair's
+    assert (properties.look_of(state), properties.table_settings_of(state)) == before
+    assert state.table_folder == str(tmp_path)
 
 
 def test_a_folder_that_cannot_be_written_is_refused(hair, tmp_path):

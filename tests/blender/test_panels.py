@@ -9,6 +9,8 @@ import pytest
 from hair_addon.blender import panels
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.params import declared
+from hair_addon.core.shading import appearance, lookup_tables
+from hair_addon.core.shading.appearance import Appearance
 
 
 class Layout:
@@ -74,6 +76,31 @@ def test_every_setting_has_one_row(hair, panel, settings_class):
     assert {name: drawn[name] for name, *_ in declared(settings_class)} == dict.fromkeys(
         (name for name, *_ in declared(settings_class)), 1
     )
+
+
+@pytest.mark.parametrize("parametrization", appearance.COLOR_FIELDS)
+@pytest.mark.parametrize("model", ["KAJIYA_KAY", "MARSCHNER"])
+def test_shading_offers_what_changes_the_picture(hair, model, parametrization):
+    """One kind of colour; nothing that differs between strands, which the viewport does not draw."""
+    state = hair.data.vellus
+    state.model, state.appearance.parametrization = model, parametrization
+    drawn = draw(panels.VELLUS_PT_shading)
+    assert drawn["model"] == 1
+    assert drawn["mode"] == (model == "MARSCHNER")
+    for name, *_ in declared(Appearance):
+        other_colors = [n for kind, names in appearance.COLOR_FIELDS.items() if kind != parametrization for n in names]
+        is_hidden = name in other_colors or name in appearance.STRAND_FIELDS
+        assert name == "mode" or drawn[name] == (not is_hidden), name
+
+
+@pytest.mark.parametrize(("mode", "has_glints"), [("classic", True), ("energy", False)])
+def test_tables_offer_what_the_appearance_does_not(hair, mode, has_glints):
+    hair.data.vellus.appearance.mode = mode
+    drawn = draw(panels.VELLUS_PT_tables)
+    shown = {name for name, *_ in declared(lookup_tables.Settings) if drawn[name]}
+    assert {"size", "axes", "shifts"} <= shown
+    assert not shown & set(appearance.TABLE_FIELDS)
+    assert ("glint_gain" in shown) == ("caustic" in shown) == has_glints
 
 
 def test_tabs_follow_the_pipeline():

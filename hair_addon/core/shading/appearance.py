@@ -14,6 +14,15 @@ from .principled import beta_r_from_roughness, variance_from_roughness
 
 _WHITE = (1.0, 1.0, 1.0)
 
+# What `table_settings` takes from the appearance, of the fields of `lookup_tables.Settings`.
+TABLE_FIELDS = ("mode", "eta", "sigma_a", "tilt", "roughness", "radial_roughness", "coat", "beta_r")
+
+# What differs along strands and between them; the average strand at its root does without.
+STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint", "gradient_start", "gradient_end")
+
+# What the colour follows from, by parametrization.
+COLOR_FIELDS = {"MELANIN": ("melanin", "redness", "tint"), "COLOR": ("color",), "ABSORPTION": ("absorption",)}
+
 
 @dataclass(frozen=True)
 class Appearance(Settings):

@@ -57,6 +57,20 @@ def test_what_artists_do_not_set_stays_as_it_was():
     assert (found.shifts, found.caustic, found.mode) == ("PUBLISHED", "exact", "classic")
 
 
+def test_each_setting_of_the_tables_is_the_artist_s_or_the_baker_s():
+    """What the appearance decides overrides any base, and nothing else does."""
+    bases = lookup_tables.Settings(), lookup_tables.Settings(
+        mode="energy", eta=1.2, sigma_a=(3.0, 2.0, 1.0), tilt=0.01, shifts="PUBLISHED", roughness=0.7,
+        radial_roughness=0.6, coat=0.5, beta_r=0.3, caustic="exact", glint_gain=3.0, glint_width=0.1, glint_fade=0.2,
+        glint_limit=0.1, size=32, axes="COSINES",
+    )  # fmt: skip
+    found = [appearance.table_settings(Appearance(), base) for base in bases]
+    for name, *_ in declared(lookup_tables.Settings):
+        assert getattr(bases[0], name) != getattr(bases[1], name)
+        is_decided = getattr(found[0], name) == getattr(found[1], name)
+        assert is_decided == (name in appearance.TABLE_FIELDS), name
+
+
 def test_the_same_hair_may_be_described_in_three_ways():
     by_melanin = Appearance(melanin=0.4, redness=0.3)
     sigma_a = appearance.sigma_a(by_melanin)
