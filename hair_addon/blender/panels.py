@@ -100,6 +100,7 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
         layout.use_property_split = True
         layout.use_property_decorate = False
         state = context.object.data.vellus
+        layout.operator_menu_enum("vellus.apply_preset", "preset", text="Presets")
         layout.prop(state, "is_drawn")
         layout.prop(state, "model")
         look = state.appearance

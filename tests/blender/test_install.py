@@ -68,7 +68,7 @@ def walk(extension, bare_python, tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def used(walk):
-    """What the four operators made."""
+    """What the operators made."""
     return walk("operators")
 
 
@@ -106,7 +106,7 @@ def test_installs_and_enables(walk):
 
 
 def test_installed_operators_run(walk, used):
-    assert used["results"] == [["FINISHED"]] * 4
+    assert used["results"] == [["FINISHED"]] * 5
     assert used["curves"] == {"Guides": 30, "Hair": 300}
     assert used["finite"]
     assert used["tables"] == ["m.exr", "n.exr", "n_trt.exr"]
@@ -117,7 +117,13 @@ def test_installed_operators_run(walk, used):
 
 def test_enabling_and_disabling_twice_leaves_nothing_behind(walk):
     before, enabled, disabled, enabled_again, disabled_again = walk("twice")["states"]
-    assert enabled["operators"] == ["bake_tables", "distribute_guides", "interpolate_hair", "render_picture"]
+    assert enabled["operators"] == [
+        "apply_preset",
+        "bake_tables",
+        "distribute_guides",
+        "interpolate_hair",
+        "render_picture",
+    ]
     assert enabled["handlers"] != before["handlers"]
     # Blender keeps the modules of a disabled add-on; they must not multiply.
     modules = [state.pop("modules") for state in (before, enabled, disabled, enabled_again, disabled_again)]

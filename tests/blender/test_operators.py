@@ -10,7 +10,9 @@ import pytest
 from hair_addon.blender import hair_cache, properties
 from hair_addon.core import exr
 from hair_addon.core.groom import GuideSettings, HairSettings
-from hair_addon.core.shading import lookup_tables
+from hair_addon.core.params import declared
+from hair_addon.core.shading import appearance, lookup_tables, presets
+from hair_addon.core.shading.appearance import Appearance
 from tests.blender.reading import attribute, points, snapshot
 
 
@@ -196,6 +198,47 @@ def test_tables_of_other_settings_leave_the_look_alone(hair, tmp_path):
     assert found.radial_roughness == before[1].radial_roughness  # what was not asked for is the hair's
     assert (properties.look_of(state), properties.table_settings_of(state)) == before
     assert state.table_folder == str(tmp_path)
+
+
+def sockets(hair):
+    node = next(n for n in hair.data.materials[0].node_tree.nodes if n.bl_idname == "ShaderNodeBsdfHairPrincipled")
+    return {s.identifier: np.array(s.default_value) for s in node.inputs if hasattr(s, "default_value")}
+
+
+@pytest.mark.parametrize("preset", presets.PRESETS)
+def test_every_preset_is_applied_whole(hair, preset):
+    """Whatever was there before: the settings and the material are the preset's, the way of drawing the artist's."""
+    look = presets.PRESETS[preset][1]
+    state = hair.data.vellus
+    unlike = Appearance(mode="classic", parametrization="ABSORPTION", tint=(0.1, 0.2, 0.3), random_color=1.0, coat=1.0)
+    properties.assign(state.appearance, unlike)
+    assert bpy.ops.vellus.apply_preset(preset=preset) == {"FINISHED"}
+    found = properties.look_of(state)
+    assert found.mode == "classic"
+    for name, *_ in declared(Appearance):
+        if name not in ("mode", "parametrization"):
+            np.testing.assert_allclose(getattr(found, name), getattr(look, name), rtol=1e-6, err_msg=name)
+    assert found.parametrization == look.parametrization
+    for name, value in appearance.principled_sockets(look).items():
+        np.testing.assert_allclose(sockets(hair)[name], value, rtol=1e-5, err_msg=name)
+    assert properties.table_settings_of(state).sigma_a == pytest.approx(appearance.sigma_a(look), rel=1e-5)
+
+
+def test_undo_takes_a_preset_back(hair):
+    bpy.ops.ed.undo_push(message="made")
+    before, sockets_before = properties.look_of(hair.data.vellus), sockets(hair)
+    bpy.ops.vellus.apply_preset("EXEC_DEFAULT", True, preset="WET_BLOND")
+    assert properties.look_of(hair.data.vellus) != before
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    hair = bpy.data.objects["Hair"]
+    assert properties.look_of(hair.data.vellus) == before
+    for name, value in sockets(hair).items():
+        np.testing.assert_array_equal(value, sockets_before[name], err_msg=name)
+
+
+def test_a_preset_needs_hair(guides):
+    assert not bpy.ops.vellus.apply_preset.poll()
 
 
 def test_a_folder_that_cannot_be_written_is_refused(hair, tmp_path):

@@ -38,6 +38,12 @@ class Layout:
         assert operator in dir(getattr(bpy.ops, category))
         self.drawn[name] += 1
 
+    def operator_menu_enum(self, name, choice, text=""):
+        category, operator = name.split(".")
+        choices = getattr(getattr(bpy.ops, category), operator).get_rna_type().properties[choice].enum_items
+        assert len(choices) > 1
+        self.operator(name)
+
 
 class Panel:
     """A panel's self: its layout, and what the class itself has."""
@@ -85,7 +91,7 @@ def test_shading_offers_what_changes_the_picture(hair, model, parametrization):
     state = hair.data.vellus
     state.model, state.appearance.parametrization = model, parametrization
     drawn = draw(panels.VELLUS_PT_shading)
-    assert drawn["model"] == 1
+    assert drawn["model"] == drawn["vellus.apply_preset"] == 1
     assert drawn["mode"] == (model == "MARSCHNER")
     for name, *_ in declared(Appearance):
         other_colors = [n for kind, names in appearance.COLOR_FIELDS.items() if kind != parametrization for n in names]

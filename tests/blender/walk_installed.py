@@ -25,7 +25,7 @@ def install(zip_path, _folder):
 
 
 def operators(_zip_path, folder):
-    """Mesh to pixels by the four operators."""
+    """Mesh to pixels by every operator."""
     gpu.init()
     bpy.ops.preferences.addon_enable(module=MODULE)
     bpy.data.objects.remove(bpy.data.objects["Cube"])
@@ -36,6 +36,7 @@ def operators(_zip_path, folder):
         bpy.ops.vellus.distribute_guides(guide_count=30, relax_iterations=5, length=0.05),
         bpy.ops.vellus.interpolate_hair(strand_count=300),
         bpy.ops.vellus.bake_tables(directory=str(folder)),
+        _apply_preset(bpy.data.objects["Hair"]),
         bpy.ops.vellus.render_picture(filepath=str(folder / "picture.png"), width=160, height=120),
     ]
     picture = bpy.data.images.load(str(folder / "picture.png"))
@@ -51,6 +52,11 @@ def operators(_zip_path, folder):
         "picture": [*picture.size, float(pixels[:, :3].std())],
         "wheels": [warp.__file__, OpenEXR.__file__],
     }
+
+
+def _apply_preset(hair):
+    bpy.context.view_layer.objects.active = hair
+    return bpy.ops.vellus.apply_preset(preset="BLOND")
 
 
 def _positions(curves):
