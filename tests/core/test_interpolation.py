@@ -176,3 +176,19 @@ def test_automatic_influence_is_twice_the_spacing(scale):
 def test_a_lone_guide_has_an_influence():
     assert interpolation.automatic_influence_distance(vectors([(3.0, 4.0, 5.0)])) > 0.0
     assert interpolation.automatic_influence_distance(vectors([(3.0, 4.0, 5.0)] * 3)) > 0.0
+
+
+@pytest.mark.parametrize("point_count", [1, 3, 4, 5, 41])
+def test_both_ways_are_one(scene, point_count):
+    """The processor's way and the GPU's, each on any device, round alike: the same sums in the same order."""
+    guides = np.concatenate([scene["guides"]] * 2, axis=1)[:, :point_count]
+    roots, normals, guides, guide_normals = map(
+        vectors, (scene["roots"], scene["normals"], guides, scene["guide_normals"])
+    )
+    guide_roots = guides[:, 0].contiguous()
+    weights = interpolation.find_guides(roots, normals, guide_roots, guide_normals, scene["distance"], 8)
+    one, other = (
+        way(roots, normals, guides, guide_normals, weights).numpy()
+        for way in (interpolation.by_strands, interpolation.by_points)
+    )
+    np.testing.assert_array_equal(one, other)
