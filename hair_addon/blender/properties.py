@@ -229,3 +229,9 @@ def folder(description):
 def file(description):
     """The `filepath` property that a file browser fills."""
     return bpy.props.StringProperty(name="File", description=description, subtype="FILE_PATH", options=_RELATIVE)
+
+
+def choice(name, description, labels):
+    """An enumeration that is no setting; labels: {identifier: label}."""
+    items = [(identifier, label, "") for identifier, label in labels.items()]
+    return bpy.props.EnumProperty(name=name, description=description, items=items)

@@ -17,12 +17,11 @@ class VELLUS_OT_apply_preset(bpy.types.Operator):
     bl_idname = "vellus.apply_preset"
     bl_label = "Apply Preset"
     bl_options = {"REGISTER", "UNDO"}
-
-    preset: bpy.props.EnumProperty(
-        name="Preset",
-        description="The look to begin with",
-        items=[(identifier, label, "") for identifier, (label, _look) in PRESETS.items()],
-    )
+    __annotations__ = {
+        "preset": properties.choice(
+            "Preset", "The look to begin with", {identifier: label for identifier, (label, _look) in PRESETS.items()}
+        )
+    }
 
     @classmethod
     def poll(cls, context):
