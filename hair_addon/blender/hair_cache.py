@@ -10,10 +10,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-from ..core import exr, strands
+from ..core import exr, strands, table_cache
 from ..core.errors import HairError
 from ..core.shading import appearance, lookup_tables
-from . import curves, drawing, properties
+from . import curves, drawing, files, preferences, properties
 
 _strands = {}  # session_uid → StrandsOnGPU, or None where the datablock cannot be drawn
 _shading = {}  # settings → Shading
@@ -95,11 +95,23 @@ def _kept(settings, make):
 
 
 def _tables(settings, folder):
-    """The tables of these settings: from the folder while it holds just those, else baked now."""
+    """The tables of these settings: from the folder while it holds just those, else from the cache, or baked now."""
     if folder:
         path = Path(bpy.path.abspath(folder))
         if path.is_dir():
             tables = exr.read_tables(path)
             if tables.settings == settings:
                 return tables
-    return lookup_tables.bake(settings)
+    cache = cache_folder()
+    if cache is None:
+        return lookup_tables.bake(settings)
+    return table_cache.tables(cache, settings, files.addon_version())
+
+
+def cache_folder():
+    """The folder of tables that were baked before, for every file of this user; None where we are no extension."""
+    if not preferences.ADDON_MODULE.startswith("bl_ext."):
+        return None  # run from a checkout
+    # Empty where Blender could not make it, of which it has told the console.
+    folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="tables", create=True)
+    return Path(folder) if folder else None

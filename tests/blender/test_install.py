@@ -110,6 +110,7 @@ def test_installed_operators_run(walk, used):
     assert used["curves"] == {"Guides": 30, "Hair": 300}
     assert used["finite"]
     assert used["tables"] == ["m.exr", "n.exr", "n_trt.exr"]
+    assert used["cached"] == ["n.exr"]  # what the picture was drawn with
     width, height, contrast = used["picture"]
     assert (width, height) == (160, 120) and contrast > 0.01
     assert all(Path(wheel).is_relative_to(walk.profile) for wheel in used["wheels"])

@@ -253,6 +253,53 @@ def test_a_path_beside_an_unsaved_file_is_refused(hair):
     assert "save" in refusal(bpy.ops.vellus.bake_tables, directory="//tables")
 
 
+@pytest.fixture
+def user_folder(tmp_path, monkeypatch):
+    """Blender's folder of this user, empty, and the add-on as if it were an installed extension."""
+    monkeypatch.setattr(hair_cache.preferences, "ADDON_MODULE", "bl_ext.user_default.vellus")
+    made = tmp_path / "user"
+
+    def extension_path_user(module, *, path, create):
+        assert module == "bl_ext.user_default.vellus" and create
+        (made / path).mkdir(parents=True, exist_ok=True)
+        return str(made / path)
+
+    monkeypatch.setattr(bpy.utils, "extension_path_user", extension_path_user)
+    return made
+
+
+def test_tables_are_found_again_in_another_session(hair, user_folder, monkeypatch):
+    hair.data.vellus.marschner.size = 32
+    hair_cache.clear()
+    hair_cache.shading_of(hair.data)
+    (cached,) = (user_folder / "tables").iterdir()
+    assert exr.read_tables(cached).settings == properties.table_settings_of(hair.data.vellus)
+    bakes = []
+    bake = lookup_tables.bake
+    monkeypatch.setattr(lookup_tables, "bake", lambda *arguments: bakes.append(arguments) or bake(*arguments))
+    hair_cache.clear()
+    hair_cache.shading_of(hair.data)
+    assert bakes == []
+    (cached / "n.exr").write_bytes(b"damaged")
+    hair_cache.clear()
+    hair_cache.shading_of(hair.data)
+    assert len(bakes) == 1
+    assert exr.read_tables(cached).settings == properties.table_settings_of(hair.data.vellus)
+
+
+def test_a_checkout_caches_nothing(hair, monkeypatch):
+    monkeypatch.setattr(bpy.utils, "extension_path_user", None)  # whoever asks for the folder fails
+    hair_cache.clear()
+    assert hair_cache.cache_folder() is None
+    assert hair_cache.shading_of(hair.data).samplers
+
+
+def test_a_folder_that_cannot_be_made_is_done_without(hair, user_folder, monkeypatch):
+    monkeypatch.setattr(bpy.utils, "extension_path_user", lambda *_arguments, **_named: "")
+    hair_cache.clear()
+    assert hair_cache.shading_of(hair.data).samplers
+
+
 def test_a_picture_is_written(hair, camera, tmp_path):
     path = tmp_path / "hair.png"
     bpy.ops.vellus.render_picture(filepath=str(path), width=64, height=48, samples_per_side=2)

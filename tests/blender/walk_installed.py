@@ -49,9 +49,14 @@ def operators(_zip_path, folder):
         "curves": {curves.name: len(curves.curves) for curves in bpy.data.hair_curves},
         "finite": all(np.isfinite(_positions(curves)).all() for curves in bpy.data.hair_curves),
         "tables": sorted(path.name for path in folder.glob("*.exr")),
+        "cached": [path.name for path in _user_folder().glob("tables/*/n.exr")],
         "picture": [*picture.size, float(pixels[:, :3].std())],
         "wheels": [warp.__file__, OpenEXR.__file__],
     }
+
+
+def _user_folder():
+    return Path(bpy.utils.extension_path_user(MODULE))
 
 
 def _apply_preset(hair):
