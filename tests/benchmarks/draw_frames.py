@@ -80,7 +80,7 @@ def strands_between(guides, strand_count, device):
 
 def measure(drawn, frame, points, radii):
     """{what: milliseconds} of these strands in place of the scene's hair."""
-    _strands, _shading, to_world = drawn.hair[0]
+    _strands, _shading, to_world, *growing_on = drawn.hair[0]
     uploaded = [drawing.upload_strands(points, radii)]
 
     def upload():
@@ -94,17 +94,18 @@ def measure(drawn, frame, points, radii):
 
     found = {"upload": median_milliseconds(upload, 3), "shadow maps": median_milliseconds(draw_shadows)}
     for label, shading in shadings().items():
-        shown = replace(drawn, hair=[(uploaded[0], shading, to_world)])
+        shown = replace(drawn, hair=[(uploaded[0], shading, to_world, *growing_on)])
         found[label] = median_milliseconds(lambda shown=shown: frame.draw(shown))
     return found
 
 
 def shadings():
     """{model: `Shading`} of the models that are timed."""
-    tables = lookup_tables.bake(lookup_tables.Settings(sigma_a=head.CHESTNUT))
+    fibres = {mode: lookup_tables.Settings(mode=mode, sigma_a=head.CHESTNUT) for mode in ("classic", "energy")}
     return {
         "Kajiya-Kay": drawing.kajiya_kay_shading(kajiya_kay.Settings()),
-        "Marschner": drawing.marschner_shading(tables),
+        "Marschner": drawing.marschner_shading(lookup_tables.bake(fibres["classic"])),
+        "dual scattering": drawing.marschner_shading(lookup_tables.bake(fibres["energy"])),
     }
 
 
