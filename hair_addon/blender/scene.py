@@ -235,7 +235,7 @@ def _read_drawn_mesh(mesh_object, to_world):
 
 
 def surface_color(mesh_object):
-    """Linear RGB: the base colour of the first material's Principled BSDF, or its colour in the viewport; None: black."""
+    """Linear RGB: base colour of the first material's Principled BSDF, or its colour in the viewport; black of None."""
     if mesh_object is None:
         return (0.0, 0.0, 0.0)
     material = next((slot.material for slot in mesh_object.material_slots if slot.material), None)
