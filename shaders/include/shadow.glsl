@@ -3,6 +3,10 @@
 
 #include "include/opacity.glsl"
 
+// How far around a strand, as a part of the map, and how far behind it, as a part of the hair, surfaces light it.
+const float BOUNCE_REACH = 0.025;
+const float BOUNCE_DISTANCE = 0.25;
+
 // Texel of a point in a light's maps, and its depth along the light; false where the maps do not reach: they hold the
 // hair and what is near it.
 bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
@@ -32,18 +36,28 @@ float crossed_strands(Light light, vec3 at, float depth)
   return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
 }
 
+// How much of the light's way on is barred by a surface near enough to light a strand from below: the mean over places
+// around it, as no surface ends for a strand where it ends for a ray.
+float surface_under(vec3 at, float depth, float extent)
+{
+  float barred = 0.0;
+  for (int corner = 0; corner < 4; corner++) {
+    vec2 offset = BOUNCE_REACH * (2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0);
+    float distance_to = textureLod(surface_front, at + vec3(offset, 0.0), 0.0).r - depth;
+    barred += 1.0 - smoothstep(0.0, BOUNCE_DISTANCE * extent, distance_to);
+  }
+  return 0.25 * barred;
+}
+
 // What the surface under the hair sends back to a strand from below, for unit irradiance of the light: through the rest
-// of the hair, off a matt surface, and through the hair again. Nothing where the light meets no surface.
+// of the hair, off a matt surface, and through the hair again.
 vec3 surface_bounce(Light light, vec3 at, float depth, float count)
 {
-  float surface = textureLod(surface_front, at, 0.0).r;
-  if (surface > depth + light.extent) {
-    return vec3(0.0);
-  }
+  float surface = min(textureLod(surface_front, at, 0.0).r, depth + BOUNCE_DISTANCE * light.extent);
   float under = max(0.0, crossed_strands(light, at, surface) - count);
   vec3 way = transmitted(count + 2.0 * under, view.hair_forward.rgb);
   // The mean cosine of a surface that is lit is 2/3, and it fills half of what a strand sees.
-  return view.surface_color.rgb * way * (2.0 / 3.0) * 0.5 / PI;
+  return view.surface_color.rgb * way * surface_under(at, depth, light.extent) * (2.0 / 3.0) * 0.5 / PI;
 }
 
 // Part of a light that arrives at a surface: the mean over 3 × 3 texels. forward: what one strand passes on.
