@@ -31,7 +31,7 @@ def median_time(work, device, repetitions=9):
 @pytest.mark.parametrize("strand_count", [30_000, 100_000, 1_000_000])
 @pytest.mark.parametrize("device", devices())
 def test_follow_guides(strand_count, device):
-    """Printed: times. Asserted: on a GPU, following guides costs no more than a few times filling the same memory."""
+    """Printed: times. Asserted: on a GPU, following guides takes less than twice as long as filling the same memory."""
     head = read_obj(HEAD)
     density = np.clip((head.vertices[:, 2] - 0.755) / 0.01, 0.0, 1.0)
     guides = groom.distribute_guides(head, groom.GuideSettings(), density=density, device=device)
@@ -47,4 +47,4 @@ def test_follow_guides(strand_count, device):
     times = {name: median_time(way, device) for name, way in ways.items()}
     print(f"\n{strand_count:9} strands, {device:7}", *(f"  {name} {1e3 * t:8.3f} ms" for name, t in times.items()))
     if device != "cpu" and strand_count == 1_000_000:
-        assert times["follow"] < 8.0 * times["fill as much"]
+        assert times["follow"] < 2.0 * times["fill as much"]
