@@ -121,8 +121,7 @@ def bounding_sphere(hair):
     """Centre (3,) and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)]."""
     corners = []
     for strands, to_world in hair:
-        bounds = np.stack([strands.points.min(axis=(0, 1)), strands.points.max(axis=(0, 1))])
-        box = np.array(np.meshgrid(*bounds.T)).reshape(3, -1).T
+        box = np.array(np.meshgrid(*strands.bounds.T)).reshape(3, -1).T
         corners.append(box @ to_world[:3, :3].T + to_world[:3, 3])
     corners = np.concatenate(corners)
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
