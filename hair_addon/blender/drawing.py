@@ -142,6 +142,11 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     return record
 
 
+def scale_of(object_to_world):
+    """The mean scale of a (4, 4) matrix: what a radius is multiplied by."""
+    return abs(np.linalg.det(object_to_world[:3, :3])) ** (1.0 / 3.0)
+
+
 def draw_strands(strands, shading, view, lights, object_to_world, shadow_maps=None, point_step=1, surface_color=0.0):
     """Draw `StrandsOnGPU` into the bound framebuffer.
 
@@ -152,7 +157,7 @@ def draw_strands(strands, shading, view, lights, object_to_world, shadow_maps=No
     drawn_points = max(2, -(-strands.point_count // point_step))
     record = view.copy()
     record["object_to_world"] = object_to_world.T
-    record["object_scale"] = abs(np.linalg.det(object_to_world[:3, :3])) ** (1.0 / 3.0)
+    record["object_scale"] = scale_of(object_to_world)
     record["point_count"] = strands.point_count
     record["drawn_points"] = drawn_points
     record["row_strands"] = strands.row_strands

@@ -9,11 +9,10 @@ from ..core import hair_volume
 from ..core.errors import HairError
 from ..core.mesh import TriMesh, positions
 from ..core.sampling import sample_surface
-from . import drawing, hair_cache, scene
+from . import drawing, hair_cache, scene, uniforms
 from .shadows import ShadowMaps
 
 _VOLUME_STRANDS = 20_000
-_VOLUME_POINTS = 41
 _PLACES_PER_MESH = 50_000
 
 
@@ -25,14 +24,14 @@ class DrawnScene:
     surfaces: list  # (batch of triangles, linear RGB)
     lights: np.ndarray  # uniforms.LIGHTS
     world_radiance: np.ndarray
-    shadow_maps: ShadowMaps
+    shadow_maps: ShadowMaps | None  # None in a viewport without hair
 
 
-def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, shadow_maps=None):
+def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None):
     """Bring a scene to the GPU and draw its shadow maps.
 
     viewport: the 3-D viewport whose visibility counts, None for a render; refused: called with the datablock and the
-    `HairError` of hair that cannot be drawn, which otherwise is raised; shadow_maps: some to draw over.
+    `HairError` of hair that cannot be drawn, which otherwise is raised.
     """
     hair = []
     for hair_object in scene.curves_objects(view_layer, "HAIR", viewport):
@@ -48,10 +47,13 @@ def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, shad
         if strands is not None:
             color = scene.surface_color(hair_object.data.surface)
             hair.append((strands, shading, np.array(hair_object.matrix_world, np.float64), color))
+    if viewport is not None and not hair:
+        # Blender draws the rest by itself: a scene without hair pays nothing for the add-on.
+        return DrawnScene([], [], uniforms.LIGHTS.record(), np.zeros(3), None)
     meshes = scene.read_drawn_meshes(depsgraph, for_render=viewport is None)
     surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
     lights = scene.read_lights(depsgraph, for_render=viewport is None)
-    shadow_maps = shadow_maps or ShadowMaps()
+    shadow_maps = ShadowMaps()
     placed = [(strands, to_world) for strands, _, to_world, _ in hair]
     shadow_maps.draw(lights, placed, [batch for batch, _ in surfaces])
     if placed:
@@ -61,29 +63,17 @@ def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, shad
 
 def _volume(placed, meshes):
     """`HairVolume` of [(StrandsOnGPU, object to world)] among meshes."""
-    points, radii = [], []
+    starts, ends, widths = [], [], []
     for strands, to_world in placed:
         # A part of the strands, each as thick as all that it stands for, is as good a cloud.
         step = -(-strands.strand_count // _VOLUME_STRANDS)
-        chosen = strands.points[::step]
-        scale = abs(np.linalg.det(to_world[:3, :3])) ** (1.0 / 3.0)
-        points.append(_to_count(chosen @ to_world[:3, :3].T + to_world[:3, 3]))
-        radii.append(_to_count((strands.radii[::step] * (scale * strands.strand_count / len(chosen)))[..., None]))
-    solid = [_places_on(mesh) for mesh in meshes]
-    return hair_volume.measure(
-        np.concatenate(points), np.concatenate(radii)[..., 0], np.concatenate(solid) if solid else np.empty((0, 3))
-    )
-
-
-def _to_count(values):
-    """(S, P, K) along strands → (S, 41, K): strands of different point counts have to stand in one array."""
-    count = values.shape[1]
-    if count == _VOLUME_POINTS:
-        return values
-    places = np.linspace(0, count - 1, _VOLUME_POINTS)
-    below = np.minimum(places.astype(int), max(count - 2, 0))
-    share = (places - below)[:, None]
-    return (1.0 - share) * values[:, below] + share * values[:, np.minimum(below + 1, count - 1)]
+        points = strands.points[::step] @ to_world[:3, :3].T + to_world[:3, 3]
+        radii = strands.radii[::step] * (drawing.scale_of(to_world) * strands.strand_count / len(points))
+        starts.append(points[:, :-1].reshape(-1, 3))
+        ends.append(points[:, 1:].reshape(-1, 3))
+        widths.append((radii[:, :-1] + radii[:, 1:]).ravel())
+    solid = [np.empty((0, 3)), *map(_places_on, meshes)]
+    return hair_volume.measure(*map(np.concatenate, (starts, ends, widths, solid)))
 
 
 def _places_on(mesh):
@@ -108,10 +98,11 @@ def draw_hair_depth(drawn, view):
 def draw_hair(drawn, view):
     """Draw all hair with depth test into the bound framebuffer; view: a `uniforms.VIEW` record."""
     view["world_radiance"][:3] = drawn.world_radiance
-    samplers = drawn.shadow_maps.samplers
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for strands, shading, to_world, color in drawn.hair:
-            drawing.draw_strands(strands, shading, view, drawn.lights, to_world, samplers, surface_color=color)
+            drawing.draw_strands(
+                strands, shading, view, drawn.lights, to_world, drawn.shadow_maps.samplers, surface_color=color
+            )
 
 
 def draw_surfaces(drawn, view):

@@ -16,6 +16,13 @@ class _HairTab:
     bl_category = "Hair"
 
     @staticmethod
+    def split(layout):
+        """The layout with names in a column of their own."""
+        layout.use_property_split = True
+        layout.use_property_decorate = False
+        return layout
+
+    @staticmethod
     def rows(layout, group, settings_class, skip=()):
         """A row for each setting of a class, in the order of declaration."""
         for name, _default, _details in declared(settings_class):
@@ -30,9 +37,7 @@ class VELLUS_PT_guides(_HairTab, bpy.types.Panel):
     bl_idname = "VELLUS_PT_guides"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.split(self.layout)
         surface = surface_of(context.object)
         layout.label(text=surface.name if surface else "Select a mesh to grow hair on", icon="MESH_DATA")
         guides = guides_of(context.object)
@@ -40,7 +45,7 @@ class VELLUS_PT_guides(_HairTab, bpy.types.Panel):
             layout.operator("vellus.distribute_guides", icon="OUTLINER_OB_CURVES")
         if guides is None:
             return
-        _draw_status(layout, guides)
+        _draw_status(layout, guides.vellus.status)
         group = guides.vellus.guides
         if surface:
             layout.prop_search(group, "density_group", surface, "vertex_groups")
@@ -57,16 +62,14 @@ class VELLUS_PT_interpolation(_HairTab, bpy.types.Panel):
     bl_idname = "VELLUS_PT_interpolation"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.split(self.layout)
         hair = active_of_kind(context.object, "HAIR")
         if hair is None:
             if guides_of(context.object) is None:
                 layout.label(text="Distribute guides first", icon="INFO")
             layout.operator("vellus.interpolate_hair", icon="CURVES")
             return
-        _draw_status(layout, hair)
+        _draw_status(layout, hair.vellus.status)
         layout.prop(hair.vellus, "guide_curves")
         group = hair.vellus.hair
         if hair.surface:
@@ -96,10 +99,9 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
     bl_idname = "VELLUS_PT_shading"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.split(self.layout)
         state = context.object.data.vellus
+        _draw_status(layout, state.shading_status)
         layout.operator_menu_enum("vellus.apply_preset", "preset", text="Presets")
         layout.prop(state, "is_drawn")
         layout.prop(state, "model")
@@ -121,9 +123,7 @@ class VELLUS_PT_tables(_OfHair, bpy.types.Panel):
     bl_idname = "VELLUS_PT_tables"
 
     def draw(self, context):
-        layout = self.layout
-        layout.use_property_split = True
-        layout.use_property_decorate = False
+        layout = self.split(self.layout)
         state = context.object.data.vellus
         hidden = (*appearance.TABLE_FIELDS, *(_GLINTS if state.appearance.mode == "energy" else ()))
         self.rows(layout, state.marschner, lookup_tables.Settings, skip=hidden)
@@ -141,9 +141,9 @@ class VELLUS_PT_output(_HairTab, bpy.types.Panel):
         self.layout.operator("vellus.render_picture", icon="IMAGE_DATA")
 
 
-def _draw_status(layout, curves):
-    if curves.vellus.status:
-        layout.label(text=curves.vellus.status, icon="ERROR")
+def _draw_status(layout, status):
+    if status:
+        layout.label(text=status, icon="ERROR")
 
 
 CLASSES = (

@@ -44,7 +44,7 @@ def interpolate_hair(guide_curves, settings, depsgraph, target=None):
     target = target or curves.new_object("Hair", surface_object).data
     _keep_settings(target, "HAIR", target.vellus.hair, settings)
     target.vellus.guide_curves = guide_curves
-    target.vellus.is_stale = False
+    target.vellus.is_stale = False  # as which another choice of guides marks it
     radii = groom.strand_radii(settings, hair.points.shape[1])
     nearest = binding.guide_weights.indices.numpy()[:, 0]
     curves.write_strands(target, surface, hair.numpy(), hair.roots, radii, nearest)
@@ -95,8 +95,9 @@ def evaluate_shading(target):
     curves.draw_natively(target, not target.vellus.is_drawn)
     try:
         materials.write_hair_material(target)
+        target.vellus.shading_status = ""
     except HairError as error:
-        target.vellus.status = str(error)
+        target.vellus.shading_status = str(error)
 
 
 def _check_surface(surface_object):

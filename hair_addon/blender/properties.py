@@ -193,6 +193,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     )
     is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
+    shading_status: bpy.props.StringProperty(description="Why this cannot be shaded", options={"HIDDEN"})
     status: bpy.props.StringProperty(description="Why this could not be made again", options={"HIDDEN"})
 
 

@@ -25,20 +25,19 @@ class HairVolume:
     high: np.ndarray
 
 
-def measure(points, radii, solid_points, resolution=48):
-    """Strands (S, P, 3) with radii (S, P) [m], places on surfaces (M, 3) [m] → `HairVolume`.
+def measure(starts, ends, widths, solid_points, resolution=48):
+    """Segments of strands from starts to ends (N, 3), widths (N,), places on surfaces (M, 3), all [m] → `HairVolume`.
 
     resolution: cells along the box's longest side.
     """
-    low, high = points.min(axis=(0, 1)).astype(float), points.max(axis=(0, 1)).astype(float)
+    low = np.minimum(starts.min(axis=0), ends.min(axis=0)).astype(float)
+    high = np.maximum(starts.max(axis=0), ends.max(axis=0)).astype(float)
     cell = max(float((high - low).max()), 1e-9) / resolution
     shape = np.maximum(np.ceil((high - low) / cell), 1.0).astype(int)  # x, y, z
     high = low + shape * cell
 
-    middles = 0.5 * (points[:, 1:] + points[:, :-1])
-    widths = radii[:, 1:] + radii[:, :-1]
-    shadows = 0.25 * np.pi * widths * np.linalg.norm(np.diff(points, axis=1), axis=-1)
-    hair = np.bincount(_cells(middles.reshape(-1, 3), low, cell, shape), shadows.ravel(), np.prod(shape)) / cell**2
+    shadows = 0.25 * np.pi * widths * np.linalg.norm(ends - starts, axis=-1)
+    hair = np.bincount(_cells(0.5 * (starts + ends), low, cell, shape), shadows, np.prod(shape)) / cell**2
     inside = ((solid_points >= low) & (solid_points < high)).all(axis=1)
     solid = np.zeros(np.prod(shape))
     solid[_cells(solid_points[inside], low, cell, shape)] = SOLID

@@ -225,7 +225,10 @@ def test_a_look_that_is_not_a_number_keeps_the_material_and_says_so(hair):
     hair.data.vellus.appearance.roughness = math.nan
     update()
     assert_material_is(hair, Appearance())
-    assert "Roughness" in hair.data.vellus.status
+    assert "Roughness" in hair.data.vellus.shading_status
+    hair.data.vellus.appearance.roughness = 0.3
+    update()
+    assert hair.data.vellus.shading_status == ""
 
 
 def test_a_deleted_surface_is_said_and_nothing_crashes(hair):

@@ -83,6 +83,20 @@ def test_supersampling_keeps_the_mean(lit):
     assert picture(samples_per_side=4).mean() == pytest.approx(many.mean(), rel=0.05)
 
 
+def test_a_viewport_without_hair_reads_nothing(sphere, monkeypatch):
+    """Whoever has the add-on on pays for it only where there is hair."""
+
+    def forbidden(*_args, **_kwargs):
+        raise AssertionError("the scene was read")
+
+    for name in ("read_drawn_meshes", "read_lights"):
+        monkeypatch.setattr(scene, name, forbidden)
+    context = bpy.context
+    viewport = next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
+    drawn = drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), viewport)
+    assert drawn.hair == [] and drawn.surfaces == [] and drawn.shadow_maps is None
+
+
 def test_more_than_the_driver_holds_is_refused(lit):
     with pytest.raises(pipeline.HairError, match="use fewer"):
         picture(width=16384, height=16384, samples_per_side=8)
