@@ -1,37 +1,39 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Centroidal Voronoi tessellation of a surface: Lloyd's relaxation of roots  [Du99], [Report12] section 2.3.
+"""Centroidal Voronoi tessellation of a surface: where guides are rooted  [Du99], [Report12] section 2.3.
 
-The cell V_i of a site s_i is the part of the surface that is nearer to it than to any other, straight through space.
-With a density rho, the energy is E = sum_i ∫_{V_i} rho(x) |x - s_i|² dA. Given the sites, the nearest one is every
-point's best. Given the cells, the surface point nearest to a cell's centroid c is its best site, exactly: the cell's
-share of E is its share with c as the site plus mass × |s_i - c|². So E never rises.
+The cell V_i of a site s_i is the part of the surface that is nearer to it than to any other (voronoi.py). With a
+density rho, the energy is E = sum_i ∫_{V_i} rho(x) |x - s_i|² dA, and its gradient 2 m_i (s_i - c_i), c_i being the
+centroid of the cell and m_i its mass. Lloyd's step, to the surface point nearest to the centroid, never raises E.
+L-BFGS takes the same step as its first guess and learns better ones [Liu09]; where one raises E, it begins again.
+
+From a random start any descent ends in grains of honeycomb that do not match. So few sites are relaxed first, and then
+each pair of neighbours gets a site in its middle, which makes a finer honeycomb out of a coarse one, again and again: a
+multilevel method, as in [Du06].
 
 Where E is least, areas of cells go with rho^(-1/2) [Gersho79]. Sites are to go with the density D that an artist
 painted, so rho = D².
-
-Integrals are sums over small pieces of triangles. All is computed with the surface scaled to unit size.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
-import warp as wp
 
-from . import hash_grid
-from .mesh import SurfacePoints, TriMesh, interpolate, positions
-from .sampling import check_density, corner_masses
-from .surface_query import SurfaceQuery
+from .cut_cells import CutCells
+from .ground import Ground
+from .lbfgs import Memory
+from .mesh import SurfacePoints, positions
+from .sampled_cells import SampledCells
+from .voronoi import sites_on
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
-
-PIECES_PER_SITE = 256
-MOST_PIECES = 400_000  # unless the mesh has more triangles: each is a piece at least
-SITES_AROUND = 16  # how many neighbours of a site (itself among them) are looked at before all sites are
-EVERYWHERE = 4.0  # a distance that reaches across a surface of unit size
-
-# Sites are moved past their centroids, by less than twice the way, which saves half of the iterations [Du06].
-OVER_RELAXATION = 1.9
+STEPS_KEPT = 7
+LONGEST_STEP = 0.5  # of the way to the next site
+FEWEST_SITES = 260  # from so many on, fewer are placed first
+LEAST_PAIR = 0.4  # of the part of the surface that two neighbours share in a honeycomb: others get no site between
+GAP_ROUNDS = 4  # gaps that share a corner are filled one after the other
+SAMPLES_PER_SITE = 64  # while they are few
+LEAST_SAMPLES = 2000
+FIRST_ITERATIONS, COARSE_ITERATIONS = 30, 10
+ENOUGH = 1e-4  # an iteration that lowers the energy by less than that part of it was the last
 
 # Second moment of a regular hexagon about its centre by its area squared: no tessellation of the plane has less.
 HEXAGON_MOMENT = 5.0 / (18.0 * np.sqrt(3.0))
@@ -39,7 +41,7 @@ HEXAGON_MOMENT = 5.0 / (18.0 * np.sqrt(3.0))
 
 @dataclass(frozen=True)
 class Relaxation:
-    """sites: `SurfacePoints`; energies (iterations + 1,) [m⁴]: before the first iteration and after each."""
+    """sites: `SurfacePoints`; energies [m⁴]: before the first iteration and after each, until they rest."""
 
     sites: SurfacePoints
     energies: np.ndarray
@@ -57,158 +59,232 @@ class Quality:
     share_variation: float
 
 
-def relax(mesh, sites, iterations, density=None, device="cpu"):
+def place(
+    mesh, count, seed, iterations, *, density=None, texture=None, mirror=None, device="cpu", progress=lambda part: None
+):
+    """`count` evenly placed sites, as `SurfacePoints`: the same for the same seed.
+
+    mesh: a checked `TriMesh`; iterations: at most, with all sites; 0 leaves them random. density (V,) ≥ 0 per vertex
+    and texture (`Texture`) multiply; mirror: `Mirror` by which sites are symmetric: the second half are images of the
+    first, in the same order, and an odd one lies between. progress(part): told which part of the work is done, and may
+    raise to stop.
+    """
+    ground = Ground(mesh, count, density, texture, mirror, device)
+    if mirror is None or count == 1:
+        return _place(ground, count, seed, iterations, device, progress)
+    # The border of a site's cell and its image's is the mirror: half of the surface is a problem of its own.
+    half = _place(ground, count - count // 2, seed, iterations, device, progress)
+    return ground.symmetric(half, count)
+
+
+def relax(mesh, sites, iterations, density=None, device="cpu", progress=lambda part: None, steps_kept=STEPS_KEPT):
     """Move sites (`SurfacePoints` on a checked `TriMesh`) until they are evenly placed for a density (V,) ≥ 0.
 
-    Sites stay on the surface, and where the density is above zero if they began there. Returns a `Relaxation`.
+    Sites stay on the surface, and where the density is above zero if they began there. progress as in `place`;
+    steps_kept: 0 for Lloyd's method alone. Returns a `Relaxation`.
     """
-    pieces = _Pieces(mesh, density, len(sites) * PIECES_PER_SITE, device)
-    ground = _Ground(pieces.mesh, pieces.density, device)
-    energies = np.empty(iterations + 1)
-    for iteration in range(iterations):
-        places = positions(pieces.mesh, sites)
-        energies[iteration] = pieces.assign(places)
-        # The last iteration ends at the centroids, so that nothing is left swinging about them.
-        reach = 1.0 if iteration == iterations - 1 else OVER_RELAXATION
-        sites = ground.move(sites, places, pieces.centroids(places), reach)
-    energies[iterations] = pieces.assign(positions(pieces.mesh, sites))
-    return Relaxation(sites, energies * pieces.size**4)
+    ground = Ground(mesh, len(sites), density, device=device)
+    cells = CutCells(ground, len(sites), device)
+    descent = _descend(ground, cells, sites, iterations, device, progress, steps_kept=steps_kept)
+    return Relaxation(descent.sites, descent.energies * ground.mass * ground.densest**2 * ground.size**4)
 
 
 def measure(mesh, sites, density=None, device="cpu"):
-    """`Quality` of sites on a checked mesh for a density (V,) or None, on finer pieces than `relax` has."""
-    pieces = _Pieces(mesh, density, 4 * len(sites) * PIECES_PER_SITE, device)
-    energy = pieces.assign(positions(pieces.mesh, sites))
-    shares = np.bincount(pieces.cells.numpy(), weights=pieces.amounts, minlength=len(sites))
-    hexagons = HEXAGON_MOMENT * shares.sum() ** 2 / len(sites)
-    return Quality(energy / hexagons, float(shares.std() / shares.mean()))
+    """`Quality` of sites on a checked mesh for a density (V,) or None."""
+    ground = Ground(mesh, len(sites), density, device=device)
+    neighbours = sites_on(ground, sites, device)
+    total = ground.amounts.sum()
+    energy = CutCells(ground, len(sites), device).sums(neighbours).energy * ground.mass
+    shares = CutCells(ground, len(sites), device, ground.densities / total).sums(neighbours).masses
+    return Quality(energy / (HEXAGON_MOMENT * total**2 / len(sites)), float(shares.std() / shares.mean()))
 
 
-class _Pieces:
-    """The surface cut into small pieces, each of which belongs as a whole to the cell of its nearest site.
+@dataclass(frozen=True)
+class _Descent:
+    sites: SurfacePoints
+    energies: np.ndarray
 
-    mesh: the `TriMesh` scaled to unit size, `size` [m] being its own; density: D (V,); centres: (Q, 3) float32;
-    amounts (Q,): ∫ D dA; masses (Q,): ∫ rho dA; cells (Q,): index of the site, once there are sites.
+
+def _place(ground, count, seed, iterations, device, progress):
+    random = np.random.Generator(np.random.PCG64(seed))
+    if iterations == 0:
+        return ground.samples(count, random)[0]
+    counts = [count]
+    while counts[0] > FEWEST_SITES:
+        counts.insert(0, _coarser(counts[0], 0.0))
+    sites, _ = ground.samples(counts[0], random)
+    # Where triangles are much smaller than cells, samples do for most of the way.
+    is_fine = len(ground.amounts) > 2 * SAMPLES_PER_SITE * count
+    for level in range(len(counts)):
+        told = _share(progress, 0.3 * level / len(counts), 0.3 * (level + 1) / len(counts))
+        if level < len(counts) - 1 or level == 0 or is_fine:
+            points, part = ground.samples(max(SAMPLES_PER_SITE * len(sites), LEAST_SAMPLES))
+            cells = SampledCells(ground, points, part, len(sites), device)
+            rounds = COARSE_ITERATIONS if level else FIRST_ITERATIONS
+            sites = _descend(ground, cells, sites, rounds, device, told, is_strict=False).sites
+        if level < len(counts) - 1:
+            if level == 0:
+                # A border has no pairs across it: so many sites are missing, twice as many from level to level.
+                missing = max(0.0, 3.0 * len(sites) - 6.0 - _pair_count(ground, cells, sites, device))
+                for finer in range(len(counts) - 2, 0, -1):
+                    counts[finer] = _coarser(counts[finer + 1], missing * 2.0**finer)
+            sites = _refined(ground, cells, points, sites, counts[level + 1], device)
+    told = _share(progress, 0.3, 1.0)
+    return _descend(ground, CutCells(ground, count, device), sites, iterations, device, told).sites
+
+
+def _coarser(count, missing):
+    """How many sites become `count` when every pair gets one: on a closed surface n sites have 3n - 6 pairs."""
+    return round((count + 6.0 + missing) / 4.0)
+
+
+def _share(progress, first, last):
+    """The progress of a stage that makes up the part between `first` and `last` of the whole."""
+    return lambda part: progress(first + (last - first) * part)
+
+
+def _descend(ground, cells, sites, iterations, device, progress, steps_kept=STEPS_KEPT, is_strict=True):
+    """Sites after at most so many iterations, none of which raised the energy unless `is_strict` is false.
+
+    A site that comes to another side, by its normal, may raise it, and that may be the way to a better place.
     """
+    memory = Memory(steps_kept)
+    state = best = _State(ground, cells, sites, device)
+    energies = [state.energy]
+    for iteration in range(iterations):
+        progress(iteration / iterations)
+        moved = _State(ground, cells, state.stepped(memory.direction(state.gradient, state.inverse)), device)
+        if moved.energy > state.energy and len(memory):
+            memory.clear()
+            moved = _State(ground, cells, state.stepped(state.to_centroids), device)
+        if is_strict and moved.energy > state.energy:
+            moved = _State(ground, cells, state.stepped(0.5 * state.to_centroids), device)
+            if moved.energy > state.energy:
+                break
+        memory.add(moved.places - state.places, moved.gradient - state.gradient)
+        is_enough = abs(state.energy - moved.energy) < ENOUGH * state.energy
+        state = moved
+        best = min(best, state, key=lambda s: s.energy)
+        energies.append(state.energy)
+        if is_enough:
+            break
+    return _Descent(best.sites, np.array(energies))
 
-    def __init__(self, mesh, density, piece_count, device):
-        self.density = check_density(mesh, density)
-        lowest, highest = mesh.corners.min(axis=(0, 1)), mesh.corners.max(axis=(0, 1))
-        self.size = float((highest - lowest).max())
-        self.mesh = TriMesh(((mesh.vertices - lowest) / self.size).astype(np.float32), mesh.triangles)
-        points, self.amounts = _cut(self.mesh, self.density, min(piece_count, MOST_PIECES))
-        self.centres = positions(self.mesh, points)
-        self.masses = self.amounts * interpolate(self.density, self.mesh, points)
-        self.cells = None
-        self._points = wp.array(self.centres, dtype=wp.vec3, device=device)
-        self._squares = wp.empty(len(points), dtype=float, device=device)
 
-    def assign(self, places):
-        """Give each piece to the nearest of the sites at places (n, 3); returns the energy."""
-        sites = wp.array(places, dtype=wp.vec3, device=self._points.device)
-        if self.cells is None:
-            nearest, _ = hash_grid.neighbours(sites, self._points, EVERYWHERE, 1)
-            self.cells = nearest.flatten()
-        around, apart = hash_grid.neighbours(sites, sites, EVERYWHERE, min(SITES_AROUND, len(places)))
-        wp.launch(
-            _nearest_sites,
-            dim=len(self._points),
-            inputs=[self._points, sites, around, apart],
-            outputs=[self.cells, self._squares],
-            device=self._points.device,
+class _State:
+    """Sites with their energy, its gradient (n, 3) along the surface, and inverse (n, 1) = 1 / (2 m_i)."""
+
+    def __init__(self, ground, cells, sites, device):
+        self.sites, self._ground = sites, ground
+        self.places = positions(ground.mesh, sites).astype(np.float64)
+        self.sums = cells.sums(sites_on(ground, sites, device))
+        self.energy = self.sums.energy
+        normals = ground.normals[sites.triangle]
+        gradient = -2.0 * self.sums.moments
+        self.gradient = gradient - np.einsum("ni,ni->n", gradient, normals)[:, None] * normals
+        filled = self.sums.masses > 0.0
+        self.inverse = np.where(filled, 0.5 / np.where(filled, self.sums.masses, 1.0), 0.0)[:, None]
+
+    @property
+    def to_centroids(self):
+        """(n, 3): Lloyd's step."""
+        return 2.0 * self.inverse * self.sums.moments
+
+    def stepped(self, step):
+        """Sites moved along the surface by (n, 3), no farther than leaves the cells their order."""
+        lengths = np.linalg.norm(step, axis=1)
+        longest = LONGEST_STEP * self.sums.spacing
+        shortened = np.where(lengths > longest, longest / np.where(lengths > 0.0, lengths, 1.0), 1.0)
+        moved = self._ground.moved(self.sites, self.places + shortened[:, None] * step)
+        rests = lengths == 0.0
+        return SurfacePoints(
+            np.where(rests, self.sites.triangle, moved.triangle),
+            np.where(rests[:, None], self.sites.barycentric, moved.barycentric),
         )
-        return float(self.masses @ self._squares.numpy())
-
-    def centroids(self, places):
-        """(n, 3) float64; that of an empty cell is its site. Summed in order on the host: the same on every device."""
-        cells = self.cells.numpy()
-        masses = np.bincount(cells, weights=self.masses, minlength=len(places))
-        sums = [np.bincount(cells, weights=self.masses * axis, minlength=len(places)) for axis in self.centres.T]
-        filled = (masses > 0.0)[:, None]
-        return np.where(filled, np.stack(sums, axis=1) / np.where(filled, masses[:, None], 1.0), places)
 
 
-class _Ground:
-    """The part of a surface where sites may be: triangles with an area and some density."""
+def _pairs(ground, cells, sites, device):
+    """Neighbours as sampled cells know them: of each sample the pair (Q,) of sites that are nearest.
 
-    def __init__(self, mesh, density, device):
-        self.mesh, self.density = mesh, density
-        self._query = SurfaceQuery(mesh, np.flatnonzero(corner_masses(mesh, density).any(axis=1)), device)
-
-    def move(self, sites, places, centroids, reach):
-        """Sites at places (n, 3) moved `reach` times the way to their centroids (n, 3), or just to these.
-
-        A cell's cost is mass × |s - c|². A site moves only to where that is less than at its old place: far beyond the
-        centroid it need not be where the surface bends.
-        """
-        squares = np.sum((places - centroids) ** 2, axis=1)
-        for target in (centroids, places + reach * (centroids - places)):
-            moved = self._query.nearest(target)
-            better = np.sum((positions(self.mesh, moved) - centroids) ** 2, axis=1) < squares
-            better &= interpolate(self.density, self.mesh, moved) > 0.0
-            sites = SurfacePoints(
-                np.where(better, moved.triangle, sites.triangle),
-                np.where(better[:, None], moved.barycentric, sites.barycentric),
-            )
-        return sites
-
-
-def _cut(mesh, density, piece_count):
-    """A mesh in about `piece_count` pieces that have an amount: their centres (`SurfacePoints`) and ∫ D dA of each.
-
-    A triangle becomes m² equal ones, m following from the amount on it.
+    A pair is n × the lower site + the higher, or -1 where sites are on different islands.
     """
-    amounts = corner_masses(mesh, density).sum(axis=1)
-    sides = np.maximum(np.round(np.sqrt(amounts * (piece_count / amounts.sum()))), 1.0).astype(int)
-    sides[amounts == 0.0] = 0
-    triangles, barycentric, areas = [], [], []
-    for side in np.unique(sides[sides > 0]):
-        whole = np.flatnonzero(sides == side)
-        i, j = np.indices((side, side)).reshape(2, -1)
-        upright, upended = i + j < side, i + j < side - 1
-        first = np.concatenate([i[upright] + 1 / 3, i[upended] + 2 / 3]) / side
-        second = np.concatenate([j[upright] + 1 / 3, j[upended] + 2 / 3]) / side
-        triangles.append(np.repeat(whole, side**2))
-        barycentric.append(np.tile(np.stack([first, second, 1.0 - first - second], axis=1), (len(whole), 1)))
-        areas.append(np.repeat(mesh.areas[whole] / side**2, side**2))
-    centres = SurfacePoints(np.concatenate(triangles).astype(np.int32), np.concatenate(barycentric).astype(np.float32))
-    return centres, np.concatenate(areas) * interpolate(density, mesh, centres)
+    first, second = cells.nearest_two(sites_on(ground, sites, device))
+    islands = ground.islands[sites.triangle]
+    is_pair = (second >= 0) & (islands[first] == islands[second])
+    return np.where(is_pair, np.minimum(first, second) * len(sites) + np.maximum(first, second), -1)
 
 
-@wp.kernel
-def _nearest_sites(
-    points: wp.array[wp.vec3],
-    sites: wp.array[wp.vec3],
-    around: wp.array2d[int],
-    apart: wp.array2d[float],
-    # outputs; cells hold the sites to begin with, any at all
-    out_cells: wp.array[int],
-    out_squares: wp.array[float],
-):
-    piece = wp.tid()
-    position = points[piece]
-    nearest = out_cells[piece]
-    distance = wp.length(sites[nearest] - position)
-    # From one site to a nearer one around it, as long as there is any. Sites more than twice as far from this site as
-    # the piece is are farther from the piece than this site [Elkan03].
-    slot = int(0)
-    searching = bool(True)
-    while searching:
-        site = nearest
-        limit = 2.0 * distance
-        slot = int(0)
-        while slot < around.shape[1] and apart[site, slot] <= limit:
-            other_distance = wp.length(sites[around[site, slot]] - position)
-            if other_distance < distance:
-                nearest = around[site, slot]
-                distance = other_distance
-            slot += 1
-        searching = nearest != site
-    if slot == around.shape[1] and slot < sites.shape[0]:  # the neighbours known do not reach that far
-        for other in range(sites.shape[0]):
-            other_distance = wp.length(sites[other] - position)
-            if other_distance < distance:
-                nearest = other
-                distance = other_distance
-    out_cells[piece] = nearest
-    out_squares[piece] = distance * distance
+def _pair_count(ground, cells, sites, device):
+    pairs = _pairs(ground, cells, sites, device)
+    return len(np.unique(pairs[pairs >= 0]))
+
+
+def _refined(ground, cells, points, sites, count, device):
+    """`count` sites out of fewer: one more between neighbours, and what is lacking in the widest gaps.
+
+    Neighbours that are closer than most get none: so sites leave where few of them stood too close, as they do where a
+    surface bends faster than its cells are wide. New sites are some of the `points` that sampled cells are made of, so
+    they have density.
+    """
+    pairs = _pairs(ground, cells, sites, device)
+    known, which, sizes = np.unique(pairs, return_inverse=True, return_counts=True)
+    places = positions(ground.mesh, sites)
+    middles = 0.5 * (places[known // len(sites)] + places[known % len(sites)])
+    squares = np.sum((cells.places - middles[which]) ** 2, axis=1)
+    # In a honeycomb of n sites each of 3n pairs has as large a part.
+    is_wide = (known >= 0) & (sizes > LEAST_PAIR * len(points) / (3.0 * len(sites)))
+    ranked = np.argsort(-sizes, kind="stable")
+    between = _firsts(which, squares)[ranked[is_wide[ranked]]]
+    islands = ground.islands[points.triangle]
+    sites = sites.joined(points[_within(between, islands, _wanted(ground, sites, count))])
+    for _ in range(GAP_ROUNDS):
+        if len(sites) < count:
+            sites = sites.joined(points[_widest_gaps(ground, cells, points, sites, count, device)])
+    lacking = count - len(sites)  # where islands are smaller than a cell
+    return sites.joined(points[np.linspace(0, len(points) - 1, lacking).astype(int)]) if lacking else sites
+
+
+def _widest_gaps(ground, cells, points, sites, count, device):
+    """Samples, indices of them, that are farthest from all sites: at most as many as are lacking, and not together."""
+    first, _ = cells.nearest_two(sites_on(ground, sites, device))
+    squares = np.sum((cells.places - positions(ground.mesh, sites)[first]) ** 2, axis=1)
+    widths = squares * cells.densities  # by the spacing that sites should have there
+    gaps = _firsts(first, -widths)
+    gaps = gaps[np.argsort(-widths[gaps], kind="stable")]
+    islands, wanted = ground.islands[points.triangle], _wanted(ground, sites, count)
+    lone = []
+    for gap in gaps:
+        if len(lone) == count - len(sites):
+            break
+        apart = np.sum((cells.places[lone] - cells.places[gap]) ** 2, axis=1)
+        # A gap is the farthest place of several cells.
+        if wanted[islands[gap]] > 0 and np.all(apart > squares[gap]):
+            lone.append(gap)
+            wanted[islands[gap]] -= 1
+    return np.array(lone, int)
+
+
+def _wanted(ground, sites, count):
+    """(islands,) how many more sites each island is to have, so that all have their shares of `count`."""
+    island_count = int(ground.islands.max()) + 1
+    amounts = np.bincount(ground.islands[ground.parts.triangle], weights=ground.amounts, minlength=island_count)
+    present = np.bincount(ground.islands[sites.triangle], minlength=island_count)
+    lacking = np.maximum(amounts / amounts.sum() * count - present, 0.0)
+    ends = np.round(np.cumsum(lacking) * ((count - len(sites)) / max(lacking.sum(), 1e-30)))
+    return np.diff(ends, prepend=0.0).astype(int)
+
+
+def _within(ranked, islands, wanted):
+    """Of samples in order of rank those that their islands want."""
+    order = np.argsort(islands[ranked], kind="stable")
+    found = islands[ranked][order]
+    place = np.arange(len(order)) - np.searchsorted(found, found)
+    return ranked[np.sort(order[place < wanted[found]])]
+
+
+def _firsts(groups, keys):
+    """Index of the smallest key of each group that there is, groups rising."""
+    order = np.argsort(-keys, kind="stable")
+    firsts = np.full(groups.max() + 1, -1)
+    firsts[groups[order]] = order  # the last one stays
+    return firsts[firsts >= 0]

@@ -11,12 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from .errors import HairError
+from .long_work import part_of, unheard
 from .mesh import SurfacePoints, check_mesh, check_points, normals, positions
 from .params import Settings, param
 from .strands import Strands
 
 CONTROL_POINT_COUNT = 6  # [Report12] section 5
 POINT_COUNT = 41  # [Report12] section 2.2
+
+COMPILING = "Compiling kernels"  # the step that takes long where Vellus is used for the first time
 
 
 @dataclass(frozen=True)
@@ -26,7 +29,17 @@ class GuideSettings(Settings):
     guide_count: int = param(200, "How many guides are placed", label="Guides", low=1, high=1_000_000, soft_high=4000)
     seed: int = param(1, "Number that all randomness follows from", low=0, high=2**31 - 1)
     density_group: str = param("", "Vertex group that guides follow; empty: the whole surface")
-    relax_iterations: int = param(30, "Rounds of relaxation that even out the guides", low=0, high=1000, soft_high=100)
+    density_image: str = param("", "Image that guides follow by the surface's UV map, black for none; empty: no image")
+    curvature: float = param(
+        0.0,
+        "How much closer guides stand where the surface bends",
+        label="Follow Curvature",
+        low=0.0,
+        high=100.0,
+        soft_high=4.0,
+    )
+    symmetric: bool = param(False, "Root guides alike on both sides of the object's X axis")
+    relax_iterations: int = param(16, "Rounds of relaxation that even out the guides", low=0, high=1000, soft_high=100)
     length: float = param(
         0.15,
         "Length of the guides from root to tip",
@@ -87,16 +100,60 @@ class HairBinding:
     guide_weights: "interpolation.GuideWeights"  # noqa: F821 (S, k)
 
 
-def distribute_guides(mesh, settings, *, density=None, device="cpu") -> Strands:
+def distribute_guides(
+    mesh,
+    settings,
+    *,
+    density=None,
+    texture=None,
+    mirror_normal=(1.0, 0.0, 0.0),
+    roots=None,
+    device="cpu",
+    progress=unheard,
+) -> Strands:
     """Guides, evenly placed and grown: (guide_count, POINT_COUNT) strands.
 
-    mesh: `TriMesh` [m]; settings: `GuideSettings`; density: (V,) per vertex, at least 0, or None for uniform.
+    mesh: `TriMesh` [m]; settings: `GuideSettings`; density: (V,) per vertex, at least 0, or None for uniform; texture:
+    `Texture` that multiplies it, or None; mirror_normal: of the plane through the origin that symmetric guides mirror;
+    roots: `SurfacePoints` that guides have already, None to place them; progress(step, part): told how far the work is,
+    and may raise to stop it.
     """
-    from . import bspline, cvt, guides, sampling
-
     check_mesh(mesh)
-    roots = sampling.sample_surface(mesh, settings.guide_count, settings.seed, density)
-    roots = cvt.relax(mesh, roots, settings.relax_iterations, density, device).sites
+    progress(COMPILING, 0.0)
+    from . import (
+        bspline,
+        curvature,
+        cut_cells,
+        cvt,
+        ground,
+        guides,
+        hash_grid,
+        islands,
+        sampled_cells,
+        surface_query,
+        voronoi,
+    )
+
+    _load_kernels(device, bspline, cut_cells, guides, hash_grid, sampled_cells, surface_query, voronoi)
+    _load_kernels("cpu", islands)
+    relaxing = part_of(progress, 0.1, 0.9)
+    mirror = ground.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
+    if roots is None:
+        if settings.curvature:
+            bend = curvature.bend_density(mesh, settings.curvature)
+            density = bend if density is None else bend * density
+        roots = cvt.place(
+            mesh,
+            settings.guide_count,
+            settings.seed,
+            settings.relax_iterations,
+            density=density,
+            texture=texture,
+            mirror=mirror,
+            device=device,
+            progress=lambda part: relaxing("Spreading guides", part),
+        )
+    progress("Growing guides", 0.9)
     controls = guides.grow(
         mesh,
         roots,
@@ -108,21 +165,39 @@ def distribute_guides(mesh, settings, *, density=None, device="cpu") -> Strands:
         control_point_count=CONTROL_POINT_COUNT,
         device=device,
     )
+    if mirror is not None:
+        controls = _symmetric(controls, positions(mesh, roots), mirror)
     return Strands(bspline.evaluate(controls, POINT_COUNT, device), roots)
 
 
-def bind_hair(mesh, guides, settings, *, density=None, device="cpu") -> HairBinding:
+def _symmetric(controls, places, mirror):
+    """Controls (G, n, 3) of which the second half are grown as images of the first, where their roots (G, 3) are."""
+    count = len(places) // 2
+    images = mirror.image(places[:count])
+    reach = 1e-3 * np.ptp(places, axis=0).max()
+    is_image = np.linalg.norm(images - places[len(places) - count :], axis=1) <= reach
+    arms = controls[:count] - controls[:count, :1]
+    mirrored = mirror.image(arms.reshape(-1, 3)).reshape(arms.shape) + places[len(places) - count :, None]
+    controls[len(places) - count :][is_image] = mirrored[is_image]
+    return controls
+
+
+def bind_hair(mesh, guides, settings, *, density=None, roots=None, device="cpu", progress=unheard) -> HairBinding:
     """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape.
 
-    Arguments as in `generate_hair`.
+    Arguments as in `generate_hair`; roots: `SurfacePoints` that strands have already, None to place them.
     """
-    import warp as wp
-
-    from . import interpolation, sampling
-
     check_mesh(mesh)
     check_points(mesh, guides.roots)
-    roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)
+    progress(COMPILING, 0.0)
+    import warp as wp
+
+    from . import hash_grid, interpolation, sampling
+
+    _load_kernels(device, hash_grid, interpolation)
+    progress("Placing strands", 0.1)
+    if roots is None:
+        roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)
 
     def on_device(vectors):
         return wp.array(vectors, dtype=wp.vec3, device=device, copy=False)
@@ -131,6 +206,7 @@ def bind_hair(mesh, guides, settings, *, density=None, device="cpu") -> HairBind
     guide_normals = on_device(normals(mesh, guides.roots))
     root_positions = on_device(positions(mesh, roots))
     root_normals = on_device(normals(mesh, roots))
+    progress("Finding guides", 0.4)
     distance = settings.influence_distance
     if settings.automatic_influence:
         distance = interpolation.automatic_influence_distance(guide_positions)
@@ -138,6 +214,13 @@ def bind_hair(mesh, guides, settings, *, density=None, device="cpu") -> HairBind
         root_positions, root_normals, guide_positions, guide_normals, distance, settings.neighbour_limit
     )
     return HairBinding(roots, root_positions, root_normals, guide_normals, guide_weights)
+
+
+def _load_kernels(device, *modules):
+    """Compile kernels, or load those that were compiled before: seconds once, microseconds from then on."""
+    import warp as wp
+
+    wp.force_load(device, [wp.get_module(module.__name__) for module in modules])
 
 
 def follow_guides(binding, guides) -> Strands:
@@ -154,6 +237,30 @@ def follow_guides(binding, guides) -> Strands:
         binding.positions, binding.normals, guide_points, binding.guide_normals, binding.guide_weights
     )
     return Strands(points, binding.roots)
+
+
+def follow_some(binding, guides, chosen):
+    """(M, P, 3) float32 [m]: the points that `follow_guides` gives some strands, and no others are computed.
+
+    chosen: (M,) indices of strands, such as `interpolation.Reach` finds for the guides that moved.
+    """
+    import warp as wp
+
+    from . import interpolation
+
+    device = binding.positions.device
+    chosen = wp.array(chosen, dtype=int, device=device)
+    weights = binding.guide_weights
+    points = interpolation.interpolate(
+        interpolation.rows(binding.positions, chosen),
+        interpolation.rows(binding.normals, chosen),
+        guides.points.to(device),
+        binding.guide_normals,
+        interpolation.GuideWeights(
+            *(interpolation.rows(array, chosen) for array in (weights.indices, weights.weights, weights.turns))
+        ),
+    )
+    return points.numpy()
 
 
 def generate_hair(mesh, guides, settings, *, density=None, device="cpu") -> Strands:

@@ -23,6 +23,12 @@ class SurfacePoints:
         """The points of a slice, a mask or an index array."""
         return SurfacePoints(self.triangle[selection], self.barycentric[selection])
 
+    def joined(self, others):
+        """These points, and then the others."""
+        return SurfacePoints(
+            np.concatenate([self.triangle, others.triangle]), np.concatenate([self.barycentric, others.barycentric])
+        )
+
 
 @dataclass(frozen=True)
 class TriMesh:
@@ -76,6 +82,14 @@ class TriMesh:
         return _unit(normals).astype(np.float32)
 
 
+@dataclass(frozen=True)
+class Faces:
+    """A mesh's polygons: corner_vertices (C,) int32, face after face, and starts (F+1,) int32, where each begins."""
+
+    corner_vertices: np.ndarray
+    starts: np.ndarray
+
+
 def check_mesh(mesh):
     """Raise `HairError` unless hair can grow on the mesh: faces, indices in range, finite vertices, some area."""
     if len(mesh.triangles) == 0:
@@ -97,6 +111,12 @@ def check_mesh(mesh):
         raise HairError(f"The surface reaches {largest:g} m from the origin: check the object's scale.")
     if not np.any(mesh.areas > 0.0):
         raise HairError("Every face of the surface has zero area: check the object's shape and scale.")
+
+
+def require_finite(vertices):
+    """Raise `HairError` unless vertices (V, 3) are finite numbers."""
+    if not np.isfinite(vertices).all():
+        raise HairError("Some of the surface's vertices are not finite numbers: repair the mesh or its modifiers.")
 
 
 def check_points(mesh, points):

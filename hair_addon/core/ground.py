@@ -1,0 +1,222 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The part of a surface where roots may be, in pieces small enough for sums over cells, and where its points are."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from .errors import HairError
+from .islands import islands
+from .mesh import SurfacePoints, TriMesh, interpolate, positions
+from .sampling import check_density, corner_masses
+from .surface_query import SurfaceQuery
+
+GRID_SIZE = 32  # cells along each axis of the grid that sites are found by; farther ones wrap around
+LONGEST_EDGE = 1.5  # of a piece, by the spacing of sites: a piece is shared among few cells
+LEAST_COSINE = -1.0 / 3.0  # between normals of one side of a surface
+LEAST_PIECES = 2000  # so many sites at least are cut for: density is one number in a piece
+PLASTIC = 0.7548776662466927, 0.5698402909980532  # steps of the evenest sequence in a square [Roberts18]
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """A plane through the origin [m]; normal (3,), unit."""
+
+    normal: np.ndarray
+
+    def image(self, vectors):
+        """(N, 3) positions or directions, mirrored."""
+        return vectors - 2.0 * (vectors @ self.normal)[:, None] * self.normal
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Triangles cut out of a mesh's triangles: triangle (Q,), barycentric (Q, 3, 3) of their corners, areas (Q,)."""
+
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    areas: np.ndarray
+
+    def chosen(self, selection):
+        """The parts of a mask or an index array."""
+        return Parts(self.triangle[selection], self.barycentric[selection], self.areas[selection])
+
+    def joined(self, *others):
+        """These parts and others, one after another."""
+        every = (self, *others)
+        return Parts(*(np.concatenate([getattr(p, n) for p in every]) for n in ("triangle", "barycentric", "areas")))
+
+    def centres(self):
+        """`SurfacePoints`."""
+        return SurfacePoints(self.triangle.astype(np.int32), self.barycentric.mean(axis=1).astype(np.float32))
+
+
+class Ground:
+    """A checked `TriMesh` at unit size with a density D, by the `densest` that was given, cut for a number of sites.
+
+    mesh: scaled, `size` [m] being its own; normals: (F, 3), unit; islands: (F,); parts: `Parts` that have density, of
+    one side of a mirror if there is one; densities (Q,): D, mean; amounts (Q,): ∫ D dA; mass: ∫ D² dA; query
+    and grid: what finds places on it, and sites that are near.
+    """
+
+    def __init__(self, mesh, site_count, density=None, texture=None, mirror=None, device="cpu"):
+        values = check_density(mesh, density)
+        self.densest = float(values.max())
+        self._values, self._texture = values / self.densest, texture
+        lowest, highest = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        self.size = float((highest - lowest).max())
+        self.origin = lowest.astype(np.float64)
+        self.mesh = TriMesh(((mesh.vertices - lowest) / np.float32(self.size)).astype(np.float32), mesh.triangles)
+        lengths = np.linalg.norm(self.mesh.scaled_normals, axis=1, keepdims=True)
+        self.normals = self.mesh.scaled_normals / np.where(lengths > 0.0, lengths, 1.0)
+        self.islands = islands(self.mesh)
+        self._mirror = mirror
+        grown = np.flatnonzero(corner_masses(self.mesh, self._values).any(axis=1))
+        self.query = SurfaceQuery(self.mesh, grown, device)
+        self.grid = wp.HashGrid(GRID_SIZE, GRID_SIZE, GRID_SIZE, device=device)
+        whole = Parts(grown, np.broadcast_to(np.eye(3), (len(grown), 3, 3)), self.mesh.areas[grown])
+        if mirror is not None:
+            whole = self._heavier_side(whole)
+        if texture is not None:  # whose details triangles know nothing of
+            whole = self._cut(whole, np.sqrt(whole.areas.sum() / LEAST_PIECES), lambda points: 1.0)
+        # Where the density is high sites are close, and pieces small.
+        amount = whole.areas @ self.density_at(whole.centres())
+        if not amount > 0.0:
+            raise HairError("The density is zero on every face: paint some weight where hair should grow.")
+        spacing = np.sqrt(amount / max(site_count, LEAST_PIECES))
+        self.parts = self._cut(whole, spacing, lambda points: np.maximum(self.density_at(points), 1e-3))
+        self.densities = self.density_at(self.parts.centres())
+        self.parts, self.densities = self.parts.chosen(self.densities > 0.0), self.densities[self.densities > 0.0]
+        self.amounts = self.parts.areas * self.densities
+        self.mass = float(self.amounts @ self.densities)
+
+    def density_at(self, points):
+        """(N,) float64: D at `SurfacePoints`, one where the given density is highest."""
+        density = interpolate(self._values, self.mesh, points).astype(np.float64)
+        return density if self._texture is None else density * self._texture.at(points)
+
+    def moved(self, points, places):
+        """`SurfacePoints` moved to the ground nearest to places (N, 3).
+
+        One that would change sides or islands, find no density, or cross the mirror, stays where it is.
+        """
+        if self._mirror is not None:
+            places = places - np.minimum(self._heights(places), 0.0)[:, None] * self._mirror.normal
+        found = self.query.nearest(places)
+        before, after = self.normals[points.triangle], self.normals[found.triangle]
+        is_good = (np.einsum("ni,ni->n", before, after) > LEAST_COSINE) & (self.density_at(found) > 0.0)
+        is_good &= self.islands[found.triangle] == self.islands[points.triangle]
+        if self._mirror is not None:
+            is_good &= self._heights(positions(self.mesh, found)) >= -1e-5
+        return SurfacePoints(
+            np.where(is_good, found.triangle, points.triangle),
+            np.where(is_good[:, None], found.barycentric, points.barycentric),
+        )
+
+    def samples(self, count, random=None):
+        """`count` points, as `SurfacePoints`, each of which stands for the same amount, and their parts (count,).
+
+        They are taken island by island at even steps, so each island has its share; random: where within each step, a
+        generator, or None for the evenest.
+        """
+        order = np.argsort(self.islands[self.parts.triangle], kind="stable")
+        running = np.cumsum(self.amounts[order])
+        number = np.arange(count)
+        if random is None:
+            within, first, second = 0.5, *((0.5 + number * step) % 1.0 for step in PLASTIC)
+        else:
+            within, first, second = random.random((3, count))
+        part = order[np.searchsorted(running, (number + within) / count * running[-1]).clip(0, len(order) - 1)]
+        folded = first + second > 1.0
+        first, second = np.where(folded, 1.0 - first, first), np.where(folded, 1.0 - second, second)
+        weights = np.stack([first, second, 1.0 - first - second], axis=1)
+        barycentric = np.einsum("nc,nck->nk", weights, self.parts.barycentric[part])
+        return SurfacePoints(self.parts.triangle[part].astype(np.int32), barycentric.astype(np.float32)), part
+
+    def symmetric(self, half, count):
+        """`count` `SurfacePoints`: one half, (count + 1) // 2 of them, and their images at the nearest place of all.
+
+        Of an odd number the one that is nearest to the mirror goes there, and is its own image.
+        """
+        places = positions(self.mesh, half).astype(np.float64)
+        heights = self._heights(places)
+        if count % 2:
+            order = np.append(np.delete(np.arange(len(half)), np.argmin(heights)), np.argmin(heights))
+            half, places, heights = half[order], places[order], heights[order]
+            between = self.moved(half[-1:], places[-1:] - heights[-1] * self._mirror.normal)
+            half = half[:-1].joined(between)
+        images = (places - 2.0 * heights[:, None] * self._mirror.normal)[: count // 2]
+        found = self.query.nearest(images) if len(images) else half[:0]
+        # Where only one side has density, guides grow on that side alone: an image there stays on its original.
+        is_bare = self.density_at(found) <= 0.0
+        triangle = np.where(is_bare, half.triangle[: count // 2], found.triangle)
+        barycentric = np.where(is_bare[:, None], half.barycentric[: count // 2], found.barycentric)
+        return half.joined(SurfacePoints(triangle, barycentric))
+
+    def _heights(self, places):
+        """(N,) heights of places above the mirror, at unit size."""
+        return (places + self.origin / self.size) @ self._mirror.normal
+
+    def _corners(self, parts):
+        return np.einsum("qck,qkx->qcx", parts.barycentric, self.mesh.corners[parts.triangle])
+
+    def _cut(self, parts, spacing, density_at):
+        """Parts halved across their longest edges until these are short; spacing: of sites where the density is one."""
+        done = []
+        while len(parts.areas):
+            corners = self._corners(parts)
+            edges = corners - np.roll(corners, -1, axis=1)
+            squares = np.einsum("qcx,qcx->qc", edges, edges)
+            limit = (LONGEST_EDGE * spacing) ** 2 / density_at(parts.centres())
+            is_long = squares.max(axis=1) > limit
+            done.append(parts.chosen(~is_long))
+            parts = _halved(parts.chosen(is_long), squares[is_long].argmax(axis=1))
+        return done[0].joined(*done[1:])
+
+    def _heavier_side(self, parts):
+        """The parts above the mirror, cut along it; a mirror whose upper side has less is turned round."""
+        above, below = (self._cut_at_mirror(parts, sign) for sign in (1.0, -1.0))
+        above_amount, below_amount = ((side.areas * self.density_at(side.centres())).sum() for side in (above, below))
+        if below_amount > above_amount * (1.0 + 1e-6):
+            self._mirror = Mirror(-self._mirror.normal)
+            return below
+        return above
+
+    def _cut_at_mirror(self, parts, sign):
+        heights = sign * self._heights(self._corners(parts).reshape(-1, 3)).reshape(-1, 3)
+        heights[np.abs(heights) < 1e-6] = 0.0
+        lowest = heights.min(axis=1)
+        pieces = [parts.chosen((lowest >= 0.0) & (heights.max(axis=1) > 0.0))]
+        # The corner that is alone on its side comes first; the plane crosses the two edges that meet there.
+        above_count = np.count_nonzero(heights > 0.0, axis=1)
+        for alone, count in ((1.0, 1), (-1.0, 2)):
+            crossed = np.flatnonzero((above_count == count) & (lowest < 0.0))
+            first = np.argmax(alone * heights[crossed], axis=1)
+            turn = (first[:, None] + np.arange(3)) % 3
+            h = np.take_along_axis(heights[crossed], turn, axis=1)
+            b = np.take_along_axis(parts.barycentric[crossed], turn[:, :, None], axis=1)
+            shares = [h[:, 0] / (h[:, 0] - h[:, k]) for k in (1, 2)]
+            cuts = [b[:, 0] + shares[k - 1][:, None] * (b[:, k] - b[:, 0]) for k in (1, 2)]
+            area = parts.areas[crossed]
+            tip = area * shares[0] * shares[1]
+            if alone > 0.0:
+                corners = [(np.stack([b[:, 0], *cuts], axis=1), tip)]
+            else:
+                near = area * (1.0 - shares[0])
+                corners = [
+                    (np.stack([cuts[0], b[:, 1], b[:, 2]], axis=1), near),
+                    (np.stack([cuts[0], b[:, 2], cuts[1]], axis=1), area - tip - near),
+                ]
+            pieces += [Parts(parts.triangle[crossed], barycentric, areas) for barycentric, areas in corners]
+        return pieces[0].joined(*pieces[1:])
+
+
+def _halved(parts, edge):
+    """Each part as two, cut from the middle of its edge that begins at corner `edge` (Q,)."""
+    rows = np.arange(len(edge))
+    one, other, across = (parts.barycentric[rows, (edge + turn) % 3] for turn in range(3))
+    middle = 0.5 * (one + other)
+    halves = [np.stack([one, middle, across], axis=1), np.stack([middle, other, across], axis=1)]
+    first, second = (Parts(parts.triangle, half, 0.5 * parts.areas) for half in halves)
+    return first.joined(second)

@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Directions of descent by a limited-memory quasi-Newton method, L-BFGS  [Liu89], algorithm 7.4 of [Nocedal06]."""
+
+
+class Memory:
+    """The last few steps and how the gradient changed along them."""
+
+    def __init__(self, limit):
+        self._limit = limit
+        self._pairs = []
+
+    def __len__(self):
+        return len(self._pairs)
+
+    def clear(self):
+        """Forget all steps: the next direction is the steepest."""
+        self._pairs.clear()
+
+    def add(self, step, change):
+        """A step (n, 3) and the change of the gradient (n, 3) along it; one that is not bent upwards is passed over."""
+        curvature = dot(step, change)
+        if self._limit and curvature > 1e-10 * (dot(step, step) * dot(change, change)) ** 0.5:
+            self._pairs = [*self._pairs, (step, change, curvature)][-self._limit :]
+
+    def direction(self, gradient, inverse):
+        """Where to go from a gradient (n, 3); inverse (n, 1): diagonal of what the inverse Hessian is thought to be."""
+        direction, parts = gradient, []
+        for step, change, curvature in reversed(self._pairs):
+            parts.append(dot(step, direction) / curvature)
+            direction = direction - parts[-1] * change
+        scale = 1.0
+        if self._pairs:
+            _, change, curvature = self._pairs[-1]
+            scale = curvature / dot(change, inverse * change)
+        direction = scale * inverse * direction
+        for (step, change, curvature), part in zip(self._pairs, reversed(parts), strict=True):
+            direction = direction + (part - dot(change, direction) / curvature) * step
+        return -direction
+
+
+def dot(first, second):
+    """The sum of products, in an order that no library's threads choose: the same on every run."""
+    return float((first * second).sum())

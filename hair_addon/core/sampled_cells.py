@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Voronoi cells made of points that stand for the surface around them: quick, and enough while sites are few."""
+
+import numpy as np
+import warp as wp
+
+from .mesh import positions
+from .voronoi import Sites, detour_of, detours, fixed, nearest_places, nearest_site, sum_cells
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+
+@wp.struct
+class Samples:
+    """Places that stand for pieces of the surface as wholes."""
+
+    places: wp.array[wp.vec3]
+    normals: wp.array[wp.vec3]
+    weights: wp.array[float]
+    islands: wp.array[int]
+    detours: wp.array[float]
+
+
+class SampledCells:
+    """The cells of sites on a `Ground`, of which they get points (`SurfacePoints` of equal amounts) as wholes."""
+
+    def __init__(self, ground, points, part, site_count, device):
+        self.places, self._device = positions(ground.mesh, points), device
+        self.densities = densities = ground.densities[part]
+        self._samples = Samples()
+        self._samples.places = wp.array(self.places, dtype=wp.vec3, device=device)
+        self._samples.normals = wp.array(ground.normals[points.triangle], dtype=wp.vec3, device=device)
+        self._samples.weights = wp.array(densities / densities.sum(), dtype=float, device=device)
+        self._samples.islands = wp.array(ground.islands[points.triangle], dtype=int, device=device)
+        self._samples.detours = wp.array(detours(ground, densities, site_count), dtype=float, device=device)
+        self._cells, self._seconds = None, wp.zeros(len(points), dtype=int, device=device)
+
+    def sums(self, sites, with_seconds=False):
+        """`Sums` for `Sites`."""
+        if self._cells is None:
+            self._cells = nearest_places(sites, self._samples.places)
+        inputs, outputs = [self._samples, sites, with_seconds], [self._cells, self._seconds]
+        return sum_cells(_nearest_two, len(self.places), inputs, outputs, sites, self._device)
+
+    def nearest_two(self, sites):
+        """(Q,) the nearest of `Sites` to each point, and (Q,) the next, -1 for none."""
+        self.sums(sites, with_seconds=True)
+        return self._cells.numpy().astype(np.int64), self._seconds.numpy().astype(np.int64)
+
+
+@wp.kernel
+def _nearest_two(
+    samples: Samples,
+    sites: Sites,
+    with_seconds: bool,
+    first_sample: int,
+    # outputs; cells hold the sites to begin with, any at all; sums are added to
+    out_cells: wp.array[int],
+    out_seconds: wp.array[int],
+    out_masses: wp.array[wp.int64],
+    out_moments: wp.array2d[wp.int64],
+    out_energies: wp.array[wp.int64],
+):
+    sample = first_sample + wp.tid()
+    point = samples.places[sample]
+    normal = samples.normals[sample]
+    island = samples.islands[sample]
+    detour = samples.detours[sample]
+    weight = samples.weights[sample]
+    site = nearest_site(point, normal, island, detour, sites, out_cells[sample])
+    out_cells[sample] = site
+    offset = point - sites.places[site]
+    square = wp.length_sq(offset) + detour_of(normal, island, detour, sites.normals[site], sites.islands[site])
+    wp.atomic_add(out_masses, site, fixed(weight))
+    for axis in range(3):
+        wp.atomic_add(out_moments, site, axis, fixed(weight * offset[axis]))
+    wp.atomic_add(out_energies, site, fixed(weight * square))
+    if not with_seconds:
+        return
+    second = int(-1)
+    second_square = float(wp.inf)
+    for slot in range(sites.around.shape[1]):
+        # The rest are farther from the sample than the second so far.
+        if sites.apart[site, slot] > wp.length(offset) + wp.sqrt(second_square):
+            break
+        other = sites.around[site, slot]
+        if other != site:
+            other_square = wp.length_sq(sites.places[other] - point)
+            if other_square < second_square:
+                other_square += detour_of(normal, island, detour, sites.normals[other], sites.islands[other])
+                if other_square < second_square:
+                    second_square = other_square
+                    second = other
+    out_seconds[sample] = second

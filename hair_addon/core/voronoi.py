@@ -1,0 +1,223 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Restricted Voronoi cells: the parts of a surface that are nearest to each site [Yan09].
+
+Two sides of a thin part and separate islands are no neighbours: there a site counts as farther away, by a number of its
+own for each piece of the surface, which leaves the borders of cells planes (a power diagram).
+
+Sums are kept as whole numbers, in units far below single precision: they do not depend on the order or the number of
+threads, so results are the same bit for bit, on every run.
+"""
+
+import os
+import threading
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from . import hash_grid
+from .mesh import positions
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+SITES_AROUND = 16  # how many neighbours of a site (itself among them) are looked at before all sites are
+EVERYWHERE = 4.0  # a distance that reaches across a surface of unit size
+SEARCH_RADIUS = 2.6  # by the square root of a cell's area: more than SITES_AROUND of a honeycomb
+DETOUR = 2.0  # by which a site on the other side of a thin part counts as farther, in spacings of sites
+
+MOST_THREADS = 8
+LEAST_SHARE = 4096  # pieces for which another thread is worth its start
+
+UNIT = wp.constant(wp.float64(2.0**54))  # sums over a surface with a mass of one stay below 2^63
+
+
+@wp.struct
+class Sites:
+    """Where sites are, which side they are on, and who is near them."""
+
+    places: wp.array[wp.vec3]
+    normals: wp.array[wp.vec3]
+    islands: wp.array[int]
+    around: wp.array2d[int]
+    apart: wp.array2d[float]
+
+
+@wp.func
+def detour_of(normal: wp.vec3, island: int, detour: float, site_normal: wp.vec3, site_island: int):
+    """What is added to the squared distance of a site: nothing on the same side of the same island."""
+    if site_island != island:
+        return detour
+    # None up to a right angle and some more: a sharp edge is no other side.
+    return detour * wp.clamp(-1.5 * wp.dot(normal, site_normal) - 0.5, 0.0, 1.0)
+
+
+@wp.func
+def candidate(around: wp.array2d[int], site: int, slot: int):
+    """Another site: first those around it, in order of distance, then all."""
+    if slot < around.shape[1]:
+        return around[site, slot]
+    return slot - around.shape[1]
+
+
+@wp.func
+def candidate_count(around: wp.array2d[int], places: wp.array[wp.vec3]):
+    """How many slots `candidate` has."""
+    if around.shape[1] < places.shape[0]:
+        return around.shape[1] + places.shape[0]
+    return around.shape[1]
+
+
+@wp.func
+def nearest_site(point: wp.vec3, normal: wp.vec3, island: int, detour: float, sites: Sites, start: int):
+    """The site nearest to a point, detours included; `start` is any site, the nearer the quicker."""
+    nearest = start
+    square = wp.length_sq(sites.places[nearest] - point)
+    square += detour_of(normal, island, detour, sites.normals[nearest], sites.islands[nearest])
+    searching = bool(True)
+    while searching:
+        site = nearest
+        # Sites farther from this one than that are farther from the point than the nearest so far [Elkan03].
+        reach = wp.length(sites.places[site] - point) + wp.sqrt(square)
+        slot = int(0)
+        while slot < candidate_count(sites.around, sites.places):
+            if slot < sites.around.shape[1]:
+                if sites.apart[site, slot] > reach:
+                    break
+            other = candidate(sites.around, site, slot)
+            other_square = wp.length_sq(sites.places[other] - point)
+            if other_square < square:
+                other_square += detour_of(normal, island, detour, sites.normals[other], sites.islands[other])
+                if other_square < square:
+                    square = other_square
+                    nearest = other
+                    # wp.sqrt shrinks the reach from this same site
+                    reach = wp.length(sites.places[site] - point) + wp.sqrt(square)
+            slot += 1
+        searching = nearest != site
+    return nearest
+
+
+@wp.func
+def fixed(value: float):
+    return wp.int64(wp.float64(value) * UNIT)
+
+
+@dataclass(frozen=True)
+class Sums:
+    """Of every cell: masses (n,), moments (n, 3) of its places about its site, energies (n,); all float64.
+
+    spacing: (n,) distance from a site to the next, infinite for one alone.
+    """
+
+    masses: np.ndarray
+    moments: np.ndarray
+    energies: np.ndarray
+    spacing: np.ndarray
+
+    @property
+    def energy(self):
+        """The energy of all cells."""
+        return float(self.energies.sum())
+
+
+def sites_on(ground, points, device):
+    """`Sites` at `SurfacePoints` of a `Ground`."""
+    sites = Sites()
+    sites.places = wp.array(positions(ground.mesh, points), dtype=wp.vec3, device=device)
+    sites.normals = wp.array(ground.normals[points.triangle], dtype=wp.vec3, device=device)
+    sites.islands = wp.array(ground.islands[points.triangle], dtype=int, device=device)
+    shape = (len(points), min(SITES_AROUND, len(points)))
+    sites.around = wp.empty(shape, dtype=int, device=device)
+    sites.apart = wp.empty(shape, dtype=float, device=device)
+    radius = SEARCH_RADIUS * float(np.sqrt(ground.parts.areas.sum() / len(points)))
+    ground.grid.build(sites.places, radius)
+    inputs, outputs = [sites.places, ground.grid.id, radius], [sites.around, sites.apart]
+    shares = share_count(len(points), LEAST_SHARE // 8, device)
+    in_threads(_find_around, len(points), inputs, [outputs] * shares, device)
+    return sites
+
+
+def nearest_places(sites, points):
+    """(Q,) int Warp array: the site whose place is nearest to each point, for a search to begin with."""
+    nearest, _ = hash_grid.neighbours(sites.places, points, EVERYWHERE, 1)
+    return nearest.flatten()
+
+
+def detours(ground, densities, site_count):
+    """(Q,) squared: how much farther a site on the other side counts, twice the spacing that sites have there."""
+    areas = ground.amounts.sum() / (site_count * densities)
+    return np.minimum(DETOUR**2 * areas, EVERYWHERE**2)
+
+
+def share_count(count, least_share, device):
+    """How many threads share so many pieces of work, at least so many each."""
+    return min(os.cpu_count() or 1, MOST_THREADS, 1 + count // least_share) if wp.get_device(device).is_cpu else 1
+
+
+def in_threads(kernel, count, inputs, outputs, device):
+    """Launch a kernel on as many shares as there are lists of outputs; its last input is where its share begins."""
+    bounds = [count * share // len(outputs) for share in range(len(outputs) + 1)]
+    if len(outputs) > 1:  # threads would compile it once each; on a processor a block is one thread
+        kernel.module.load(wp.get_device(device), 1)
+
+    def launch(share):
+        first, end = bounds[share : share + 2]
+        wp.launch(kernel, dim=end - first, inputs=[*inputs, first], outputs=outputs[share], device=device)
+
+    others = [threading.Thread(target=launch, args=(share,)) for share in range(1, len(outputs))]
+    for thread in others:
+        thread.start()
+    launch(0)
+    for thread in others:
+        thread.join()
+
+
+def sum_cells(kernel, count, inputs, outputs, sites, device):
+    """`Sums` of a kernel that adds to the masses, moments and energies of cells; every thread adds up its own."""
+    site_count = len(sites.places)
+    shapes = (site_count, (site_count, 3), site_count)
+    sums = [
+        [wp.zeros(shape, dtype=wp.int64, device=device) for shape in shapes]
+        for _ in range(share_count(count, LEAST_SHARE, device))
+    ]
+    in_threads(kernel, count, inputs, [[*outputs, *own] for own in sums], device)
+    totals = (sum(array.numpy() for array in arrays) / float(UNIT) for arrays in zip(*sums, strict=True))
+    spacing = sites.apart.numpy()[:, 1] if site_count > 1 else np.full(1, np.inf)
+    return Sums(*totals, spacing)
+
+
+@wp.kernel
+def _find_around(
+    places: wp.array[wp.vec3],
+    grid: wp.uint64,
+    first_radius: float,
+    first_site: int,
+    # outputs
+    out_around: wp.array2d[int],
+    out_apart: wp.array2d[float],
+):
+    site = first_site + wp.tid()
+    limit = out_around.shape[1]
+    place = places[site]
+    radius = first_radius
+    count = int(0)
+    while count < limit:
+        count = int(0)
+        for other in wp.hash_grid_query(grid, place, radius):
+            apart = wp.length(places[other] - place)
+            if apart < radius and (count < limit or apart <= out_apart[site, limit - 1]):
+                slot = wp.min(count, limit - 1)
+                if count == limit and apart == out_apart[site, slot] and other > out_around[site, slot]:
+                    continue
+                while slot > 0 and (
+                    out_apart[site, slot - 1] > apart
+                    or (out_apart[site, slot - 1] == apart and out_around[site, slot - 1] > other)
+                ):
+                    out_apart[site, slot] = out_apart[site, slot - 1]
+                    out_around[site, slot] = out_around[site, slot - 1]
+                    slot -= 1
+                out_apart[site, slot] = apart
+                out_around[site, slot] = other
+                count = wp.min(count + 1, limit)
+        radius = 1.5 * radius

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How evenly, and how quickly, guides are placed: ours beside geogram, pyacvd and Blender's Poisson disks, in one run.
+
+Prints a table and a line of JSON for each row. Peers that are not installed are left out; `make bench` installs them.
+"""
+
+import importlib.metadata
+import importlib.util
+import json
+import os
+import platform
+import time
+from dataclasses import asdict
+from functools import cache
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.core import cvt
+from hair_addon.core.groom import GuideSettings
+from hair_addon.core.mesh import TriMesh, positions
+from hair_addon.core.sampling import sample_surface
+from tests.benchmarks.placement_quality import evenness
+from tests.core.conftest import HEAD, read_obj, subdivided_sphere
+from tests.devices import DEVICE
+
+REPETITIONS = 3  # of each, in turns
+
+
+@cache
+def surface(name):
+    """A `TriMesh` of some thousands of triangles."""
+    if name == "sphere":
+        return subdivided_sphere(5)
+    return suzanne() if name == "Suzanne" else read_obj(HEAD)
+
+
+def suzanne():
+    """Blender's monkey, subdivided twice: three islands, thin ears, borders."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_monkey_add()
+    bpy.context.object.modifiers.new("Subdivision", "SUBSURF").levels = 2
+    mesh = bpy.context.object.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    mesh.calc_loop_triangles()
+    vertices = np.empty((len(mesh.vertices), 3), np.float32)
+    triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.vertices.foreach_get("co", vertices.ravel())
+    mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+    return TriMesh(vertices, triangles)
+
+
+def ours(mesh, count):
+    """What the add-on does, with its settings as they come."""
+    fresh = TriMesh(mesh.vertices, mesh.triangles)  # nothing is known of it from the last run
+    return positions(fresh, cvt.place(fresh, count, 1, GuideSettings().relax_iterations, device=DEVICE))
+
+
+def random(mesh, count):
+    return positions(mesh, sample_surface(mesh, count, 1))
+
+
+def geogram(mesh, count):
+    """Restricted Lloyd and Newton, ten rounds of each, as it comes."""
+    import point_cloud_utils
+
+    return point_cloud_utils.sample_mesh_lloyd(mesh.vertices.astype(np.float64), mesh.triangles, count)
+
+
+def pyacvd(mesh, count):
+    """Clusters of vertices, on a mesh that is subdivided until each has ten."""
+    import pyacvd
+    import pyvista
+
+    clustering = pyacvd.Clustering(pyvista.PolyData.from_regular_faces(mesh.vertices, mesh.triangles))
+    if len(mesh.vertices) < 10 * count:
+        clustering.subdivide(2)
+    clustering.cluster(count)
+    return np.asarray(clustering.create_mesh().points)
+
+
+def _poisson_object(mesh):
+    data = bpy.data.meshes.new("Surface")
+    data.from_pydata(mesh.vertices.tolist(), [], mesh.triangles.tolist())
+    group = bpy.data.node_groups.new("Poisson", "GeometryNodeTree")
+    group.interface.new_socket("Geometry", in_out="INPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Geometry", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    into, out = group.nodes.new("NodeGroupInput"), group.nodes.new("NodeGroupOutput")
+    node = group.nodes.new("GeometryNodeDistributePointsOnFaces")
+    vertices = group.nodes.new("GeometryNodePointsToVertices")
+    node.distribute_method, node.name = "POISSON", "Distribute"
+    group.links.new(into.outputs[0], node.inputs["Mesh"])
+    group.links.new(node.outputs["Points"], vertices.inputs["Points"])
+    group.links.new(vertices.outputs[0], out.inputs[0])
+    placed = bpy.data.objects.new("Surface", data)
+    bpy.context.scene.collection.objects.link(placed)
+    placed.modifiers.new("Poisson", "NODES").node_group = group
+    return placed
+
+
+def _distributed(placed, distance):
+    node = placed.modifiers["Poisson"].node_group.nodes["Distribute"]
+    node.inputs["Distance Min"].default_value = distance
+    node.inputs["Density Max"].default_value = 4.0 / distance**2
+    placed.update_tag()
+    mesh = placed.evaluated_get(bpy.context.evaluated_depsgraph_get()).to_mesh()
+    places = np.empty((len(mesh.vertices), 3), np.float32)
+    if len(places):
+        mesh.vertices.foreach_get("co", places.ravel())
+    return places
+
+
+def poisson(mesh, count):
+    """Blender's node, its distance found beforehand so that about `count` points come."""
+    placed = _poisson_object(mesh)
+    low, high = 0.3 * np.sqrt(mesh.areas.sum() / count), 1.2 * np.sqrt(mesh.areas.sum() / count)
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if len(_distributed(placed, middle)) > count else (low, middle)
+    return lambda: _distributed(placed, 0.5 * (low + high))
+
+
+def ways(mesh, count):
+    """{name: call} of what is compared and installed."""
+    found = {"ours": lambda: ours(mesh, count)}
+    if importlib.util.find_spec("point_cloud_utils"):
+        found["geogram"] = lambda: geogram(mesh, count)
+    if importlib.util.find_spec("pyacvd"):
+        found["pyacvd"] = lambda: pyacvd(mesh, count)
+    found["Poisson disks"] = poisson(mesh, count)
+    found["random"] = lambda: random(mesh, count)
+    return found
+
+
+def versions():
+    """Of all that is compared, and the machine."""
+    packages = ("warp-lang", "numpy", "point-cloud-utils", "pyacvd", "bpy")
+    found = {}
+    for package in packages:
+        try:
+            found[package] = importlib.metadata.version(package)
+        except importlib.metadata.PackageNotFoundError:
+            found[package] = "not installed"
+    return found | {"machine": platform.machine(), "processors": os.cpu_count(), "device": DEVICE}
+
+
+@pytest.mark.filterwarnings("default")  # peers have theirs
+@pytest.mark.parametrize("name", ["sphere", "Suzanne", "head"])
+def test_sites_are_more_even_than_anybody_elses(name):
+    mesh = surface(name)
+    ours(mesh, 200)  # compiles kernels
+    print("\n" + json.dumps({"surface": name, "triangles": len(mesh.triangles), **versions()}))
+    print(f"{'':14} sites  energy  variation  closest   straight: energy  variation   seconds  by ours")
+    for count in (200, 1000, 4000):
+        found = ways(mesh, count)
+        times, places = {way: [] for way in found}, {}
+        for _ in range(REPETITIONS):
+            for way, call in found.items():  # in turns, so that all meet the same machine
+                start = time.perf_counter()
+                places[way] = call()
+                times[way].append(time.perf_counter() - start)
+        rows = {way: evenness(mesh, places[way]) for way in found}
+        for way, row in rows.items():
+            seconds = float(np.median(times[way]))
+            print(
+                f"{way:14} {len(places[way]):5} {row.energy:7.4f} {row.variation:10.4f} {row.closest:8.3f}"
+                f"   {row.straight_energy:16.4f} {row.straight_variation:10.4f} {seconds:9.3f}"
+                f" {seconds / np.median(times['ours']):8.2f}"
+            )
+            line = {"surface": name, "way": way, "sites": len(places[way]), "seconds": seconds}
+            print(json.dumps(line | {key: float(value) for key, value in asdict(row).items()}))
+        assert len(places["ours"]) == count
+        for way in set(found) - {"ours"}:
+            assert rows["ours"].energy < rows[way].energy, (way, count)
+            assert rows["ours"].variation < rows[way].variation, (way, count)
