@@ -4,56 +4,107 @@
 N depends on each channel's absorption alone. So a slice of one scalar sigma_a serves red, green and blue, and a shader
 looks up three times where `lookup_tables` has the three channels side by side.
 
-    n   N_TT, N_TRT, N of the residual, N_R    over phi (columns), cos(theta) (rows) and sqrt(sigma_a) (slices)
+    n    N_TT, N_TRT, N of the residual, N_R    over phi (columns), cos(theta) (rows) and sqrt(sigma_a) (slices)
+    n_g  the same, averaged over half circles as `dual_scattering` does it; of the energy-conserving mode
+    n_trt  N_TRT of the four layers of `elliptic_section`; of the classic mode
 
 Columns and rows are those of `lookup_tables`. Slice k of K lies at sqrt(sigma_a) = low + (high - low) k / (K - 1): the
 first and the last hold the ends of the range. Between slices values are interpolated geometrically in sigma_a: light
 along one way falls exponentially with absorption, and the mean over many ways almost so.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..params import Settings as _Settings
+from ..params import param
 from . import energy_conserving, lookup_tables, marschner
 from .angles import cos_theta_d
+from .azimuthal import half_circle_mean
+from .cell_means import smooth_trt_means
+from .elliptic_section import layer_etas, layer_weights
 
 SLICE_COUNT = 16
 _DARKEST = 2.0**-14  # below the smallest normal half float there is nothing to be told from black
 
 
+@dataclass(frozen=True)
+class Range(_Settings):
+    """What slices cover."""
+
+    low: float = param(0.0, "Least sqrt(sigma_a)", low=0.0)
+    high: float = param(1.0, "Greatest sqrt(sigma_a)", low=0.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Slices:
-    """Float32 texels, the range of sqrt(sigma_a) that they cover, and the settings (less sigma_a) of their bake."""
+    """Float32 texels, the range that they cover, and the settings (less sigma_a) of their bake."""
 
     n: np.ndarray  # (K, H, W, 4)
-    low: float
-    high: float
+    n_g: np.ndarray | None  # (K, H, W, 4)
+    range: Range
     settings: lookup_tables.Settings
+    n_trt: np.ndarray | None = None  # (K, H, W, 4), where the section is no circle
+
+    @property
+    def lobes(self):
+        """N_R (H, W, 1), N_TT and N_TRT (H, W, K) and the residual's N (H, 1, K), as `azimuthal_lobes` bakes them."""
+        n_tt, n_trt, n_res = self.n[..., :3].transpose(3, 1, 2, 0)
+        return self.n[0, ..., 3:], n_tt, n_trt, n_res[:, :1]
 
 
 def bake(settings, sigma_a_range, slice_count=SLICE_COUNT, device="cpu"):
     """`lookup_tables.Settings`, (least, greatest) sigma_a → `Slices`. The settings' own sigma_a is not used."""
-    low, high = np.sqrt(sigma_a_range)
-    sigma_a = np.square(np.linspace(low, high, slice_count))
+    covered = Range(*(float(end) for end in np.sqrt(sigma_a_range)))
+    sigma_a = np.square(np.linspace(covered.low, covered.high, slice_count))
     n_r, n_tt, n_trt, n_res = lookup_tables.azimuthal_lobes(settings, sigma_a, device)
-    n = np.zeros((slice_count, settings.size, settings.size, 4), np.float32)
-    n[..., 0] = np.moveaxis(n_tt, -1, 0)
-    n[..., 1] = np.moveaxis(n_trt, -1, 0)
-    if n_res is not None:
-        n[..., 2] = np.moveaxis(n_res, -1, 0)
-    n[..., 3] = n_r[..., 0]
-    return Slices(n, float(low), float(high), settings)
+    if settings.mode == "classic":
+        elliptic = _elliptic_trt(settings, sigma_a, device) if settings.is_elliptic else None
+        return Slices(_texels(n_r, n_tt, n_trt, 0.0), None, covered, settings, elliptic)
+    mean = half_circle_mean(lookup_tables.phi_edges(settings)).astype(np.float32)
+    n_g = _texels(*lookup_tables.spread_columns((n_r, n_tt, n_trt), mean), n_res)
+    return Slices(_texels(n_r, n_tt, n_trt, n_res), n_g, covered, settings)
 
 
-def sample(slices, u, v, sigma_a):
+def _elliptic_trt(settings, sigma_a, device):
+    """N_TRT (K, H, W, 4) for indices from eta*_1 to eta*_2."""
+    layers = [replace(settings, eta=float(eta)) for eta in layer_etas(settings.eta, settings.eccentricity)]
+    if device == "cpu":
+        edges, cosines = lookup_tables.phi_edges(settings), lookup_tables.row_cosines(settings)
+        lobes = [smooth_trt_means(edges, cosines, layer, sigma_a) for layer in layers]
+    else:
+        lobes = [lookup_tables.azimuthal_lobes(layer, sigma_a, device)[2] for layer in layers]
+    return np.moveaxis(np.stack(lobes, axis=-1), 2, 0)
+
+
+def _texels(n_r, n_tt, n_trt, n_res):
+    """Lobes (H, W, K) or less → (K, H, W, 4)."""
+    height, width, slice_count = n_tt.shape
+    texels = np.empty((slice_count, height, width, 4), np.float32)
+    for channel, lobe in enumerate((n_tt, n_trt, n_res, n_r)):
+        texels[..., channel] = np.moveaxis(np.broadcast_to(lobe, n_tt.shape), -1, 0)
+    return texels
+
+
+def sample_lobes(texels, covered, u, v, sigma_a):
+    """What `energy_conserving.lobe_sum` takes beside M, at coordinates (...) of fibres with sigma_a (..., 3).
+
+    texels (K, H, W, 4): n or n_g; returns N_TT and N_R (..., 4), N_TRT and N of the residual (..., 3).
+    """
+    channels = [sample(texels, covered, u, v, sigma_a[..., channel]) for channel in range(3)]
+    n_tt, n_trt, n_res = (np.stack([channel[..., lobe] for channel in channels], axis=-1) for lobe in range(3))
+    return np.concatenate([n_tt, channels[0][..., 3:]], axis=-1), n_trt, n_res
+
+
+def sample(texels, covered, u, v, sigma_a):
     """(N_TT, N_TRT, N of the residual, N_R), (..., 4), at coordinates (...) and scalar absorptions (...)."""
-    below, fraction = slice_of(sigma_a, slices.low, slices.high, len(slices.n))
+    below, fraction = slice_of(sigma_a, covered.low, covered.high, len(texels))
     ends = np.empty((2, *np.shape(below), 4))
     for index in np.unique(below):
         where = below == index
         for end in (0, 1):
-            ends[end][where] = lookup_tables.sample(slices.n[index + end], u[where], v[where])
+            ends[end][where] = lookup_tables.sample(texels[index + end], u[where], v[where])
     return geometric_mix(ends[0], ends[1], fraction[..., None])
 
 
@@ -71,20 +122,25 @@ def geometric_mix(a, b, fraction):
     return a * np.power(b / a, fraction) - _DARKEST
 
 
-def sample_radiance(slices, angles, sigma_a):
-    """Radiance per irradiance (..., 3) at `FibreAngles` (...) of strands with sigma_a (..., 3): the shader's twin."""
+def sample_radiance(slices, angles, sigma_a, roughness=None, cos_twice_phi_h=None):
+    """Radiance per irradiance (..., 3) at `FibreAngles` (...) of strands with sigma_a (..., 3): the shader's twin.
+
+    roughness: (...) of strands that differ in it; None: the settings' own; cos_twice_phi_h (...): as in
+    `elliptic_section`, where the section is no circle.
+    """
     settings = slices.settings
-    is_classic = settings.mode == "classic"
-    sines = np.sin(angles.theta_i), np.sin(angles.theta_o)
-    cosine = cos_theta_d(*sines) if is_classic else np.cos(angles.theta_o)
+    if settings.mode == "energy":
+        at = lookup_tables.n_coordinates(angles.phi, np.cos(angles.theta_o), settings.axes)
+        m = energy_conserving.m_lobes(angles.theta_i, angles.theta_o, settings, roughness)
+        return energy_conserving.lobe_sum(m, *sample_lobes(slices.n, slices.range, *at, sigma_a))
+    cosine = cos_theta_d(np.sin(angles.theta_i), np.sin(angles.theta_o))
     at = lookup_tables.n_coordinates(angles.phi, cosine, settings.axes)
-    channels = [sample(slices, *at, sigma_a[..., channel]) for channel in range(3)]
-    n_tt, n_trt, n_res = (np.stack([channel[..., lobe] for channel in channels], axis=-1) for lobe in range(3))
-    n = np.concatenate([n_tt, channels[0][..., 3:]], axis=-1)
-    if is_classic:
-        theta_h = angles.theta_h[..., None]
-        alpha, beta = np.transpose(marschner.longitudinal_lobes(settings))
-        m = marschner.m_lobe(theta_h, alpha, beta)
-        return marschner.marschner_scattering(m, n, n_trt, cosine) * np.cos(angles.theta_i)[..., None]
-    m = energy_conserving.m_lobes(angles.theta_i, angles.theta_o, settings)
-    return energy_conserving.lobe_sum(m, n, n_trt, n_res)
+    n, n_trt, _none = sample_lobes(slices.n, slices.range, *at, sigma_a)
+    if slices.n_trt is not None:
+        weights = layer_weights(cos_twice_phi_h)
+        channels = [sample(slices.n_trt, slices.range, *at, sigma_a[..., channel]) for channel in range(3)]
+        n_trt = np.stack([np.sum(weights * channel, axis=-1) for channel in channels], axis=-1)
+    m = marschner.gaussian_lobes(
+        angles.theta_h, settings, None if roughness is None else marschner.beta_r_of(roughness)
+    )
+    return marschner.marschner_scattering(m, n, n_trt, cosine) * np.cos(angles.theta_i)[..., None]

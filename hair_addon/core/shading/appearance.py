@@ -6,18 +6,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..params import Settings, declared, param
-from . import kajiya_kay, lookup_tables, strand_absorption
+from ..params import Settings, param
+from . import kajiya_kay, lookup_tables, strand_variation
 from .fresnel import dielectric_reflectance
-from .pigment import color_from_sigma_a, sigma_a_from_color, sigma_a_from_melanin
-from .principled import beta_r_from_roughness, variance_from_roughness
+from .marschner import beta_r_of
+from .pigment import color_falloff, color_from_sigma_a, sigma_a_from_color, sigma_a_from_melanin
 
 _WHITE = (1.0, 1.0, 1.0)
 
 # What `table_settings` takes from the appearance, of the fields of `lookup_tables.Settings`.
 TABLE_FIELDS = ("mode", "eta", "sigma_a", "tilt", "roughness", "radial_roughness", "coat", "beta_r")
 
-# What differs along strands and between them; the average strand at its root does without.
+# What differs along strands and between them.
 STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint", "gradient_start", "gradient_end")
 
 # What the colour follows from, by parametrization.
@@ -48,7 +48,7 @@ class Appearance(Settings):
         ),
     )
     melanin: float = param(0.8, "Amount of pigment: 0.2 is blond, 0.66 brown, 1 black", low=0.0, high=1.0)
-    redness: float = param(1.0, "Part of the pigment that is red", label="Melanin redness", low=0.0, high=1.0)
+    redness: float = param(1.0, "Part of the pigment that is red", label="Redness", low=0.0, high=1.0)
     tint: tuple = param(_WHITE, "Colour of a dye over the melanin", low=0.0, high=1.0, subtype="COLOR")
     color: tuple = param(
         (0.017513, 0.005763, 0.002059), "Colour of a full head of hair", low=0.0, high=1.0, subtype="COLOR"
@@ -94,10 +94,16 @@ def sigma_a(appearance):
     return tuple(float(pigment + dye) for pigment, dye in zip(strands.pigment, strands.dye, strict=True))
 
 
+def mean_color(appearance):
+    """The colour of a full head of this hair, RGB (3,), the mean over all strands from root to tip."""
+    sigma_a_everywhere = strand_variation.sample_sigma_a(strand_settings(appearance))
+    return color_from_sigma_a(sigma_a_everywhere, appearance.radial_roughness).reshape(-1, 3).mean(axis=0)
+
+
 def strand_settings(appearance):
-    """`Appearance` → `strand_absorption.Settings`: absorption from strand to strand and along each."""
+    """`Appearance` → `strand_variation.Settings`: absorption from strand to strand and along each."""
     pigment, dye, melanin = _absorption(appearance)
-    return strand_absorption.Settings(
+    return strand_variation.Settings(
         pigment=tuple(map(float, pigment)),
         dye=tuple(map(float, dye)),
         melanin=melanin,
@@ -106,6 +112,7 @@ def strand_settings(appearance):
         tip_dye=_dye(appearance.tip_tint, appearance.radial_roughness),
         gradient_start=min(appearance.gradient_start, appearance.gradient_end),
         gradient_end=appearance.gradient_end,
+        random_roughness=appearance.random_roughness,
     )
 
 
@@ -131,7 +138,6 @@ def table_settings(appearance, base=None):
 
     base: settings that the rest is taken from: size and axes of the tables, shifts, glints of the classic mode.
     """
-    width = next(details for name, _default, details in declared(lookup_tables.Settings) if name == "beta_r")
     return replace(
         base or lookup_tables.Settings(),
         mode=appearance.mode,
@@ -141,17 +147,26 @@ def table_settings(appearance, base=None):
         roughness=appearance.roughness,
         radial_roughness=appearance.radial_roughness,
         coat=appearance.coat,
-        beta_r=float(min(max(beta_r_from_roughness(appearance.roughness), width.low), width.high)),
+        beta_r=float(beta_r_of(appearance.roughness)),
     )
 
 
 def kajiya_kay_settings(appearance):
     """`Appearance` → `kajiya_kay.Settings`: the groom's colour, and a highlight with R's width and R's energy."""
-    exponent = 1.0 / float(variance_from_roughness((1.0 - appearance.coat) * appearance.roughness))
-    exponent = min(max(exponent, 1.0), 10000.0)
-    peak = _mean_reflectance(appearance.ior) / float(kajiya_kay.kajiya_kay_specular_albedo(exponent))
+    exponent = float(kajiya_kay.highlight_exponent((1.0 - appearance.coat) * appearance.roughness))
+    peak = float(kajiya_kay.highlight_peak(_mean_reflectance(appearance.ior), exponent))
     color = color_from_sigma_a(np.array(sigma_a(appearance)), appearance.radial_roughness)
-    return kajiya_kay.Settings(tuple(map(float, color)), (min(peak, 1.0),) * 3, exponent)
+    return kajiya_kay.Settings(tuple(map(float, color)), (peak,) * 3, exponent)
+
+
+def kajiya_kay_strand_settings(appearance):
+    """`Appearance` → `kajiya_kay.StrandSettings`: the same for strands that differ."""
+    return kajiya_kay.StrandSettings(
+        falloff=float(color_falloff(appearance.radial_roughness)),
+        reflectance=_mean_reflectance(appearance.ior),
+        roughness=appearance.roughness,
+        coat=appearance.coat,
+    )
 
 
 def _mean_reflectance(eta):

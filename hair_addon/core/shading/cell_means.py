@@ -34,6 +34,13 @@ def smooth_means(edges, cosines, settings, sigma_a):
     return n_r, n_tt, n_trt
 
 
+def smooth_trt_means(edges, cosines, settings, sigma_a):
+    """N_TRT (H, W, C) alone, as `smooth_means` has it."""
+    starts = range(0, len(cosines), _ROWS_AT_ONCE)
+    blocks = [_trt_cell_means(edges, cosines[start : start + _ROWS_AT_ONCE], settings, sigma_a) for start in starts]
+    return np.concatenate(blocks).astype(np.float32)
+
+
 def residual(cosines, eta, sigma_a):
     """N of all paths beyond TRT together, which leave evenly around the fibre: (H, C) for cosines (H,)."""
     gamma = 0.25 * np.pi * (1.0 + _WIDE_NODES)

@@ -20,7 +20,7 @@ SAMPLE_COUNT = 128  # over theta
 # Rows of `DualTables.theta`, in order.
 QUANTITIES = ("a_f", "a_b", "alpha_f", "alpha_b", "beta_f", "beta_b", "back", "back_shift", "back_width")
 
-BACK_GAIN = 1.35  # of what comes back from behind a strand: calibrated against Cycles, see DECISIONS.md
+BACK_GAIN = 1.35  # of what comes back from behind a strand: fitted to Cycles by blend_samples/calibrate.py
 
 _WHITEST = 0.99  # the series over scattering events must end
 
@@ -45,54 +45,80 @@ class DualTables:
         return lookup_tables.sample(row, u, np.full_like(u, 0.5))
 
 
+def light_inclinations(count=SAMPLE_COUNT):
+    """theta (count,) of the tables' columns."""
+    return np.pi * ((np.arange(count) + 0.5) / count - 0.5)
+
+
 def bake(tables):
     """`lookup_tables.Tables` → `DualTables`."""
-    theta = np.pi * ((np.arange(SAMPLE_COUNT) + 0.5) / SAMPLE_COUNT - 0.5)
-    forward, backward = scattered_parts(tables, theta)
+    rows = quantities(*scattered_parts(tables, light_inclinations()), tables.settings)
+    mean = half_circle_mean(lookup_tables.phi_edges(tables.settings)).astype(np.float32)
+    n_g, n_g_trt = lookup_tables.spread_columns((tables.n, tables.n_trt), mean)
+    return DualTables(rows, n_g, n_g_trt, tables.settings)
+
+
+def quantities(forward, backward, settings):
+    """The rows of `DualTables.theta`, (9, T, C) float32, of what `scattered_parts` finds, (4, T, C) each."""
     a_f, a_b = (np.minimum(parts.sum(axis=0), _WHITEST) for parts in (forward, backward))
-    alpha, beta = _centres_and_widths(tables.settings)
+    alpha, beta = _centres_and_widths(settings)
     alpha_f, alpha_b = (_weighted(alpha, parts) for parts in (forward, backward))
     beta_f, beta_b = (np.sqrt(_weighted(np.square(beta), parts)) for parts in (forward, backward))
     back = back_scattering(a_f, a_b, alpha_f, alpha_b, beta_f, beta_b)
-    rows = np.stack([a_f, a_b, alpha_f, alpha_b, beta_f, beta_b, *back]).astype(np.float32)
-    mean = half_circle_mean(lookup_tables.phi_edges(tables.settings)).astype(np.float32)
-    n_g, n_g_trt = (lookup_tables.spread_columns(table, mean) for table in (tables.n, tables.n_trt))
-    return DualTables(rows, n_g, n_g_trt, tables.settings)
+    return np.stack([a_f, a_b, alpha_f, alpha_b, beta_f, beta_b, *back]).astype(np.float32)
 
 
 def scattered_parts(tables, theta):
     """(forward, backward), each (4, T, 3): what R, TT, TRT and the residual scatter of light inclined by theta (T,)."""
-    edges = lookup_tables.phi_edges(tables.settings)
+    return lobe_parts(tables.lobes, tables.settings, theta)
+
+
+def lobe_parts(lobes, settings, theta):
+    """`scattered_parts`, (4, T, C) each, of N_R, N_TT, N_TRT and N of the residual as `azimuthal_lobes` bakes them."""
+    edges = lookup_tables.phi_edges(settings)
     widths = 2.0 * np.abs(np.diff(edges))  # twice: N is even in phi
     ahead = 0.5 * (edges[1:] + edges[:-1]) / np.pi
-    return tuple(_lobe_albedos(tables, widths * share, theta) for share in (ahead, 1.0 - ahead))
+    rows = row_weights(settings, theta)
+    return tuple(lobe_albedos(lobes, widths * share, rows) for share in (ahead, 1.0 - ahead))
 
 
-def _lobe_albedos(tables, weights, theta):
-    n_r, n_tt, n_trt = (
-        np.einsum("hwc,w->hc", table, weights) for table in (tables.n[..., 3:], tables.n[..., :3], tables.n_trt)
-    )
-    settings = tables.settings
+def lobe_albedos(lobes, weights, rows):
+    """(4, T, C): the integral of each lobe over phi, with weights (W,) of the columns, and over the other inclination.
+
+    rows: the `row_weights` of theta (T,), the viewer's in the energy-conserving mode; the classic one does not know
+    light from viewer.
+    """
+    *narrow, n_res = lobes
+    n_r, n_tt, n_trt = (np.einsum("hwc,w->hc", lobe, weights) for lobe in narrow)
+    around = [np.repeat(n_r, n_tt.shape[1], axis=1), n_tt, n_trt]
+    around.append(np.zeros_like(n_tt) if n_res is None else n_res[:, 0] * weights.sum())
+    return np.stack([weights_of_rows @ lobe for weights_of_rows, lobe in zip(rows, around, strict=True)])
+
+
+def row_weights(settings, theta):
+    """Of each lobe, (T, H): how much each row of N adds to what is scattered of light inclined by theta (T,)."""
     rows = lookup_tables.row_cosines(settings)
     if settings.mode == "energy":
         # M is of unit area, whatever its width.
-        lobes = (np.repeat(n_r, 3, axis=1), n_tt, n_trt, tables.n_res[:, 0] * weights.sum())
-        return np.stack([_interpolated(np.cos(theta), rows, lobe) for lobe in lobes])
+        return [_interpolation(np.cos(theta)[:, None], rows, 1.0)] * 4
     out = np.pi * ((np.arange(361) + 0.5) / 361 - 0.5)
     theta_h, theta_d = 0.5 * (theta[:, None] + out), 0.5 * (theta[:, None] - out)
     cosine = np.maximum(np.cos(theta_d), marschner.LEAST_COS_THETA_D)
     measure = np.square(np.cos(out) / cosine) * np.pi / 361
-    albedos = np.zeros((4, len(theta), 3))
-    for index, ((alpha, beta), n) in enumerate(
-        zip(marschner.longitudinal_lobes(settings), (n_r, n_tt, n_trt), strict=True)
-    ):
-        lobe = marschner.m_lobe(theta_h, alpha, beta) * measure
-        albedos[index] = np.einsum("to,toc->tc", lobe, _interpolated(cosine, rows, n))
-    return albedos
+    m = marschner.gaussian_lobes(theta_h, settings)
+    weights = [_interpolation(cosine, rows, m[..., lobe] * measure) for lobe in range(3)]
+    return [*weights, np.zeros_like(weights[0])]
 
 
-def _interpolated(cosine, rows, values):
-    return np.stack([np.interp(cosine, rows, column) for column in values.T], axis=-1)
+def _interpolation(cosines, rows, weights):
+    """(T, H) that sums values at rows (H,), interpolated to cosines (T, O), with weights (T, O)."""
+    place = np.clip(np.interp(cosines, rows, np.arange(len(rows))), 0.0, len(rows) - 1.0)
+    below = np.minimum(place.astype(int), len(rows) - 2)
+    first = below + len(rows) * np.arange(len(cosines))[:, None]
+    above = weights * (place - below)
+    flat = np.bincount(first.ravel(), (weights - above).ravel(), len(cosines) * len(rows))
+    flat += np.bincount(first.ravel() + 1, above.ravel(), len(flat))
+    return flat.reshape(len(cosines), len(rows))
 
 
 def _centres_and_widths(settings):
@@ -147,41 +173,46 @@ def scattered_part(count, a_f):
     return np.exp(-count * (1.0 - a_f)) - np.exp(-count)
 
 
-def mean_back(dual):
-    """What the strands behind send back of light from everywhere, RGB (3,), the mean over all directions."""
-    theta = np.pi * ((np.arange(SAMPLE_COUNT) + 0.5) / SAMPLE_COUNT - 0.5)
-    return np.average(dual.theta[QUANTITIES.index("back")], axis=0, weights=np.cos(theta))
-
-
 def sample_radiance(tables, dual, angles, strand_count, *, gain=BACK_GAIN):
     """Radiance per irradiance (..., 3) of a strand with a mean of `strand_count` (...) others before it.
 
-    Energy-conserving mode; what the shader computes from the tables. The irradiance is that outside the hair; gain: of
-    what comes back from behind. Shifts and widths are the mean over the channels, which differ little in them.
+    Energy-conserving mode; what the shader computes from the tables.
     """
     settings = tables.settings
-    a_f, back = (dual.at(name, angles.theta_i) for name in ("a_f", "back"))
-    beta_f, back_shift, back_width = (
-        dual.at(name, angles.theta_i).mean(axis=-1) for name in ("beta_f", "back_shift", "back_width")
-    )
-    spread = np.asarray(strand_count, float) * np.square(beta_f)
-
     u, v = lookup_tables.n_coordinates(angles.phi, np.cos(angles.theta_o), settings.axes)
     n_res = lookup_tables.sample(tables.n_res, np.full_like(v, 0.5), v)
-    n_g, n_g_trt = (lookup_tables.sample(table, u, v) for table in (dual.n_g, dual.n_g_trt))
+    n, n_trt, n_g, n_g_trt = (
+        lookup_tables.sample(table, u, v) for table in (tables.n, tables.n_trt, dual.n_g, dual.n_g_trt)
+    )
+    quantity = {name: dual.at(name, angles.theta_i) for name in QUANTITIES}
+    return radiance(angles, settings, quantity, (n, n_trt, n_res), (n_g, n_g_trt, n_res), strand_count, gain=gain)
 
-    def lobe(shift, variance):
-        turned = angles.theta_o - shift
+
+def radiance(angles, settings, quantity, n, n_g, strand_count, *, roughness=None, gain=BACK_GAIN):
+    """Radiance per irradiance (..., 3) of a strand with a mean of `strand_count` (...) others before it.
+
+    The irradiance is that outside the hair. quantity: {name: (..., 3)} of the strands around, at theta_i; n, n_g: what
+    `energy_conserving.lobe_sum` takes beside M, for light from one direction and from a half circle; roughness: (...)
+    of strands that differ in it; gain: of what comes back from behind. Shifts and widths are the mean over the
+    channels, which differ little in them.
+    """
+    back = quantity["back"] * gain / np.pi
+    beta_f, back_shift, back_width = (quantity[name].mean(axis=-1) for name in ("beta_f", "back_shift", "back_width"))
+    spread = np.asarray(strand_count, float) * np.square(beta_f)
+
+    def back_lobe(variance):
+        turned = angles.theta_o - 2.0 * back_shift
         return d_eon_lobe(
             np.sin(angles.theta_i), np.cos(angles.theta_i), np.sin(turned), np.abs(np.cos(turned)), variance
         )
 
     # Variances of theta_h are quarters of those of theta_i + theta_o.
-    m = [lobe(shift, variance + 4.0 * spread) for shift, variance in energy_conserving.lobes(settings)]
-    through = energy_conserving.lobe_sum(np.stack(m, axis=-1), n_g, n_g_trt, n_res)
-    back = back * gain / np.pi
-    back_direct = back_azimuth(angles.phi) * lobe(2.0 * back_shift, 4.0 * back_width**2)
-    back_spread = spread_back_azimuth(angles.phi) * lobe(2.0 * back_shift, 4.0 * (back_width**2 + spread))
-    direct = lookup_tables.sample_radiance(tables, angles) + back * back_direct[..., None]
-    indirect = through + back * back_spread[..., None]
-    return direct_part(strand_count)[..., None] * direct + scattered_part(strand_count, a_f) * indirect
+    m = [
+        energy_conserving.m_lobes(angles.theta_i, angles.theta_o, settings, roughness, widening)
+        for widening in (0.0, 4.0 * spread)
+    ]
+    back_direct = back_azimuth(angles.phi) * back_lobe(4.0 * back_width**2)
+    back_spread = spread_back_azimuth(angles.phi) * back_lobe(4.0 * (back_width**2 + spread))
+    direct = energy_conserving.lobe_sum(m[0], *n) + back * back_direct[..., None]
+    indirect = energy_conserving.lobe_sum(m[1], *n_g) + back * back_spread[..., None]
+    return direct_part(strand_count)[..., None] * direct + scattered_part(strand_count, quantity["a_f"]) * indirect

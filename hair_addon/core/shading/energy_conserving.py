@@ -19,18 +19,23 @@ from .principled import LEAST_VARIANCE, scale_from_radial_roughness, variance_fr
 LOBES = (paths.R, paths.TT, paths.TRT, paths.RESIDUAL)
 
 
-def lobes(settings):
-    """[(shift, v)] of the four lobes: centre [rad] and variance [rad²] in theta_i + theta_o."""
+def lobes(settings, roughness=None):
+    """[(shift, v)] of the four lobes: centre [rad] and variance [rad²] in theta_i + theta_o.
+
+    roughness: (...) of strands that differ in it; None: the settings' own.
+    """
+    roughness = settings.roughness if roughness is None else roughness
     shifts = [2.0 * alpha for alpha, _beta in longitudinal_lobes(settings)]
-    v = float(variance_from_roughness(settings.roughness))
-    coated = float(variance_from_roughness((1.0 - settings.coat) * settings.roughness))
-    return [(shifts[0], coated), (shifts[1], max(0.25 * v, LEAST_VARIANCE)), (shifts[2], 4.0 * v), (0.0, 4.0 * v)]
+    v = variance_from_roughness(roughness)
+    coated = variance_from_roughness((1.0 - settings.coat) * roughness)
+    narrow = np.maximum(0.25 * v, LEAST_VARIANCE)
+    return [(shifts[0], coated), (shifts[1], narrow), (shifts[2], 4.0 * v), (0.0, 4.0 * v)]
 
 
-def m_lobes(theta_i, theta_o, settings):
-    """M_p (..., 4) of inclinations (...)."""
+def m_lobes(theta_i, theta_o, settings, roughness=None, widening=0.0):
+    """M_p (..., 4) of inclinations (...); roughness as in `lobes`, widening: what is added to each variance (...)."""
     sin_i, cos_i = np.sin(theta_i), np.cos(theta_i)
-    turned = [(theta_o - shift, v) for shift, v in lobes(settings)]
+    turned = [(theta_o - shift, v + widening) for shift, v in lobes(settings, roughness)]
     # A view turned past the pole comes down on the other side.
     return np.stack([d_eon_lobe(sin_i, cos_i, np.sin(to), np.abs(np.cos(to)), v) for to, v in turned], axis=-1)
 

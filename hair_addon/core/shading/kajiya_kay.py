@@ -12,6 +12,10 @@ import numpy as np
 from ..params import Settings as _Settings
 from ..params import param
 from .angles import sin_from_cos
+from .pigment import color_from_falloff
+from .principled import variance_from_roughness
+
+_LEAST_EXPONENT, _GREATEST_EXPONENT = 1.0, 10000.0
 
 
 @dataclass(frozen=True)
@@ -24,7 +28,38 @@ class Settings(_Settings):
     specular_color: tuple = param(
         (0.050, 0.047, 0.043), "Brightness of the highlight's middle", low=0.0, high=1.0, subtype="COLOR"
     )
-    exponent: float = param(60.0, "Sharpness of the highlight", low=1.0, high=10000.0, soft_high=500.0)
+    exponent: float = param(
+        60.0, "Sharpness of the highlight", low=_LEAST_EXPONENT, high=_GREATEST_EXPONENT, soft_high=500.0
+    )
+
+
+@dataclass(frozen=True)
+class StrandSettings(_Settings):
+    """Strands that differ in absorption and roughness: what the colours and the highlight of each follow from."""
+
+    falloff: float = param(5.5, "How fast ln(colour) falls with the root of absorption", low=0.0)
+    reflectance: float = param(0.1, "What the surface reflects of light from everywhere", low=0.0, high=1.0)
+    roughness: float = param(0.3, "Longitudinal roughness of an average strand", low=0.0, high=1.0)
+    coat: float = param(0.0, "How much sharper the highlight is than that roughness", low=0.0, high=1.0)
+
+
+def highlight_exponent(roughness):
+    """Exponent (...) of a highlight as wide as the R lobe of a longitudinal roughness (...)."""
+    return np.clip(1.0 / variance_from_roughness(roughness), _LEAST_EXPONENT, _GREATEST_EXPONENT)
+
+
+def highlight_peak(reflectance, exponent):
+    """Brightness (...) of the middle of a highlight that returns `reflectance` of a uniform surrounding; at most 1."""
+    return np.minimum(reflectance / kajiya_kay_specular_albedo(exponent), 1.0)
+
+
+def kajiya_kay_of_strands(tangent, to_light, to_view, settings, sigma_a, roughness):
+    """`kajiya_kay` (..., 3) of `StrandSettings`, for strands of absorption (..., 3) and roughness (...)."""
+    exponent = highlight_exponent((1.0 - settings.coat) * roughness)
+    peak = highlight_peak(settings.reflectance, exponent)
+    diffuse = kajiya_kay_diffuse(tangent, to_light)[..., None] / np.pi**2
+    specular = peak * kajiya_kay_specular(tangent, to_light, to_view, exponent)
+    return color_from_falloff(sigma_a, settings.falloff) * diffuse + specular[..., None]
 
 
 def kajiya_kay_diffuse(tangent, to_light):
@@ -68,3 +103,10 @@ def mean_albedo(settings):
     """Radiance in a uniform surrounding of radiance one, RGB (3,), as `albedo.mean_albedo` for the Marschner model."""
     specular = np.asarray(settings.specular_color) * kajiya_kay_specular_albedo(settings.exponent)
     return np.asarray(settings.diffuse_color) + specular
+
+
+def mean_albedo_of_strands(settings, sigma_a):
+    """The mean (3,) of `mean_albedo` over strands of `StrandSettings` with absorptions (..., 3)."""
+    exponent = highlight_exponent((1.0 - settings.coat) * settings.roughness)
+    specular = highlight_peak(settings.reflectance, exponent) * kajiya_kay_specular_albedo(exponent)
+    return color_from_falloff(sigma_a, settings.falloff).reshape(-1, 3).mean(axis=0) + specular

@@ -55,6 +55,11 @@ class Tables:
     settings: Settings
     n_res: np.ndarray | None = None  # (H, 1, 3), of the energy-conserving mode
 
+    @property
+    def lobes(self):
+        """N_R (H, W, 1), N_TT and N_TRT (H, W, 3) and the residual's N (H, 1, 3), as `azimuthal_lobes` bakes them."""
+        return self.n[..., 3:], self.n[..., :3], self.n_trt, self.n_res
+
 
 def bake(settings, device="cpu"):
     """`Settings` → `Tables`; device: a Warp device such as "cuda:0", or the processor."""
@@ -76,14 +81,16 @@ def azimuthal_lobes(settings, sigma_a, device="cpu"):
 
         return *texel_kernels.azimuthal_means(edges, cosines, settings, sigma_a, spread, device), n_res
     smooth = smooth_means(edges, cosines, settings, sigma_a)
-    return *(smooth if spread is None else [spread_columns(lobe, spread) for lobe in smooth]), n_res
+    return *(smooth if spread is None else spread_columns(smooth, spread)), n_res
 
 
-def spread_columns(lobe, spread):
-    """Cell means (H, W, C) with their columns mixed by a matrix (W, W), as one product of plain matrices."""
-    height, width, channel_count = lobe.shape
-    rows = lobe.swapaxes(1, 2).reshape(-1, width) @ spread.T
-    return rows.reshape(height, channel_count, width).swapaxes(1, 2)
+def spread_columns(lobes, spread):
+    """Cell means (H, W, C) each, of any C, with their columns mixed by a matrix (W, W): all in one product."""
+    height, width, _channels = lobes[0].shape
+    counts = [lobe.shape[2] for lobe in lobes]
+    side_by_side = np.concatenate([lobe.swapaxes(1, 2) for lobe in lobes], axis=1)  # (H, channels, W)
+    mixed = (side_by_side.reshape(-1, width) @ spread.T).reshape(height, -1, width).swapaxes(1, 2)
+    return np.split(mixed, np.cumsum(counts)[:-1], axis=2)
 
 
 def row_cosines(settings):
@@ -108,8 +115,8 @@ def _longitudinal(settings, device):
     if settings.mode == "energy":
         return energy_conserving.m_lobes(theta_i, theta_o, settings).astype(np.float32)
     theta_h = 0.5 * (theta_o + theta_i)
-    lobes = [marschner.m_lobe(theta_h, alpha, beta) for alpha, beta in marschner.longitudinal_lobes(settings)]
-    return np.stack([*lobes, cos_theta_d(np.sin(theta_i), np.sin(theta_o))], axis=-1).astype(np.float32)
+    cosine = cos_theta_d(np.sin(theta_i), np.sin(theta_o))[..., None]
+    return np.concatenate([marschner.gaussian_lobes(theta_h, settings), cosine], axis=-1).astype(np.float32)
 
 
 def m_coordinates(sin_theta_i, sin_theta_o, axes):

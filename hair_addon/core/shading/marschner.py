@@ -18,6 +18,7 @@ from ..params import param
 from . import paths
 from .fresnel import bravais_indices, dielectric_reflectance
 from .pigment import sigma_a_from_melanin
+from .principled import beta_r_from_roughness
 
 # Shift of each lobe's centre in theta_h per cuticle tilt. A traced tilted wedge gives -1, eta - 1, 2 eta - 1
 # (-1, +0.55, +2.10 for hair), which Cycles' set approaches more closely than the published one.
@@ -26,6 +27,8 @@ _WIDTHS = (1.0, 0.5, 2.0)  # of each lobe, relative to R's [Marschner03]
 
 # Keeps 1 / cos^2(theta_d) finite where light and view run along the fibre, and cos(theta_i) takes it to nothing.
 LEAST_COS_THETA_D = 1e-3
+
+LEAST_BETA_R, GREATEST_BETA_R = math.radians(1.0), math.radians(45.0)
 
 _BROWN = tuple(round(float(channel), 3) for channel in sigma_a_from_melanin(0.659, 0.0))
 
@@ -80,8 +83,8 @@ class Settings(_Settings):
         math.radians(7.5),
         "Width of the first highlight; the transmitted one is half and the inner one twice as wide",
         label="Highlight width",
-        low=math.radians(1.0),
-        high=math.radians(45.0),
+        low=LEAST_BETA_R,
+        high=GREATEST_BETA_R,
         unit="ROTATION",
         subtype="ANGLE",
     )
@@ -108,6 +111,14 @@ class Settings(_Settings):
     glint_limit: float = param(
         0.5, "Largest part of the fibre's width that a glint may gather, delta h", low=0.0, high=1.0
     )
+    eccentricity: float = param(
+        1.0, "Shortest over longest axis of the fibre's section, for the inner reflection", low=0.85, high=1.0
+    )
+
+    @property
+    def is_elliptic(self):
+        """Whether the section is no circle, which only the classic mode knows."""
+        return self.mode == "classic" and self.eccentricity < 1.0
 
 
 def gaussian(x, sigma):
@@ -115,10 +126,24 @@ def gaussian(x, sigma):
     return np.exp(-0.5 * np.square(x / sigma)) / (sigma * math.sqrt(2.0 * math.pi))
 
 
-def longitudinal_lobes(settings):
-    """[(alpha, beta)] of R, TT and TRT: centre and standard deviation in theta_h."""
-    shifts = _SHIFTS[settings.shifts]
-    return [(shift * settings.tilt, width * settings.beta_r) for shift, width in zip(shifts, _WIDTHS, strict=True)]
+def beta_r_of(roughness):
+    """beta_R (...) [rad] of a longitudinal roughness (...) in [0, 1], held to what `Settings` allow."""
+    return np.clip(beta_r_from_roughness(roughness), LEAST_BETA_R, GREATEST_BETA_R)
+
+
+def longitudinal_lobes(settings, beta_r=None):
+    """[(alpha, beta)] of R, TT and TRT: centre and standard deviation in theta_h.
+
+    beta_r: R's deviation (...) on strands that differ in it; None: the settings' own.
+    """
+    beta_r = settings.beta_r if beta_r is None else beta_r
+    return [(s * settings.tilt, width * beta_r) for s, width in zip(_SHIFTS[settings.shifts], _WIDTHS, strict=True)]
+
+
+def gaussian_lobes(theta_h, settings, beta_r=None):
+    """M_R, M_TT and M_TRT (..., 3) at theta_h (...); beta_r as in `longitudinal_lobes`."""
+    lobes = longitudinal_lobes(settings, beta_r)
+    return np.stack([m_lobe(theta_h, alpha, beta) for alpha, beta in lobes], axis=-1)
 
 
 def m_lobe(theta_h, alpha, beta):
@@ -217,7 +242,7 @@ class Caustic:
 def scattering(angles, settings):
     """S (..., 3) [1/sr] at `FibreAngles` (...). Eq. 14."""
     cos_theta_d = np.maximum(np.cos(angles.theta_d), LEAST_COS_THETA_D)
-    m = np.stack([m_lobe(angles.theta_h, alpha, beta) for alpha, beta in longitudinal_lobes(settings)], axis=-1)
+    m = gaussian_lobes(angles.theta_h, settings)
     transmitted = n_tt(angles.phi, cos_theta_d, settings.eta, settings.sigma_a)
     reflected = n_r(angles.phi, cos_theta_d, settings.eta)[..., None]
     if settings.caustic == "exact":

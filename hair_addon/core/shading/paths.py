@@ -54,14 +54,22 @@ def trt_segments(eta_prime):
     ]
 
 
-def trt_gamma(phi, low, high, slope_sign, eta_prime, iterations=50):
-    """gamma (...) in one monotone segment at which TRT leaves at phi; the nearer end where none does. Bisection."""
-    for _ in range(iterations):
+def trt_gamma(phi, low, high, slope_sign, eta_prime, bisections=16, newton_steps=2):
+    """gamma (...) in one monotone segment at which TRT leaves at phi; the nearer end where none does.
+
+    Newton's steps square the error that bisection has left, and stay between its ends, as beside the caustic the slope
+    is nothing to divide by.
+    """
+    for _ in range(bisections):
         middle = 0.5 * (low + high)
         below = slope_sign * (exit_angle(TRT, middle, eta_prime) - phi) < 0.0
         low = np.where(below, middle, low)
         high = np.where(below, high, middle)
-    return 0.5 * (low + high)
+    gamma = 0.5 * (low + high)
+    for _ in range(newton_steps):
+        slope = slope_sign * np.maximum(np.abs(exit_angle_slope(TRT, gamma, eta_prime)), 1e-12)
+        gamma = np.clip(gamma - (exit_angle(TRT, gamma, eta_prime) - phi) / slope, low, high)
+    return gamma
 
 
 def attenuation(fresnel, transmittance):

@@ -28,14 +28,19 @@ def sigma_a_from_melanin(melanin, redness):
 def sigma_a_from_color(color, azimuthal_roughness=0.3):
     """Colour of a groom, linear RGB (..., 3) → the sigma_a (..., 3) of its fibres [Chiang16]."""
     color = np.clip(color, _DARKEST, _BRIGHTEST)
-    return np.square(np.log(color) / _color_falloff(azimuthal_roughness))
+    return np.square(np.log(color) / color_falloff(azimuthal_roughness))
 
 
 def color_from_sigma_a(sigma_a, azimuthal_roughness=0.3):
     """The colour, linear RGB (..., 3), that light takes on among many fibres of sigma_a (..., 3) [Chiang16]."""
-    return np.exp(-_color_falloff(azimuthal_roughness) * np.sqrt(sigma_a))
+    return color_from_falloff(sigma_a, color_falloff(azimuthal_roughness))
 
 
-def _color_falloff(roughness):
+def color_from_falloff(sigma_a, falloff):
+    """The same from the `color_falloff` of that roughness."""
+    return np.exp(-falloff * np.sqrt(sigma_a))
+
+
+def color_falloff(roughness):
     """Fit of [Chiang16] to path traced grooms: how fast ln(colour) falls with sqrt(sigma_a)."""
     return np.polynomial.polynomial.polyval(roughness, [5.969, -0.215, 2.532, -10.73, 5.574, 0.245])

@@ -19,6 +19,11 @@ _LIGHT_BROWN = Appearance(melanin=0.48, redness=0.3, random_color=0.1, random_ro
 _BLOND = Appearance(melanin=0.22, redness=0.3, random_color=0.15, random_roughness=0.1)
 _AUBURN = Appearance(melanin=0.68, redness=0.8, random_color=0.1)
 
+# Grey hair is white and dark strands side by side, coarser than what grew before. A little melanin would make it blond.
+_GREY = Appearance(
+    parametrization="COLOR", color=(0.02, 0.0185, 0.017), roughness=0.35, random_color=1.0, random_roughness=0.2
+)
+
 PRESETS = {
     "BLACK": ("Black", _BLACK),
     "DARK_BROWN": ("Dark Brown", _DARK_BROWN),
@@ -27,11 +32,13 @@ PRESETS = {
     "DARK_BLOND": ("Dark Blond", replace(_BLOND, melanin=0.34)),
     "BLOND": ("Blond", _BLOND),
     "PLATINUM": ("Platinum Blond", replace(_BLOND, melanin=0.08, random_color=0.1)),
-    "SUN_BLEACHED": ("Sun-Bleached", replace(_LIGHT_BROWN, tip_absorption=0.4, gradient_start=0.2)),
+    "SUN_BLEACHED": (
+        "Sun-Bleached",
+        replace(_LIGHT_BROWN, melanin=0.6, redness=0.1, tip_absorption=0.2, gradient_start=0.15, gradient_end=0.9),
+    ),
     "AUBURN": ("Auburn", _AUBURN),
     "GINGER": ("Ginger", Appearance(melanin=0.42, redness=0.97, random_color=0.12)),
-    # Grey hair is white and dark strands side by side, coarser than what grew before.
-    "GREY": ("Grey", Appearance(melanin=0.3, redness=0.0, roughness=0.35, random_color=1.0, random_roughness=0.2)),
+    "GREY": ("Grey", _GREY),
     "WHITE": ("White", Appearance(melanin=0.02, redness=0.2, roughness=0.35, random_color=0.2)),
     "DYED_BLUE": ("Dyed Blue", Appearance(melanin=0.03, redness=0.3, tint=(0.02, 0.08, 0.6), random_color=0.1)),
     "DYED_PINK": (

@@ -33,7 +33,7 @@ def test_any_absorption_between_slices_is_known_to_a_percent(rng, settings, sigm
     exact = lookup_tables.azimuthal_lobes(settings, sigma_a)[1:3]
     u, v = rng.random((2, 3000))
     for index, absorption in enumerate(sigma_a):
-        found = absorption_slices.sample(slices, u, v, np.full(3000, absorption))
+        found = absorption_slices.sample(slices.n, slices.range, u, v, np.full(3000, absorption))
         for lobe, table in enumerate(exact):
             expected = lookup_tables.sample(table[..., index : index + 1], u, v)[..., 0]
             # Half floats below 6e-5 are kept as none.
@@ -66,8 +66,8 @@ def test_strands_of_different_absorption_stand_side_by_side(rng, settings):
 def test_absorption_beyond_the_range_is_held_to_it(settings):
     slices = absorption_slices.bake(settings, (0.5, 2.0), slice_count=4)
     u, v = np.full((2, 2), 0.9)
-    found = absorption_slices.sample(slices, u, v, np.array([0.0, 99.0]))
-    expected = absorption_slices.sample(slices, u, v, np.array([0.5, 2.0]))
+    found = absorption_slices.sample(slices.n, slices.range, u, v, np.array([0.0, 99.0]))
+    expected = absorption_slices.sample(slices.n, slices.range, u, v, np.array([0.5, 2.0]))
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
@@ -75,5 +75,5 @@ def test_hair_without_variation_takes_a_range_of_one_value(settings):
     slices = absorption_slices.bake(settings, (0.7, 0.7))
     u, v = np.full((2, 1), 0.9)
     exact = lookup_tables.azimuthal_lobes(settings, (0.7,))[1]
-    found = absorption_slices.sample(slices, u, v, np.array([0.7]))[0, 0]
+    found = absorption_slices.sample(slices.n, slices.range, u, v, np.array([0.7]))[0, 0]
     assert found == pytest.approx(float(lookup_tables.sample(exact, u, v)[0, 0]), rel=1e-5)

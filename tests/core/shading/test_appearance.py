@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.params import declared
-from hair_addon.core.shading import albedo, appearance, kajiya_kay, lookup_tables, presets, strand_absorption
+from hair_addon.core.shading import albedo, appearance, kajiya_kay, lookup_tables, presets, strand_variation
 from hair_addon.core.shading.appearance import Appearance
 
 # Of a freshly made Principled Hair BSDF.
@@ -46,7 +46,7 @@ def test_every_appearance_is_one_that_every_model_takes(look):
     appearance.kajiya_kay_settings(look)
     strands = appearance.strand_settings(look)
     assert appearance.table_settings(look).sigma_a == appearance.sigma_a(look)
-    least, greatest = strand_absorption.absorption_range(strands)
+    least, greatest = strand_variation.absorption_range(strands)
     assert 0.0 <= least <= greatest < np.inf
 
 
@@ -62,7 +62,7 @@ def test_each_setting_of_the_tables_is_the_artist_s_or_the_baker_s():
     bases = lookup_tables.Settings(), lookup_tables.Settings(
         mode="energy", eta=1.2, sigma_a=(3.0, 2.0, 1.0), tilt=0.01, shifts="PUBLISHED", roughness=0.7,
         radial_roughness=0.6, coat=0.5, beta_r=0.3, caustic="exact", glint_gain=3.0, glint_width=0.1, glint_fade=0.2,
-        glint_limit=0.1, size=32, axes="COSINES",
+        glint_limit=0.1, eccentricity=0.9, size=32, axes="COSINES",
     )  # fmt: skip
     found = [appearance.table_settings(Appearance(), base) for base in bases]
     for name, *_ in declared(lookup_tables.Settings):
@@ -83,7 +83,7 @@ def test_the_same_hair_may_be_described_in_three_ways():
 
 def test_a_white_dye_is_none_and_another_only_darkens():
     plain, dyed = Appearance(melanin=0.1), Appearance(melanin=0.1, tint=(1.0, 0.5, 0.2))
-    np.testing.assert_allclose(appearance.sigma_a(plain), strand_absorption.strand_sigma_a(
+    np.testing.assert_allclose(appearance.sigma_a(plain), strand_variation.strand_sigma_a(
         appearance.strand_settings(plain), 0.5, 1.0))  # fmt: skip
     added = np.subtract(appearance.sigma_a(dyed), appearance.sigma_a(plain))
     assert added[0] == 0.0 < added[1] < added[2]
@@ -148,7 +148,7 @@ def test_red_hair_is_redder_than_as_much_brown(name):
 def test_dyed_hair_has_the_colour_of_its_dye():
     red, green, blue = color_of("DYED_BLUE")
     assert blue > 2.0 * green > 2.0 * red
-    pink = strand_absorption.strand_sigma_a(appearance.strand_settings(presets.PRESETS["DYED_PINK"][1]), 0.5, 1.0)
+    pink = strand_variation.strand_sigma_a(appearance.strand_settings(presets.PRESETS["DYED_PINK"][1]), 0.5, 1.0)
     assert pink[0] < pink[2] < pink[1]
 
 
@@ -175,7 +175,7 @@ def test_even_hair_says_so():
 @given(st.floats(0.05, 0.9), st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_random_strands_are_hair_of_other_melanin(melanin, spread, random):
     """As Cycles varies it: the amount of melanin times 1 + 2 (random - ½) spread."""
-    found = strand_absorption.strand_sigma_a(strands_of(melanin=melanin, random_color=spread), random, 0.0)
+    found = strand_variation.strand_sigma_a(strands_of(melanin=melanin, random_color=spread), random, 0.0)
     other = min(melanin * (1.0 + 2.0 * (random - 0.5) * spread), 1.0)
     np.testing.assert_allclose(found, appearance.sigma_a(Appearance(melanin=other)), rtol=1e-9, atol=1e-12)
 
@@ -183,7 +183,7 @@ def test_random_strands_are_hair_of_other_melanin(melanin, spread, random):
 @given(st.floats(0.0, 1.0))
 def test_tips_begin_and_end_where_they_are_told(position):
     strands = strands_of(tip_absorption=0.25, gradient_start=0.4, gradient_end=0.6, melanin=0.5)
-    part = strand_absorption.strand_sigma_a(strands, 0.5, position) / np.array(
+    part = strand_variation.strand_sigma_a(strands, 0.5, position) / np.array(
         appearance.sigma_a(Appearance(melanin=0.5))
     )
     assert (part <= 1.0 + 1e-12).all() and (part >= 0.25 - 1e-12).all()
@@ -196,6 +196,37 @@ def test_tips_begin_and_end_where_they_are_told(position):
 @given(appearances, st.floats(0.0, 1.0), st.floats(0.0, 1.0))
 def test_the_range_holds_every_strand(look, random, position):
     strands = appearance.strand_settings(look)
-    least, greatest = strand_absorption.absorption_range(strands)
-    sigma_a = strand_absorption.strand_sigma_a(strands, random, position)
+    least, greatest = strand_variation.absorption_range(strands)
+    sigma_a = strand_variation.strand_sigma_a(strands, random, position)
     assert least * (1.0 - 1e-9) <= sigma_a.min() and sigma_a.max() <= greatest * (1.0 + 1e-9)
+
+
+def test_grey_hair_is_grey_and_of_white_and_dark_strands():
+    look = presets.PRESETS["GREY"][1]
+    color = appearance.mean_color(look)
+    assert color.max() < 1.1 * color.min()
+    strands = appearance.strand_settings(look)
+    sigma_a = strand_variation.strand_sigma_a(strands, np.array([0.0, 1.0]), 0.0)
+    white, dark = np.exp(-5.5 * np.sqrt(sigma_a)).mean(axis=1)
+    assert white > 0.9 and dark < 0.02
+
+
+def color_at(name, position):
+    strands = appearance.strand_settings(presets.PRESETS[name][1])
+    return np.exp(-5.5 * np.sqrt(strand_variation.strand_sigma_a(strands, 0.5, position)))
+
+
+def test_sun_bleached_hair_is_lighter_at_its_tips():
+    assert (color_at("SUN_BLEACHED", 1.0) > 2.0 * color_at("SUN_BLEACHED", 0.0)).all()
+
+
+def test_pink_tips_are_pink_and_their_roots_blond():
+    red, green, blue = color_at("DYED_PINK", 1.0)
+    assert red > 2.0 * blue > 2.0 * green
+    red, green, blue = color_at("DYED_PINK", 0.0)
+    assert red > green > blue
+
+
+def test_the_mean_colour_of_even_hair_is_that_of_each_strand():
+    look = Appearance(melanin=0.4, redness=0.2)
+    np.testing.assert_allclose(appearance.mean_color(look), appearance.kajiya_kay_settings(look).diffuse_color)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Absorption that differs from strand to strand and from root to tip.
+"""What differs from strand to strand and from root to tip: absorption, and roughness (`principled.varied_roughness`).
 
     sigma_a = (pigment k(random) + dye) (1 + (tip_absorption - 1) g) + tip_dye g
 
@@ -17,7 +17,7 @@ from .pigment import LEAST_LIGHT
 
 @dataclass(frozen=True)
 class Settings(_Settings):
-    """What a shader needs to know a point's absorption; `appearance` makes it from what artists set."""
+    """What a shader needs to know a point's absorption and roughness; `appearance` makes it from what artists set."""
 
     pigment: tuple = param((0.0, 0.0, 0.0), "Absorption per radius that varies from strand to strand", low=0.0)
     dye: tuple = param((0.0, 0.0, 0.0), "Absorption per radius that all strands share", low=0.0)
@@ -28,18 +28,37 @@ class Settings(_Settings):
     gradient_start: float = param(0.0, "Part of the length at which the tip's colour begins", low=0.0, high=1.0)
     gradient_end: float = param(1.0, "Part of the length at which the tip's colour is reached", low=0.0, high=1.0)
 
+    random_roughness: float = param(0.0, "Greatest relative change of the roughness", low=0.0, high=1.0)
+
     @property
     def is_even(self):
         """Whether all strands are alike from root to tip: the tables of one sigma_a do."""
-        return self.random_color == 0.0 and self.tip_absorption == 1.0 and not any(self.tip_dye)
+        return self.random_color == 0.0 and self.random_roughness == 0.0 and not self.has_gradient
+
+    @property
+    def has_gradient(self):
+        """Whether tips differ from roots."""
+        return self.tip_absorption != 1.0 or any(self.tip_dye)
 
 
 def strand_sigma_a(settings, random, position):
     """sigma_a (..., 3) of strands with random numbers (...) in [0, 1], at positions (...) from root 0 to tip 1."""
+    gradient = tip_gradient(settings.gradient_start, settings.gradient_end, position)
+    return sigma_a_along(settings, random, gradient)
+
+
+def sigma_a_along(settings, random, gradient):
+    """sigma_a (..., 3) where the root's colour has turned into the tip's by a part (...)."""
     pigment = pigment_factor(settings.melanin, settings.random_color, random)[..., None] * settings.pigment
-    gradient = tip_gradient(settings.gradient_start, settings.gradient_end, position)[..., None]
+    gradient = np.asarray(gradient, float)[..., None]
     at_root = pigment + np.asarray(settings.dye)
     return at_root * (1.0 + (settings.tip_absorption - 1.0) * gradient) + gradient * settings.tip_dye
+
+
+def sample_sigma_a(settings, count=16):
+    """sigma_a (count, count, 3) of strands with evenly chosen random numbers, at places evenly chosen along them."""
+    middles = (np.arange(count) + 0.5) / count
+    return strand_sigma_a(settings, middles[:, None], middles)
 
 
 def pigment_factor(melanin, random_color, random):
