@@ -41,6 +41,36 @@ class GuideWeights:
     turns: "wp.array2d[wp.vec2]"
 
 
+@dataclass(frozen=True)
+class Reach:
+    """The strands that follow each guide, as compressed rows: guide g's are strands[starts[g]:starts[g + 1]]."""
+
+    starts: np.ndarray  # (G+1,) int64
+    strands: np.ndarray  # int32
+
+    def of(self, guides):
+        """Indices, rising, of the strands that follow any of some guides."""
+        is_reached = np.zeros(int(self.strands.max(initial=-1)) + 1, bool)
+        for guide in guides:
+            is_reached[self.strands[self.starts[guide] : self.starts[guide + 1]]] = True
+        return np.flatnonzero(is_reached)
+
+
+def reach(guide_weights, guide_count):
+    """The `Reach` of guides, from the `GuideWeights` of the strands that follow them."""
+    indices = guide_weights.indices.numpy()
+    strands, slots = np.nonzero(indices >= 0)
+    guides = indices[strands, slots]
+    order = np.argsort(guides, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(guides, minlength=guide_count))])
+    return Reach(starts, strands[order].astype(np.int32))
+
+
+def rows(array, chosen):
+    """Some rows of a Warp array, in an array of their own; chosen: int32 Warp array on its device."""
+    return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()
+
+
 def automatic_influence_distance(guide_roots):
     """Twice the mean distance [m] from a guide's root to the next one's; guide_roots (G,) vec3 [m].
 

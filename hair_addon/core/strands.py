@@ -45,6 +45,11 @@ def from_numpy(points, roots, device="cpu"):
     return Strands(wp.array(points, dtype=wp.vec3, device=device, copy=False), roots)
 
 
+def random_numbers(count):
+    """(count,) float32 in [0, 1): by which strands differ. More strands do not change those of the first."""
+    return np.random.Generator(np.random.PCG64(0)).random(count, np.float32)
+
+
 def offsets(points):
     """(S, P, 3) [m] → o (S, P, 3) [m]: o_0 = p_0, o_i = p_i - p_(i-1)  (Eq. 7)."""
     return np.concatenate([points[:, :1], np.diff(points, axis=1)], axis=1)

@@ -1,0 +1,132 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a surface carries what is rooted on it when it deforms: rotations that are continuous all over the surface.
+
+A face's deformation gradient takes two of its edges and its unit normal to where they are now. The mean over the faces
+around a vertex has a nearest rotation, its polar factor U V^T of the singular value decomposition [Higham86]; between
+vertices two of its columns are interpolated and made orthonormal again. So a rigid motion is found exactly, shear and
+stretch turn nothing more than they must, and no two neighbouring roots jump apart, as they do by the frames of single
+triangles or of a UV map. blender/follow_nodes.py says the same in geometry nodes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from .mesh import require_finite
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+
+@dataclass(frozen=True)
+class SurfaceMotion:
+    """Where a mesh's vertices were and where they are, (V, 3) float32, and how the surface turned there.
+
+    axes: (V, 2, 3) float32, where the rotation at each vertex takes the x and the y axis.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    axes: np.ndarray
+
+
+def motion(before, after, faces):
+    """The `SurfaceMotion` of vertices (V, 3) that went from `before` to `after`; faces: the mesh's `Faces`.
+
+    Raises `HairError` where vertices are not finite numbers: no rotation could be found for them.
+    """
+    require_finite(before)
+    require_finite(after)
+    return SurfaceMotion(before, after, vertex_axes(before, after, faces))
+
+
+def vertex_axes(before, after, faces):
+    """(V, 2, 3) float32: where the rotation at each vertex takes the x and the y axis; unturned where no face is."""
+    starts = faces.starts[:-1]
+    corners = np.stack(
+        [faces.corner_vertices[starts], faces.corner_vertices[starts + 1], faces.corner_vertices[faces.starts[1:] - 1]]
+    )
+    was, is_now = _bases(before, corners), _bases(after, corners)
+    has_area = abs(np.linalg.det(was)) > 1e-30
+    gradients = np.zeros_like(was)
+    gradients[has_area] = is_now[has_area] @ np.linalg.inv(was[has_area])
+    of_corners = np.repeat(gradients.reshape(-1, 9), np.diff(faces.starts), axis=0)
+    sums = np.stack(
+        [np.bincount(faces.corner_vertices, of_corners[:, i], minlength=len(before)) for i in range(9)], axis=1
+    )
+    # The mean but for its length, of which the nearest rotation knows nothing.
+    left, _stretches, right = np.linalg.svd(sums.reshape(-1, 3, 3))
+    return np.ascontiguousarray(np.swapaxes(left @ right, 1, 2)[:, :2], np.float32)
+
+
+def _bases(vertices, corners):
+    """(F, 3, 3): columns are the edges from each face's first corner to the next and to the last, and its normal."""
+    first, following, last = vertices.astype(np.float64)[corners]
+    along, across = following - first, last - first
+    normals = np.cross(along, across)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.stack([along, across, normals / np.where(lengths > 0.0, lengths, 1.0)], axis=-1)
+
+
+def carry(points, surface_motion, root_vertices, barycentric):
+    """(N, P, 3) float32 points of strands → float32, each strand carried rigidly as the surface goes at its root.
+
+    root_vertices: (N, 3) int32 corners of the triangles that roots lie in; barycentric: (N, 3) float32 in their order.
+    """
+    carried = wp.empty(points.shape[:2], dtype=wp.vec3, device="cpu")
+
+    def shared(array, kind):
+        return wp.array(np.ascontiguousarray(array), dtype=kind, device="cpu", copy=False)
+
+    wp.launch(
+        _carry,
+        dim=len(points),
+        inputs=[
+            shared(points, wp.vec3),
+            shared(surface_motion.before, wp.vec3),
+            shared(surface_motion.after, wp.vec3),
+            shared(surface_motion.axes, wp.vec3),
+            shared(root_vertices, wp.vec3i),
+            shared(barycentric, wp.vec3),
+        ],
+        outputs=[carried],
+        device="cpu",
+    )
+    return carried.numpy()
+
+
+@wp.func
+def _unit(vector: wp.vec3, otherwise: wp.vec3):
+    length = wp.length(vector)
+    return wp.where(length > 0.0, vector / wp.max(length, 1.0e-37), otherwise)
+
+
+@wp.kernel
+def _carry(
+    points: wp.array2d[wp.vec3],
+    before: wp.array[wp.vec3],
+    after: wp.array[wp.vec3],
+    axes: wp.array2d[wp.vec3],
+    root_vertices: wp.array[wp.vec3i],
+    barycentric: wp.array[wp.vec3],
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    strand = wp.tid()
+    from_root = wp.vec3()
+    to_root = wp.vec3()
+    x_axis = wp.vec3()
+    y_axis = wp.vec3()
+    for corner in range(3):
+        vertex = root_vertices[strand][corner]
+        weight = barycentric[strand][corner]
+        from_root += weight * before[vertex]
+        to_root += weight * after[vertex]
+        x_axis += weight * axes[vertex, 0]
+        y_axis += weight * axes[vertex, 1]
+    x_axis = _unit(x_axis, wp.vec3(1.0, 0.0, 0.0))
+    z_axis = _unit(wp.cross(x_axis, y_axis), wp.vec3(0.0, 0.0, 1.0))
+    rotation = wp.matrix_from_cols(x_axis, wp.cross(z_axis, x_axis), z_axis)
+    for point in range(points.shape[1]):
+        out_points[strand, point] = to_root + rotation * (points[strand, point] - from_root)
