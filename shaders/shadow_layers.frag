@@ -6,7 +6,7 @@
 void main()
 {
   Light light = lights.light[view.light_index];
-  float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
+  float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, drawn_position);
   float front = texelFetch(hair_front, ivec3(ivec2(gl_FragCoord.xy), light.shadow_layer), 0).r;
-  color = layers_behind((depth - front) / light.extent) * strand_coverage;
+  color = layers_behind(depth - front) * strand_coverage;
 }

@@ -1,19 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One vertex of the strip of a strand, pulled from the strand texture by its index.
 
-#include "include/strand.glsl"
-
-vec4 strand_point(int strand, int point)
-{
-  return texelFetch(strands, strand_texel(strand, point, view.point_count, view.row_strands), 0);
-}
+#include "include/segment.glsl"
 
 void main()
 {
   int strand, drawn_point;
   float side;
   strip_vertex(gl_VertexID, view.drawn_points, strand, drawn_point, side);
-  int point = (drawn_point * (view.point_count - 1)) / (view.drawn_points - 1);
+  strand = drawn_strand(strand);
+  int point = piece_start(drawn_point);
   vec4 here = strand_point(strand, point);
   vec3 along = strand_point(strand, min(point + 1, view.point_count - 1)).xyz -
                strand_point(strand, max(point - 1, 0)).xyz;
@@ -21,14 +17,15 @@ void main()
   along = (dot(along, along) > 0.0) ? along : vec3(0.0, 0.0, 1.0);
 
   strand_index = strand;
-  strand_tangent = (view.object_to_world * vec4(along, 0.0)).xyz;
+  strand_place = float(drawn_point);
+  vec3 tangent = (view.object_to_world * vec4(along, 0.0)).xyz;
   drawn_position = (view.object_to_world * vec4(here.xyz, 1.0)).xyz;
   vec3 to_view = view.is_perspective != 0 ? view.eye.xyz - drawn_position : view.eye.xyz;
   // Length under the least half width that the picture asks for, in pixels of this depth.
   float depth = view.is_perspective != 0 ? (view.world_to_clip * vec4(drawn_position, 1.0)).w : 1.0;
-  float true_half_width = here.w * view.object_scale;
+  float true_half_width = here.w * view.object_scale * view.thickness;
   float half_width = max(true_half_width, view.least_half_width * abs(depth));
   strand_coverage = true_half_width / max(half_width, 1e-20);
-  vec3 offset = strip_side(normalize(strand_tangent), normalize(to_view)) * (side * half_width);
+  vec3 offset = strip_side(normalize(tangent), normalize(to_view)) * (side * half_width);
   gl_Position = view.world_to_clip * vec4(drawn_position + offset, 1.0);
 }

@@ -7,7 +7,10 @@
 void main()
 {
   vec3 N = normalize(gl_FrontFacing ? surface_normal : -surface_normal);
-  vec3 irradiance = PI * world_light(drawn_position, max(N, 0.0), max(-N, 0.0), view.hair_forward.rgb);
+  mat3 plus;
+  mat3 minus;
+  world_sides(corner_seen_x_y, corner_seen_z, view.seen_opacity, view.hair_forward.rgb, plus, minus);
+  vec3 irradiance = surface_irradiance(plus, minus, N);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);

@@ -5,35 +5,66 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import hair_volume
 from ..core.errors import HairError
-from ..core.mesh import TriMesh, positions
-from ..core.sampling import sample_surface
-from . import drawing, hair_cache, scene, uniforms
-from .shadows import ShadowMaps
+from . import drawing, hair_cache, level_of_detail, scene, surroundings, uniforms, visibility
+from . import lights as light_door
+from .shadows import SUN, ShadowMaps
 
-_VOLUME_STRANDS = 20_000
-_PLACES_PER_MESH = 50_000
+_SHADOWED_LIGHTS = 8
+_MAP_SIZE = 512  # texels along a side of each light's map: on a head, 0.8 mm
+
+# As many strands as such a map can tell from all of them, each as thick as those that it stands for; and what will do
+# while a stroke of the comb runs.
+_SHADOW_STEPS = drawing.Steps(strand_count=50_000)
+_DRAFT_STEPS = drawing.Steps(point_count=21, strand_count=10_000)
 
 
 @dataclass(frozen=True)
 class DrawnScene:
     """Read once by `read`, drawn from any number of views until something moves."""
 
-    hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on)
-    surfaces: list  # (batch of triangles, linear RGB)
+    hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on, part in viewports)
+    surfaces: list  # (SurfaceOnGPU, linear RGB)
     lights: np.ndarray  # uniforms.LIGHTS
-    world_radiance: np.ndarray
+    world: light_door.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
+    hair_visibility: list  # {sampler: texture} of the world's light on each of the hair
+    surface_visibility: list
+    owners: tuple = ()  # session_uid of the object of each hair
 
 
-def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None):
+def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, before=None, is_draft=False):
     """Bring a scene to the GPU and draw its shadow maps.
 
     viewport: the 3-D viewport whose visibility counts, None for a render; refused: called with the datablock and the
-    `HairError` of hair that cannot be drawn, which otherwise is raised.
+    `HairError` of hair that cannot be drawn, which otherwise is raised; before: the `DrawnScene` from before hair
+    changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse.
     """
-    hair = []
+    hair, owners = _read_hair(view_layer, viewport, refused)
+    if viewport is not None and not hair:
+        # Blender draws the rest by itself: a scene without hair pays nothing for the add-on.
+        return DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
+    placed = [(strands, to_world) for strands, _, to_world, *_ in hair]
+    if before is None or before.shadow_maps is None:
+        meshes = scene.read_drawn_meshes(depsgraph, viewport)
+        surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
+        world = light_door.read_world(blender_scene)
+        lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, placed)
+        shadow_maps = ShadowMaps(_MAP_SIZE, max(1, min(int(lights["count"]), _SHADOWED_LIGHTS)))
+    else:
+        surfaces, lights, world, shadow_maps = before.surfaces, before.lights, before.world, before.shadow_maps
+    batches = [surface.batch for surface, _ in surfaces]
+    shadow_maps.draw(lights, placed, batches, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
+    if is_draft and before is not None and _have_same_places(before.hair, hair):
+        seen = before.hair_visibility, before.surface_visibility
+    else:
+        opacities = [shading.opacity for _, shading, *_ in hair]
+        seen = visibility.measure(placed, [surface for surface, _ in surfaces], opacities)
+    return DrawnScene(hair, surfaces, lights, world, shadow_maps, *seen, owners)
+
+
+def _read_hair(view_layer, viewport, refused):
+    hair, owners = [], []
     for hair_object in scene.curves_objects(view_layer, "HAIR", viewport):
         if viewport is not None and not hair_object.data.vellus.is_drawn:
             continue
@@ -46,70 +77,68 @@ def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None):
             continue
         if strands is not None:
             color = scene.surface_color(hair_object.data.surface)
-            hair.append((strands, shading, np.array(hair_object.matrix_world, np.float64), color))
-    if viewport is not None and not hair:
-        # Blender draws the rest by itself: a scene without hair pays nothing for the add-on.
-        return DrawnScene([], [], uniforms.LIGHTS.record(), np.zeros(3), None)
-    meshes = scene.read_drawn_meshes(depsgraph, for_render=viewport is None)
-    surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
-    lights = scene.read_lights(depsgraph, for_render=viewport is None)
-    shadow_maps = ShadowMaps()
-    placed = [(strands, to_world) for strands, _, to_world, _ in hair]
-    shadow_maps.draw(lights, placed, [batch for batch, _ in surfaces])
-    if placed:
-        shadow_maps.fill_volume(lights, _volume(placed, meshes))
-    return DrawnScene(hair, surfaces, lights, scene.read_world_radiance(blender_scene), shadow_maps)
+            part = 0.01 * hair_object.data.vellus.viewport_percentage
+            hair.append((strands, shading, np.array(hair_object.matrix_world, np.float64), color, part))
+            owners.append(hair_object.session_uid)
+    return hair, tuple(owners)
 
 
-def _volume(placed, meshes):
-    """`HairVolume` of [(StrandsOnGPU, object to world)] among meshes."""
-    starts, ends, widths = [], [], []
-    for strands, to_world in placed:
-        # A part of the strands, each as thick as all that it stands for, is as good a cloud.
-        step = -(-strands.strand_count // _VOLUME_STRANDS)
-        points = strands.points[::step] @ to_world[:3, :3].T + to_world[:3, 3]
-        radii = strands.radii[::step] * (drawing.scale_of(to_world) * strands.strand_count / len(points))
-        starts.append(points[:, :-1].reshape(-1, 3))
-        ends.append(points[:, 1:].reshape(-1, 3))
-        widths.append((radii[:, :-1] + radii[:, 1:]).ravel())
-    solid = [np.empty((0, 3)), *map(_places_on, meshes)]
-    return hair_volume.measure(*map(np.concatenate, (starts, ends, widths, solid)))
+def _have_same_places(hair, others):
+    """Whether the visibility textures of some hair have a texel for each place of other hair."""
+    sizes, other_sizes = ([(one[0].strand_count, one[0].point_count) for one in many] for many in (hair, others))
+    return sizes == other_sizes
 
 
-def _places_on(mesh):
-    """(M, 3) places all over a `DrawnMesh`, close enough together to leave no hole in a volume's cells."""
-    triangles = TriMesh(mesh.positions, np.arange(len(mesh.positions), dtype=np.int32).reshape(-1, 3))
-    if not np.any(triangles.areas > 0.0):
-        return np.empty((0, 3))
-    return positions(triangles, sample_surface(triangles, _PLACES_PER_MESH, seed=0))
+def _lights(lamps, world, placed):
+    """A `uniforms.LIGHTS` record of a scene's lights (N,) and of its world's: those that matter most where hair is."""
+    lobes, sides = surroundings.light_of(world)
+    suns = np.zeros(len(lobes), uniforms.LIGHT.dtype)
+    for sun, lobe in zip(suns, lobes, strict=True):
+        sun["kind"], sun["casts_shadow"] = SUN, True
+        sun["axis"][:3], sun["power"][:3] = -lobe.direction, lobe.irradiance
+        sun["radius"] = 2.0 * np.sqrt(lobe.variance)  # a disk's variance along an axis is a quarter of its radius²
+    found = np.concatenate([lamps, suns])
+    if len(found) > 1 and placed:
+        centre, _radius = drawing.bounding_sphere(placed)
+        found = found[np.argsort(-_brightness(found, centre), kind="stable")]
+    found = found[: uniforms.LIGHT_CAPACITY]
+    record = uniforms.LIGHTS.record()
+    record["light"][: len(found)], record["count"] = found, len(found)
+    record["world"][:, :3] = sides
+    return record
 
 
-def draw_hair_depth(drawn, view):
-    """Draw the depth of all hair into the bound framebuffer, before anything is shaded.
+def _brightness(lights, place):
+    """(N,) about how much light arrives at a place (3,): by the distance alone."""
+    distances = np.linalg.norm(lights["position"][:, :3] - place, axis=1)
+    spread = np.where(lights["kind"] == SUN, 1.0, 4.0 * np.pi * np.square(np.maximum(distances, 1e-6)))
+    return lights["power"][:, :3].mean(axis=1) / spread
 
-    Strands overlap many times, so with many samples a pixel it pays to shade only what stays visible; with one sample a
-    pixel a second pass over the strands costs more than it saves.
+
+def draw_hiding(drawn, view):
+    """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer."""
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        for surface, _color in drawn.surfaces:
+            drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
+
+
+def draw_hair(drawn, view, buffer, is_viewport=False):
+    """Draw all hair in front of the surfaces of a `HairBuffer`.
+
+    view: a `uniforms.VIEW` record; is_viewport: only as much of it as is seen from there, and as the artist wants.
     """
-    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for strands, _shading, to_world, _color in drawn.hair:
-            drawing.draw_strands(strands, drawing.depth_only(), view, drawn.lights, to_world)
-
-
-def draw_hair(drawn, view):
-    """Draw all hair with depth test into the bound framebuffer; view: a `uniforms.VIEW` record."""
-    view["world_radiance"][:3] = drawn.world_radiance
-    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for strands, shading, to_world, color in drawn.hair:
-            drawing.draw_strands(
-                strands, shading, view, drawn.lights, to_world, drawn.shadow_maps.samplers, surface_color=color
-            )
+    hair = []
+    for (strands, shading, to_world, color, part), seen in zip(drawn.hair, drawn.hair_visibility, strict=True):
+        steps = level_of_detail.steps_of(strands, view, to_world, part) if is_viewport else drawing.Steps()
+        hair.append((strands, shading, to_world, color, drawn.shadow_maps.samplers | seen, steps))
+    buffer.add_hair(hair, drawn.lights, view)
 
 
 def draw_surfaces(drawn, view):
     """Draw all surfaces with depth test into the bound framebuffer."""
-    view["world_radiance"][:3] = drawn.world_radiance
     # The hair's shadow on a surface takes the first hair's colour: one colour a draw call.
-    view["hair_forward"][:3] = drawn.hair[0][1].forward if drawn.hair else 0.0
+    if drawn.hair:
+        view["hair_forward"][:3], view["seen_opacity"] = drawn.hair[0][1].forward, drawn.hair[0][1].opacity
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for batch, color in drawn.surfaces:
-            drawing.draw_surface(batch, color, view, drawn.lights, drawn.shadow_maps.samplers)
+        for (surface, color), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=True):
+            drawing.draw_surface(surface, color, view, drawn.lights, drawn.shadow_maps.samplers | seen)

@@ -4,22 +4,61 @@
 import bpy
 
 from ..core.shading import appearance
-from . import properties
+from . import curves as curves_door
+from . import properties, strand_nodes
 
 HAIR_NODE = "ShaderNodeBsdfHairPrincipled"
+
+_OURS = "is_vellus_hair"  # the custom property of materials that are written here
 
 
 def write_hair_material(curves):
     """Give Curves a Principled Hair material of their appearance; an artist's own material is left alone."""
-    material = next((m for m in curves.materials if m is not None), None)
-    if material is None:
+    slot = next((slot for slot, m in enumerate(curves.materials) if m is not None), None)
+    if slot is None:
         material = bpy.data.materials.new(curves.name)
-        curves.materials.append(material)
-        node = _hair_node(material.node_tree)
+        material[_OURS] = True
+        _fill_first_slot(curves, material)
+        _hair_node(material.node_tree)
     else:
+        material = curves.materials[slot]
+        if is_hair_material(material) and (material.library or _shows_another_look(material, curves)):
+            material = curves.materials[slot] = material.copy()
+    if is_hair_material(material) and material.library is None:
         node = next((n for n in material.node_tree.nodes if n.bl_idname == HAIR_NODE), None)
-    if node is not None:
-        _fill(node, material, properties.look_of(curves.vellus))
+        if node is not None:  # else an artist has made something else of it
+            look = properties.look_of(curves.vellus)
+            if not appearance.strand_settings(look).is_even:
+                curves_door.write_randoms(curves)  # hair of before this attribute
+            _fill(node, material, look)
+
+
+def _fill_first_slot(curves, material):
+    """What renderers take; a material that was removed leaves its slot empty."""
+    if len(curves.materials):
+        curves.materials[0] = material
+    else:
+        curves.materials.append(material)
+
+
+def _shows_another_look(material, curves):
+    """Whether a material is that of other hair too, as Blender has it after a duplication, and they look different."""
+    look = _values(curves.vellus.appearance)
+    others = (c for c in bpy.data.hair_curves if c != curves and c.vellus.kind == "HAIR")
+    return any(material in {*c.materials} and _values(c.vellus.appearance) != look for c in others)
+
+
+def _values(group):
+    names = properties.names_of(appearance.Appearance)
+    return [
+        value[:] if isinstance(value, bpy.types.bpy_prop_array) else value
+        for value in (getattr(group, n) for n in names)
+    ]
+
+
+def is_hair_material(material):
+    """Whether a material was made here."""
+    return bool(material.get(_OURS))
 
 
 def _hair_node(tree):
@@ -30,14 +69,19 @@ def _hair_node(tree):
     output = tree.nodes.new("ShaderNodeOutputMaterial")
     output.location.x = 300.0
     tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
-    return node
 
 
 def _fill(node, material, look):
-    color = (*appearance.kajiya_kay_settings(look).diffuse_color, 1.0)
+    color = (*appearance.mean_color(look), 1.0)
     # By identifier: a socket that the node's parametrization disables cannot be looked up by name.
     sockets = {socket.identifier: socket for socket in node.inputs}
     # EEVEE knows no hair: it shows the colour.
     for name, value in {**appearance.principled_sockets(look), "Color": color}.items():
         sockets[name].default_value = value
     material.diffuse_color = color
+    variation = appearance.strand_settings(look)
+    if variation.is_even:
+        strand_nodes.remove(material.node_tree)
+    else:
+        falloff = appearance.kajiya_kay_strand_settings(look).falloff
+        strand_nodes.write(material.node_tree, node, variation, falloff)

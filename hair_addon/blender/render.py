@@ -12,7 +12,7 @@ import numpy as np
 
 from ..core.errors import HairError
 from ..core.params import Settings, param
-from . import drawing, drawn_scene, scene
+from . import drawing, drawn_scene, hair_buffer, scene, surroundings
 
 
 @dataclass(frozen=True)
@@ -39,20 +39,18 @@ def draw_picture(blender_scene, view_layer, depsgraph, settings):
     # No strand is thinner than one of a pixel's samples: it would break into dots.
     view = drawing.view_record(world_to_view, view_to_clip, height, least_width=1.0)
     drawn = drawn_scene.read(blender_scene, view_layer, depsgraph)
-    background = (0.0, 0.0, 0.0, 0.0) if settings.is_transparent else (*drawn.world_radiance, 1.0)
+    background = (0.0, 0.0, 0.0, 0.0) if settings.is_transparent else (*drawn.world.color, 1.0)
 
-    color = gpu.types.GPUTexture((width, height), format="RGBA16F")
-    depth = gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
-    framebuffer = gpu.types.GPUFrameBuffer(color_slots=color, depth_slot=depth)
-    with framebuffer.bind():
-        framebuffer.clear(color=background, depth=1.0)
-        drawn_scene.draw_hair_depth(drawn, view)
+    buffer = hair_buffer.HairBuffer(width, height)
+    with buffer.surfaces(background):
+        if drawn.world.image is not None and not settings.is_transparent:
+            surroundings.draw_background(drawn.world, view, width, height)
         drawn_scene.draw_surfaces(drawn, view)
-        drawn_scene.draw_hair(drawn, view)
+    drawn_scene.draw_hair(drawn, view, buffer)
     resolved = gpu.types.GPUTexture((settings.width, settings.height), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=resolved)
     with target.bind():
-        drawing.resolve(color, samples)
+        drawing.resolve(buffer.color, samples)
         pixels = target.read_color(0, 0, settings.width, settings.height, 4, 0, "FLOAT")
     return np.array(pixels, np.float32).reshape(settings.height, settings.width, 4)
 

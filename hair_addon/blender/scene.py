@@ -1,26 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The door for surfaces, lights and cameras: Blender's data → arrays."""
+"""The door for surfaces and cameras: Blender's data → arrays."""
 
+import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 
+import bpy
 import numpy as np
 
 from ..core.errors import HairError
-from ..core.mesh import SurfacePoints, TriMesh
-from . import uniforms
-
-LIGHT_KINDS = {"SUN": 0, "POINT": 1, "SPOT": 2, "AREA": 3}  # as in shaders/include/lights.glsl
+from ..core.mesh import Faces, SurfacePoints, TriMesh
+from ..core.texture import Texture
 
 
 @dataclass(frozen=True)
 class Surface:
-    """A mesh object as the mathematics sees it: world axes and scale [m], the object's origin at zero.
+    """A mesh object at rest as the mathematics sees it: world axes and scale [m], the object's origin at zero.
 
-    So gravity is -Z and lengths are true, while an object far from the world's origin loses no precision.
+    So gravity is -Z and lengths are true, while an object far from the world's origin loses no precision. At rest means
+    before shape keys and modifiers move its vertices: hair is made there, and carried to where the surface is
+    (surface_frames.py).
     """
 
     name: str
     mesh: TriMesh
+    faces: Faces
+    rest: np.ndarray  # (V, 3) float32, vertices at rest in local coordinates
+    posed: np.ndarray  # (V, 3) float32, where they are now, in local coordinates
     corner_uvs: np.ndarray | None  # (F, 3, 2) float32, None without a UV map
     uv_map: str
     to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → these
@@ -28,11 +34,43 @@ class Surface:
 
     def to_local(self, positions):
         """(..., 3) positions → the object's local coordinates, float32."""
-        return (positions @ np.linalg.inv(self.to_world_axes).T).astype(np.float32)
+        return _transformed(positions, np.linalg.inv(self.to_world_axes))
 
     def from_local(self, positions):
         """(..., 3) local coordinates → positions here, float32."""
-        return (positions @ self.to_world_axes.T).astype(np.float32)
+        return _transformed(positions, self.to_world_axes)
+
+    @property
+    def is_deformed(self):
+        """Whether anything moves its vertices away from where they rest."""
+        return not np.array_equal(self.rest, self.posed)
+
+    @property
+    def mirror_normal(self):
+        """(3,) unit: of the plane across the object's own X axis."""
+        normal = np.linalg.inv(self.to_world_axes)[0]
+        return normal / np.linalg.norm(normal)
+
+    def root_vertices(self, points):
+        """(N, 3) int32: the vertices that surface points lie between, in Blender's order of corners."""
+        vertices = self.mesh.triangles[points.triangle]
+        return np.ascontiguousarray(vertices[:, [0, 2, 1]]) if self.is_mirrored else vertices
+
+    @property
+    def scale(self):
+        """The mean scale of the object: metres in a unit of its local coordinates."""
+        return abs(np.linalg.det(self.to_world_axes)) ** (1.0 / 3.0)
+
+    @cached_property
+    def extent(self):
+        """The longest side of the box around its vertices at rest, in local coordinates."""
+        return float(np.ptp(self.rest, axis=0).max())
+
+    @cached_property
+    def topology(self):
+        """What another mesh shares if it has the same triangles, in the same order; mirrored or not."""
+        triangles = self.mesh.triangles[:, [0, 2, 1]] if self.is_mirrored else self.mesh.triangles
+        return hashlib.blake2b(triangles.tobytes(), digest_size=16).hexdigest()
 
     def to_local_normals(self, normals):
         """(N, 3) unit normals → unit normals in local coordinates: the inverse transpose of `to_local`."""
@@ -52,6 +90,13 @@ class Surface:
         return SurfacePoints(points.triangle, np.ascontiguousarray(points.barycentric[:, [0, 2, 1]]))
 
 
+def _transformed(positions, matrix):
+    """(..., 3) float32 positions by a (3, 3) matrix, float32; the positions themselves where it changes nothing."""
+    if np.array_equal(matrix, np.eye(3)):
+        return np.asarray(positions, np.float32)
+    return np.asarray(positions, np.float32) @ matrix.T.astype(np.float32)
+
+
 def read_surface(surface_object, depsgraph):
     """The evaluated mesh of an object as a `Surface`."""
     to_world_axes = np.array(surface_object.matrix_world.to_3x3(), np.float64)
@@ -61,7 +106,9 @@ def read_surface(surface_object, depsgraph):
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        vertices = _vertex_positions(mesh)
+        posed = _vertex_positions(mesh)
+        rest = _rest_positions(mesh, posed)
+        faces = _faces(mesh)
         mesh.calc_loop_triangles()
         triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
         mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
@@ -80,8 +127,26 @@ def read_surface(surface_object, depsgraph):
         triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
         corner_uvs = None if corner_uvs is None else corner_uvs[:, [0, 2, 1]]
     with np.errstate(invalid="ignore"):  # what is not finite is refused where the mesh is checked
-        vertices = (vertices @ to_world_axes.T).astype(np.float32)
-    return Surface(surface_object.name, TriMesh(vertices, triangles), corner_uvs, uv_map, to_world_axes, is_mirrored)
+        mesh = TriMesh(_transformed(rest, to_world_axes), triangles)
+    return Surface(surface_object.name, mesh, faces, rest, posed, corner_uvs, uv_map, to_world_axes, is_mirrored)
+
+
+def _rest_positions(mesh, posed):
+    """(V, 3) float32 of the attribute that Blender adds before it deforms; where there is none, `posed`."""
+    attribute = mesh.attributes.get("rest_position")
+    if attribute is None or (attribute.data_type, attribute.domain) != ("FLOAT_VECTOR", "POINT") or not len(posed):
+        return posed
+    rest = np.empty_like(posed)
+    attribute.data.foreach_get("vector", rest.ravel())
+    return rest
+
+
+def _faces(mesh):
+    corner_vertices = np.empty(len(mesh.loops), np.int32)
+    mesh.loops.foreach_get("vertex_index", corner_vertices)
+    starts = np.empty(len(mesh.polygons), np.int32)
+    mesh.polygons.foreach_get("loop_start", starts)
+    return Faces(corner_vertices, np.append(starts, np.int32(len(corner_vertices))))
 
 
 def _vertex_positions(mesh):
@@ -113,61 +178,25 @@ def read_vertex_group(surface_object, depsgraph, name):
     return weights
 
 
-def read_lights(depsgraph, for_render):
-    """The visible lights, or those that are rendered, as a `uniforms.LIGHTS` record: its capacity of the first."""
-    lights = [
-        _read_light(instance.object.data, np.array(instance.matrix_world))
-        for instance in depsgraph.object_instances
-        if instance.object.type == "LIGHT" and not (for_render and instance.object.hide_render)
-    ][: uniforms.LIGHT_CAPACITY]
-    record = uniforms.LIGHTS.record()
-    record["light"][: len(lights)] = lights
-    record["count"] = len(lights)
-    return record
-
-
-def _read_light(light, matrix):
-    record = uniforms.LIGHT.record()
-    record["kind"] = LIGHT_KINDS[light.type]
-    record["position"][:3] = matrix[:3, 3]
-    axis = -matrix[:3, 2]  # a light shines along its own -Z
-    record["axis"][:3] = axis / np.linalg.norm(axis)
-    temperature = light.temperature_color if light.use_temperature else (1.0, 1.0, 1.0)
-    record["power"][:3] = np.array(light.color) * temperature * light.energy * 2.0**light.exposure
-    if not light.normalize:
-        record["power"][:3] *= _emitting_area(light, matrix)
-    if light.type == "SPOT":
-        record["cos_cone"] = np.cos(0.5 * light.spot_size)
-        record["blend"] = light.spot_blend
-    elif light.type == "AREA":
-        record["cos_cone"] = np.cos(0.5 * light.spread)
-    return record
-
-
-def _emitting_area(light, matrix):
-    """What multiplies the power of a light that is not normalised: its area [m²], or a sun's on the unit sphere.
-
-    As Cycles does it, which takes the disk of a point without size for one.
-    """
-    if light.type == "AREA":
-        width, height = light.size, light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
-        x_scale, y_scale = np.linalg.norm(matrix[:3, :2], axis=0)
-        part = 0.25 * np.pi if light.shape in {"DISK", "ELLIPSE"} else 1.0
-        return part * width * x_scale * height * y_scale
-    if light.type == "SUN":
-        return np.pi * np.sin(0.5 * light.angle) ** 2 or 1.0
-    return 4.0 * (np.pi * light.shadow_soft_size**2 or 1.0)
-
-
-def read_world_radiance(scene):
-    """(3,) colour times strength of the world's background, black without a world."""
-    world = scene.world
-    if world is None:
-        return np.zeros(3)
-    background = next((n for n in world.node_tree.nodes if n.type == "BACKGROUND"), None) if world.node_tree else None
-    if background is None:
-        return np.array(world.color)
-    return np.array(background.inputs["Color"].default_value[:3]) * background.inputs["Strength"].default_value
+def read_texture(surface, name):
+    """The `Texture` of an image on a `Surface`, the mean of its colours, or None for the empty name."""
+    if not name:
+        return None
+    image = bpy.data.images.get(name)
+    if image is None:
+        raise HairError('There is no image "{name}": pick another one, or none.', name=name)
+    if surface.corner_uvs is None:
+        sentence = '"{name}" has no UV map to find an image by: make one, or pick no image.'
+        raise HairError(sentence, name=surface.name)
+    width, height = image.size
+    if not (width and height and image.channels):
+        raise HairError('The image "{name}" has no pixels: load it again, or pick another one.', name=name)
+    pixels = np.empty(width * height * image.channels, np.float32)
+    image.pixels.foreach_get(pixels)
+    values = pixels.reshape(height, width, image.channels)[:, :, :3].mean(axis=2)
+    if not (np.isfinite(values).all() and np.any(values > 0.0)):
+        raise HairError('The image "{name}" is black: paint some white where hair should grow.', name=name)
+    return Texture(np.maximum(values, 0.0), surface.corner_uvs)
 
 
 def curves_objects(view_layer, kind, viewport=None):
@@ -204,14 +233,20 @@ class DrawnMesh:
     color: tuple
 
 
-def read_drawn_meshes(depsgraph, for_render):
-    """A `DrawnMesh` for every visible mesh of the depsgraph, instances included; or for every one that is rendered."""
+def read_drawn_meshes(depsgraph, viewport=None):
+    """A `DrawnMesh` for every mesh that a 3-D viewport shows as a surface, or without one a render; instances too."""
     meshes = []
     for instance in depsgraph.object_instances:
-        is_hidden = for_render and instance.object.hide_render
-        if instance.object.type == "MESH" and instance.show_self and not is_hidden:
+        if instance.object.type == "MESH" and instance.show_self and _is_surface_seen(instance, viewport):
             meshes.append(_read_drawn_mesh(instance.object, np.array(instance.matrix_world, np.float64)))
     return [mesh for mesh in meshes if len(mesh.positions)]
+
+
+def _is_surface_seen(instance, viewport):
+    if viewport is None:
+        return not instance.object.hide_render
+    placed = instance.parent if instance.is_instance else instance.object
+    return placed.original.visible_in_viewport_get(viewport) and instance.object.display_type in {"TEXTURED", "SOLID"}
 
 
 def _read_drawn_mesh(mesh_object, to_world):

@@ -1,134 +1,147 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deep opacity maps [Yuksel08]: from each light, the front of the hair, its layers, and the front of the surfaces."""
+"""Deep opacity maps [Yuksel08]: from each light, the front of the hair, its layers, and how deep surfaces lie."""
 
 import gpu
 import numpy as np
 
-from . import drawing, shaders
-
-SHADOWED_LIGHTS = 4
-SIZE = 512  # texels along a side of each map: on a head, 0.8 mm
+from . import drawing, shaders, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 
-# Parts of the hair's diameter: how far apart a surface and itself may be, and how near a light may stand.
-_SURFACE_BIAS = 0.01
-_NEAREST = 0.01
+_NEAREST = 0.01  # that a light may stand, as a part of the hair's diameter
+_FAR = 2.0  # FAR of shaders/include/opacity.glsl
+_NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it
 
-_POINT_STEP = 2  # a shadow's outline needs half the points
-
-_FAR = 1e4  # depth [m] of what no light meets; not more, as maps are filtered
+# Texels by which shadows of surfaces are blurred, at least and as a part of a map at most; and how far, as a part of
+# the hair's diameter, a surface is taken to be from the hair that it shades.
+_LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
+_SHADE_DISTANCE = 0.15
+_ALL = drawing.Steps()
 
 
 class ShadowMaps:
-    """Textures of every shadowed light and of the world's, made once and read until something moves."""
+    """Textures of the first lights, made once and read until something moves.
 
-    def __init__(self):
-        self._hair_front = _array("R32F")
-        self._hair_layers = _array("RGBA16F")
-        self._surface_front = _array("R32F")
-        self._volume = _volume_textures(np.zeros((1, 1, 1, 6), np.float32))
-        self._depth = gpu.types.GPUTexture((SIZE, SIZE), format="DEPTH_COMPONENT32F")
+    size: texels along a side of each map; layer_count: of lights that have one; in_compute: whether compute programs
+    draw the strands, None: where they can.
+    """
+
+    def __init__(self, size, layer_count, in_compute=None):
+        self._size, self._layer_count = size, layer_count
+        self._hair_front = _array(size, layer_count, "R32F")
+        self._hair_layers = _array(size, layer_count, "RGBA16F")
+        self._surface_moments = _array(size, layer_count, "RGBA32F")
+        self._in_compute = shaders.has_image_atomics() if in_compute is None else in_compute
+        # What is drawn before it is filtered into a map.
+        self._surface_depth = gpu.types.GPUTexture((size, size), format="R32F")
+        self._half_blurred = gpu.types.GPUTexture((size, size), format="RGBA32F")
+        self._fronts = gpu.types.GPUTexture((size, size), format="R32UI")
+        self._counts = gpu.types.GPUTexture((4 * size, size), format="R32UI") if self._in_compute else None
+        self._depth = gpu.types.GPUTexture((size, size), format="DEPTH_COMPONENT32F")
 
     @property
     def samplers(self):
         """{sampler: texture} for the shaders that receive shadows."""
-        textures = (self._hair_front, self._hair_layers, self._surface_front)
-        return dict(zip((*shaders.SHADOW_SAMPLERS, *shaders.VOLUME_SAMPLERS), (*textures, *self._volume), strict=True))
+        textures = (self._hair_front, self._hair_layers, self._surface_moments)
+        return dict(zip(shaders.SHADOW_SAMPLERS, textures, strict=True))
 
-    def fill_volume(self, lights, volume):
-        """Take over a `hair_volume.HairVolume`, and write its box into the lights' record."""
-        lights["volume_low"][:3] = volume.low
-        lights["volume_size"][:3] = volume.high - volume.low
-        self._volume = _volume_textures(volume.counts)
-
-    def draw(self, lights, hair, surfaces):
+    def draw(self, lights, hair, surfaces, steps=_ALL):
         """Draw the maps and write each light's part in them into its record.
 
-        lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: batches.
+        lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: batches;
+        steps: what is drawn of each hair for all of it.
         """
         lights["light"]["shadow_layer"] = -1
         if not hair:
             return
-        centre, radius = bounding_sphere(hair)
-        for index in range(min(int(lights["count"]), SHADOWED_LIGHTS)):
-            view = _aim(lights["light"][index], centre, radius)
-            if view is not None:
+        centre, radius = drawing.bounding_sphere(hair)
+        for index in range(min(int(lights["count"]), self._layer_count)):
+            view = _aim(lights["light"][index], centre, radius, self._size)
+            if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index
                 view["light_index"] = index
-                self._draw_light(index, view, lights, hair, surfaces)
+                self._draw_light(index, view, lights, hair, surfaces, steps)
 
-    def _draw_light(self, layer, view, lights, hair, surfaces):
-        front = drawing.Shading(shaders.strand_program("shadow_front.frag", shadow_samplers=()))
-        layers = drawing.Shading(shaders.strand_program("shadow_layers.frag", shadow_samplers=("hair_front",)))
-        with self._target(self._surface_front, layer, _FAR), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+    def _draw_light(self, layer, view, lights, hair, surfaces, steps):
+        with self._target(self._surface_depth), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             for surface in surfaces:
                 drawing.draw_surface_depth(surface, view, lights)
-        with self._target(self._hair_front, layer, _FAR), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-            for strands, to_world in hair:
-                drawing.draw_strands(strands, front, view, lights, to_world, point_step=_POINT_STEP)
+        self._blur(layer, _blur_of(lights["light"][layer], self._size))
+        self._fronts.clear(format="UINT", value=(_NOTHING,))
+        light_block = uniforms.uniform_buffer(lights)
+        placed = [(strands, drawing.strand_record(strands, view, to_world, steps)) for strands, to_world in hair]
+        if self._in_compute:
+            self._walk(layer, placed, light_block)
+        else:
+            self._draw_strips(layer, placed, light_block)
+
+    def _walk(self, layer, placed, lights):
+        """A map of strands by compute programs: what is counted are whole numbers, the same in any order."""
+        program, samplers = shaders.strand_shadow_program(), {"hair_front": self._hair_front}
+        images = {"fronts": self._fronts, "counts": self._counts}
+        for strands, record in placed:
+            drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 1})
+        self._fill_fronts(layer)
+        self._counts.clear(format="UINT", value=(0,))
+        for strands, record in placed:
+            drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 0})
+        with self._target(self._hair_layers, layer):
+            self._filter(shaders.shadow_counts_program(), "counts", self._counts)
+
+    def _draw_strips(self, layer, placed, lights):
+        """The same map of strips of triangles."""
+        front = shaders.strip_program("shadow_front.frag", targets=(("front", "UINT"),))
+        layers = shaders.strip_program("shadow_layers.frag", shadow_samplers=("hair_front",))
+        nearest = gpu.types.GPUFrameBuffer(color_slots=self._fronts, depth_slot=self._depth)
+        with nearest.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+            nearest.clear(depth=1.0)
+            for strands, record in placed:
+                drawing.draw_strip(strands, front, record, lights)
+        self._fill_fronts(layer)
         with (
-            self._target(self._hair_layers, layer, 0.0),
+            self._target(self._hair_layers, layer, value=0.0),
             drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"),
         ):
-            for strands, to_world in hair:
-                drawing.draw_strands(
-                    strands, layers, view, lights, to_world, {"hair_front": self._hair_front}, _POINT_STEP
-                )
+            for strands, record in placed:
+                drawing.draw_strip(strands, layers, record, lights, {"hair_front": self._hair_front})
 
-    def _target(self, texture, layer, value):
-        framebuffer = gpu.types.GPUFrameBuffer(color_slots={"texture": texture, "layer": layer}, depth_slot=self._depth)
-        return _cleared(framebuffer, value)
+    def _fill_fronts(self, layer):
+        with self._target(self._hair_front, layer):
+            self._filter(shaders.shadow_fill_program(), "fronts", self._fronts)
+
+    def _blur(self, layer, deviation):
+        """Fill a layer of the surfaces' moments from their raw depth, blurred by a deviation in texels."""
+        program = shaders.shadow_moments_program()
+        passes = (
+            (self._target(self._half_blurred), self._surface_depth, (1, 0)),
+            (self._target(self._surface_moments, layer), self._half_blurred, (0, 1)),
+        )
+        for target, source, along in passes:
+            with target:
+                program.bind()
+                program.uniform_int("along", along)
+                program.uniform_int("taps", int(np.ceil(2.0 * deviation)))
+                program.uniform_int("is_depth", int(source is self._surface_depth))
+                program.uniform_float("deviation", deviation)
+                self._filter(program, "surface_depth", source)
+
+    def _filter(self, program, sampler, source):
+        with drawing.gpu_state("NONE", depth_writes=False):
+            drawing.draw_cover(program, {}, {sampler: source})
+
+    def _target(self, texture, layer=None, value=_FAR):
+        slot = texture if layer is None else {"texture": texture, "layer": layer}
+        return drawing.cleared(gpu.types.GPUFrameBuffer(color_slots=slot, depth_slot=self._depth), (value,) * 4)
 
 
-class _cleared:
-    """Bind a framebuffer, all its channels set to one value."""
-
-    def __init__(self, framebuffer, value):
-        self.binding, self.framebuffer, self.value = framebuffer.bind(), framebuffer, value
-
-    def __enter__(self):
-        self.binding.__enter__()
-        self.framebuffer.clear(color=(self.value,) * 4, depth=1.0)
-
-    def __exit__(self, *error):
-        return self.binding.__exit__(*error)
-
-
-def _array(texture_format):
-    texture = gpu.types.GPUTexture((SIZE, SIZE), layers=SHADOWED_LIGHTS, format=texture_format)
+def _array(size, layer_count, texture_format):
+    texture = gpu.types.GPUTexture((size, size), layers=layer_count, format=texture_format)
     texture.filter_mode(True)
     texture.extend_mode("EXTEND")
     return texture
 
 
-def _volume_textures(counts):
-    """(D, H, W, 6) counts → textures of the sides along x and y, and along z."""
-    depth, height, width, _sides = counts.shape
-    along_z = np.zeros((depth, height, width, 4), np.float32)
-    along_z[..., :2] = counts[..., 4:]
-    textures = []
-    for texels in (np.ascontiguousarray(counts[..., :4]), along_z):
-        data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
-        texture = gpu.types.GPUTexture((width, height, depth), format="RGBA16F", data=data)
-        texture.filter_mode(True)
-        texture.extend_mode("EXTEND")
-        textures.append(texture)
-    return textures
-
-
-def bounding_sphere(hair):
-    """Centre (3,) and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)]."""
-    corners = []
-    for strands, to_world in hair:
-        box = np.array(np.meshgrid(*strands.bounds.T)).reshape(3, -1).T
-        corners.append(box @ to_world[:3, :3].T + to_world[:3, 3])
-    corners = np.concatenate(corners)
-    centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    return centre, float(np.linalg.norm(corners - centre, axis=1).max())
-
-
-def _aim(light, centre, radius):
+def _aim(light, centre, radius, size):
     """The view of a light that holds the sphere of the hair, also written into the light; None from inside it."""
     position = light["position"][:3].astype(np.float64)
     is_sun = light["kind"] == SUN
@@ -139,11 +152,19 @@ def _aim(light, centre, radius):
     eye = centre - axis * (2.0 * radius) if is_sun else position
     world_to_view = _look_at(eye, axis / distance)
     view_to_clip = _orthographic(radius) if is_sun else _perspective(radius, distance)
-    view = drawing.view_record(world_to_view, view_to_clip, SIZE, least_width=1.0)
+    view = drawing.view_record(world_to_view, view_to_clip, size, least_width=1.0)
     light["world_to_shadow"] = view["world_to_clip"]
     light["extent"] = 2.0 * radius
-    light["surface_bias"] = 2.0 * radius * _SURFACE_BIAS
+    light["near"] = (centre @ axis / distance if is_sun else distance) - radius
     return view
+
+
+def _blur_of(light, size):
+    """Deviation [texels] by which a light's size blurs the shadows of surfaces."""
+    is_sun = light["kind"] == SUN
+    angle = light["radius"] / (1.0 if is_sun else light["near"] + 0.5 * light["extent"])
+    # A disk's deviation along an axis is half its radius.
+    return float(np.clip(0.5 * angle * _SHADE_DISTANCE * size, _LEAST_BLUR, _MOST_BLUR * size))
 
 
 def _look_at(eye, forward):

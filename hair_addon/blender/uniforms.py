@@ -26,14 +26,15 @@ class Block:
     """A GLSL struct: `source` declares it, `dtype` is the NumPy record of its std140 layout."""
 
     def __init__(self, type_name, members):
-        """members: {name: GLSL type}, or {name: (Block, count)} for an array of structs."""
+        """members: {name: GLSL type}, or {name: (Block, count)} and {name: ("vec4", count)} for arrays."""
         offsets, formats, lines = [], [], []
         end = 0
         for name, kind in members.items():
             if isinstance(kind, tuple):
-                block, count = kind
-                form, alignment = np.dtype((block.dtype, (count,))), 16
-                lines.append(f"  {block.type_name} {name}[{count}];")
+                element, count = kind
+                is_block = isinstance(element, Block)
+                form, alignment = np.dtype((element.dtype, (count,)) if is_block else ("<f4", (count, 4))), 16
+                lines.append(f"  {element.type_name if is_block else element} {name}[{count}];")
             else:
                 scalar, shape, alignment = _TYPES[kind]
                 form = np.dtype((scalar, shape))
@@ -60,19 +61,26 @@ VIEW = Block(
     {
         "world_to_clip": "mat4",
         "object_to_world": "mat4",
+        "object_to_clip": "mat4",
         "eye": "vec4",  # the viewer's place, or in a parallel projection the unit direction towards the viewer
-        "world_radiance": "vec4",
-        "hair_albedo": "vec4",
         "hair_forward": "vec4",  # what one strand passes on of the light that meets it
         "surface_color": "vec4",  # of what the hair grows on
         "is_perspective": "int",
         "point_count": "int",
         "drawn_points": "int",  # of each strand's points, evenly chosen: at least two
+        "strand_count": "int",
+        "drawn_strands": "int",  # of all, each as thick as those that it stands for
+        "first_strand": "int",  # of those that are drawn
+        "thickness": "float",
+        "seen_points": "int",  # of each strand's points, those of the visibility textures
+        "seen_opacity": "float",  # of a strand, for which they hold
         "row_strands": "int",
         "object_scale": "float",
-        "least_half_width": "float",  # at distance one, in a perspective
+        "pixels_per_unit": "float",  # at distance one, in a perspective
+        "least_half_width": "float",  # there as well
         "back_gain": "float",  # of what comes back from behind a strand
         "light_index": "int",  # the light that a shadow pass looks from
+        "coverage_turn": "float",  # by which a pass takes other samples of thin strands
     },
 )
 LIGHT = Block(
@@ -86,17 +94,30 @@ LIGHT = Block(
         "cos_cone": "float",
         "blend": "float",
         "shadow_layer": "int",  # of the shadow maps, -1 without
+        "casts_shadow": "int",
+        "radius": "float",  # [m]; of a sun, the tangent of its angular radius
         "extent": "float",  # diameter of the hair [m], which the layers of a shadow are parts of
-        "surface_bias": "float",  # [m] by which a surface may stand before itself
+        "near": "float",  # depth [m] of the hair's near side, which depths are counted from
     },
 )
 LIGHTS = Block(
     "Lights",
     {
         "light": (LIGHT, LIGHT_CAPACITY),
-        "volume_low": "vec4",  # the box of the hair volume [m]
-        "volume_size": "vec4",
+        "world": ("vec4", 6),  # mean radiance of the world's sides, in the order of `sphere.SIDES`
         "count": "int",
+    },
+)
+
+ENVIRONMENT = Block(
+    "Environment",
+    {
+        "to_image": "mat4",  # from world directions to the picture's
+        "clip_to_world": "mat4",
+        "color": "vec4",  # by which the picture is multiplied
+        "size": "vec4",  # width and height of what is drawn [pixels]
+        "is_mirror_ball": "int",
+        "taps": "int",  # samples along each side of a texel
     },
 )
 
@@ -110,10 +131,13 @@ def _glsl_type(default, details):
 
 
 @cache
-def settings_block(settings_class):
-    """The struct `Settings` of a shading model. An enumeration is the index of its choice; free text has no place."""
+def settings_block(settings_class, instance="settings"):
+    """The struct of a class of settings, called after its instance: `settings` is a `Settings`.
+
+    An enumeration is the index of its choice; free text has no place.
+    """
     kinds = {name: _glsl_type(default, details) for name, default, details in declared(settings_class)}
-    return Block("Settings", {name: kind for name, kind in kinds.items() if kind})
+    return Block(instance.capitalize(), {name: kind for name, kind in kinds.items() if kind})
 
 
 def fill(settings):

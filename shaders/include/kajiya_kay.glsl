@@ -2,6 +2,7 @@
 // [Kajiya89], as in [Report12] Eq. 11-12 with the second sine and the sign corrected: see DECISIONS.md.
 
 #include "include/fibre.glsl"
+#include "include/principled.glsl"
 
 // Eq. 11: a diffuse cylinder receives light in proportion to the sine between tangent and light.
 float kajiya_kay_diffuse(vec3 T, vec3 L)
@@ -24,4 +25,28 @@ float kajiya_kay_specular(vec3 T, vec3 L, vec3 V, float exponent)
 float kajiya_kay_specular_albedo(float exponent)
 {
   return 0.5 * PI * PI * sqrt(2.0 * PI / (exponent + 1.5));
+}
+
+// Exponent of a highlight of light whose direction has a variance: that of the highlight is close to 1 / exponent.
+float blurred_exponent(float exponent, float blur)
+{
+  return exponent / (1.0 + exponent * blur);
+}
+
+// Exponent of a highlight as wide as the R lobe of a longitudinal roughness.
+float highlight_exponent(float roughness)
+{
+  return clamp(1.0 / variance_from_roughness(roughness), 1.0, 10000.0);
+}
+
+// Brightness of the middle of a highlight that returns `reflectance` of a uniform surrounding.
+float highlight_peak(float reflectance, float exponent)
+{
+  return min(reflectance / kajiya_kay_specular_albedo(exponent), 1.0);
+}
+
+// The colour that light takes on among many fibres [Chiang16].
+vec3 color_from_falloff(vec3 sigma_a, float falloff)
+{
+  return exp(-falloff * sqrt(sigma_a));
 }

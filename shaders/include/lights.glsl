@@ -14,6 +14,15 @@ vec3 to_light(int kind, vec3 light_position, vec3 axis, vec3 position)
   return (kind == LIGHT_SUN) ? -axis : normalize(light_position - position);
 }
 
+// Variance [rad²] of a light's direction along an axis, as of a disk: a quarter of its angular radius squared. radius: of
+// the light, or the tangent of a sun's.
+float light_blur(int kind, vec3 light_position, float radius, vec3 position)
+{
+  vec3 offset = position - light_position;
+  float squared = radius * radius / ((kind == LIGHT_SUN) ? 1.0 : max(dot(offset, offset), 1e-8));
+  return 0.25 * min(squared, 1.0);
+}
+
 // How much of a spot light's beam arrives at an angle: one inside, zero outside the cone, smooth over the part
 // `blend` of the way, in cosines, from the cone to the axis.
 float spot_falloff(float cos_angle, float cos_cone, float blend)

@@ -2,6 +2,7 @@
 // How light spreads along a rough fibre: [DEon11] with the roughness of [Chiang16].
 
 #include "include/fibre.glsl"
+#include "include/principled.glsl"
 
 // exp(-x) I0(x) for x >= 0 [Abramowitz64, 9.8.1-2].
 float i0e(float x)
@@ -26,13 +27,6 @@ float d_eon_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float v)
   return i0e(cos_i * cos_o / v) * exp(beside_cone / v) / (v * (1.0 - exp(-2.0 / v)));
 }
 
-// v_R of a longitudinal roughness in [0, 1].
-float variance_from_roughness(float roughness)
-{
-  float deviation = roughness * (0.726 + 0.812 * roughness) + 3.7 * pow(roughness, 20.0);
-  return max(deviation * deviation, 1e-4);
-}
-
 // One lobe of m_lobes(): the view's inclination turned back by the lobe's shift.
 float shifted_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float shift, float v)
 {
@@ -41,15 +35,22 @@ float shifted_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float shi
   return d_eon_lobe(sin_i, cos_i, sin_turned, cos_turned, v);
 }
 
-// M_R, M_TT, M_TRT and M of the residual; tilt_trt: shift of TRT per tilt, in theta_i + theta_o.
-vec4 m_lobes(float sin_theta_i, float sin_theta_o, float tilt, float tilt_trt, float roughness, float coat)
+// M_R, M_TT, M_TRT and M of the residual; tilt_trt: shift of TRT per tilt, in theta_i + theta_o; widening: what is added
+// to each variance.
+vec4 m_lobes(float sin_theta_i,
+             float sin_theta_o,
+             float tilt,
+             float tilt_trt,
+             float roughness,
+             float coat,
+             float widening)
 {
   float cos_i = sin_from_cos(sin_theta_i);
   float cos_o = sin_from_cos(sin_theta_o);
   float v = variance_from_roughness(roughness);
   float v_r = variance_from_roughness((1.0 - coat) * roughness);
-  return vec4(shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, -2.0 * tilt, v_r),
-              shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, tilt, max(0.25 * v, 1e-4)),
-              shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, tilt_trt * tilt, 4.0 * v),
-              d_eon_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, 4.0 * v));
+  return vec4(shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, -2.0 * tilt, v_r + widening),
+              shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, tilt, max(0.25 * v, 1e-4) + widening),
+              shifted_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, tilt_trt * tilt, 4.0 * v + widening),
+              d_eon_lobe(sin_theta_i, cos_i, sin_theta_o, cos_o, 4.0 * v + widening));
 }

@@ -2,6 +2,7 @@
 // [Marschner03] from baked tables: where to look, and how the lobes are put together (Eq. 14).
 
 #include "include/fibre.glsl"
+#include "include/principled.glsl"
 
 const int AXES_ANGLES = 0;
 const int AXES_COSINES = 1;
@@ -23,6 +24,21 @@ vec2 n_coordinates(float phi, float cos_theta_d, int axes)
 {
   float u = (axes == AXES_COSINES) ? 0.5 * cos(phi) + 0.5 : phi / PI;
   return vec2(u, cos_theta_d);
+}
+
+// beta_R of a longitudinal roughness in [0, 1], from 1 to 45 degrees.
+float beta_r_of(float roughness)
+{
+  return clamp(0.5 * deviation_from_roughness(roughness), PI / 180.0, 0.25 * PI);
+}
+
+// M_R, M_TT, M_TRT: Gaussians of theta_h, of unit area in theta_o. tilt_trt: shift of TRT per tilt; blur: variance of the
+// light's direction.
+vec3 gaussian_lobes(float theta_h, float tilt, float tilt_trt, float beta_r, float blur)
+{
+  vec3 beta = sqrt(beta_r * beta_r * vec3(1.0, 0.25, 4.0) + vec3(0.25 * blur));
+  vec3 x = (vec3(theta_h) - tilt * vec3(-1.0, 0.5, tilt_trt)) / beta;
+  return 0.5 * exp(-0.5 * x * x) / (beta * sqrt(2.0 * PI));
 }
 
 // S = sum over p of M_p N_p / cos²(theta_d), from texels m = (M_R, M_TT, M_TRT), n = (N_TT rgb, N_R), n_trt.

@@ -3,19 +3,54 @@
 
 #include "include/lights.glsl"
 
+// Depth as shadows of surfaces are filtered by: what is far behind counts for little beside what is in front, so that a
+// part of it is told from the whole [Lauritzen08].
+const float WARP = 5.0;
+
+float warped_depth(float depth)
+{
+  return -exp(-WARP * max(depth, -0.25));
+}
+
 // Depths of the four layers' far sides behind the first strand, as parts of the hair's extent: thin where light dies.
 const vec4 LAYER_ENDS = vec4(0.007, 0.058, 0.205, 0.5);
 
-// Depth along a light: the distance that its light has come, from the origin's plane in the case of a sun.
-float light_depth(int kind, vec3 light_position, vec3 axis, vec3 position)
+// Depth of what no light meets.
+const float FAR = 2.0;
+
+// Depth along a light: how far its light has come beyond the near side of the hair, as a part of the hair's extent. What
+// is far off on either side counts as a little outside: depths are averaged.
+float light_depth(int kind, vec3 light_position, vec3 axis, float near, float extent, vec3 position)
 {
-  return (kind == LIGHT_SUN) ? dot(axis, position) : distance(light_position, position);
+  float way = (kind == LIGHT_SUN) ? dot(axis, position) : distance(light_position, position);
+  return clamp((way - near) / extent, -1.0, FAR);
 }
 
 // Layers that lie behind a strand at this depth, as parts of the extent: it darkens its own and all deeper ones.
 vec4 layers_behind(float depth)
 {
   return vec4(lessThanEqual(vec4(depth), LAYER_ENDS)) + vec4(0.0, 0.0, 0.0, float(depth > LAYER_ENDS.w));
+}
+
+// The layer that a strand at this depth darkens first.
+int layer_of(float depth)
+{
+  vec4 ends = vec4(greaterThan(vec4(depth), LAYER_ENDS));
+  return min(int(dot(ends, vec4(1.0))), 3);
+}
+
+// Strands are counted in whole numbers of this part of one: sums do not depend on their order.
+const float COUNT_UNIT = 4096.0;
+
+// A front as a whole number, and back.
+uint front_bits(float depth)
+{
+  return floatBitsToUint(depth + 1.0);  // not negative: then bits have the order of floats
+}
+
+float front_of_bits(uint bits)
+{
+  return uintBitsToFloat(bits) - 1.0;
 }
 
 // Strands in front of a depth: linear between the layers' ends, constant beyond the last.

@@ -1,23 +1,39 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The main that every shading model includes: hair_bsdf() summed over the scene's lights, plus the world's light.
+// The main that every shading model includes: hair_bsdf() summed over the scene's lights, plus the world's light, for each
+// sample of a picture in which a strand of this hair is nearest.
 //
-// vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count)  light leaving the fibre towards V for unit irradiance from L
-//                                                          outside the hair, with a mean of `count` strands between
-// vec3 hair_albedo()                                       what the fibre returns of a uniform surrounding
+// vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
+//     light leaving the fibre towards V for unit irradiance from around L outside the hair, with a mean of `count` strands
+//     between; blur: variance of the light's direction along an axis [rad²]
+// void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+//     what it sends back of light from everywhere: the integral over phi, and the same weighted with the cosine of phi
 
 #include "include/fibre.glsl"
 #include "include/shadow.glsl"
+#include "include/this_place.glsl"
 #include "include/world.glsl"
 
 const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not seen beside any light
 
-void main()
+// Radiance towards the viewer of the place that `find_place` found.
+vec3 strand_light()
 {
-  vec3 T = normalize(strand_tangent);
+  vec3 T = strand_tangent;
   vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
-  // A fibre receives light in proportion to its sine with the direction, from either end alike.
-  vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
-  vec3 radiance = world_light(drawn_position, sides, sides, view.hair_forward.rgb) * hair_albedo();
+  vec3 returned;
+  vec3 towards;
+  hair_return(dot(T, V), returned, towards);
+  vec2 seen_at = seen_texel(strand_index, strand_position, view.point_count, view.seen_points, view.row_strands) /
+                 vec2(textureSize(visibility_x_y, 0));
+  mat3 plus;
+  mat3 minus;
+  world_sides(textureLod(visibility_x_y, seen_at, 0.0),
+              textureLod(visibility_z, seen_at, 0.0).xy,
+              view.seen_opacity,
+              view.hair_forward.rgb,
+              plus,
+              minus);
+  vec3 radiance = strand_radiance(plus, minus, T, V, returned, towards);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
@@ -32,15 +48,31 @@ void main()
     float depth;
     float count = 0.0;
     if (shadow_place(light, drawn_position, at, depth)) {
-      irradiance *= lit_part(light, at, depth);
-      count = crossed_strands(light, at, depth);
-      radiance += irradiance * surface_bounce(light, at, depth, count) * hair_albedo();
+      irradiance *= lit_part(at, depth);
+      count = crossed_strands(at, depth);
+      radiance += irradiance * surface_bounce(at, depth, count) * returned;
     }
     // Most of a head of hair lies in the shadow of the rest, where nothing is left to scatter.
     vec3 arriving = irradiance * transmitted(count, view.hair_forward.rgb);
     if (max(arriving.r, max(arriving.g, arriving.b)) > LEAST_IRRADIANCE) {
-      radiance += irradiance * hair_radiance(T, L, V, count);
+      float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
+      radiance += irradiance * hair_radiance(T, L, V, count, blur);
     }
   }
-  color = vec4(radiance, 1.0);
+  return radiance;
+}
+
+void main()
+{
+  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
+  ivec2 size = textureSize(segments, 0);
+  if (any(greaterThanEqual(place, size))) {
+    return;
+  }
+  // Segments of other hair, and no segment at all, are beyond this hair's count either way.
+  uint found = texelFetch(segments, place, 0).r - uint(first_segment);
+  if (found < uint(segment_count)) {
+    find_place(int(found), vec2(place) + 0.5, vec2(size));
+    imageStore(picture, place, vec4(strand_light(), 1.0));
+  }
 }

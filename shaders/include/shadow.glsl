@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Reads the shadow maps of a light: needs the samplers hair_front, hair_layers, surface_front.
+// Reads the shadow maps of a light: needs the samplers hair_front, hair_layers, surface_moments.
 
 #include "include/opacity.glsl"
 
@@ -7,12 +7,15 @@
 const float BOUNCE_REACH = 0.025;
 const float BOUNCE_DISTANCE = 0.25;
 
-// Texel of a point in a light's maps, and its depth along the light; false where the maps do not reach: they hold the
-// hair and what is near it.
+// How far apart a surface and itself may be, as a part of the hair's extent.
+const float SURFACE_BIAS = 0.01;
+
+// Place of a point in a light's maps, and its depth; false where the maps do not reach: they hold the hair and what is
+// near it.
 bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
 {
   at = vec3(0.0);
-  depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, position);
+  depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, position);
   if (light.shadow_layer < 0) {
     return false;
   }
@@ -21,43 +24,48 @@ bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
   return clip.w > 0.0 && at.xy == clamp(at.xy, vec2(0.0), vec2(1.0));
 }
 
-// Part of the light that gets past surfaces.
-float lit_part(Light light, vec3 at, float depth)
+// Part of the light that gets past surfaces: at most this part of those around have a depth beyond it [Donnelly06].
+float lit_part(vec3 at, float depth)
 {
-  // Half a bias either side: a soft step that neither stripes a surface nor lets it shine through itself.
-  float behind = depth - light.surface_bias - textureLod(surface_front, at, 0.0).r;
-  return 1.0 - smoothstep(-0.5, 0.5, behind / light.surface_bias);
+  vec2 moments = textureLod(surface_moments, at, 0.0).rg;
+  float warped = warped_depth(depth - SURFACE_BIAS);
+  float behind = warped - moments.x;
+  float rounding = 0.3 * SURFACE_BIAS * WARP * warped;
+  float variance = max(moments.y - moments.x * moments.x, rounding * rounding);
+  // Where one surface is behind another, the bound is not tight: its tail is cut off.
+  float part = clamp((variance / (variance + behind * behind) - 0.05) / 0.95, 0.0, 1.0);
+  return (behind <= 0.0) ? 1.0 : part;
 }
 
 // Mean number of strands that the light has crossed.
-float crossed_strands(Light light, vec3 at, float depth)
+float crossed_strands(vec3 at, float depth)
 {
-  float behind = max(0.0, depth - textureLod(hair_front, at, 0.0).r) / light.extent;
+  float behind = max(0.0, depth - textureLod(hair_front, at, 0.0).r);
   return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
 }
 
 // How much of the light's way on is barred by a surface near enough to light a strand from below: the mean over places
 // around it, as no surface ends for a strand where it ends for a ray.
-float surface_under(vec3 at, float depth, float extent)
+float surface_under(vec3 at, float depth)
 {
   float barred = 0.0;
   for (int corner = 0; corner < 4; corner++) {
     vec2 offset = BOUNCE_REACH * (2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0);
-    float distance_to = textureLod(surface_front, at + vec3(offset, 0.0), 0.0).r - depth;
-    barred += 1.0 - smoothstep(0.0, BOUNCE_DISTANCE * extent, distance_to);
+    float distance_to = textureLod(surface_moments, at + vec3(offset, 0.0), 0.0).b - depth;
+    barred += 1.0 - smoothstep(0.0, BOUNCE_DISTANCE, distance_to);
   }
   return 0.25 * barred;
 }
 
 // What the surface under the hair sends back to a strand from below, for unit irradiance of the light: through the rest
 // of the hair, off a matt surface, and through the hair again.
-vec3 surface_bounce(Light light, vec3 at, float depth, float count)
+vec3 surface_bounce(vec3 at, float depth, float count)
 {
-  float surface = min(textureLod(surface_front, at, 0.0).r, depth + BOUNCE_DISTANCE * light.extent);
-  float under = max(0.0, crossed_strands(light, at, surface) - count);
+  float surface = min(textureLod(surface_moments, at, 0.0).b, depth + BOUNCE_DISTANCE);
+  float under = max(0.0, crossed_strands(at, surface) - count);
   vec3 way = transmitted(count + 2.0 * under, view.hair_forward.rgb);
   // The mean cosine of a surface that is lit is 2/3, and it fills half of what a strand sees.
-  return view.surface_color.rgb * way * surface_under(at, depth, light.extent) * (2.0 / 3.0) * 0.5 / PI;
+  return view.surface_color.rgb * way * surface_under(at, depth) * (2.0 / 3.0) * 0.5 / PI;
 }
 
 // Part of a light that arrives at a surface: the mean over 3 × 3 texels. forward: what one strand passes on.
@@ -73,7 +81,7 @@ vec3 surface_visibility(Light light, vec3 position, vec3 forward)
   for (int y = -1; y <= 1; y++) {
     for (int x = -1; x <= 1; x++) {
       vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
-      total += lit_part(light, near, depth) * transmitted(crossed_strands(light, near, depth), forward);
+      total += lit_part(near, depth) * transmitted(crossed_strands(near, depth), forward);
     }
   }
   return total / 9.0;

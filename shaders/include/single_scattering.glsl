@@ -3,7 +3,7 @@
 
 #include "include/opacity.glsl"
 
-vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count)
+vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
 {
-  return transmitted(count, view.hair_forward.rgb) * hair_bsdf(T, L, V);
+  return transmitted(count, view.hair_forward.rgb) * hair_bsdf(T, L, V, blur);
 }

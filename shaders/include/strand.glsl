@@ -12,11 +12,22 @@ void strip_vertex(int vertex, int point_count, out int strand, out int point, ou
   side = float(2 * (local - 2 * point) - 1);
 }
 
+// Every how many-th point of a strand has a texel of its own in the visibility textures.
+const int SEEN_STEP = 4;
+
 // Texel of a point: each row of the texture holds `row_strands` whole strands.
 ivec2 strand_texel(int strand, int point, int point_count, int row_strands)
 {
   int row = strand / row_strands;
   return ivec2((strand - row * row_strands) * point_count + point, row);
+}
+
+// Place in the visibility textures, in texels, of a position from root 0 to tip 1: neighbours in a row are of one strand.
+vec2 seen_texel(int strand, float position, int point_count, int seen_points, int row_strands)
+{
+  int row = strand / row_strands;
+  float point = position * float(point_count - 1) / float(SEEN_STEP);
+  return vec2(float((strand - row * row_strands) * seen_points) + point, float(row)) + 0.5;
 }
 
 // Unit vector across the strip, facing the viewer; any perpendicular where the strand points at the viewer.

@@ -1,18 +1,51 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The even light of the world, as far as it gets through hair and past surfaces: six sides, each with the number of
-// strands on the way out. Needs the samplers volume_x_y (+x, -x, +y, -y) and volume_z (+z, -z).
+// The light of the world, as far as it gets through hair and past surfaces: six sides, each with its own radiance and the
+// part of its directions that is open, `sphere.SIDES` as +x -x +y -y and +z -z.
 
-#include "include/opacity.glsl"
+#include "include/fibre.glsl"
 
-// World light that arrives at a position, the mean over the sides. plus, minus: weights of the sides +x +y +z and
-// -x -y -z; forward: what one strand passes on.
-vec3 world_light(vec3 position, vec3 plus, vec3 minus, vec3 forward)
+// Part of light that is left for each channel where strands of an opacity would leave a part `seen`.
+vec3 seen_through(float seen, float opacity, vec3 forward)
 {
-  vec3 at = (position - lights.volume_low.xyz) / max(lights.volume_size.xyz, vec3(1e-9));
-  vec4 x_y = textureLod(volume_x_y, at, 0.0);
-  vec2 z = textureLod(volume_z, at, 0.0).xy;
-  vec3 arriving = plus.x * transmitted(x_y.x, forward) + minus.x * transmitted(x_y.y, forward) +
-                  plus.y * transmitted(x_y.z, forward) + minus.y * transmitted(x_y.w, forward) +
-                  plus.z * transmitted(z.x, forward) + minus.z * transmitted(z.y, forward);
-  return view.world_radiance.rgb * arriving / (dot(plus, vec3(1.0)) + dot(minus, vec3(1.0)));
+  return pow(vec3(max(seen, 1e-6)), (vec3(1.0) - forward) / opacity);
+}
+
+// Radiance that arrives from the sides +x +y +z and -x -y -z, a column each. seen: for strands of an opacity; forward: what one passes on.
+void world_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, out mat3 plus, out mat3 minus)
+{
+  plus[0] = lights.world[0].rgb * seen_through(seen_x_y.x, opacity, forward);
+  minus[0] = lights.world[1].rgb * seen_through(seen_x_y.y, opacity, forward);
+  plus[1] = lights.world[2].rgb * seen_through(seen_x_y.z, opacity, forward);
+  minus[1] = lights.world[3].rgb * seen_through(seen_x_y.w, opacity, forward);
+  plus[2] = lights.world[4].rgb * seen_through(seen_z.x, opacity, forward);
+  minus[2] = lights.world[5].rgb * seen_through(seen_z.y, opacity, forward);
+}
+
+// Irradiance of a surface with the normal N.
+vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
+{
+  vec3 irradiance = vec3(0.0);
+  for (int axis = 0; axis < 3; axis++) {
+    // Squared cosines share the half sphere out among three sides.
+    irradiance += PI * N[axis] * N[axis] * (N[axis] > 0.0 ? plus[axis] : minus[axis]);
+  }
+  return irradiance;
+}
+
+// Radiance of a strand towards V. returned: what it sends back of light from everywhere; towards: the moment of that over
+// the cosine of phi, by which it sends more to where the light comes from, or less.
+vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 towards)
+{
+  // A fibre receives light in proportion to its sine with the direction, from either end alike.
+  vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
+  float sin_theta_o = dot(T, V);
+  // sin(T, side) cos(phi) of each side: V across the strand.
+  vec3 across = (V - sin_theta_o * T) / max(sin_from_cos(sin_theta_o), 1e-4);
+  vec3 radiance = vec3(0.0);
+  for (int axis = 0; axis < 3; axis++) {
+    vec3 even = sides[axis] * returned;
+    vec3 uneven = 2.0 * across[axis] * towards;
+    radiance += plus[axis] * (even + uneven) + minus[axis] * (even - uneven);
+  }
+  return radiance / (2.0 * dot(sides, vec3(1.0)));
 }

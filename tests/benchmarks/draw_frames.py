@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What drawing hair costs: milliseconds for upload, shadow maps and a frame, one sample a pixel, on the sample head.
+"""What drawing hair costs: milliseconds for upload, shadow maps and a frame, on the sample head.
 
 .venv/bin/python tests/benchmarks/draw_frames.py --strands 10000 100000
 """
@@ -22,9 +22,18 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
 import head  # the samples' scene
 
 import hair_addon
-from hair_addon.blender import drawing, drawn_scene, pipeline, scene
+from hair_addon.blender import (
+    drawing,
+    drawn_scene,
+    hair_buffer,
+    hair_shading,
+    pipeline,
+    scene,
+    strand_textures,
+    visibility,
+)
 from hair_addon.core import groom
-from hair_addon.core.shading import kajiya_kay, lookup_tables
+from hair_addon.core.shading import kajiya_kay, lookup_tables, strand_tables, strand_variation
 
 REPETITIONS = 15
 
@@ -40,28 +49,29 @@ def median_milliseconds(work, repetitions=REPETITIONS):
 
 
 class Frame:
-    """A framebuffer of one sample a pixel, and the view of the scene's camera into it."""
+    """A picture of some samples a pixel, and the view of the scene's camera into it."""
 
-    def __init__(self, width, height):
+    def __init__(self, width, height, samples_per_side):
+        width, height = width * samples_per_side, height * samples_per_side
         depsgraph = bpy.context.evaluated_depsgraph_get()
         camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
         self.view = drawing.view_record(*camera, height, least_width=1.0)
-        self._color = gpu.types.GPUTexture((width, height), format="RGBA16F")
-        self._depth = gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
-        self._framebuffer = gpu.types.GPUFrameBuffer(color_slots=self._color, depth_slot=self._depth)
+        self._buffer = hair_buffer.HairBuffer(width, height)
+        self._pixel = gpu.types.GPUTexture((1, 1), format="RGBA16F")
+        self._end = gpu.types.GPUFrameBuffer(color_slots=self._pixel)
 
     def draw(self, drawn):
-        """Draw a `DrawnScene` and wait until that is done."""
-        with self._framebuffer.bind():
-            self._framebuffer.clear(color=(0.0, 0.0, 0.0, 1.0), depth=1.0)
-            drawn_scene.draw_surfaces(drawn, self.view)
-            drawn_scene.draw_hair(drawn, self.view)
-            self.wait()
+        """Draw a `DrawnScene` as a viewport does, whose surfaces Blender shades, and wait until that is done."""
+        with self._buffer.surfaces():
+            drawn_scene.draw_hiding(drawn, self.view)
+        drawn_scene.draw_hair(drawn, self.view, self._buffer)
+        self.wait()
 
     def wait(self):
         """Wait until all that was drawn before is done: what is read has to be there."""
-        with self._framebuffer.bind():
-            self._framebuffer.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
+        with self._end.bind():
+            drawing.resolve(self._buffer.color, 1)
+            self._end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
 
 
 def strands_between(guides, strand_count, device):
@@ -81,20 +91,32 @@ def strands_between(guides, strand_count, device):
 def measure(drawn, frame, points, radii):
     """{what: milliseconds} of these strands in place of the scene's hair."""
     _strands, _shading, to_world, *growing_on = drawn.hair[0]
-    uploaded = [drawing.upload_strands(points, radii)]
+    uploaded = [strand_textures.upload_strands(points, radii)]
 
     def upload():
         uploaded.clear()  # not two of them at a time
-        uploaded.append(drawing.upload_strands(points, radii))
+        uploaded.append(strand_textures.upload_strands(points, radii))
         frame.wait()
 
     def draw_shadows():
-        drawn.shadow_maps.draw(drawn.lights, [(uploaded[0], to_world)], [batch for batch, _ in drawn.surfaces])
+        drawn.shadow_maps.draw(
+            drawn.lights, [(uploaded[0], to_world)], [surface.batch for surface, _ in drawn.surfaces]
+        )
         frame.wait()
 
-    found = {"upload": median_milliseconds(upload, 3), "shadow maps": median_milliseconds(draw_shadows)}
+    def see_world():
+        seen = visibility.measure([(uploaded[0], to_world)], [surface for surface, _ in drawn.surfaces], [0.6])
+        frame.wait()
+        return seen
+
+    found = {
+        "upload": median_milliseconds(upload, 3),
+        "shadow maps": median_milliseconds(draw_shadows),
+        "visibility": median_milliseconds(see_world, 3),
+    }
+    seen, _surfaces = see_world()
     for label, shading in shadings().items():
-        shown = replace(drawn, hair=[(uploaded[0], shading, to_world, *growing_on)])
+        shown = replace(drawn, hair=[(uploaded[0], shading, to_world, *growing_on)], hair_visibility=seen)
         found[label] = median_milliseconds(lambda shown=shown: frame.draw(shown))
     return found
 
@@ -102,10 +124,14 @@ def measure(drawn, frame, points, radii):
 def shadings():
     """{model: `Shading`} of the models that are timed."""
     fibres = {mode: lookup_tables.Settings(mode=mode, sigma_a=head.CHESTNUT) for mode in ("classic", "energy")}
+    variation = strand_variation.Settings(pigment=head.CHESTNUT, random_color=0.5, tip_absorption=0.5)
     return {
-        "Kajiya-Kay": drawing.kajiya_kay_shading(kajiya_kay.Settings()),
-        "Marschner": drawing.marschner_shading(lookup_tables.bake(fibres["classic"])),
-        "dual scattering": drawing.marschner_shading(lookup_tables.bake(fibres["energy"])),
+        "Kajiya-Kay": hair_shading.kajiya_kay_shading(kajiya_kay.Settings()),
+        "Marschner": hair_shading.marschner_shading(lookup_tables.bake(fibres["classic"])),
+        "dual scattering": hair_shading.marschner_shading(lookup_tables.bake(fibres["energy"])),
+        "the same, strands that differ": hair_shading.marschner_strand_shading(
+            strand_tables.bake(fibres["energy"], variation)
+        ),
     }
 
 
@@ -114,6 +140,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--strands", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
     parser.add_argument("--size", type=int, nargs=2, default=[1920, 1080], metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--samples-per-side", type=int, default=1, help="samples along each side of a pixel")
     parser.add_argument("--device", default="cpu", help="the Warp device that makes the strands")
     options = parser.parse_args()
     hair_addon.register()
@@ -122,10 +149,10 @@ def main():
     guides, _hair = head.grow(head.build(), strand_count=1000)
     head.light()
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
-    frame = Frame(*options.size)
+    frame = Frame(*options.size, options.samples_per_side)
     print(
-        "{} × {} on {}, {}, median [ms]".format(
-            *options.size, gpu.platform.renderer_get(), gpu.platform.backend_type_get()
+        "{} × {}, {} samples a pixel, on {}, {}, median [ms]".format(
+            *options.size, options.samples_per_side**2, gpu.platform.renderer_get(), gpu.platform.backend_type_get()
         )
     )
     for strand_count in options.strands:

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core.shading import absorption_slices, lookup_tables, texel_kernels
+from hair_addon.core.shading import absorption_slices, appearance, lookup_tables, strand_tables, texel_kernels
 
 
 def median_time(way, repetitions=7):
@@ -29,13 +29,16 @@ def devices():
 def test_bake(mode, monkeypatch):
     """Printed: times and their ratio to NumPy's. Asserted: how often kernels are launched, whatever the size."""
     settings = lookup_tables.Settings(mode=mode)
+    varied = appearance.strand_settings(appearance.Appearance(random_color=0.5, tip_absorption=0.5))
     numpy_time = median_time(lambda: lookup_tables.bake(settings))
     for device in devices():
         tables = median_time(lambda device=device: lookup_tables.bake(settings, device))
         slices = median_time(lambda device=device: absorption_slices.bake(settings, (0.0, 9.0), device=device), 3)
+        strands = median_time(lambda device=device: strand_tables.bake(settings, varied, device), 3)
         name = "NumPy" if device == "cpu" else device
         print(f"\n{mode:8} {name:8} tables {1e3 * tables:7.1f} ms  {tables / numpy_time:5.2f} × NumPy", end="")
         print(f"   {absorption_slices.SLICE_COUNT} slices {1e3 * slices:7.1f} ms", end="")
+        print(f"   strands that differ {1e3 * strands:7.1f} ms", end="")
 
     launches = []
     launch = wp.launch

@@ -11,7 +11,14 @@ _WIDTH = 64  # of the picture; rows as needed
 _COMPONENTS = {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 
 # The parts of a shading model that are no function of their arguments.
-_MAIN = ("include/shade_strand.glsl", "include/shadow.glsl", "include/world.glsl")
+_MAIN = (
+    "include/shade_strand.glsl",
+    "include/shadow.glsl",
+    "include/world.glsl",
+    "include/hair_return.glsl",
+    "include/this_place.glsl",
+    "include/segment.glsl",
+)
 
 
 def source(*names):
@@ -26,19 +33,19 @@ def source(*names):
     return "\n".join(text) + "\n"
 
 
-def evaluate(text, returns, expression, *, textures=None, structs="", blocks=None, **inputs):
+def evaluate(text, returns, expression, *, textures=None, volumes=(), structs="", blocks=None, **inputs):
     """Values of a GLSL expression, (N,) or (N, components) float32.
 
     text: GLSL before the expression, such as `source("include/fibre.glsl")`; returns: the expression's type;
     inputs: (N,) or (N, 2..4) arrays that the expression knows by their names, integers as int and the rest as float or
-    vec; textures: {sampler: GPUTexture}; structs: the text that declares the types of blocks; blocks: uniform blocks,
-    {instance: (type, record)}.
+    vec; textures: {sampler: GPUTexture}; volumes: samplers that are three-dimensional; structs: the text that declares
+    the types of blocks; blocks: uniform blocks, {instance: (type, record)}.
     """
     textures, blocks = textures or {}, blocks or {}
     inputs = {name: np.asarray(values) for name, values in inputs.items()}
     count = len(next(iter(inputs.values())))
     size = (_WIDTH, -(-count // _WIDTH))
-    program = _program(text, returns, expression, inputs, textures, structs, blocks)
+    program = _program(text, returns, expression, inputs, textures, volumes, structs, blocks)
     samplers = {f"{name}_input": _texture(values, size) for name, values in inputs.items()} | textures
     buffers = {name: uniforms.uniform_buffer(record) for name, (_type, record) in blocks.items()}
     target = gpu.types.GPUTexture(size, format="RGBA32F")
@@ -51,18 +58,20 @@ def evaluate(text, returns, expression, *, textures=None, structs="", blocks=Non
         for name, buffer in buffers.items():
             program.uniform_block(name, buffer)
         triangle.draw(program)
+        # A program freed while it is bound is taken for bound when another one comes to lie where it lay.
+        gpu.shader.unbind()
         pixels = np.array(framebuffer.read_color(0, 0, *size, 4, 0, "FLOAT"), np.float32)
     values = pixels.reshape(-1, 4)[:count, : _COMPONENTS[returns]]
     return values[:, 0] if returns == "float" else values
 
 
-def _program(text, returns, expression, inputs, textures, structs, blocks):
+def _program(text, returns, expression, inputs, textures, volumes, structs, blocks):
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(structs)
     for slot, (name, (type_name, _record)) in enumerate(blocks.items()):
         info.uniform_buf(slot, type_name, name)
     for slot, name in enumerate([*(f"{name}_input" for name in inputs), *textures]):
-        info.sampler(slot, "FLOAT_2D", name)
+        info.sampler(slot, "FLOAT_3D" if name in volumes else "FLOAT_2D", name)
     reads = "".join(_read(name, values) for name, values in inputs.items())
     zeros = ", 0.0" * (4 - _COMPONENTS[returns])
     info.vertex_source(shaders.expand("cover.vert")[0])

@@ -20,6 +20,14 @@ def points(curves_object):
     return positions.reshape(len(curves.curves), -1, 3)
 
 
+def evaluated_points(curves_object):
+    """(S, P, 3) float32 in local coordinates of what Blender renders: after the object's modifiers."""
+    curves = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    positions = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", positions.ravel())
+    return positions.reshape(len(curves.curves), -1, 3)
+
+
 def write_points(curves_object, positions):
     """Move the points of Curves as a brush does, and let Blender notice."""
     flat = np.ascontiguousarray(positions, np.float32).ravel()

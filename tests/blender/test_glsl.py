@@ -3,9 +3,8 @@
 
 import numpy as np
 import pytest
-from scipy.stats import poisson
 
-from hair_addon.blender import drawing, uniforms
+from hair_addon.blender import hair_shading, strand_textures, uniforms
 from hair_addon.core.shading import (
     angles,
     dual_scattering,
@@ -108,7 +107,7 @@ def test_kajiya_kay_specular(fibres, exponent):
 
 def test_kajiya_kay_reflection(fibres):
     settings = kajiya_kay.Settings(diffuse_color=(0.9, 0.4, 0.1), specular_color=(0.3, 0.2, 0.7), exponent=30.0)
-    shader = shading_model("kajiya_kay.frag", settings, "hair_bsdf(T, L, V)", **fibres)
+    shader = shading_model("kajiya_kay.comp", settings, "hair_bsdf(T, L, V, 0.0)", **fibres)
     T, L, V = doubles(fibres)
     regular = angles.sin_from_cos(np.sum(T * L, axis=-1)) > 1e-2  # its diffuse part is a root, see above
     assert_twins(shader[regular], kajiya_kay.kajiya_kay(T, L, V, settings)[regular], 1e-5)
@@ -122,22 +121,55 @@ def test_kajiya_kay_albedo_is_the_mean_answer_to_a_uniform_surrounding(exponent,
     theta_i, theta_o = (grid.ravel() for grid in np.meshgrid(theta, theta))
     directions = [np.stack([np.cos(t), np.zeros_like(t), np.sin(t)], axis=-1) for t in (theta_i, theta_o)]
     T = np.broadcast_to([0.0, 0.0, 1.0], directions[0].shape)
-    reflected = shading_model("kajiya_kay.frag", settings, "hair_bsdf(T, L, V)", T=T, L=directions[0], V=directions[1])
+    reflected = shading_model(
+        "kajiya_kay.comp", settings, "hair_bsdf(T, L, V, 0.0)", T=T, L=directions[0], V=directions[1]
+    )
     # It does not depend on the azimuth, which is 2 pi of the solid angle 2 pi cos(theta) d(theta).
     over_lights = 2.0 * np.pi * (reflected * np.cos(theta_i)[:, None]).reshape(180, 180, 3).sum(axis=1) * np.pi / 180
     mean = np.average(over_lights, axis=0, weights=np.cos(theta))
-    albedo = shading_model("kajiya_kay.frag", settings, "hair_albedo()", T=T[:1])[0]
+    returned = (
+        "vec3 returned(float sin_theta_o)\n{\n  vec3 all;\n  vec3 towards;\n"
+        "  hair_return(sin_theta_o, all, towards);\n  return all;\n}\n"
+    )
+    albedo = shading_model("kajiya_kay.comp", settings, "returned(T.x)", more=returned, T=T[:1])[0]
     np.testing.assert_allclose(albedo, mean, rtol=tolerance)
 
 
-def shading_model(fragment, settings, expression, textures=None, **inputs):
-    """A function of a .frag, with its settings in a uniform block as when hair is drawn."""
+def shading_model(fragment, settings, expression, textures=None, more="", **inputs):
+    """A function of a .frag, or of more GLSL after it, with its settings in a uniform block as when hair is drawn."""
     structs = uniforms.VIEW.source + uniforms.settings_block(type(settings)).source
     view = uniforms.VIEW.record()
     view["back_gain"] = dual_scattering.BACK_GAIN
     blocks = {"view": ("View", view), "settings": ("Settings", uniforms.fill(settings))}
-    text = glsl.source(fragment)
+    text = glsl.source(fragment) + more
     return glsl.evaluate(text, "vec3", expression, structs=structs, blocks=blocks, textures=textures, **inputs)
+
+
+@pytest.mark.parametrize("model", ["kajiya_kay.comp", "energy_conserving.comp"])
+@pytest.mark.parametrize("width", [0.1, 0.5])
+def test_a_wide_light_is_as_many_narrow_ones(rng, model, width):
+    """Light from a stripe of inclinations [rad], one direction after the other and all at once."""
+    if model == "kajiya_kay.comp":
+        settings, textures = kajiya_kay.Settings(diffuse_color=(0.0, 0.0, 0.0), exponent=60.0), {}
+    else:
+        settings = lookup_tables.Settings(mode="energy", size=64, roughness=0.3)
+        textures = hair_shading.marschner_shading(lookup_tables.bake(settings)).samplers
+    theta_i, theta_o = rng.uniform(-0.4, 0.4, (2, 200))
+    phi = rng.uniform(0.0, np.pi, 200)
+    tangent = np.broadcast_to([0.0, 0.0, 1.0], (200, 3))
+    view = np.stack([np.cos(theta_o), np.zeros(200), np.sin(theta_o)], axis=-1)
+
+    def radiance(theta, blur):
+        light = np.stack([np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)], axis=-1)
+        expression = f"hair_bsdf(T, L, V, {blur})"
+        return shading_model(model, settings, expression, textures=textures, T=tangent, L=light, V=view)
+
+    stripe = width * ((np.arange(24) + 0.5) / 24 - 0.5)
+    many = np.mean([radiance(theta_i + offset, 0.0) for offset in stripe], axis=0)
+    once = radiance(theta_i, width**2 / 12.0)
+    np.testing.assert_allclose(once, many, rtol=0.05, atol=0.08 * many.max())
+    if width > 0.2:  # it is seen at all
+        assert np.abs(radiance(theta_i, 0.0) - many).max() > 0.16 * many.max()
 
 
 # Marschner
@@ -169,8 +201,8 @@ def test_lobes_are_put_together(rng):
 def test_marschner_reflection_is_read_from_the_tables(fibres, axes):
     """The whole of hair_bsdf() on real textures equals the tables' own sampling times cos(theta_i)."""
     tables = lookup_tables.bake(lookup_tables.Settings(size=64, axes=axes))
-    textures = drawing.marschner_shading(tables).samplers
-    shader = shading_model("marschner.frag", tables.settings, "hair_bsdf(T, L, V)", textures=textures, **fibres)
+    textures = hair_shading.marschner_shading(tables).samplers
+    shader = shading_model("marschner.comp", tables.settings, "hair_bsdf(T, L, V, 0.0)", textures=textures, **fibres)
     halves = lookup_tables.Tables(*(texels(table) for table in (tables.m, tables.n, tables.n_trt)), tables.settings)
     at = angles.fibre_angles(*doubles(fibres))
     python = lookup_tables.sample_scattering(halves, at) * np.cos(at.theta_i)[:, None]
@@ -193,7 +225,7 @@ def test_bessel_function_without_its_overflow():
 @pytest.mark.parametrize("roughness", [0.1, 0.3, 1.0])
 def test_longitudinal_lobes(sines, roughness):
     sin_i, sin_o = (np.clip(values, -1.0, 1.0) for values in sines)
-    text, expression = glsl.source("include/longitudinal.glsl"), f"m_lobes(i, o, 0.1, 4.0, {roughness}, 0.4)"
+    text, expression = glsl.source("include/longitudinal.glsl"), f"m_lobes(i, o, 0.1, 4.0, {roughness}, 0.4, 0.0)"
     shader = glsl.evaluate(text, "vec4", expression, i=sin_i, o=sin_o)
     settings = lookup_tables.Settings(mode="energy", tilt=0.1, roughness=roughness, coat=0.4)
     python = energy_conserving.m_lobes(*(np.arcsin(values.astype(np.float64)) for values in (sin_i, sin_o)), settings)
@@ -205,8 +237,8 @@ def test_longitudinal_lobes(sines, roughness):
 def test_energy_conserving_reflection_is_read_from_the_tables(fibres, axes):
     settings = lookup_tables.Settings(mode="energy", size=64, axes=axes, roughness=0.4, coat=0.5)
     tables = lookup_tables.bake(settings)
-    textures = drawing.marschner_shading(tables).samplers
-    shader = shading_model("energy_conserving.frag", settings, "hair_bsdf(T, L, V)", textures=textures, **fibres)
+    textures = hair_shading.marschner_shading(tables).samplers
+    shader = shading_model("energy_conserving.comp", settings, "hair_bsdf(T, L, V, 0.0)", textures=textures, **fibres)
     arrays = (tables.m, tables.n, tables.n_trt, tables.n_res)
     m, n, n_trt, n_res = (texels(table) for table in arrays)
     halves = lookup_tables.Tables(m, n, n_trt, settings, n_res)
@@ -220,10 +252,10 @@ def test_energy_conserving_reflection_is_read_from_the_tables(fibres, axes):
 def test_dual_scattering_is_read_from_the_tables(fibres, rng):
     settings = lookup_tables.Settings(mode="energy", size=64, roughness=0.4, sigma_a=(0.1, 0.3, 0.8))
     tables = lookup_tables.bake(settings)
-    textures = drawing.marschner_shading(tables).samplers
+    textures = hair_shading.marschner_shading(tables).samplers
     count = rng.uniform(0.0, 6.0, len(fibres["T"])).astype(np.float32)
-    expression = "hair_radiance(T, L, V, count)"
-    shader = shading_model("energy_conserving.frag", settings, expression, textures=textures, count=count, **fibres)
+    expression = "hair_radiance(T, L, V, count, 0.0)"
+    shader = shading_model("energy_conserving.comp", settings, expression, textures=textures, count=count, **fibres)
     halves = lookup_tables.Tables(*map(texels, (tables.m, tables.n, tables.n_trt)), settings, texels(tables.n_res))
     at = angles.fibre_angles(*doubles(fibres))
     python = dual_scattering.sample_radiance(halves, dual_scattering.bake(tables), at, count.astype(np.float64))
@@ -270,7 +302,7 @@ def test_strip_passes_every_side_of_every_point_once_apart_from_its_ends(strip):
 def test_strand_texture_holds_the_points_where_the_shader_looks(rng, strand_count, point_count):
     points = rng.random((strand_count, point_count, 3), dtype=np.float32)
     radii = rng.random((strand_count, point_count), dtype=np.float32)
-    uploaded = drawing.upload_strands(points, radii)
+    uploaded = strand_textures.upload_strands(points, radii)
     strand, point = (grid.ravel() for grid in np.indices((strand_count, point_count)))
     found = glsl.evaluate(
         glsl.source("include/strand.glsl"),
@@ -339,7 +371,8 @@ def test_an_even_medium_is_counted_exactly():
 
 def test_transmitted_light_is_the_mean_over_a_random_number_of_strands():
     means, forward = (grid.ravel() for grid in np.meshgrid([0.0, 0.1, 1.0, 7.0, 30.0], [0.0, 0.2, 0.9, 1.0]))
-    strands = np.arange(200)
-    expected = np.sum(poisson.pmf(strands, means[:, None]) * forward[:, None] ** strands, axis=1)
+    strands = np.arange(1, 200)
+    later = np.cumprod(means[:, None] / strands, axis=1)  # of Poisson's probabilities, by the first
+    expected = np.exp(-means) * (1.0 + np.sum(later * forward[:, None] ** strands, axis=1))
     shader = opacity("transmitted(mean, vec3(forward)).g", mean=means, forward=forward)
     assert_twins(shader, expected, 1e-6)

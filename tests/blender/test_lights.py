@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Euler, Matrix
 
-from hair_addon.blender import scene as door
+from hair_addon.blender import lights as door
 from hair_addon.blender import uniforms
 from tests.blender import glsl
 
@@ -128,8 +128,10 @@ def test_irradiance_equals_cycles(wall, tmp_path, name):
         settings = {"size": SMALL, "size_y": 2.0 * SMALL, **settings}
     add_light(wall, kind, matrix, **settings)
     rendered = cycles_irradiance(wall, tmp_path)
-    lights = door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)
-    assert lights["count"] == 1
+    lamps = door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)
+    assert len(lamps) == 1
+    lights = uniforms.LIGHTS.record()
+    lights["light"][:1] = lamps
     computed = shader_irradiance(lights)
     assert rendered.max() > 0.0
     # A pixel may lie where a hard cone ends for one part of the light and not for another.
@@ -138,4 +140,4 @@ def test_irradiance_equals_cycles(wall, tmp_path, name):
 
 
 def test_a_scene_without_lights_is_dark(wall):
-    assert door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)["count"] == 0
+    assert len(door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)) == 0

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Depth without light: the colour is drawn over by the pass that follows.
+// A surface that Blender draws: here it only hides the hair behind it.
 
 void main()
 {

@@ -4,7 +4,8 @@
 #include "include/fibre.glsl"
 #include "include/marschner.glsl"
 
-vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)
+// M is as it was baked, for light from one direction: the blur of a light with a size is left out.
+vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
 {
   float sin_theta_i = dot(T, L);
   float sin_theta_o = dot(T, V);
@@ -17,10 +18,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V)
   return marschner_scattering(m, n, n_trt, cosine) * sin_from_cos(sin_theta_i);
 }
 
-vec3 hair_albedo()
-{
-  return view.hair_albedo.rgb;
-}
+#include "include/hair_return.glsl"
 
 #include "include/single_scattering.glsl"
 #include "include/shade_strand.glsl"

@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What ties hair to its guides, kept while an artist combs them: by the hair's session, without Blender's data.
+
+Nothing here is the truth. All of it follows from the surface, the guides, the settings and the roots that the hair's
+Curves store, and may be forgotten at any time: the next change of a guide then searches once more.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..core import groom
+from ..core.groom import HairBinding, HairSettings
+from ..core.strands import Strands
+from .scene import Surface
+
+
+@dataclass
+class BoundHair:
+    """Hair as it is now, ahead of its datablock while `is_written` is not."""
+
+    binding: HairBinding
+    settings: HairSettings
+    root_key: str  # of `pipeline.root_key`
+    guides: Strands  # as they were when the hair followed them last
+    guide_uid: int  # session_uid of their Curves
+    surface: Surface
+    points: np.ndarray  # (S, P, 3) float32 at rest, in the surface's local coordinates
+    is_written: bool = False  # whether the datablock holds these points
+    has_moved_only: bool = False  # whether what is not written is where points are, and nothing else
+
+    @property
+    def radii(self):
+        """(P,) float32 along every strand, in the surface's local units."""
+        return groom.strand_radii(self.settings, self.points.shape[1]) / np.float32(self.surface.scale)
+
+    @cached_property
+    def reach(self):
+        """The strands that follow each guide."""
+        from ..core import interpolation
+
+        return interpolation.reach(self.binding.guide_weights, len(self.guides))
+
+
+_bound = {}  # session_uid → BoundHair
+
+
+def keep(datablock, bound):
+    """Keep what a hair Curves datablock is bound by."""
+    _bound[datablock.session_uid] = bound
+
+
+def of(datablock):
+    """The `BoundHair` of a hair Curves datablock, or None."""
+    return _bound.get(datablock.session_uid)
+
+
+def forget(datablock):
+    """Drop what is known of a datablock that was changed by somebody else."""
+    _bound.pop(datablock.session_uid, None)
+
+
+def clear():
+    """Drop everything: after undo, with a new file."""
+    _bound.clear()
+
+
+def has_unwritten():
+    """Whether any hair is ahead of its datablock."""
+    return any(not bound.is_written for bound in _bound.values())

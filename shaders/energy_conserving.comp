@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The energy-conserving Marschner model [DEon11] [Chiang16]: M evaluated, N from baked tables at theta_o.
+
+#include "include/constants.glsl"
+#include "include/lobe_sum.glsl"
+
+float fibre_roughness()
+{
+  return settings.roughness;
+}
+
+vec3 fibre_residual(vec2 at)
+{
+  return textureLod(n_res_table, vec2(0.5, at.y), 0.0).rgb;
+}
+
+FibreLobes fibre_lobes(vec2 at)
+{
+  return FibreLobes(textureLod(n_table, at, 0.0), textureLod(n_trt_table, at, 0.0).rgb, fibre_residual(at));
+}
+
+FibreLobes half_circle_lobes(vec2 at)
+{
+  return FibreLobes(textureLod(n_g_table, at, 0.0), textureLod(n_g_trt_table, at, 0.0).rgb, fibre_residual(at));
+}
+
+vec3 dual(int row, float theta_i)
+{
+  return textureLod(dual_table, vec2(theta_i / PI + 0.5, (float(row) + 0.5) / 9.0), 0.0).rgb;
+}
+
+#include "include/dual_radiance.glsl"
+#include "include/hair_return.glsl"
+#include "include/shade_strand.glsl"

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The energy-conserving Marschner model for strands that differ in absorption and roughness.
+
+#include "include/this_fibre.glsl"
+
+float fibre_roughness()
+{
+  return this_roughness();
+}
+
+vec4 half_circle_channel(vec2 at, float sigma_a)
+{
+  float slice_count = float(textureSize(n_g_slices, 0).z);
+  vec2 place = slice_of(sigma_a, slices.low, slices.high, int(slice_count));
+  vec4 below = textureLod(n_g_slices, vec3(at, (place.x + 0.5) / slice_count), 0.0);
+  vec4 above = textureLod(n_g_slices, vec3(at, (place.x + 1.5) / slice_count), 0.0);
+  return geometric_mix(below, above, place.y);
+}
+
+FibreLobes half_circle_lobes(vec2 at)
+{
+  vec3 sigma_a = this_sigma_a();
+  return side_by_side(half_circle_channel(at, sigma_a.r),
+                      half_circle_channel(at, sigma_a.g),
+                      half_circle_channel(at, sigma_a.b));
+}
+
+// Of the strands around, which have turned from root to tip as far as this one.
+vec3 dual(int row, float theta_i)
+{
+  float step_count = float(textureSize(dual_table, 0).z);
+  vec3 at = vec3(theta_i / PI + 0.5, (float(row) + 0.5) / 9.0, between_ends(this_gradient(), step_count));
+  return textureLod(dual_table, at, 0.0).rgb;
+}
+
+// As `albedo.azimuthal_moments`: with what the strands behind send back.
+void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+{
+  fibre_return(sin_theta_o, returned, towards);
+  vec3 back = view.back_gain * dual(6, atan(sin_theta_o, sin_from_cos(sin_theta_o)));
+  returned += back;
+  towards = clamp(towards + 4.0 / (PI * PI) * back, -0.5 * returned, 0.5 * returned);
+}
+
+#include "include/dual_radiance.glsl"
+#include "include/shade_strand.glsl"

@@ -1,0 +1,10 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What a strand sends back of light from everywhere, from the table of `albedo.azimuthal_moments`: needs the sampler
+// return_table.
+
+void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+{
+  float u = atan(sin_theta_o, sin_from_cos(sin_theta_o)) / PI + 0.5;
+  returned = textureLod(return_table, vec2(u, 0.25), 0.0).rgb;
+  towards = textureLod(return_table, vec2(u, 0.75), 0.0).rgb;
+}

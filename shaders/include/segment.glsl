@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Segments of strands, each between two neighbouring points, as they lie in a picture: needs the sampler strands.
+
+#include "include/strand.glsl"
+
+// Which strand is drawn at a turn, and from which of its points on a piece runs to where the next one starts.
+int drawn_strand(int turn)
+{
+  int strand = turn + view.first_strand;
+  return (strand < view.strand_count) ? strand : strand - view.strand_count;
+}
+
+int piece_start(int piece)
+{
+  return piece * (view.point_count - 1) / (view.drawn_points - 1);
+}
+
+// A point of a strand and, last, its radius.
+vec4 strand_point(int strand, int point)
+{
+  return texelFetch(strands, strand_texel(strand, point, view.point_count, view.row_strands), 0);
+}
+
+// What of a segment lies in front of the near plane: its two ends.
+struct Segment {
+  vec3 start;  // [samples], and the depth from 0 to 1
+  vec3 end;
+  vec2 w;  // of clip space
+  vec2 half_width;  // [samples]
+  vec2 part;  // where the ends lie between the two points
+};
+
+// Place of a point of clip space: [samples], and the depth from 0 to 1.
+vec3 sample_place(vec4 clip, vec2 size)
+{
+  return (0.5 * clip.xyz / clip.w + 0.5) * vec3(size, 1.0);
+}
+
+vec4 to_clip(vec4 point)
+{
+  return view.object_to_clip * vec4(point.xyz, 1.0);
+}
+
+// False where a segment lies behind the near plane. start, end: its two points in clip space; size: of the picture
+// [samples].
+bool segment_in_front(vec4 start, vec4 end, vec2 radii, vec2 size, out Segment segment)
+{
+  vec2 beyond = vec2(start.z + start.w, end.z + end.w);
+  segment.part = vec2(0.0, 1.0);
+  if (max(beyond.x, beyond.y) <= 0.0) {
+    return false;
+  }
+  if (min(beyond.x, beyond.y) < 0.0) {
+    float crossing = beyond.x / (beyond.x - beyond.y);
+    segment.part = (beyond.x < 0.0) ? vec2(crossing, 1.0) : vec2(0.0, crossing);
+    vec4 way = end - start;
+    end = start + segment.part.y * way;
+    start += segment.part.x * way;
+    radii = mix(radii.xx, radii.yy, segment.part);
+  }
+  segment.w = max(vec2(start.w, end.w), vec2(1e-6));
+  segment.start = sample_place(start, size);
+  segment.end = sample_place(end, size);
+  segment.half_width = radii * (view.object_scale * view.thickness * view.pixels_per_unit) / segment.w;
+  return true;
+}
+
+// How far from the first to the second point a place of the picture lies, on the axis of the segment.
+float place_on_segment(Segment segment, vec2 place)
+{
+  vec2 along = segment.end.xy - segment.start.xy;
+  float on_screen = clamp(dot(place - segment.start.xy, along) / max(dot(along, along), 1e-12), 0.0, 1.0);
+  float near_end = on_screen * segment.w.x;  // what is further away is shorter
+  return mix(segment.part.x, segment.part.y, near_end / mix(segment.w.y, segment.w.x, on_screen));
+}

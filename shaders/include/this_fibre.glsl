@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// N of the absorption where this sample lies: needs the samplers n_slices and return_slices and the block slices.
+
+#include "include/absorption_slices.glsl"
+#include "include/fibre.glsl"
+#include "include/lobe_sum.glsl"
+#include "include/this_strand.glsl"
+
+// N_TT, N_TRT, N of the residual and N_R of one channel's absorption.
+vec4 channel_lobes(vec2 at, float sigma_a)
+{
+  float slice_count = float(textureSize(n_slices, 0).z);
+  vec2 place = slice_of(sigma_a, slices.low, slices.high, int(slice_count));
+  vec4 below = textureLod(n_slices, vec3(at, (place.x + 0.5) / slice_count), 0.0);
+  vec4 above = textureLod(n_slices, vec3(at, (place.x + 1.5) / slice_count), 0.0);
+  return geometric_mix(below, above, place.y);
+}
+
+FibreLobes side_by_side(vec4 red, vec4 green, vec4 blue)
+{
+  return FibreLobes(
+      vec4(red.x, green.x, blue.x, red.w), vec3(red.y, green.y, blue.y), vec3(red.z, green.z, blue.z));
+}
+
+FibreLobes fibre_lobes(vec2 at)
+{
+  vec3 sigma_a = this_sigma_a();
+  return side_by_side(channel_lobes(at, sigma_a.r), channel_lobes(at, sigma_a.g), channel_lobes(at, sigma_a.b));
+}
+
+// A value in [0, 1] as the coordinate of a table whose first and last texel are at its ends.
+float between_ends(float value, float texel_count)
+{
+  return (clamp(value, 0.0, 1.0) * (texel_count - 1.0) + 0.5) / texel_count;
+}
+
+// Of light from everywhere, what one channel's absorption sends back towards theta_o: the integral over phi, and the
+// same weighted with the cosine of phi. As `albedo.fibre_moments`.
+vec2 channel_return(float u, float sigma_a)
+{
+  float along = (sqrt(sigma_a) - slices.low) / max(slices.high - slices.low, 1e-6);
+  return textureLod(return_slices, vec2(u, between_ends(along, float(textureSize(return_slices, 0).y))), 0.0).rg;
+}
+
+void fibre_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+{
+  float u = atan(sin_theta_o, sin_from_cos(sin_theta_o)) / PI + 0.5;
+  vec3 sigma_a = this_sigma_a();
+  vec2 red = channel_return(u, sigma_a.r);
+  vec2 green = channel_return(u, sigma_a.g);
+  vec2 blue = channel_return(u, sigma_a.b);
+  returned = vec3(red.x, green.x, blue.x);
+  towards = vec3(red.y, green.y, blue.y);
+}

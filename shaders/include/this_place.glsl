@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Where on which strand a sample of the picture lies, for all that shades it.
+
+#include "include/segment.glsl"
+
+int strand_index;
+float strand_position;  // root 0 to tip 1
+vec3 strand_tangent;
+vec3 drawn_position;
+
+// Direction of a strand at a point, as long as it may be; any where the strand turns back on itself.
+vec3 tangent_at(vec3 before, vec3 after)
+{
+  vec3 along = after - before;
+  return (dot(along, along) > 0.0) ? along : vec3(0.0, 0.0, 1.0);
+}
+
+// The place on segment `index` of the strands that a sample shows.
+void find_place(int index, vec2 at, vec2 size)
+{
+  int pieces = view.drawn_points - 1;
+  strand_index = index / pieces;
+  int piece = index % pieces;
+  int start = piece_start(piece);
+  int end = piece_start(piece + 1);
+  vec4 first = strand_point(strand_index, start);
+  vec4 second = strand_point(strand_index, end);
+  Segment segment;
+  bool is_in_front = segment_in_front(to_clip(first), to_clip(second), vec2(first.w, second.w), size, segment);
+  float t = is_in_front ? place_on_segment(segment, at) : 0.0;
+  vec3 before = strand_point(strand_index, max(start - 1, 0)).xyz;
+  vec3 after = strand_point(strand_index, min(end + 1, view.point_count - 1)).xyz;
+  vec3 near_start = strand_point(strand_index, start + 1).xyz;
+  vec3 near_end = strand_point(strand_index, end - 1).xyz;
+  vec3 tangent = mix(tangent_at(before, near_start), tangent_at(near_end, after), t);
+  strand_position = mix(float(start), float(end), t) / float(view.point_count - 1);
+  strand_tangent = normalize(mat3(view.object_to_world) * tangent);
+  drawn_position = (view.object_to_world * vec4(mix(first.xyz, second.xyz, t), 1.0)).xyz;
+}

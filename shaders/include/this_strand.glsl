@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// What differs from strand to strand and along each, where this sample lies: needs the sampler strand_randoms and the
+// block variation.
+
+#include "include/constants.glsl"
+#include "include/principled.glsl"
+#include "include/strand_variation.glsl"
+#include "include/this_place.glsl"
+
+float this_random()
+{
+  return texelFetch(strand_randoms, ivec2(strand_index % view.row_strands, strand_index / view.row_strands), 0).r;
+}
+
+float this_gradient()
+{
+  return tip_gradient(variation.gradient_start, variation.gradient_end, strand_position);
+}
+
+vec3 this_sigma_a()
+{
+  return sigma_a_along(variation, this_random(), this_gradient());
+}
+
+float this_roughness()
+{
+  return varied_roughness(settings.roughness, variation.random_roughness, this_random());
+}

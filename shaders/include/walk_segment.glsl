@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Strands as samples of a picture, a thread for each run of segments. Hair is lines a sample wide, for which this is faster
+// than triangles: graphics hardware draws those four samples at a time, software drivers at an even greater cost.
+
+#include "include/segment.glsl"
+
+// Segments that a thread takes one after the other: their points are read and brought into the picture once.
+const int RUN_LENGTH = 8;
+
+// What a program does at the start of a segment, and at each sample that it covers: how far along, and how much of the width
+// that is drawn is the strand's own.
+void begin(int strand, int piece, Segment segment, vec4 first, vec4 second);
+void meet(ivec2 place, float along, float coverage);
+
+// Samples whose centres lie in the segment, column by column along the axis on which it is longer.
+void walk(Segment segment, ivec2 size)
+{
+  vec2 extent = abs(segment.end.xy - segment.start.xy);
+  bool is_steep = extent.y > extent.x;
+  vec2 start = is_steep ? segment.start.yx : segment.start.xy;
+  vec2 end = is_steep ? segment.end.yx : segment.end.xy;
+  ivec2 last_place = (is_steep ? size.yx : size) - 1;
+  int first_column = max(int(ceil(clamp(min(start.x, end.x), -1.0, 1e6) - 0.5)), 0);
+  int last_column = min(int(ceil(clamp(max(start.x, end.x), -1.0, 1e6) - 0.5)) - 1, last_place.x);
+  vec2 way = end - start;
+  // Width across the columns, of a strip that is as wide as the strand across its own axis.
+  float widening = (way.x == 0.0) ? 1.0 : length(way) / abs(way.x);
+  float least_half_width = view.least_half_width * view.pixels_per_unit;
+  for (int column = first_column; column <= last_column; column++) {
+    float along = (float(column) + 0.5 - start.x) / way.x;
+    float true_half_width = mix(segment.half_width.x, segment.half_width.y, along);
+    float half_width = max(true_half_width, least_half_width);
+    float middle = start.y + along * way.y;
+    float reach = half_width * widening;
+    int first_row = max(int(ceil(clamp(middle - reach, -1.0, 1e6) - 0.5)), 0);
+    int last_row = min(int(ceil(clamp(middle + reach, -1.0, 1e6) - 0.5)) - 1, last_place.y);
+    for (int row = first_row; row <= last_row; row++) {
+      meet(is_steep ? ivec2(row, column) : ivec2(column, row), along, true_half_width / half_width);
+    }
+  }
+}
+
+// The run of segments of this thread, between every how many-th point is drawn.
+void walk_run(ivec2 size)
+{
+  int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
+  int index = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
+  int pieces = view.drawn_points - 1;
+  int runs = (pieces + RUN_LENGTH - 1) / RUN_LENGTH;
+  int run = index / runs;
+  if (run >= view.drawn_strands) {
+    return;
+  }
+  int strand = drawn_strand(run);
+  int piece = (index - run * runs) * RUN_LENGTH;
+  int last = min(piece + RUN_LENGTH, pieces);
+  ivec2 root = strand_texel(strand, 0, view.point_count, view.row_strands);
+  vec4 first = texelFetch(strands, root + ivec2(piece_start(piece), 0), 0);
+  vec4 start = to_clip(first);
+  for (; piece < last; piece++) {
+    vec4 second = texelFetch(strands, root + ivec2(piece_start(piece + 1), 0), 0);
+    vec4 end = to_clip(second);
+    Segment segment;
+    if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), segment)) {
+      begin(strand, piece, segment, first, second);
+      walk(segment, size);
+    }
+    first = second;
+    start = end;
+  }
+}

@@ -1,0 +1,22 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The Kajiya-Kay model [Kajiya89], [Report12] Eq. 13.
+
+#include "include/kajiya_kay.glsl"
+
+vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
+{
+  // The integral of sin(T, L) over the sphere is pi², so this diffuse part has the albedo diffuse_color.
+  vec3 diffuse = settings.diffuse_color * kajiya_kay_diffuse(T, L) / (PI * PI);
+  float exponent = blurred_exponent(settings.exponent, blur);
+  float peak = kajiya_kay_specular_albedo(settings.exponent) / kajiya_kay_specular_albedo(exponent);
+  return diffuse + settings.specular_color * (peak * kajiya_kay_specular(T, L, V, exponent));
+}
+
+void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+{
+  returned = settings.diffuse_color + settings.specular_color * kajiya_kay_specular_albedo(settings.exponent);
+  towards = vec3(0.0);
+}
+
+#include "include/single_scattering.glsl"
+#include "include/shade_strand.glsl"

@@ -1,0 +1,12 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A corner of a triangle, with what it sees of the world.
+
+void main()
+{
+  ivec2 texel = ivec2(gl_VertexID % view.row_strands, gl_VertexID / view.row_strands);
+  corner_seen_x_y = texelFetch(visibility_x_y, texel, 0);
+  corner_seen_z = texelFetch(visibility_z, texel, 0).xy;
+  surface_normal = normal;
+  drawn_position = position;
+  gl_Position = view.world_to_clip * vec4(position, 1.0);
+}

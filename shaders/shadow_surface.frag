@@ -1,0 +1,11 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The depth of the surfaces that a light meets first.
+
+#include "include/opacity.glsl"
+
+void main()
+{
+  Light light = lights.light[view.light_index];
+  float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, drawn_position);
+  color = vec4(depth, 0.0, 0.0, 1.0);
+}

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The samples of a picture that strands cover: first the depth of the nearest, then which segment it is.
+
+#include "include/coverage.glsl"
+#include "include/walk_segment.glsl"
+
+vec2 end_depths;
+uint this_index;
+float dash_offset;
+
+void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
+{
+  end_depths = vec2(segment.start.z, segment.end.z);
+  dash_offset = strand_offset(strand) + view.coverage_turn;
+  this_index = uint(first_segment + strand * (view.drawn_points - 1) + piece);
+}
+
+void meet(ivec2 place, float along, float coverage)
+{
+  if (!is_covered(dash_offset, place, coverage)) {
+    return;
+  }
+  // Of floats that are not negative the bits have the same order.
+  uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, along), 0.0));
+  uint nearest = imageLoad(depths, place).r;
+  if (is_depth != 0) {
+    // Most samples lie behind others: to look first is cheaper than to write.
+    if (depth < nearest) {
+      imageAtomicMin(depths, place, depth);
+    }
+  }
+  else if (depth == nearest) {
+    imageAtomicMin(segments, place, this_index);  // the same one at each redraw
+  }
+}
+
+void main()
+{
+  walk_run(imageSize(depths));
+}

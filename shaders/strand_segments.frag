@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Strips of strands as samples of a picture: which segment of which strand, and how deep.
+
+#include "include/coverage.glsl"
+
+void main()
+{
+  if (!is_covered(strand_offset(strand_index) + view.coverage_turn, ivec2(gl_FragCoord.xy), strand_coverage)) {
+    discard;
+  }
+  int pieces = view.drawn_points - 1;
+  int piece = clamp(int(strand_place), 0, pieces - 1);
+  segment = uint(first_segment + strand_index * pieces + piece);
+  depth = floatBitsToUint(gl_FragCoord.z);
+}

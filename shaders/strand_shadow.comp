@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Strands in a deep opacity map: first the depth of the nearest, then how much of them lies in each layer behind it.
+
+#include "include/opacity.glsl"
+#include "include/walk_segment.glsl"
+
+vec2 end_depths;
+
+float depth_of(vec3 point)
+{
+  Light light = lights.light[view.light_index];
+  vec3 place = (view.object_to_world * vec4(point, 1.0)).xyz;
+  return light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, place);
+}
+
+void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
+{
+  end_depths = mix(vec2(depth_of(first.xyz)), vec2(depth_of(second.xyz)), segment.part);
+}
+
+void meet(ivec2 place, float along, float coverage)
+{
+  float depth = mix(end_depths.x, end_depths.y, along);
+  if (is_front != 0) {
+    uint bits = front_bits(depth);
+    if (bits < imageLoad(fronts, place).r) {
+      imageAtomicMin(fronts, place, bits);
+    }
+  }
+  else {
+    float front = texelFetch(hair_front, ivec3(place, lights.light[view.light_index].shadow_layer), 0).r;
+    int layer = layer_of(depth - front);
+    imageAtomicAdd(counts, ivec2(place.x * 4 + layer, place.y), uint(coverage * COUNT_UNIT + 0.5));
+  }
+}
+
+void main()
+{
+  walk_run(imageSize(fronts));
+}

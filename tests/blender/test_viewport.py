@@ -1,0 +1,377 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a viewport shows of hair: the scene's colours, strands of any width at their brightness, no work for nothing."""
+
+import re
+import shutil
+import sys
+from types import SimpleNamespace
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from hair_addon.blender import (
+    curves,
+    display_transform,
+    drawing,
+    drawn_scene,
+    hair_cache,
+    hair_picture,
+    level_of_detail,
+    scene,
+    shaders,
+    strand_textures,
+    viewport,
+)
+from hair_addon.core.errors import HairError
+from tests.blender import glsl
+
+SIZE = 96
+
+# ------------------------------------------------------------------------------------------------- the display
+
+
+@pytest.fixture
+def colors(rng):
+    """(20000, 3) scene-linear float32, from deep shadow to glints, grey to saturated."""
+    return (2.0 ** rng.uniform(-9.0, 5.0, (20_000, 1)) * rng.random((20_000, 3)) ** 2).astype(np.float32)
+
+
+SETTINGS = [
+    ("AgX", "None", 1.0),
+    ("AgX", "AgX - Punchy", 1.0),
+    ("Filmic", "High Contrast", 1.3),
+    ("Standard", "None", 0.8),
+    ("Raw", "None", 1.0),
+    ("Khronos PBR Neutral", "None", 1.0),
+]
+
+
+def set_view(blender_scene, view, look, gamma):
+    settings = blender_scene.view_settings
+    settings.view_transform, settings.look, settings.gamma = view, look, gamma
+    return display_transform.DisplayTransform.of(blender_scene)
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_colours_are_those_that_blender_writes_into_a_picture(blender_scene, colors, tmp_path, settings):
+    transform = set_view(blender_scene, *settings)
+    image = bpy.data.images.new("colours", 200, 100, float_buffer=True)
+    image.pixels.foreach_set(np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1).ravel())
+    output = blender_scene.render.image_settings
+    output.file_format, output.color_mode, output.color_depth = "PNG", "RGB", "16"
+    blender_scene.render.dither_intensity = 0.0
+    image.save_render(str(tmp_path / "colours.png"), scene=blender_scene)
+    written = bpy.data.images.load(str(tmp_path / "colours.png"))
+    written.colorspace_settings.name = "Non-Color"
+    blenders = np.empty(4 * len(colors), np.float32)
+    written.pixels.foreach_get(blenders)
+    ours = np.clip(display_transform.apply(transform, colors), 0.0, 1.0)
+    np.testing.assert_allclose(ours, blenders.reshape(-1, 4)[:, :3], atol=2e-4)
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_the_table_is_as_good_as_eight_bits(blender_scene, colors, settings):
+    transform = set_view(blender_scene, *settings)
+    at = display_transform.display_place(colors)[:, ::-1].T * (display_transform.SIZE - 1)
+    found = np.stack([map_coordinates(transform.table()[..., c], at, order=1) for c in range(3)], axis=-1)
+    error = 255.0 * np.abs(found - np.clip(display_transform.apply(transform, colors), 0.0, 1.0))
+    assert error.mean() < 0.25
+    assert np.quantile(error, 0.99) < 4.0
+
+
+def test_places_in_the_table_are_twins_and_come_back():
+    light = np.concatenate([[0.0, 512.0, 1e6], np.geomspace(1e-6, 500.0, 1000)]).astype(np.float32)
+    text = glsl.source("include/display_place.glsl")
+    shader = glsl.evaluate(text, "vec3", "display_place(vec3(light))", light=light)[:, 1]
+    python = display_transform.display_place(light.astype(np.float64))
+    np.testing.assert_allclose(shader, python, atol=1e-5)
+    np.testing.assert_allclose(display_transform.linear_at(python), np.minimum(light, 512.0), rtol=1e-9, atol=1e-12)
+
+
+def test_without_opencolorio_colours_are_the_standard_view(blender_scene, colors, monkeypatch, capsys):
+    standard = display_transform.apply(set_view(blender_scene, "Standard", "None", 1.0), colors)
+    monkeypatch.setitem(sys.modules, "PyOpenColorIO", None)
+    without = display_transform.apply(set_view(blender_scene, "AgX", "None", 1.0), colors)
+    np.testing.assert_allclose(without, np.clip(standard, 0.0, 1.0), atol=1e-3)
+    assert "PyOpenColorIO" in capsys.readouterr().err
+
+
+def test_hair_is_laid_over_a_viewport_in_its_colours(lit):
+    """Over white: shown is the mix of white and the light's display colour, to the power that Blender undoes."""
+    picture = pictured(lit, 2, per_side=2)
+    transform = display_transform.DisplayTransform.of(bpy.context.scene)
+    table = hair_picture.table_texture(transform.table())
+    below = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
+    framebuffer = gpu.types.GPUFrameBuffer(color_slots=below)
+    with framebuffer.bind():
+        framebuffer.clear(color=(1.0, 1.0, 1.0, 1.0))
+        picture.show(table, exposure=2.0, opacity=0.5, depth_test="NONE")
+        shown = np.array(framebuffer.read_color(0, 0, SIZE, SIZE, 4, 0, "FLOAT"))[..., :3]
+    light = picture.read()
+    alpha = light[..., 3:]
+    straight = (2.0 * light[..., :3] / np.maximum(alpha, 1e-9)).reshape(-1, 3).astype(np.float32)
+    display = np.clip(display_transform.apply(transform, straight), 0.0, 1.0).reshape(SIZE, SIZE, 3)
+    assert (alpha > 0.1).sum() > 500
+    np.testing.assert_allclose(shown, 1.0 - 0.5 * alpha + 0.5 * alpha * display**2.2, atol=0.02)
+
+
+# ------------------------------------------------------------------------------------------------- thin strands
+
+
+@pytest.mark.parametrize("coverage", [0.03, 0.25, 0.7, 1.0])
+def test_of_a_thin_strand_just_its_part_is_drawn(coverage):
+    """Over a picture for each strand, and nearly so over sixteen samples of a row or column."""
+    size = 64
+    strand, x, y = (grid.ravel() for grid in np.indices((20, size, size)))
+    text = glsl.source("include/coverage.glsl")
+    expression = f"is_covered(strand_offset(strand) + 0.25, ivec2(x, y), {coverage}) ? 1.0 : 0.0"
+    drawn = glsl.evaluate(text, "float", expression, strand=strand, x=x, y=y).reshape(20, size, size)
+    np.testing.assert_allclose(drawn.mean(axis=(1, 2)), coverage, atol=0.01)
+    for rows in (drawn, drawn.swapaxes(1, 2)):
+        runs = rows.reshape(20, size, size // 16, 16).sum(axis=-1)
+        assert np.abs(runs - 16 * coverage).max() <= 4.0  # by chance it would be eight
+
+
+def test_strands_that_cross_are_left_out_of_different_samples():
+    text = glsl.source("include/coverage.glsl")
+    strand = np.arange(4000)
+    offsets = glsl.evaluate(text, "float", "strand_offset(strand)", strand=strand)
+    np.testing.assert_allclose(np.histogram(offsets, bins=10, range=(0.0, 1.0))[0], 400, atol=80)
+    assert abs(np.corrcoef(offsets[:-1], offsets[1:])[0, 1]) < 0.05
+
+
+@pytest.fixture
+def thin(lit):
+    """Hair of which a strand covers a fifth of a pixel."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    bpy.data.objects["Hair"].data.vellus.hair.strand_count = 4000
+    bpy.data.objects["Hair"].data.vellus.hair.radius = 0.003
+    bpy.context.view_layer.update()
+    return lit
+
+
+def pictured(hair, passes, per_side, size=SIZE):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    picture = hair_picture.HairPicture(size, size, per_side)
+    matrices = scene.read_camera(bpy.context.scene, depsgraph, size, size)
+    for _ in range(passes):
+        picture.add_pass(drawn, *matrices)
+    return picture
+
+
+def sparkles(light):
+    """How many pixels are half as bright again as the brightest of their eight neighbours."""
+    luminance = light[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
+    around = [np.roll(luminance, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]
+    return np.count_nonzero((luminance > 1.5 * np.max(around, axis=0)) & (luminance > 0.1 * luminance.max()))
+
+
+@pytest.mark.parametrize("per_side", [1, 2])
+def test_thin_hair_keeps_its_brightness_and_does_not_sparkle(thin, per_side):
+    """The first pass, and what becomes of it, against many samples: in a picture large enough that chance is small."""
+    size = 2 * SIZE
+    reference = pictured(thin, 32, 2, size).read()
+    fine = hair_picture.SAMPLE_COUNT // per_side**2
+    first, last = (pictured(thin, passes, per_side, size).read() for passes in (1, fine))
+    for light in (first, last):
+        np.testing.assert_allclose(light.mean(axis=(0, 1)), reference.mean(axis=(0, 1)), rtol=0.03)
+    assert sparkles(last) <= sparkles(reference) + 0.002 * size**2
+
+
+# --------------------------------------------------------------------------------------------- from afar
+
+
+def seen_from(distance, size=SIZE):
+    """(world to view, view to clip) of a camera along -Y that holds the ball of hair from 3 m."""
+    world_to_view = np.array([[1, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, -distance], [0, 0, 0, 1.0]])
+    return world_to_view, np.array([[2.0, 0, 0, 0], [0, 2.0, 0, 0], [0, 0, -1.002, -0.2002], [0, 0, -1, 0]])
+
+
+def steps_from(strands, distance, part=1.0, coverage_turn=0.0):
+    view = drawing.view_record(*seen_from(distance), SIZE, least_width=1.0)
+    view["coverage_turn"] = coverage_turn
+    return level_of_detail.steps_of(strands, view, np.eye(4), part)
+
+
+@pytest.fixture
+def many(rng):
+    """50,000 strands of 41 points on a ball, on the GPU."""
+    roots = rng.normal(size=(50_000, 1, 3))
+    roots /= np.linalg.norm(roots, axis=2, keepdims=True)
+    points = (roots * np.linspace(1.0, 1.4, 41)[:, None]).astype(np.float32)
+    return strand_textures.upload_strands(points, np.full(points.shape[:2], 4e-3, np.float32))
+
+
+def test_further_hair_has_fewer_strands_and_points_one_by_one(many):
+    steps = [steps_from(many, distance) for distance in np.geomspace(1.5, 300.0, 400)]
+    counts, points = (np.array([getattr(one, name) for one in steps]) for name in ("strand_count", "point_count"))
+    assert (counts[0], points[0]) == (50_000, 41)
+    assert (np.diff(counts) <= 0).all() and (np.diff(points) <= 0).all()
+    assert (counts[-1], points[-1]) == (10_000, 9)
+    falling = counts[:-1] > 10_000
+    assert (counts[1:][falling] > 0.9 * counts[:-1][falling]).all()  # a step of the distance is 1.3 %
+
+
+def test_passes_take_all_strands_in_turn_but_those_that_the_artist_leaves_out(many):
+    taken = np.zeros(50_000, bool)
+    for turn in 0.61803399 * np.arange(16):
+        steps = steps_from(many, 30.0, coverage_turn=turn)
+        taken[(steps.first_strand + np.arange(steps.strand_count)) % 50_000] = True
+    assert taken.all() and steps.strand_count < 30_000
+    few = [steps_from(many, 1.5, 0.25, coverage_turn=turn) for turn in (0.0, 0.3)]
+    assert {(one.strand_count, one.first_strand) for one in few} == {(12_500, 0)}
+
+
+@pytest.mark.parametrize("distance", [8.0, 20.0])
+def test_hair_from_afar_is_as_bright_as_all_of_it(thin, monkeypatch, distance):
+    """Light that leaves it, and what it covers: a part of the strands, as much thicker, against all of them."""
+    thin.data.vellus.hair.strand_count = 40_000
+    thin.data.vellus.hair.radius = 0.001
+    bpy.context.view_layer.update()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+
+    def picture():
+        found = hair_picture.HairPicture(SIZE, SIZE, 2)
+        while not found.is_fine:
+            found.add_pass(drawn, *seen_from(distance))
+        return found.read().sum(axis=(0, 1))
+
+    some = picture()
+    steps, strands = steps_from(drawn.hair[0][0], distance), drawn.hair[0][0]
+    assert steps.strand_count < strands.strand_count
+    monkeypatch.setattr(level_of_detail, "steps_of", lambda *_args: drawing.Steps())
+    np.testing.assert_allclose(some, picture(), rtol=0.04)
+
+
+def test_surfaces_hide_hair_in_every_sample(lit):
+    """The half of the strands that is behind the sphere shows only where surfaces are seen through."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    bare = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    bare.surfaces.clear()
+    matrices = scene.read_camera(bpy.context.scene, depsgraph, SIZE, SIZE)
+    pictures = {}
+    for name, of, through in (("hidden", drawn, False), ("through", drawn, True), ("bare", bare, False)):
+        picture = hair_picture.HairPicture(SIZE, SIZE)
+        picture.add_pass(of, *matrices, is_see_through=through)
+        pictures[name] = picture.read()
+    np.testing.assert_array_equal(pictures["through"], pictures["bare"])
+    assert pictures["hidden"][..., 3].sum() < 0.9 * pictures["bare"][..., 3].sum()
+
+
+# ------------------------------------------------------------------------------------------------- when it is drawn
+
+
+@pytest.fixture
+def region(lit):
+    """Stand-ins for a region and its view, with the place of the scene's camera."""
+    matrices = scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE)
+    names = ("view_matrix", "window_matrix")
+    view = SimpleNamespace(**dict(zip(names, matrices, strict=True)))
+    yield SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 1), view
+    viewport._pictures.clear()
+
+
+def test_a_view_at_rest_is_drawn_until_it_is_fine_and_no_more(region, monkeypatch):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    draws = []
+    real = drawn_scene.draw_hair
+    monkeypatch.setattr(drawn_scene, "draw_hair", lambda *args, **kwargs: (draws.append(1), real(*args, **kwargs)))
+    place, view = region
+    pass_count = hair_picture.SAMPLE_COUNT // hair_picture.samples_per_side() ** 2
+
+    def redraw(count, is_see_through=False):
+        draws.clear()
+        for _ in range(count):
+            viewport._picture(drawn, view, place, is_see_through)
+        return len(draws)
+
+    assert redraw(pass_count + 5) == pass_count
+    assert redraw(5) == 0
+    view.view_matrix = view.view_matrix + np.eye(4) * 1e-3
+    assert redraw(pass_count + 5) == pass_count
+    assert redraw(1, is_see_through=True) == 1
+    place.width = SIZE - 10
+    assert redraw(1, is_see_through=True) == 1
+
+
+def test_blender_draws_hair_itself_only_where_this_does_not(hair):
+    assert hair.display_type == "WIRE"  # as which Curves have nothing to draw
+    hair.data.vellus.is_drawn = False
+    bpy.context.view_layer.update()
+    assert hair.display_type == "TEXTURED"
+    curves.draw_natively(hair.data, False)
+    assert hair.display_type == "WIRE" and not hair.hide_render and not hair.hide_select
+
+
+def test_meshes_that_are_no_surface_in_the_viewport_hide_nothing(sphere):
+    space = next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
+
+    def count():
+        bpy.context.view_layer.update()
+        return len(scene.read_drawn_meshes(bpy.context.evaluated_depsgraph_get(), space))
+
+    assert count() == 1
+    sphere.display_type = "WIRE"
+    assert count() == 0
+    sphere.display_type = "TEXTURED"
+    sphere.hide_set(True)
+    assert count() == 0
+
+
+# ------------------------------------------------------------------------------------------------- shaders that fail
+
+
+PROGRAMS = {
+    "guides.frag": lambda: shaders.strip_program.__wrapped__("guides.frag"),
+    "strand_segments.comp": lambda: shaders.segments_program.__wrapped__(),
+}
+
+
+@pytest.mark.parametrize("file", PROGRAMS)
+def test_a_shader_that_does_not_compile_is_reported_once_with_file_and_line(file, tmp_path, monkeypatch):
+    shutil.copytree(shaders.FOLDER, tmp_path / "shaders")
+    broken = tmp_path / "shaders" / "include" / "strand.glsl"
+    text = broken.read_text()
+    line = next(number for number, words in enumerate(text.splitlines(), 1) if "int row =" in words)
+    broken.write_text(text.replace("int row =", "int row = nonsense; int other =", 1))
+    monkeypatch.setattr(shaders, "FOLDER", tmp_path / "shaders")
+    monkeypatch.setattr(shaders, "_complaints", {})
+    compilations = []
+    real = gpu.shader.create_from_info
+    monkeypatch.setattr(gpu.shader, "create_from_info", lambda info: (compilations.append(1), real(info))[1])
+    for _ in range(3):
+        with pytest.raises(HairError, match=rf"{re.escape(file)} .*include/strand\.glsl:{line}: .*nonsense"):
+            PROGRAMS[file]()
+    assert len(compilations) == 2  # and once more, to hear where
+
+
+def test_a_complaint_is_found_in_what_vulkan_writes():
+    log = (
+        "00:02.605  gpu.shader       | ERROR pyGPU_Shader vertex: \n"
+        "                            |       | python_shader.glsl:2: Error: 'x' : undeclared identifier\n"
+    )
+    vertex, fragment = [("a.vert", 1), ("include/b.glsl", 7)], [("c.frag", 1), ("c.frag", 2)]
+    assert shaders.complaint(log, vertex, fragment) == "include/b.glsl:7: Error: 'x' : undeclared identifier"
+    assert shaders.complaint(log.replace("vertex", "fragment"), vertex, fragment).startswith("c.frag:2: ")
+    assert shaders.complaint("something else", vertex, fragment) is None
+
+
+def test_what_cannot_be_drawn_is_said_once(monkeypatch, capsys):
+    def refuse(_context):
+        raise HairError("The shader x.frag does not compile.")
+
+    space = SimpleNamespace(shading=SimpleNamespace(type="SOLID"), overlay=SimpleNamespace(show_overlays=False))
+    monkeypatch.setattr(viewport, "_draw_hair", refuse)
+    monkeypatch.setattr(viewport, "_told", set())
+    monkeypatch.setattr(viewport, "bpy", SimpleNamespace(context=SimpleNamespace(space_data=space)))
+    viewport.draw()
+    viewport.draw()
+    assert capsys.readouterr().err == "Vellus: The shader x.frag does not compile.\n"
+    hair_cache.clear()
+    PROGRAMS["guides.frag"]()  # others compile as before

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The world's light: its picture as Cycles sees it, and what of it arrives among strands and on surfaces."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender import drawing, lights, render, strand_textures, surroundings, visibility
+from hair_addon.core import environment
+
+HEIGHT = 64
+
+
+def picture(rng):
+    """A smooth coloured picture with one bright spot, as an image of Blender's."""
+    width, height = 64, 32
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., 0] = 0.5 + 0.4 * np.sin(2.0 * np.pi * u)
+    pixels[..., 1] = v
+    pixels[..., 2] = 0.3
+    pixels[..., :3] += np.array([6.0, 5.0, 4.0]) * np.exp(-200.0 * ((u - 0.3) ** 2 + (v - 0.7) ** 2))[..., None]
+    image = bpy.data.images.new("Surroundings", width, height, float_buffer=True, is_data=True)
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    return image
+
+
+def environment_node(scene, image, **settings):
+    """Light the scene with a picture; returns the node that holds it."""
+    scene.world = bpy.data.worlds.new("World")
+    tree = scene.world.node_tree
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = image
+    for name, value in settings.items():
+        setattr(node, name, value)
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+    return node
+
+
+def turn(node, kind, rotation, scale=(1.0, 1.0, 1.0)):
+    """Put a Mapping node before an environment's."""
+    tree = node.id_data
+    mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    mapping.vector_type = kind
+    mapping.inputs["Rotation"].default_value, mapping.inputs["Scale"].default_value = rotation, scale
+    tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+
+
+def panorama(scene, folder):
+    """(H, 2 H, 3) radiance of the world by longitude and latitude, rendered by Cycles."""
+    camera = bpy.data.cameras.new("Camera")
+    camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
+    scene.camera = bpy.data.objects.new("Camera", camera)
+    scene.camera.rotation_euler = (0.5 * math.pi, 0.0, -0.5 * math.pi)  # looks along +x, z up
+    scene.collection.objects.link(scene.camera)
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 64, False
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 2 * HEIGHT, HEIGHT, 100
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(folder / "panorama.exr")
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath)
+    pixels = np.empty(2 * HEIGHT * HEIGHT * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(HEIGHT, 2 * HEIGHT, 4)[..., :3]
+
+
+@pytest.mark.parametrize(
+    ("settings", "mapping"),
+    [
+        ({}, None),
+        ({}, ("POINT", (0.3, 0.5, 1.1))),
+        ({}, ("TEXTURE", (0.3, 0.5, 1.1), (1.0, 2.0, 0.5))),
+        ({}, ("VECTOR", (0.0, 0.0, 2.0), (1.0, -1.0, 1.0))),
+        ({"projection": "MIRROR_BALL"}, ("POINT", (0.0, 0.4, 0.0))),
+    ],
+)
+def test_surroundings_are_where_cycles_has_them(scene, rng, tmp_path, settings, mapping):
+    node = environment_node(scene, picture(rng), **settings)
+    if mapping:
+        turn(node, *mapping)
+    unrolled = surroundings._unrolled(lights.read_world(scene))
+    rendered = panorama(scene, tmp_path)
+    # Where a mirror ball's or a longitude's seam lies, a texel is a mean of both sides.
+    is_close = np.isclose(unrolled, rendered, rtol=0.05, atol=0.05).all(axis=-1)
+    assert is_close.mean() > 0.97
+
+
+def test_light_of_a_picture_is_neither_lost_nor_made(scene, rng):
+    environment_node(scene, picture(rng))
+    world = lights.read_world(scene)
+    unrolled = surroundings._unrolled(world)
+    lobes, sides = surroundings.light_of(world)
+    _directions, solid_angles = environment._texels(*unrolled.shape[:2])
+    # A plane that faces a lobe receives its light at slightly oblique angles.
+    in_lobes = sum(lobe.irradiance / (1.0 - lobe.variance) for lobe in lobes)
+    assert len(lobes) == 1
+    found = in_lobes + 4.0 * np.pi * sides.mean(axis=0)
+    np.testing.assert_allclose(found, solid_angles @ unrolled.reshape(-1, 3), rtol=0.01)
+
+
+def test_a_world_of_other_nodes_shines_in_its_viewport_colour(scene):
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.color = (0.1, 0.2, 0.3)
+    tree = scene.world.node_tree
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs[1], background.inputs["Color"])
+    np.testing.assert_allclose(lights.read_world(scene).color, (0.1, 0.2, 0.3), rtol=1e-6)
+
+
+def test_the_picture_is_seen_behind_the_scene(scene, rng, tmp_path):
+    environment_node(scene, picture(rng))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.rotation_euler = (1.2, 0.0, 0.7)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    settings = render.PictureSettings(48, 32, 2)
+    bpy.context.view_layer.update()
+    drawn = render.draw_picture(scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get(), settings)
+    scene.render.engine, scene.render.resolution_percentage = "CYCLES", 100
+    scene.render.resolution_x, scene.render.resolution_y = 48, 32
+    scene.cycles.samples, scene.cycles.use_denoising = 32, False
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(tmp_path / "behind.exr")
+    bpy.ops.render.render(write_still=True)
+    pixels = np.empty(48 * 32 * 4, np.float32)
+    bpy.data.images.load(scene.render.filepath).pixels.foreach_get(pixels)
+    np.testing.assert_allclose(drawn[..., :3], pixels.reshape(32, 48, 4)[..., :3], rtol=0.05, atol=0.02)
+
+
+def seen(places, strands=None, opacity=1.0):
+    """(N, 6) part of each side that places (N, 3) see among strands (S, P, 3) of radius (S, P)."""
+    corners = np.repeat(places, 3, axis=0).astype(np.float32)
+    surface = drawing.upload_surface(corners, np.zeros_like(corners))
+    hair = [(strand_textures.upload_strands(*strands), np.eye(4))] if strands else []
+    _hair, (found,) = visibility.measure(hair, [surface], [opacity] * len(hair))
+    texels = [np.array(found[name].read()).reshape(-1, 4) for name in ("visibility_x_y", "visibility_z")]
+    return np.concatenate([texels[0], texels[1][:, :2]], axis=1)[: len(corners) : 3]
+
+
+def test_nothing_hides_the_world_from_places_without_hair(scene, rng):
+    np.testing.assert_allclose(seen(rng.normal(size=(5, 3))), 1.0, atol=2e-3)
+
+
+def test_a_cloud_of_strands_lets_through_what_rays_say(scene, rng):
+    """Brute force: rays from the middle of a cloud cross as many strands as its density says."""
+    middles = rng.normal(size=(6000, 3))
+    middles *= (rng.random(6000) ** (1 / 3) / np.linalg.norm(middles, axis=1))[:, None]
+    along = rng.normal(size=(6000, 3))
+    along *= 0.06 / np.linalg.norm(along, axis=1)[:, None]
+    points = (middles[:, None] + np.linspace(-1.0, 1.0, 5)[:, None] * along[:, None]).astype(np.float32)
+    radii = np.full((6000, 5), 0.0014, np.float32)
+    places = 0.3 * rng.normal(size=(20, 3)) / np.sqrt(3.0)
+    found = seen(places, (points, radii)).mean()
+    # The shadow of an isotropic strand is pi / 4 of length × width; the cloud fills a ball of radius 1.
+    density = 6000 * 0.25 * np.pi * 0.12 * 0.0028 / (4.0 / 3.0 * np.pi)
+    directions = rng.normal(size=(4000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    along = places @ directions.T
+    ways = -along + np.sqrt(along**2 + 1.0 - np.square(places).sum(axis=1)[:, None])
+    assert found == pytest.approx(np.exp(-density * ways).mean(), rel=0.05)
