@@ -138,14 +138,18 @@ ROOMS = {
     "bpy": (lambda path: import_lines(path, "bpy", "mathutils", "bmesh", "bl_ui", "bpy_extras"), r"blender/.*"),
     "gpu": (
         lambda path: import_lines(path, "gpu", "gpu_extras"),
-        r"blender/(uniforms|shaders|drawing|shadows|viewport|render|batch)\.py",
+        r"blender/(uniforms|shaders|strand_textures|hair_shading|drawing|hair_buffer|shadows|visibility|surroundings"
+        r"|hair_picture|viewport|render|batch)\.py",
     ),
     "bpy.props": (
         lambda path: [*attribute_lines(syntax(path), "bpy.props"), *import_lines(path, "bpy.props")],
         r"blender/(properties|preferences)\.py",
     ),
     "Blender's arrays": (array_lines, r"blender/(scene|curves)\.py"),
-    "layout": (lambda path: list(attribute_lines(syntax(path), *LAYOUT)), r"blender/(panels|preferences)\.py"),
+    "layout": (
+        lambda path: list(attribute_lines(syntax(path), *LAYOUT)),
+        r"blender/(panels/.*|menus\.py|preferences\.py)",
+    ),
     "self.report": (lambda path: list(attribute_lines(syntax(path), "self.report")), r"blender/operators/.*"),
     "wp.kernel": (lambda path: list(attribute_lines(syntax(path), "wp.kernel", "wp.func")), r"core/.*"),
     "OpenEXR": (lambda path: import_lines(path, "OpenEXR"), r"core/exr\.py"),

@@ -3,13 +3,14 @@
 
 import bpy
 
-from . import handlers, operators, panels, preferences, properties, viewport
+from . import handlers, keymap, menus, operators, panels, preferences, properties, running, translations, viewport
 
 CLASSES = (
     preferences.VellusPreferences,
     *properties.CLASSES,
     *operators.CLASSES,
     *panels.CLASSES,
+    *menus.CLASSES,
 )
 
 
@@ -17,15 +18,22 @@ def register():
     """Register classes, then listen and draw."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
+    translations.register()
     properties.register()
+    menus.register()
+    keymap.register()
     handlers.register()
     viewport.register()
 
 
 def unregister():
     """Undo `register` in reverse."""
+    running.end(bpy.context)
     viewport.unregister()
     handlers.unregister()
+    keymap.unregister()
+    menus.unregister()
     properties.unregister()
+    translations.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

@@ -7,10 +7,13 @@ evaluation of Catmull-Rom curves would cost more than making the strands.
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ..core import mesh as mesh_math
+from ..core import strands
 from ..core.errors import HairError
 from ..core.mesh import SurfacePoints
+from . import follow_nodes
 
 # How an attribute's values are called by its data type.
 _VALUE_NAMES = {"FLOAT": "value", "INT": "value", "FLOAT2": "vector", "FLOAT_VECTOR": "vector"}
@@ -42,52 +45,155 @@ def _read_attribute(curves, name, width):
 
 def new_object(name, surface_object):
     """An empty Curves object on a surface, in the surface's collection."""
-    if not surface_object.add_rest_position_attribute:
-        # What Blender's own nodes find roots on a moving surface by. It counts as a change of the mesh: let Blender
-        # take note of it before there is hair that would be made again for it.
-        surface_object.add_rest_position_attribute = True
-        bpy.context.view_layer.update()
     curves = bpy.data.hair_curves.new(name)
     curves.surface = surface_object
+    return link_object(name, curves, surface_object)
+
+
+def link_object(name, curves, surface_object):
+    """A new object for Curves, a child of their surface and in its collection."""
     curves_object = bpy.data.objects.new(name, curves)
     curves_object.parent = surface_object
     collections = surface_object.users_collection or (bpy.context.scene.collection,)
     collections[0].objects.link(curves_object)
+    follow_nodes.add_modifier(curves_object)
     return curves_object
 
 
+def keep_rest(surface_object):
+    """Let Blender hand out where a surface's vertices are before it deforms: what strands are rooted on."""
+    if not surface_object.add_rest_position_attribute:
+        surface_object.add_rest_position_attribute = True
+        # It counts as a change of the mesh: let Blender take note of it before there is hair that would follow it.
+        bpy.context.view_layer.update()
+
+
 def draw_natively(curves, is_shown):
-    """Let Blender draw Curves in viewports as they are, or as their bounding box: selectable, rendered, and cheap."""
+    """Let Blender draw Curves in viewports as they are, or not at all. Renders show them either way.
+
+    As wire, for which Curves have no lines: nothing is drawn, evaluated or uploaded for it, unlike a bounding box.
+    """
     for user in bpy.data.objects:
         if user.data == curves:
-            user.display_type = "TEXTURED" if is_shown else "BOUNDS"
+            user.display_type = "TEXTURED" if is_shown else "WIRE"
 
 
 def write_strands(curves, surface, points, roots, radii, guide_index):
     """Fill Curves with strands.
 
-    points: (S, P, 3) float32 [m] in the surface's axes; roots: `SurfacePoints`; radii: (P,) [m];
-    guide_index: (S,) int32, the guide that each strand follows first.
+    points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) [m]; guide_index: (S,) int32,
+    the guide that each strand follows first.
     """
     strand_count, point_count, _xyz = points.shape
     if strand_count == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
     _resize(curves, strand_count, point_count)
-    local = surface.to_local(points)
-    scale = abs(np.linalg.det(surface.to_world_axes)) ** (1.0 / 3.0)
-    stored_roots = surface.swap_winding(roots)
-    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots))
-    _write_attribute(curves, "position", "FLOAT_VECTOR", "POINT", local)
-    _write_attribute(curves, "rest_position", "FLOAT_VECTOR", "POINT", local)
-    _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii / scale, strand_count))
-    _write_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
-    _write_attribute(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
+    _write_attribute(curves, "position", "FLOAT_VECTOR", "POINT", points)
+    _write_attribute(curves, "rest_position", "FLOAT_VECTOR", "POINT", points)
+    _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii / surface.scale, strand_count))
     _write_attribute(curves, "guide_curve_index", "INT", "CURVE", guide_index)
     _write_attribute(curves, "id", "INT", "CURVE", np.arange(strand_count))
-    _write_attribute(curves, "root_triangle", "INT", "CURVE", stored_roots.triangle)
-    _write_attribute(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", stored_roots.barycentric)
+    _write_attribute(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
+    write_roots(curves, surface, roots)
+
+
+def write_roots(curves, surface, roots):
+    """Store where strands are rooted: for ourselves, for the nodes that carry them, and for Blender's own tools."""
+    stored = surface.swap_winding(roots)
+    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots))
+    _write_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
+    _write_attribute(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
+    _write_attribute(curves, "root_triangle", "INT", "CURVE", stored.triangle)
+    _write_attribute(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", stored.barycentric)
+    for name, vertices in zip(follow_nodes.ROOT_VERTICES, surface.root_vertices(roots).T, strict=True):
+        _write_attribute(curves, name, "INT", "CURVE", vertices)
+    curves.surface_uv_map = surface.uv_map
+    curves.vellus.topology = surface.topology
+    for user in bpy.data.objects:
+        if user.data == curves and user.library is None:
+            is_combed = curves.vellus.kind == "GUIDES" and surface.corner_uvs is not None
+            follow_nodes.set_surface(user, curves.surface, len(surface.rest), is_combed)
+    curves.update_tag()
+
+
+def write_uvs(curves, surface):
+    """Tell Curves the UV coordinates of their roots, and nothing else."""
+    counts = point_counts(curves)
+    if not len(counts):
+        return
+    firsts = np.concatenate([[0], np.cumsum(counts)])[:-1]
+    roots = read_roots(curves, surface, surface.from_local(read_points(curves)[firsts]))
+    _write_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
     curves.surface_uv_map = surface.uv_map
     curves.update_tag()
+
+
+def write_points(curves, points):
+    """Move strands that `write_strands` made; points: (S, P, 3) float32 in local coordinates."""
+    _write_attribute(curves, "position", "FLOAT_VECTOR", "POINT", points)
+    _write_attribute(curves, "rest_position", "FLOAT_VECTOR", "POINT", points)
+    curves.update_tag()
+
+
+# The name of the property that says where a surface was when guides were rooted on it.
+_STOOD_ON = "vellus_surface"
+
+
+def keep_surface(curves, surface):
+    """Remember where the surface's vertices rest: what guides are carried from when somebody edits it."""
+    if _STOOD_ON in curves:
+        # Blender 5.2 writes an array over a shorter one, past its end.
+        del curves[_STOOD_ON]
+    curves[_STOOD_ON] = surface.rest.ravel()
+
+
+def stood_on(curves):
+    """(V, 3) float32 that `keep_surface` remembered, or None."""
+    kept = curves.get(_STOOD_ON)
+    return None if kept is None else np.array(kept, np.float32).reshape(-1, 3)
+
+
+def carry(curves, motion):
+    """Move strands, and what is remembered of how they were generated, with their surface's `SurfaceMotion`."""
+    from ..core import surface_frames  # Warp takes longer to import than the add-on may take to start
+
+    roots, counts = read_root_places(curves), point_counts(curves)
+    for name in ("position", "rest_position"):
+        points = _read_attribute(curves, name, 3)
+        if points is None:
+            continue
+        if (counts == counts[0]).all():
+            points = surface_frames.carry(points.reshape(len(counts), -1, 3), motion, *roots)
+        else:  # each point as a strand of its own
+            points = surface_frames.carry(points[:, None], motion, *(np.repeat(part, counts, axis=0) for part in roots))
+        _write_attribute(curves, name, "FLOAT_VECTOR", "POINT", points)
+
+
+def transform(curves, matrix):
+    """Multiply all points, and what is remembered of how they were generated, by a (3, 3) matrix.
+
+    So that strands stay where they are in the world when the opposite was applied to their surface, whose child they
+    are: what Blender has put between parent and child to keep the child in place is taken away again.
+    """
+    for name in ("position", "rest_position"):
+        points = _read_attribute(curves, name, 3)
+        if points is not None:
+            _write_attribute(curves, name, "FLOAT_VECTOR", "POINT", points @ matrix.T)
+    for user in bpy.data.objects:
+        if user.data == curves and user.parent == curves.surface:
+            user.matrix_local = Matrix()
+
+
+def read_root_places(curves):
+    """Stored (S, 3) int32 root vertices and (S, 3) float32 barycentric coordinates in Blender's order; or None."""
+    barycentric = _read_attribute(curves, "root_barycentric", 3)
+    attributes = [curves.attributes.get(name) for name in follow_nodes.ROOT_VERTICES]
+    if barycentric is None or None in attributes:
+        return None
+    vertices = np.empty((3, len(barycentric)), np.int32)
+    for row, attribute in zip(vertices, attributes, strict=True):
+        attribute.data.foreach_get("value", row)
+    return np.ascontiguousarray(vertices.T), barycentric
 
 
 def _resize(curves, strand_count, point_count):
@@ -124,6 +230,25 @@ def read_radii(curves):
     return np.full(len(curves.points), 0.005, np.float32) if radii is None else radii[:, 0]
 
 
+def read_randoms(curves):
+    """(S,) float32 in [0, 1]: by which strands differ; numbers follow from the order of curves that carry none."""
+    if not _has_randoms(curves):
+        return strands.random_numbers(len(curves.curves))
+    randoms = _read_attribute(curves, "strand_random", 1)[:, 0]
+    return np.where((randoms >= 0.0) & (randoms <= 1.0), randoms, np.float32(0.5))
+
+
+def write_randoms(curves):
+    """Give the strands that carry none their random numbers."""
+    if len(curves.curves) and not _has_randoms(curves):
+        _write_attribute(curves, "strand_random", "FLOAT", "CURVE", read_randoms(curves))
+
+
+def _has_randoms(curves):
+    attribute = curves.attributes.get("strand_random")
+    return attribute is not None and (attribute.data_type, attribute.domain) == ("FLOAT", "CURVE")
+
+
 def is_combed(curves):
     """Whether points were moved, added or removed since `write_strands`."""
     written = _read_attribute(curves, "rest_position", 3)
@@ -135,12 +260,12 @@ def read_roots(curves, surface, first_points):
 
     Curves that were added or slid in sculpt mode are stale, and so are all when the surface has other triangles.
     """
-    stored = _stored_roots(curves, surface)
-    if stored is None:
+    mesh_math.check_mesh(surface.mesh)
+    stored = stored_roots(curves, surface)
+    if stored is None or curves.vellus.topology != surface.topology:
         return _nearest_roots(surface, first_points)
     distance = np.linalg.norm(mesh_math.positions(surface.mesh, stored) - first_points, axis=1)
-    extent = np.ptp(surface.mesh.vertices, axis=0).max()
-    stale = np.flatnonzero(~(distance <= _ROOT_TOLERANCE * extent))
+    stale = np.flatnonzero(~(distance <= _ROOT_TOLERANCE * surface.extent * surface.scale))
     if len(stale):
         found = _nearest_roots(surface, first_points[stale])
         stored.triangle[stale] = found.triangle
@@ -155,7 +280,7 @@ def _nearest_roots(surface, places):
     return SurfaceQuery(surface.mesh).nearest(places)
 
 
-def _stored_roots(curves, surface):
+def stored_roots(curves, surface):
     """`SurfacePoints` from the curves' attributes; impossible ones become a corner of triangle 0. None if absent."""
     barycentric = _read_attribute(curves, "root_barycentric", 3)
     triangle_attribute = curves.attributes.get("root_triangle")
@@ -168,6 +293,20 @@ def _stored_roots(curves, surface):
     triangle[~known] = 0
     barycentric[~known] = (1.0, 0.0, 0.0)
     return surface.swap_winding(SurfacePoints(triangle, barycentric))
+
+
+def root_places(curves, surface):
+    """(S, 3) int32 root vertices and (S, 3) float32 barycentric coordinates in Blender's order, on a `Surface`.
+
+    As stored, or where the surface at rest is nearest if that has other triangles now.
+    """
+    stored = read_root_places(curves)
+    if stored is not None and curves.vellus.topology == surface.topology:
+        return stored
+    counts = point_counts(curves)
+    firsts = np.concatenate([[0], np.cumsum(counts[:-1])])
+    roots = _nearest_roots(surface, surface.from_local(read_points(curves)[firsts]))
+    return surface.root_vertices(roots), surface.swap_winding(roots).barycentric
 
 
 def require_editable(datablock):

@@ -6,7 +6,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from . import curves as curves_door
-from . import hair_cache, pipeline, viewport
+from . import hair_cache, live_hair, pipeline, running, viewport
 
 # Guides as they were when their geometry was last reported: session_uid → (N, 3) points. Blender reports the geometry
 # of Curves as updated when no more than their surface's place has changed.
@@ -15,26 +15,58 @@ _guide_points = {}
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
 _is_opening = False
 
+# Whether an undo or redo may have brought back guides without the hair that was written for them, or the reverse.
+_is_undone = False
+
 
 @persistent
 def after_depsgraph_update(_scene, depsgraph):
     """Forget what changed on the GPU and make again what its settings or inputs have outdated."""
     if depsgraph.mode != "VIEWPORT":
         return
-    global _is_opening
-    viewport.forget()
+    global _is_opening, _is_undone
+    viewport.forget(is_hair_only=_is_hair_only(depsgraph))
     if _is_opening:
         _is_opening = False
         return
     changed = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
+    for surface_object in _deformed(depsgraph):
+        hair_cache.forget_pose(surface_object)
+        # Nobody is in the middle of editing or painting it: hair waits until they leave that mode.
+        if surface_object.mode == "OBJECT":
+            live_hair.follow_surface(surface_object, depsgraph, surface_object.data in changed)
+    live_hair.remember_axes()
+    if _is_undone:
+        _is_undone = False
+        for datablock in _of_kind("HAIR"):
+            if datablock.vellus.is_live and live_hair.is_left_by_undo(datablock):
+                datablock.vellus.is_stale = True
+    combed = []
     for datablock in changed:
         if isinstance(datablock, bpy.types.Curves):
-            hair_cache.forget(datablock.session_uid)
+            hair_cache.forget_unless_same(datablock)
             if datablock.vellus.kind == "GUIDES" and _has_moved(datablock):
-                _mark_followers(datablock)
-        elif isinstance(datablock, bpy.types.Mesh):
-            _mark_grown_on(datablock)
-    _evaluate_stale(depsgraph)
+                combed.append(datablock)
+    _evaluate(depsgraph, combed)
+
+
+def _is_hair_only(depsgraph):
+    """Whether nothing but the geometry of Curves has changed: surfaces, lights and the world are as they were."""
+    # Of what is hidden or shown Blender reports no datablock at all.
+    return len(depsgraph.updates) > 0 and all(_are_curves(update) for update in depsgraph.updates)
+
+
+def _are_curves(update):
+    changed = update.id
+    if isinstance(changed, bpy.types.Object):
+        return changed.type == "CURVES" and not update.is_updated_transform
+    return isinstance(changed, bpy.types.Curves)
+
+
+def _deformed(depsgraph):
+    """The mesh objects whose evaluated shape may have changed."""
+    updated = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
+    return {o for o in updated if isinstance(o, bpy.types.Object) and o.type == "MESH"}
 
 
 def _has_moved(guide_curves):
@@ -44,31 +76,32 @@ def _has_moved(guide_curves):
     return before is None or not np.array_equal(before, points)
 
 
-def _mark_followers(guide_curves):
-    for curves in bpy.data.hair_curves:
-        if curves.vellus.guide_curves == guide_curves:
-            curves.vellus.is_stale = True
+def _of_kind(kind):
+    return [curves for curves in bpy.data.hair_curves if curves.vellus.kind == kind]
 
 
-def _mark_grown_on(mesh):
-    for curves in bpy.data.hair_curves:
-        if curves.surface is not None and curves.surface.data == mesh and curves.vellus.kind != "NONE":
-            curves.vellus.is_stale = True
-
-
-def _evaluate_stale(depsgraph):
-    """Guides first: hair follows what they become."""
-    for kind in ("GUIDES", "HAIR"):
-        for curves in bpy.data.hair_curves:
-            if curves.vellus.kind != kind:
-                continue
-            if curves.vellus.is_stale and curves.vellus.is_live and _is_surface_at_rest(curves):
-                pipeline.evaluate(curves, depsgraph)
-                hair_cache.forget(curves.session_uid)
-                if kind == "GUIDES":
-                    _mark_followers(curves)
-            if curves.vellus.is_shading_stale:
-                pipeline.evaluate_shading(curves)
+def _evaluate(depsgraph, combed):
+    """Guides first: hair follows what they become. While an operator computes, what is outdated waits for its end."""
+    if running.job() is not None:
+        for guides in combed:
+            live_hair.mark_followers(guides)
+        return
+    for guides in _of_kind("GUIDES"):
+        if guides.vellus.is_stale and guides.vellus.is_live and _is_surface_at_rest(guides):
+            pipeline.evaluate(guides, depsgraph)
+            hair_cache.forget(guides.session_uid)
+            combed.append(guides)
+    for hair in _of_kind("HAIR"):
+        state = hair.vellus
+        follows = state.guide_curves in combed
+        if not (state.is_live and _is_surface_at_rest(hair)):
+            state.is_stale = state.is_stale or follows
+        elif state.is_stale and not live_hair.is_ahead(hair):
+            live_hair.make_again(hair, depsgraph)
+        elif follows:
+            live_hair.follow_guides(hair, depsgraph)
+        if state.is_shading_stale:
+            pipeline.evaluate_shading(hair)
 
 
 def _is_surface_at_rest(curves):
@@ -77,10 +110,35 @@ def _is_surface_at_rest(curves):
 
 
 @persistent
+def after_frame_change(_scene, depsgraph):
+    """Strands are carried to where their surfaces are in this frame; nothing is written."""
+    if depsgraph.mode != "VIEWPORT":
+        return
+    viewport.forget()
+    for surface_object in _deformed(depsgraph):
+        hair_cache.forget_pose(surface_object)
+
+
+@persistent
+def before_reading(*_args):
+    """Somebody is about to read the hair's Curves: a file, a render."""
+    live_hair.write_all()
+
+
+@persistent
 def after_load(*_args):
     """Hair in a file is as it was saved; without a window Blender reports nothing of it."""
-    global _is_opening
+    global _is_opening, _is_undone
     _is_opening = not bpy.app.background
+    _is_undone = True  # a file that was saved in the middle of a stroke is no better off
+    forget_everything()
+
+
+@persistent
+def after_undo(*_args):
+    """Undo brings back what the file held, which may be guides without the hair that followed them."""
+    global _is_undone
+    _is_undone = True
     forget_everything()
 
 
@@ -88,14 +146,18 @@ def after_load(*_args):
 def forget_everything(*_args):
     """Undo, redo and a new file bring other data under the same names."""
     viewport.forget()
+    live_hair.forget()
     hair_cache.clear()
     _guide_points.clear()
 
 
 _HANDLERS = (
     (bpy.app.handlers.depsgraph_update_post, after_depsgraph_update),
-    (bpy.app.handlers.undo_post, forget_everything),
-    (bpy.app.handlers.redo_post, forget_everything),
+    (bpy.app.handlers.frame_change_post, after_frame_change),
+    (bpy.app.handlers.save_pre, before_reading),
+    (bpy.app.handlers.render_init, before_reading),
+    (bpy.app.handlers.undo_post, after_undo),
+    (bpy.app.handlers.redo_post, after_undo),
     (bpy.app.handlers.load_post, after_load),
 )
 
@@ -107,7 +169,9 @@ def register():
 
 
 def unregister():
-    """Stop listening."""
+    """Stop listening; what hair is ahead of its Curves is written first."""
     for handlers, handler in _HANDLERS:
         handlers.remove(handler)
+    live_hair.write_all()
+    live_hair.forget()
     _guide_points.clear()

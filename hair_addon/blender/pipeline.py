@@ -5,28 +5,48 @@ mesh object ─ distribute_guides ─▶ Guides Curves ─ interpolate_hair ─�
 and its inputs, so `evaluate` can make it again.
 """
 
+import hashlib
+from dataclasses import replace
+
+import bpy
 import numpy as np
 
 from ..core import groom, strands
 from ..core.errors import HairError
-from . import curves, materials, preferences, properties, scene
+from ..core.long_work import part_of, run_now
+from ..core.mesh import require_finite
+from . import bindings, curves, materials, preferences, properties, scene
+from .bindings import BoundHair
+from .datablocks import Remembered
 
 
-def distribute_guides(surface_object, settings, depsgraph, target=None):
+def distribute_guides(surface_object, settings, depsgraph, target=None, keeps_roots=False):
     """Grow guides on a mesh object; returns their Curves object's data, a new object's unless `target` is given.
 
-    Raises `HairError` before anything in the scene changes.
+    keeps_roots: guides of `target` stay where they are if what placed them is the same. Raises `HairError` before
+    anything in the scene changes.
     """
-    _check_surface(surface_object)
-    surface = scene.read_surface(surface_object, depsgraph)
-    density = scene.read_vertex_group(surface_object, depsgraph, settings.density_group)
-    guides = groom.distribute_guides(surface.mesh, settings, density=density, device=preferences.device())
-    target = target or curves.new_object("Guides", surface_object).data
-    _keep_settings(target, "GUIDES", target.vellus.guides, settings)
-    indices = np.arange(len(guides.roots), dtype=np.int32)
-    radii = np.full(guides.points.shape[1], 0.5e-3, np.float32)
-    curves.write_strands(target, surface, guides.numpy(), guides.roots, radii, indices)
-    return target
+    return run_now(distributing_guides(surface_object, settings, depsgraph, target, keeps_roots))
+
+
+def distributing_guides(surface_object, settings, depsgraph, target=None, keeps_roots=False):
+    """`distribute_guides` as work in steps (core/long_work.py)."""
+    surface, density = _read_surface(surface_object, settings, depsgraph)
+    key = root_key(settings, density)
+    roots = _kept_roots(target, surface, key) if keeps_roots else None
+    device, place, target = preferences.device(), Remembered(surface_object), Remembered(target)
+    texture = scene.read_texture(surface, settings.density_image)
+    guides = yield lambda progress: groom.distribute_guides(
+        surface.mesh,
+        settings,
+        density=density,
+        texture=texture,
+        mirror_normal=surface.mirror_normal,
+        roots=roots,
+        device=device,
+        progress=progress,
+    )
+    return _write_guides(target.find(), place.find(), surface, guides, settings, key)
 
 
 def interpolate_hair(guide_curves, settings, depsgraph, target=None):
@@ -34,22 +54,145 @@ def interpolate_hair(guide_curves, settings, depsgraph, target=None):
 
     Raises `HairError` before anything in the scene changes.
     """
-    surface_object = guide_curves.surface
-    _check_surface(surface_object)
-    surface = scene.read_surface(surface_object, depsgraph)
+    return run_now(interpolating_hair(guide_curves, settings, depsgraph, target))
+
+
+def interpolating_hair(guide_curves, settings, depsgraph, target=None):
+    """`interpolate_hair` as work in steps."""
+    place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
+    bound = yield from _binding_hair(guide_curves, settings, depsgraph, target)
+    return _write_bound(its_target.find(), place.find(), its_guides.find(), bound)
+
+
+def bind_hair(guide_curves, settings, depsgraph, target=None):
+    """The `BoundHair` that grows between guides, written nowhere. Strands of `target` keep their roots if they may."""
+    return run_now(_binding_hair(guide_curves, settings, depsgraph, target))
+
+
+def _binding_hair(guide_curves, settings, depsgraph, target):
+    surface, density = _read_surface(guide_curves.surface, settings, depsgraph)
     guides = read_guides(guide_curves, surface)
-    density = scene.read_vertex_group(surface_object, depsgraph, settings.density_group)
-    binding = groom.bind_hair(surface.mesh, guides, settings, density=density, device=preferences.device())
-    hair = groom.follow_guides(binding, guides)
+    key = root_key(settings, density)
+    roots = _kept_roots(target, surface, key)
+    device, guide_uid = preferences.device(), guide_curves.session_uid
+    binding, points = yield lambda progress: _bind(surface, guides, settings, density, roots, device, progress)
+    return BoundHair(binding, settings, key, guides, guide_uid, surface, points)
+
+
+def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
+    """Guides on a mesh object and hair between them, as work in steps; returns the Curves of both.
+
+    No object is made before all of it is computed.
+    """
+    surface, density = _read_surface(surface_object, guide_settings, depsgraph)
+    texture = scene.read_texture(surface, guide_settings.density_image)
+    device, place = preferences.device(), Remembered(surface_object)
+
+    def compute(progress):
+        guides = groom.distribute_guides(
+            surface.mesh,
+            guide_settings,
+            density=density,
+            texture=texture,
+            mirror_normal=surface.mirror_normal,
+            device=device,
+            progress=part_of(progress, 0.0, 0.5),
+        )
+        return guides, *_bind(surface, guides, hair_settings, density, None, device, part_of(progress, 0.5, 1.0))
+
+    guides, binding, points = yield compute
+    guide_curves = _write_guides(None, place.find(), surface, guides, guide_settings, root_key(guide_settings, density))
+    key = root_key(hair_settings, density)
+    bound = BoundHair(binding, hair_settings, key, guides, guide_curves.session_uid, surface, points)
+    return guide_curves, _write_bound(None, place.find(), guide_curves, bound)
+
+
+def _bind(surface, guides, settings, density, roots, device, progress):
+    """`HairBinding`, and strands (S, P, 3) float32 in the surface's local coordinates."""
+    binding = groom.bind_hair(
+        surface.mesh,
+        guides,
+        settings,
+        density=density,
+        roots=roots,
+        device=device,
+        progress=part_of(progress, 0.0, 0.8),
+    )
+    progress("Growing strands", 0.8)
+    return binding, surface.to_local(groom.follow_guides(binding, guides).numpy())
+
+
+def _write_guides(target, surface_object, surface, guides, settings, key):
+    target = target or curves.new_object("Guides", surface_object).data
+    _keep_settings(target, "GUIDES", target.vellus.guides, settings)
+    target.vellus.root_key = key
+    indices = np.arange(len(guides.roots), dtype=np.int32)
+    radii = np.full(guides.points.shape[1], 0.5e-3, np.float32)
+    curves.write_strands(target, surface, surface.to_local(guides.numpy()), guides.roots, radii, indices)
+    curves.keep_surface(target, surface)
+    return target
+
+
+def _write_bound(target, surface_object, guide_curves, bound):
     target = target or curves.new_object("Hair", surface_object).data
-    _keep_settings(target, "HAIR", target.vellus.hair, settings)
+    curves.require_editable(target)
     target.vellus.guide_curves = guide_curves
-    target.vellus.is_stale = False  # as which another choice of guides marks it
-    radii = groom.strand_radii(settings, hair.points.shape[1])
-    nearest = binding.guide_weights.indices.numpy()[:, 0]
-    curves.write_strands(target, surface, hair.numpy(), hair.roots, radii, nearest)
+    bindings.keep(target, bound)
+    write_hair(target)
     evaluate_shading(target)
     return target
+
+
+def write_hair(target):
+    """Bring a hair Curves datablock up to what it is bound to: the one place where hair is written."""
+    bound, state = bindings.of(target), target.vellus
+    if bound.has_moved_only:
+        curves.write_points(target, bound.points)
+    else:
+        _keep_settings(target, "HAIR", state.hair, bound.settings)
+        state.root_key = bound.root_key
+        radii = groom.strand_radii(bound.settings, bound.points.shape[1])
+        nearest = bound.binding.guide_weights.indices.numpy()[:, 0]
+        curves.write_strands(target, bound.surface, bound.points, bound.binding.roots, radii, nearest)
+    state.is_stale = False  # as which another choice of guides marks it
+    state.followed = guides_digest(state.guide_curves)
+    bound.is_written = bound.has_moved_only = True
+    _store_roots(state.guide_curves, bound)
+
+
+def _store_roots(guide_curves, bound):
+    """Tell guides that were drawn or slid by a brush where they are rooted now: so that their surface carries them."""
+    if guide_curves is None or guide_curves.library is not None or guide_curves.session_uid != bound.guide_uid:
+        return
+    stored, roots, surface = curves.read_root_places(guide_curves), bound.guides.roots, bound.surface
+    wanted = surface.root_vertices(roots), surface.swap_winding(roots).barycentric
+    if stored is None or not all(map(np.array_equal, stored, wanted)):
+        curves.write_roots(guide_curves, surface, roots)
+
+
+def root_key(settings, density):
+    """What roots are placed by, beside the surface: while it stays, so do they. Of an image its name counts alone."""
+    names = (
+        *("seed", "guide_count", "relax_iterations", "density_image", "curvature", "symmetric"),
+        "strand_count",
+    )
+    placing = repr([getattr(settings, name, None) for name in names])
+    painted = b"" if density is None else density.tobytes()
+    return hashlib.blake2b(placing.encode() + painted, digest_size=16).hexdigest()
+
+
+def _kept_roots(target, surface, key):
+    """The `SurfacePoints` that Curves store, if they were placed by this `root_key` on these triangles; else None."""
+    if target is None or (target.vellus.root_key, target.vellus.topology) != (key, surface.topology):
+        return None
+    return curves.stored_roots(target, surface)
+
+
+def guides_digest(guide_curves):
+    """What says whether hair was written for guides as they are: undo may bring back one and not the other."""
+    if guide_curves is None:
+        return ""
+    return hashlib.blake2b(curves.read_points(guide_curves).tobytes(), digest_size=16).hexdigest()
 
 
 def read_guides(guide_curves, surface):
@@ -57,7 +200,11 @@ def read_guides(guide_curves, surface):
     counts = curves.point_counts(guide_curves)
     if not len(counts):
         raise HairError(f'"{guide_curves.name}" has no guides: distribute some first.')
-    points = surface.from_local(curves.read_points(guide_curves))
+    local = curves.read_points(guide_curves)
+    if not np.isfinite(local).all():
+        sentence = '"{name}" has points that are no numbers: undo, or delete those guides.'
+        raise HairError(sentence, name=guide_curves.name)
+    points = surface.from_local(local)
     offsets = np.concatenate([[0], np.cumsum(counts)])
     roots = curves.read_roots(guide_curves, surface, points[offsets[:-1]])
     if (counts == groom.POINT_COUNT).all():
@@ -65,6 +212,88 @@ def read_guides(guide_curves, surface):
     else:
         points = strands.resample(points, offsets, groom.POINT_COUNT)
     return strands.from_numpy(points, roots, preferences.device())
+
+
+def follow_guides(target):
+    """Move the strands of bound hair whose guides were combed since; indices (M,) of those that moved.
+
+    None where that is not enough: guides came, went or slid over the surface, and the hair has to be bound again.
+    """
+    bound = bindings.of(target)
+    guides = read_guides(target.vellus.guide_curves, bound.surface)
+    before = bound.guides
+    if guides.points.shape != before.points.shape or not _are_same(guides.roots, before.roots):
+        return None
+    combed = np.flatnonzero((guides.numpy() != before.numpy()).any(axis=(1, 2)))
+    bound.guides = guides
+    moved = bound.reach.of(combed)
+    if len(moved):
+        bound.points[moved] = bound.surface.to_local(groom.follow_some(bound.binding, guides, moved))
+        bound.has_moved_only = bound.is_written or bound.has_moved_only
+        bound.is_written = False
+    return moved
+
+
+def _are_same(roots, others):
+    return np.array_equal(roots.triangle, others.triangle) and np.array_equal(roots.barycentric, others.barycentric)
+
+
+def follow_surface(guide_curves, depsgraph, axes_before=None):
+    """Carry guides, combed or not, with a surface that was edited; whether it was. Raises `HairError`.
+
+    axes_before: `to_world_axes` of the surface before the edit, None if nobody knows. Shape keys and modifiers are no
+    edits: strands are stored on the surface at rest. Where faces came or went, roots are found again at the nearest
+    place.
+    """
+    state = guide_curves.vellus
+    surface = scene.read_surface(guide_curves.surface, depsgraph)
+    if state.topology != surface.topology:
+        _root_again(guide_curves, surface)
+        state.status = f'The faces of "{surface.name}" have changed: guides are rooted where it is nearest.'
+        return True
+    before = curves.stood_on(guide_curves)
+    if before is None or before.shape != surface.rest.shape or np.array_equal(before, surface.rest):
+        return False
+    require_finite(surface.rest)
+    applied = None if axes_before is None else np.linalg.solve(surface.to_world_axes, axes_before)
+    if applied is not None and np.allclose(before @ applied.T, surface.rest, rtol=0.0, atol=1e-5 * surface.extent):
+        # The object's rotation or scale was applied: in the world nothing has moved.
+        for target in (guide_curves, *followers(guide_curves)):
+            curves.transform(target, applied)
+            bindings.forget(target)
+    else:
+        from ..core import surface_frames  # Warp takes longer to import than the add-on may take to start
+
+        curves.carry(guide_curves, surface_frames.motion(before, surface.rest, surface.faces))
+    curves.write_roots(guide_curves, surface, curves.stored_roots(guide_curves, surface))
+    curves.keep_surface(guide_curves, surface)
+    return True
+
+
+def followers(guide_curves):
+    """The hair Curves that follow some guides."""
+    return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and c.vellus.guide_curves == guide_curves]
+
+
+def _root_again(guide_curves, surface):
+    counts = curves.point_counts(guide_curves)
+    firsts = np.concatenate([[0], np.cumsum(counts[:-1])])
+    points = surface.from_local(curves.read_points(guide_curves)[firsts])
+    curves.write_roots(guide_curves, surface, curves.read_roots(guide_curves, surface, points))
+    curves.keep_surface(guide_curves, surface)
+
+
+def has_other_density(target, depsgraph):
+    """Whether the weights that roots were placed by have been painted over."""
+    state = target.vellus
+    group, settings_class = (
+        (state.guides, groom.GuideSettings) if state.kind == "GUIDES" else (state.hair, groom.HairSettings)
+    )
+    if not group.density_group:
+        return False  # the surface has no say but by its shape
+    settings = properties.to_settings(group, settings_class)
+    density = scene.read_vertex_group(target.surface, depsgraph, settings.density_group)
+    return state.root_key != root_key(settings, density)
 
 
 def evaluate(target, depsgraph):
@@ -75,18 +304,36 @@ def evaluate(target, depsgraph):
     state = target.vellus
     state.is_stale = False
     try:
-        if curves.is_combed(target):
-            raise HairError(f'"{target.name}" was combed and is kept: run its operator again to replace it.')
+        require_uncombed(target)
         if state.kind == "GUIDES":
             settings = properties.to_settings(state.guides, groom.GuideSettings)
-            distribute_guides(target.surface, settings, depsgraph, target)
+            distribute_guides(target.surface, settings, depsgraph, target, keeps_roots=True)
         elif state.kind == "HAIR":
-            if state.guide_curves is None:
-                raise HairError(f'"{target.name}" has lost its guides: pick them in the Hair tab.')
-            settings = properties.to_settings(state.hair, groom.HairSettings)
-            interpolate_hair(state.guide_curves, settings, depsgraph, target)
+            interpolate_hair(*inputs_of(target), depsgraph, target)
     except HairError as error:
         state.status = str(error)
+
+
+def require_uncombed(target):
+    """Raise `HairError` for Curves that somebody's hand was in."""
+    if curves.is_combed(target):
+        raise HairError(f'"{target.name}" was combed and is kept: run its operator again to replace it.')
+
+
+def inputs_of(target):
+    """(guide Curves, `HairSettings`) of a hair Curves datablock. Raises `HairError`."""
+    state = target.vellus
+    if state.guide_curves is None:
+        raise HairError(f'"{target.name}" has lost its guides: pick them in the Hair tab.')
+    return state.guide_curves, properties.to_settings(state.hair, groom.HairSettings)
+
+
+def _read_surface(surface_object, settings, depsgraph):
+    """`Surface` and the density (V,) or None that settings name, of a mesh object that may be changed."""
+    _check_surface(surface_object)
+    curves.keep_rest(surface_object)
+    surface = scene.read_surface(surface_object, depsgraph)
+    return surface, scene.read_vertex_group(surface_object, depsgraph, settings.density_group)
 
 
 def evaluate_shading(target):
@@ -98,6 +345,23 @@ def evaluate_shading(target):
         target.vellus.shading_status = ""
     except HairError as error:
         target.vellus.shading_status = str(error)
+
+
+def apply_look(target, look):
+    """Give hair an `Appearance`, but for its mode: how to draw is no part of a look. Raises `HairError`."""
+    curves.require_editable(target)
+    group = target.vellus.appearance
+    properties.assign(group, replace(look, mode=group.mode))
+    evaluate_shading(target)
+
+
+def show_shaded(hair, is_drawn):
+    """Let Vellus draw hair datablocks in viewports, or Blender. Raises `HairError`."""
+    for target in hair:
+        curves.require_editable(target)
+    for target in hair:
+        target.vellus.is_drawn = is_drawn
+        evaluate_shading(target)
 
 
 def _check_surface(surface_object):

@@ -3,6 +3,8 @@
 
 import bpy
 
+from .translations import CONTEXT
+
 # The add-on's module: the extension's package, or hair_addon itself where it runs from a checkout.
 ADDON_MODULE = __package__.removesuffix(".blender").removesuffix(".hair_addon")
 
@@ -15,6 +17,7 @@ class VellusPreferences(bpy.types.AddonPreferences):
     device: bpy.props.EnumProperty(
         name="Compute Device",
         description="Where hair is computed",
+        translation_context=CONTEXT,
         items=[("cpu", "CPU", "The processor"), ("cuda", "NVIDIA GPU", "The first CUDA device")],
         default="cpu",
     )

@@ -15,6 +15,7 @@ from ..core.groom import GuideSettings, HairSettings
 from ..core.params import declared, label_of
 from ..core.shading import appearance, lookup_tables
 from ..core.shading.appearance import Appearance
+from .translations import CONTEXT
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
 
@@ -34,7 +35,8 @@ def annotations(settings_class, update=None, skip=()):
 
 
 def _property(name, default, details, update):
-    common = {"name": label_of(name, details), "description": details.description, "default": default}
+    common = {"name": _title(label_of(name, details)), "description": details.description, "default": default}
+    common["translation_context"] = CONTEXT
     if update is not None:
         common["update"] = update
     if isinstance(default, str):
@@ -51,6 +53,11 @@ def _property(name, default, details, update):
         return bpy.props.FloatVectorProperty(size=len(default), subtype=details.subtype, **common, **limits)
     # A subtype such as DISTANCE or ANGLE implies its unit.
     return bpy.props.FloatProperty(subtype=details.subtype, unit=details.unit, **common, **limits)
+
+
+def _title(label):
+    """A label as Blender writes them: Melanin Redness, IOR."""
+    return " ".join(word[:1].upper() + word[1:] for word in label.split())
 
 
 def _limits(details, is_integer):
@@ -85,6 +92,11 @@ def _plain(value, default, details):
     if isinstance(default, tuple):
         return tuple(_plain(float(part), meant, details) for part, meant in zip(value, default, strict=True))
     return value
+
+
+def names_of(settings_class):
+    """Names of the settings of a class, in the order of declaration."""
+    return tuple(name for name, _default, _details in declared(settings_class))
 
 
 def look_of(state):
@@ -160,6 +172,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     guide_curves: bpy.props.PointerProperty(
         name="Guides",
         description="The guides that this hair follows",
+        translation_context=CONTEXT,
         type=bpy.types.Curves,
         poll=lambda _group, curves: curves.vellus.kind == "GUIDES",
         update=_mark_geometry,
@@ -169,6 +182,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     model: bpy.props.EnumProperty(
         name="Shading Model",
         description="How strands scatter light in the viewport",
+        translation_context=CONTEXT,
         items=MODELS,
         default="MARSCHNER",
         update=_mark_shading,
@@ -178,6 +192,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     table_folder: bpy.props.StringProperty(
         name="Table Folder",
         description="Folder with baked tables; they are used while their settings are those of this hair",
+        translation_context=CONTEXT,
         subtype="DIR_PATH",
         options=_RELATIVE,
         update=_mark_shading,
@@ -185,15 +200,32 @@ class VellusCurves(bpy.types.PropertyGroup):
     is_drawn: bpy.props.BoolProperty(
         name="Shaded in Viewport",
         description="Draw this hair with its shading model; off: as Blender draws curves",
+        translation_context=CONTEXT,
         default=True,
         update=_mark_shading,
     )
+    viewport_percentage: bpy.props.IntProperty(
+        name="Strands in Viewport",
+        description="How many of the strands viewports show, each as much thicker; renders show all",
+        translation_context=CONTEXT,
+        subtype="PERCENTAGE",
+        min=1,
+        max=100,
+        default=100,
+    )
     is_live: bpy.props.BoolProperty(
-        name="Live", description="Make this again whenever its settings or its inputs change", default=True
+        name="Live",
+        description="Make this again whenever its settings or its inputs change",
+        translation_context=CONTEXT,
+        default=True,
     )
     is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
+    topology: bpy.props.StringProperty(description="The triangles that roots are stored by", options={"HIDDEN"})
+    root_key: bpy.props.StringProperty(description="What the roots were placed by", options={"HIDDEN"})
+    followed: bpy.props.StringProperty(description="The guides that the strands were written for", options={"HIDDEN"})
     shading_status: bpy.props.StringProperty(description="Why this cannot be shaded", options={"HIDDEN"})
+    uv_status: bpy.props.StringProperty(description="What is wrong with the surface's UV map", options={"HIDDEN"})
     status: bpy.props.StringProperty(description="Why this could not be made again", options={"HIDDEN"})
 
 
@@ -224,15 +256,24 @@ def copy(source, target, settings_class):
 
 def folder(description):
     """The `directory` property that a file browser fills."""
-    return bpy.props.StringProperty(name="Folder", description=description, subtype="DIR_PATH", options=_RELATIVE)
+    return bpy.props.StringProperty(
+        name="Folder", description=description, subtype="DIR_PATH", options=_RELATIVE, translation_context=CONTEXT
+    )
 
 
 def file(description):
     """The `filepath` property that a file browser fills."""
-    return bpy.props.StringProperty(name="File", description=description, subtype="FILE_PATH", options=_RELATIVE)
+    return bpy.props.StringProperty(
+        name="File", description=description, subtype="FILE_PATH", options=_RELATIVE, translation_context=CONTEXT
+    )
+
+
+def text(name, description):
+    """A line of text that is no setting."""
+    return bpy.props.StringProperty(name=name, description=description, translation_context=CONTEXT)
 
 
 def choice(name, description, labels):
     """An enumeration that is no setting; labels: {identifier: label}."""
     items = [(identifier, label, "") for identifier, label in labels.items()]
-    return bpy.props.EnumProperty(name=name, description=description, items=items)
+    return bpy.props.EnumProperty(name=name, description=description, items=items, translation_context=CONTEXT)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A Blender without a window, the add-on registered as Blender would, and scenes to grow hair in."""
 
+import math
+
 import bpy
 import gpu
 import numpy as np
@@ -54,3 +56,53 @@ def hair(guides):
     bpy.ops.vellus.interpolate_hair(strand_count=500, radius=0.004)
     bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
     return bpy.data.objects["Hair"]
+
+
+@pytest.fixture
+def arm(scene):
+    """A cylinder along X, 4 m long, whose second bone bends it from straight in frame 1 to a right angle in 11."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=24, size=2.0)
+    arm = bpy.context.object
+    for vertex in arm.data.vertices:
+        x, turn = 2.0 * vertex.co.x, np.pi * vertex.co.y
+        vertex.co = (x, 0.5 * np.cos(turn), 0.5 * np.sin(turn))
+    bpy.ops.object.armature_add(enter_editmode=True)
+    rig = bpy.context.object
+    bones = rig.data.edit_bones
+    bones[0].head, bones[0].tail, bones[0].name = (-2, 0, 0), (0, 0, 0), "upper"
+    lower = bones.new("lower")
+    lower.head, lower.tail, lower.parent = (0, 0, 0), (2, 0, 0), bones[0]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for name, sign in (("upper", -1.0), ("lower", 1.0)):
+        group = arm.vertex_groups.new(name=name)
+        for vertex in arm.data.vertices:
+            group.add([vertex.index], float(np.clip(0.5 + sign * vertex.co.x, 0.0, 1.0)), "REPLACE")
+    arm.modifiers.new("Armature", "ARMATURE").object = rig
+    bone = rig.pose.bones["lower"]
+    bone.rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.0), (11, np.pi / 2)):
+        bone.rotation_euler.x = angle
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    scene.frame_set(1)
+    bpy.context.view_layer.update()
+    return arm
+
+
+@pytest.fixture
+def lit(hair):
+    """The hairy sphere with a camera in front of it and a sun over the camera's shoulder."""
+    blender_scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -8.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 3.0, (math.pi / 3, 0.0, 0.0)
+    for new in (camera, sun):
+        blender_scene.collection.objects.link(new)
+    blender_scene.camera = camera
+    return hair
+
+
+@pytest.fixture
+def blender_scene(scene):
+    """The empty scene, where a module is called `scene`."""
+    return scene

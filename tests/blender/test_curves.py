@@ -120,3 +120,26 @@ def test_hair_without_a_uv_map_grows_all_the_same(scene):
     made = bpy.data.objects["Guides"]
     assert len(made.data.curves) == 10 and made.data.surface_uv_map == ""
     assert vertex_positions(plane).shape == (4, 3)
+
+
+def test_a_strand_keeps_its_random_number_when_there_are_more(hair):
+    before = curves.read_randoms(hair.data)
+    assert 0.0 <= before.min() and before.max() <= 1.0
+    assert before.std() == pytest.approx(12.0**-0.5, rel=0.05)  # evenly between 0 and 1
+    bpy.ops.vellus.interpolate_hair(strand_count=900)
+    np.testing.assert_array_equal(curves.read_randoms(hair.data)[: len(before)], before)
+
+
+@pytest.mark.parametrize("damage", ["missing", "another type", "not numbers"])
+def test_random_numbers_are_numbers_whatever_the_file_holds(hair, damage):
+    if damage == "not numbers":
+        values = np.tile(np.array([np.nan, -3.0, np.inf, 0.25], np.float32), 125)
+        hair.data.attributes["strand_random"].data.foreach_set("value", values)
+    else:
+        hair.data.attributes.remove(hair.data.attributes["strand_random"])
+        if damage == "another type":
+            hair.data.attributes.new("strand_random", "FLOAT_VECTOR", "POINT")
+    found = curves.read_randoms(hair.data)
+    assert found.shape == (500,) and (0.0 <= found).all() and (found <= 1.0).all()
+    curves.write_randoms(hair.data)
+    np.testing.assert_array_equal(curves.read_randoms(hair.data), found)

@@ -61,7 +61,10 @@ def _user_folder():
 
 def _apply_preset(hair):
     bpy.context.view_layer.objects.active = hair
-    return bpy.ops.vellus.apply_preset(preset="BLOND")
+    result = bpy.ops.vellus.apply_preset(preset="BLOND")
+    look = hair.data.vellus.appearance
+    look.random_color = look.random_roughness = 0.0  # the tables of even hair are cached
+    return result
 
 
 def _positions(curves):

@@ -1,22 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A named look → the active hair's appearance."""
 
-from dataclasses import replace
-
 import bpy
 
-from ...core.errors import HairError
 from ...core.shading.presets import PRESETS
-from .. import curves, pipeline, properties
-from ..selection import active_of_kind
+from .. import pipeline, properties
+from ..selection import hair_of
+from .base import HairOperator
 
 
-class VELLUS_OT_apply_preset(bpy.types.Operator):
+class VELLUS_OT_apply_preset(HairOperator, bpy.types.Operator):
     """Make the active hair look like natural, dyed or wet hair"""
 
     bl_idname = "vellus.apply_preset"
     bl_label = "Apply Preset"
-    bl_options = {"REGISTER", "UNDO"}
     __annotations__ = {
         "preset": properties.choice(
             "Preset", "The look to begin with", {identifier: label for identifier, (label, _look) in PRESETS.items()}
@@ -26,18 +23,9 @@ class VELLUS_OT_apply_preset(bpy.types.Operator):
     @classmethod
     def poll(cls, context):
         cls.poll_message_set("Select hair.")
-        return active_of_kind(context.object, "HAIR") is not None
+        return hair_of(context.object) is not None
 
-    def execute(self, context):
-        hair = active_of_kind(context.object, "HAIR")
+    def change(self, context):
         label, look = PRESETS[self.preset]
-        group = hair.vellus.appearance
-        try:
-            curves.require_editable(hair)
-        except HairError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        properties.assign(group, replace(look, mode=group.mode))  # how to draw is no part of a look
-        pipeline.evaluate_shading(hair)
-        self.report({"INFO"}, label)
-        return {"FINISHED"}
+        pipeline.apply_look(hair_of(context.object), look)
+        return label, {}

@@ -5,18 +5,17 @@ import bpy
 
 from ...core import exr
 from ...core.errors import HairError
-from ...core.params import declared
 from ...core.shading import lookup_tables
 from .. import files, properties
-from ..selection import active_of_kind
+from ..selection import hair_of
+from .base import HairOperator
 
 
-class VELLUS_OT_bake_tables(bpy.types.Operator):
+class VELLUS_OT_bake_tables(HairOperator, bpy.types.Operator):
     """Bake the active hair's Marschner tables to a folder, from which it reads them while its settings stay"""
 
     bl_idname = "vellus.bake_tables"
     bl_label = "Bake Tables"
-    bl_options = {"REGISTER", "UNDO"}
     __annotations__ = {
         "directory": properties.folder("Folder that the tables are written to"),
         **properties.annotations(lookup_tables.Settings),
@@ -24,10 +23,9 @@ class VELLUS_OT_bake_tables(bpy.types.Operator):
 
     def invoke(self, context, _event):
         try:
-            self._take_from(active_of_kind(context.object, "HAIR"))
+            self._take_from(hair_of(context.object))
         except HairError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+            return self.refuse(error)
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
@@ -36,21 +34,16 @@ class VELLUS_OT_bake_tables(bpy.types.Operator):
         if hair is None:
             return
         settings = properties.table_settings_of(hair.vellus)
-        for name, _default, _details in declared(lookup_tables.Settings):
+        for name in properties.names_of(lookup_tables.Settings):
             if not self.properties.is_property_set(name):
                 setattr(self, name, getattr(settings, name))
 
-    def execute(self, context):
-        hair = active_of_kind(context.object, "HAIR")
-        try:
-            self._take_from(hair)
-            settings = properties.to_settings(self, lookup_tables.Settings)
-            folder = files.resolve(self.directory)
-            exr.write_tables(folder, lookup_tables.bake(settings), files.addon_version())
-        except HairError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
+    def change(self, context):
+        hair = hair_of(context.object)
+        self._take_from(hair)
+        settings = properties.to_settings(self, lookup_tables.Settings)
+        folder = files.resolve(self.directory)
+        exr.write_tables(folder, lookup_tables.bake(settings), files.addon_version())
         if hair is not None:
             hair.vellus.table_folder = self.directory
-        self.report({"INFO"}, f"Tables written to {folder}")
-        return {"FINISHED"}
+        return "Tables written to {folder}", {"folder": folder}

@@ -3,18 +3,18 @@
 
 import bpy
 
-from ...core.errors import HairError
+from ...core import estimate
 from ...core.groom import GuideSettings
 from .. import pipeline, properties
 from ..selection import guides_again, surface_of
+from .modal import LongOperator
 
 
-class VELLUS_OT_distribute_guides(bpy.types.Operator):
+class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
     """Place guide hairs evenly on the active mesh, or place the active guides again"""
 
     bl_idname = "vellus.distribute_guides"
     bl_label = "Distribute Guides"
-    bl_options = {"REGISTER", "UNDO"}
     __annotations__ = properties.annotations(GuideSettings)
 
     @classmethod
@@ -22,20 +22,20 @@ class VELLUS_OT_distribute_guides(bpy.types.Operator):
         cls.poll_message_set("Select a mesh to grow guides on, or guides to place again.")
         return surface_of(context.object) is not None
 
-    def invoke(self, context, _event):
+    def prefill(self, context):
         guides = guides_again(context.object)
         if guides is not None:
             properties.copy(guides.vellus.guides, self, GuideSettings)
-        return self.execute(context)
 
-    def execute(self, context):
-        try:
-            settings = properties.to_settings(self, GuideSettings)
-            target = guides_again(context.object)
-            depsgraph = context.evaluated_depsgraph_get()
-            guides = pipeline.distribute_guides(surface_of(context.object), settings, depsgraph, target)
-        except HairError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"{len(guides.curves)} guides")
-        return {"FINISHED"}
+    def seconds(self, context):
+        return estimate.guide_seconds(properties.to_settings(self, GuideSettings))
+
+    def work(self, context):
+        settings = properties.to_settings(self, GuideSettings)
+        depsgraph = context.evaluated_depsgraph_get()
+        return pipeline.distributing_guides(
+            surface_of(context.object), settings, depsgraph, guides_again(context.object)
+        )
+
+    def message(self, made):
+        return "{count} guides", {"count": len(made.curves)}

@@ -3,18 +3,18 @@
 
 import bpy
 
-from ...core.errors import HairError
+from ...core import estimate
 from ...core.groom import HairSettings
 from .. import pipeline, properties
 from ..selection import active_of_kind, guides_of
+from .modal import LongOperator
 
 
-class VELLUS_OT_interpolate_hair(bpy.types.Operator):
+class VELLUS_OT_interpolate_hair(LongOperator, bpy.types.Operator):
     """Grow strands between the guides of the active object, or grow the active hair again"""
 
     bl_idname = "vellus.interpolate_hair"
     bl_label = "Interpolate Hair"
-    bl_options = {"REGISTER", "UNDO"}
     __annotations__ = properties.annotations(HairSettings)
 
     @classmethod
@@ -22,20 +22,20 @@ class VELLUS_OT_interpolate_hair(bpy.types.Operator):
         cls.poll_message_set("Select guides, the mesh that they grow on, or hair to grow again.")
         return guides_of(context.object) is not None
 
-    def invoke(self, context, _event):
+    def prefill(self, context):
         hair = active_of_kind(context.object, "HAIR")
         if hair is not None:
             properties.copy(hair.vellus.hair, self, HairSettings)
-        return self.execute(context)
 
-    def execute(self, context):
-        try:
-            settings = properties.to_settings(self, HairSettings)
-            target = active_of_kind(context.object, "HAIR")
-            depsgraph = context.evaluated_depsgraph_get()
-            hair = pipeline.interpolate_hair(guides_of(context.object), settings, depsgraph, target)
-        except HairError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"{len(hair.curves)} strands")
-        return {"FINISHED"}
+    def seconds(self, context):
+        return estimate.hair_seconds(properties.to_settings(self, HairSettings))
+
+    def work(self, context):
+        settings = properties.to_settings(self, HairSettings)
+        depsgraph = context.evaluated_depsgraph_get()
+        return pipeline.interpolating_hair(
+            guides_of(context.object), settings, depsgraph, active_of_kind(context.object, "HAIR")
+        )
+
+    def message(self, made):
+        return "{count} strands", {"count": len(made.curves)}

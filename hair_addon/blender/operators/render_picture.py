@@ -3,11 +3,11 @@
 
 import bpy
 
-from ...core.errors import HairError
 from .. import files, properties, render
+from .base import HairOperator
 
 
-class VELLUS_OT_render_picture(bpy.types.Operator):
+class VELLUS_OT_render_picture(HairOperator, bpy.types.Operator):
     """Draw the hair as the viewport shades it, from the scene's camera, into a file"""
 
     bl_idname = "vellus.render_picture"
@@ -27,15 +27,10 @@ class VELLUS_OT_render_picture(bpy.types.Operator):
         context.window_manager.fileselect_add(self)
         return {"RUNNING_MODAL"}
 
-    def execute(self, context):
-        try:
-            settings = properties.to_settings(self, render.PictureSettings)
-            path = files.resolve(self.filepath)
-            depsgraph = context.evaluated_depsgraph_get()
-            pixels = render.draw_picture(context.scene, context.view_layer, depsgraph, settings)
-            render.write_picture(pixels, path, context.scene)
-        except HairError as error:
-            self.report({"ERROR"}, str(error))
-            return {"CANCELLED"}
-        self.report({"INFO"}, f"Picture written to {path}")
-        return {"FINISHED"}
+    def change(self, context):
+        settings = properties.to_settings(self, render.PictureSettings)
+        path = files.resolve(self.filepath)
+        depsgraph = context.evaluated_depsgraph_get()
+        pixels = render.draw_picture(context.scene, context.view_layer, depsgraph, settings)
+        render.write_picture(pixels, path, context.scene)
+        return "Picture written to {path}", {"path": path}

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Geometry nodes that carry strands with their surface: core/surface_frames.py where Blender evaluates by itself.
+
+So hair follows an armature in every frame that Cycles renders and an exporter writes, in a file that is linked, and on
+a machine without this add-on. Nodes find a root by its stored vertices, and need no UV map; on a surface of another
+number of vertices, such as a finer subdivision for renders, by the nearest place of the surface at rest.
+"""
+
+import bpy
+
+_NAME = "Vellus Follow Surface"
+_VERSION = 1  # of the nodes below: a group of another one, from an older file, is left to what uses it
+ROOT_VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
+
+
+def add_modifier(curves_object):
+    """Let an object's strands follow the surface that `set_surface` names, before any other modifier of theirs."""
+    modifier = curves_object.modifiers.new("Follow Surface", "NODES")
+    modifier.node_group = _group()
+    curves_object.modifiers.move(len(curves_object.modifiers) - 1, 0)
+
+
+def set_surface(curves_object, surface_object, vertex_count, is_combed):
+    """Name the surface that an object's strands follow, if it still has the modifier.
+
+    vertex_count: of the evaluated surface that the strands' root vertices count in; is_combed: whether brushes are to
+    move strands where the surface has carried them, which needs a UV map.
+    """
+    for modifier in curves_object.modifiers:
+        if modifier.type == "NODES" and _is_ours(modifier.node_group):
+            inputs = {"Surface": surface_object, "Vertices": vertex_count, "Combed": is_combed}
+            for name, value in inputs.items():
+                socket = getattr(modifier.properties.inputs, _identifier(modifier.node_group, name))
+                if socket.value != value:
+                    socket.value = value
+
+
+def _is_ours(group):
+    return group is not None and "vellus_version" in group
+
+
+def _identifier(group, name):
+    return next(s.identifier for s in group.interface.items_tree if s.name == name)
+
+
+def _group():
+    """The node group of this version, made if the file has none that may be used."""
+    for group in bpy.data.node_groups:
+        if _is_ours(group) and group["vellus_version"] == _VERSION and group.library is None:
+            return group
+    group = bpy.data.node_groups.new(_NAME, "GeometryNodeTree")
+    group["vellus_version"] = _VERSION
+    group.is_modifier = True
+    group.interface.new_socket("Curves", in_out="INPUT", socket_type="NodeSocketGeometry")
+    group.interface.new_socket("Surface", in_out="INPUT", socket_type="NodeSocketObject")
+    group.interface.new_socket("Vertices", in_out="INPUT", socket_type="NodeSocketInt")
+    group.interface.new_socket("Combed", in_out="INPUT", socket_type="NodeSocketBool")
+    group.interface.new_socket("Curves", in_out="OUTPUT", socket_type="NodeSocketGeometry")
+    _Tree(group).build()
+    return group
+
+
+class _Tree:
+    """Nodes as functions of sockets: each method adds some and returns what they compute."""
+
+    def __init__(self, group):
+        self._group = group
+        self._column = 0
+
+    def build(self):
+        """All of the group, from its input to its output."""
+        given = self._node("NodeGroupInput").outputs
+        # In the surface's own coordinates, which are those of its children.
+        info = self._node("GeometryNodeObjectInfo", {"Object": given["Surface"]}, transform_space="ORIGINAL")
+        position = self._node("GeometryNodeInputPosition").outputs[0]
+        surface, (after, *axes) = self._with_motion(info.outputs["Geometry"], position)
+        before, after, x_axis, y_axis = self._at_roots(
+            surface, info.outputs["Geometry"], given["Vertices"], [self._rest(position), after, *axes]
+        )
+        rotation = self._node(
+            "FunctionNodeAxesToRotation",
+            {0: x_axis, 1: self._vector("CROSS_PRODUCT", x_axis, y_axis)},
+            primary_axis="X",
+            secondary_axis="Z",
+        ).outputs[0]
+        turned = self._node("FunctionNodeRotateVector", {0: before, 1: rotation}).outputs[0]
+        # Computed once a strand, not once a point.
+        offset = self._on_domain(self._vector("SUBTRACT", after, turned), "FLOAT_VECTOR", "CURVE")
+        rotation = self._on_domain(rotation, "QUATERNION", "CURVE")
+        curves, (position,) = self._capture(given["Curves"], [position])
+        turned = self._node("FunctionNodeRotateVector", {0: position, 1: rotation}).outputs[0]
+        moved = self._node(
+            "GeometryNodeSetPosition",
+            {
+                "Geometry": self._with_turns_for_brushes(curves, given["Combed"]),
+                "Position": self._vector("ADD", turned, offset),
+            },
+        )
+        # A surface that rests costs no more than looking at it.
+        is_deformed = self._is_deformed(info.outputs["Geometry"])
+        inputs = {"Switch": is_deformed, "False": given["Curves"], "True": moved.outputs[0]}
+        self._node("NodeGroupOutput", {0: self._node("GeometryNodeSwitch", inputs, input_type="GEOMETRY").outputs[0]})
+
+    def _is_deformed(self, surface):
+        position = self._node("GeometryNodeInputPosition").outputs[0]
+        inputs = {"Geometry": surface, "Attribute": self._vector("DISTANCE", position, self._rest(position))}
+        farthest = self._node("GeometryNodeAttributeStatistic", inputs, data_type="FLOAT", domain="POINT")
+        return self._node("FunctionNodeCompare", {"A": farthest.outputs["Max"], "B": 0.0}, data_type="FLOAT").outputs[0]
+
+    def _with_turns_for_brushes(self, curves, is_combed):
+        """Curves that know how a brush's strokes have to be turned back: Blender's own node is the one that says."""
+        deformed = self._node("GeometryNodeDeformCurvesOnSurface", {0: curves}).outputs[0]
+        inputs = {"Switch": is_combed, "False": curves, "True": deformed}
+        return self._node("GeometryNodeSwitch", inputs, input_type="GEOMETRY").outputs[0]
+
+    def _with_motion(self, surface, position):
+        """The surface and, per vertex, its position and where the rotation there takes the x and the y axis."""
+        face = self._node("GeometryNodeInputIndex").outputs[0]
+        corners = []
+        for offset in (0, 1, -1):
+            corner = self._node("GeometryNodeCornersOfFace", {"Face Index": face, "Sort Index": offset}).outputs[0]
+            corners.append(self._node("GeometryNodeVertexOfCorner", {0: corner}).outputs[0])
+        inverse = self._node("FunctionNodeInvertMatrix", {0: self._basis(self._rest(position), corners)}).outputs
+        is_now = self._basis(position, corners)
+        gradient = self._node("FunctionNodeMatrixMultiply", {0: is_now, 1: inverse["Matrix"]}).outputs[0]
+        columns = []
+        for column in self._axes_of(gradient, 3):
+            # A face without area has no gradient, and no say.
+            column = self._vector("SCALE", column, scale=inverse["Invertible"])
+            columns.append(self._on_domain(column, "FLOAT_VECTOR", "FACE"))
+        surface, columns = self._capture(surface, columns)
+        factors = self._node("FunctionNodeMatrixSVD", {0: self._matrix(*columns)}).outputs
+        back = self._node("FunctionNodeTransposeMatrix", {0: factors["V"]}).outputs[0]
+        nearest = self._node("FunctionNodeMatrixMultiply", {0: factors["U"], 1: back}).outputs[0]
+        return self._capture(surface, [position, *self._axes_of(nearest, 2)])
+
+    def _at_roots(self, surface, evaluated, vertex_count, values):
+        """Vectors of a surface's vertices at the strands' roots."""
+        barycentric = self._named("root_barycentric", "FLOAT_VECTOR")
+        weights = self._node("ShaderNodeSeparateXYZ", {0: barycentric}).outputs
+        corners = [self._named(name, "INT") for name in ROOT_VERTICES]
+        found = self._node("GeometryNodeAttributeDomainSize", {0: evaluated}).outputs["Point Count"]
+        is_other = self._node(
+            "FunctionNodeCompare", {"A": found, "B": vertex_count}, data_type="INT", operation="NOT_EQUAL"
+        ).outputs[0]
+        position = self._node("GeometryNodeInputPosition").outputs[0]
+        first = self._node("GeometryNodePointsOfCurve", {"Sort Index": 0}).outputs[0]
+        root = self._on_domain(self._at_index(position, first), "FLOAT_VECTOR", "CURVE")
+        at_rest = self._node("GeometryNodeSetPosition", {"Geometry": surface, "Position": self._rest(position)})
+
+        def at_root(value):
+            parts = [
+                self._vector("SCALE", self._sample(surface, value, corner), scale=weight)
+                for corner, weight in zip(corners, weights, strict=True)
+            ]
+            known = self._vector("ADD", self._vector("ADD", *parts[:2]), parts[2])
+            nearest = self._node(
+                "GeometryNodeSampleNearestSurface",
+                {"Mesh": at_rest.outputs[0], "Value": value, "Sample Position": root},
+                data_type="FLOAT_VECTOR",
+            ).outputs[0]
+            return self._switch(is_other, known, nearest)
+
+        return [at_root(value) for value in values]
+
+    def _rest(self, position):
+        """Where vertices are before they deform; where they are, if Blender was not asked to remember."""
+        named = self._node("GeometryNodeInputNamedAttribute", {"Name": "rest_position"}, data_type="FLOAT_VECTOR")
+        return self._switch(named.outputs["Exists"], position, named.outputs["Attribute"])
+
+    def _basis(self, value, corners):
+        first, following, last = (self._at_index(value, corner) for corner in corners)
+        along = self._vector("SUBTRACT", following, first)
+        across = self._vector("SUBTRACT", last, first)
+        return self._matrix(along, across, self._vector("NORMALIZE", self._vector("CROSS_PRODUCT", along, across)))
+
+    def _matrix(self, *columns):
+        matrix = self._node("FunctionNodeCombineMatrix")
+        for index, column in enumerate(columns, start=1):
+            for row, part in enumerate(self._node("ShaderNodeSeparateXYZ", {0: column}).outputs, start=1):
+                self._group.links.new(part, matrix.inputs[f"Column {index} Row {row}"])
+        return matrix.outputs[0]
+
+    def _axes_of(self, matrix, count):
+        """Where a matrix takes the first axes."""
+        axes = ((1, 0, 0), (0, 1, 0), (0, 0, 1))[:count]
+        return [self._node("FunctionNodeTransformDirection", {0: axis, 1: matrix}).outputs[0] for axis in axes]
+
+    def _capture(self, geometry, vectors):
+        node = self._node("GeometryNodeCaptureAttribute", {"Geometry": geometry}, domain="POINT")
+        names = [f"Value {index}" for index in range(len(vectors))]
+        for name, vector in zip(names, vectors, strict=True):
+            node.capture_items.new("VECTOR", name)
+            self._group.links.new(vector, node.inputs[name])
+        return node.outputs["Geometry"], [node.outputs[name] for name in names]
+
+    def _named(self, name, data_type):
+        return self._node("GeometryNodeInputNamedAttribute", {"Name": name}, data_type=data_type).outputs[0]
+
+    def _at_index(self, value, index):
+        inputs = {"Value": value, "Index": index}
+        return self._node("GeometryNodeFieldAtIndex", inputs, data_type="FLOAT_VECTOR", domain="POINT").outputs[0]
+
+    def _sample(self, surface, value, index):
+        inputs = {"Geometry": surface, "Value": value, "Index": index}
+        return self._node("GeometryNodeSampleIndex", inputs, data_type="FLOAT_VECTOR", domain="POINT").outputs[0]
+
+    def _on_domain(self, value, data_type, domain):
+        return self._node("GeometryNodeFieldOnDomain", {0: value}, data_type=data_type, domain=domain).outputs[0]
+
+    def _switch(self, condition, otherwise, value):
+        inputs = {"Switch": condition, "False": otherwise, "True": value}
+        return self._node("GeometryNodeSwitch", inputs, input_type="VECTOR").outputs[0]
+
+    def _vector(self, operation, *vectors, scale=None):
+        node = self._node("ShaderNodeVectorMath", dict(enumerate(vectors)), operation=operation)
+        if scale is not None:
+            self._group.links.new(scale, node.inputs["Scale"])
+        return node.outputs["Value" if operation == "DISTANCE" else "Vector"]
+
+    def _node(self, kind, inputs=None, **settings):
+        node = self._group.nodes.new(kind)
+        self._column += 180
+        node.location.x = self._column
+        for name, value in settings.items():
+            setattr(node, name, value)
+        for name, value in (inputs or {}).items():
+            if isinstance(value, bpy.types.NodeSocket):
+                self._group.links.new(value, node.inputs[name])
+            else:
+                node.inputs[name].default_value = value
+        return node

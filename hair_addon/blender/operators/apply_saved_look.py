@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A look that the artist saved → the active hair's appearance."""
+
+import bpy
+
+from .. import pipeline, properties, saved_looks
+from ..selection import hair_of
+from .base import HairOperator
+
+
+class VELLUS_OT_apply_saved_look(HairOperator, bpy.types.Operator):
+    """Make the active hair look as it was saved"""
+
+    bl_idname = "vellus.apply_saved_look"
+    bl_label = "Apply Saved Look"
+    __annotations__ = {"name": properties.text("Name", "The saved look")}
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Select hair.")
+        return hair_of(context.object) is not None
+
+    def change(self, context):
+        pipeline.apply_look(hair_of(context.object), saved_looks.read(self.name))

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a mesh or its hair to Blender's brushes on the guides."""
+
+import bpy
+
+from ...core.errors import HairError
+from ..selection import guides_of, make_active, object_of
+from .base import HairOperator
+
+
+class VELLUS_OT_comb_guides(HairOperator, bpy.types.Operator):
+    """Select the guides of the active mesh or hair and sculpt them with Blender's brushes"""
+
+    bl_idname = "vellus.comb_guides"
+    bl_label = "Comb Guides"
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Select a mesh with guides, or hair that follows some, in Object Mode.")
+        return context.mode == "OBJECT" and guides_of(context.object) is not None
+
+    def change(self, context):
+        guides = object_of(guides_of(context.object), context.view_layer)
+        if guides is None:
+            raise HairError("The guides have no object here: restore it.")
+        make_active(guides, context.view_layer)
+        bpy.ops.object.mode_set(mode="SCULPT_CURVES")

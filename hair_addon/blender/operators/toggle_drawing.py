@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair shaded by Vellus ↔ hair as Blender draws curves."""
+
+import bpy
+
+from .. import pipeline
+from ..selection import drawn_with
+from .base import HairOperator
+
+
+class VELLUS_OT_toggle_drawing(HairOperator, bpy.types.Operator):
+    """Shade the active hair in viewports, or leave it to Blender; all hair of the file where none is active"""
+
+    bl_idname = "vellus.toggle_drawing"
+    bl_label = "Toggle Hair Shading"
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("There is no hair in this file.")
+        return bool(drawn_with(context.object))
+
+    def change(self, context):
+        hair = drawn_with(context.object)
+        pipeline.show_shaded(hair, not all(datablock.vellus.is_drawn for datablock in hair))

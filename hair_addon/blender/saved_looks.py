@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Looks that an artist saved, for every file: JSON in the add-on's own folder.
+
+Blender's presets are Python scripts, which it runs; a look is numbers, so it is read as numbers.
+"""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+import bpy
+
+from ..core.errors import HairError
+from ..core.params import declared
+from ..core.shading.appearance import Appearance
+from . import preferences
+
+_LARGEST_FILE = 65_536  # bytes; a look takes some 700
+
+
+def names():
+    """Names of all saved looks, in alphabetical order; no file is read."""
+    folder = _folder(create=False)
+    found = folder.glob("*.json") if folder is not None and folder.is_dir() else ()
+    return sorted((path.stem for path in found), key=str.casefold)
+
+
+def write(name, look):
+    """Save an `Appearance` under a name, in place of what had it. Raises `HairError`."""
+    path = _path(name, create=True)
+    try:
+        path.write_text(json.dumps({"version": 1, **asdict(look)}, indent=1), encoding="utf-8")
+    except OSError as error:
+        raise HairError("The look cannot be written: {cause}.", cause=error) from error
+
+
+def read(name):
+    """The `Appearance` of a name; what the file does not say is at its default. Raises `HairError`."""
+    path = _path(name, create=False)
+    try:
+        if path.stat().st_size > _LARGEST_FILE:
+            raise HairError('"{name}" is no saved look: its file is too large.', name=name)
+        found = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise HairError('"{name}" cannot be read: save the look again.', name=name) from error
+    if not isinstance(found, dict):
+        raise HairError('"{name}" cannot be read: save the look again.', name=name)
+    values = {key: _value(name, found[key], default) for key, default, _ in declared(Appearance) if key in found}
+    return Appearance(**values)
+
+
+def _value(name, value, default):
+    """What JSON gave, in the type of a setting; its range is checked by the `Appearance`."""
+    try:
+        if isinstance(default, tuple):
+            return tuple(float(component) for component in value)
+        return type(default)(value)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise HairError('"{name}" cannot be read: save the look again.', name=name) from error
+
+
+def remove(name):
+    """Remove a saved look for good. Raises `HairError`."""
+    try:
+        _path(name, create=False).unlink()
+    except OSError as error:
+        raise HairError("The look cannot be removed: {cause}.", cause=error) from error
+
+
+def _path(name, create):
+    folder = _folder(create)
+    if folder is None:
+        raise HairError("Looks are saved by the installed extension only: install it.")
+    stem = bpy.path.clean_name(name.strip())  # no separators, no dots that lead out of the folder
+    if not stem.strip("_."):
+        raise HairError("The look has no name: type one.")
+    return folder / f"{stem}.json"
+
+
+def _folder(create):
+    """None where we are no extension."""
+    if not preferences.ADDON_MODULE.startswith("bl_ext."):
+        return None
+    folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="looks", create=create)
+    return Path(folder) if folder else None

@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is amiss with a surface or the hair on it, and the operator that mends it: a look at names and numbers only.
+
+Panels ask for this with every redraw, so nothing here reads geometry.
+"""
+
+from dataclasses import dataclass
+
+from .pipeline import followers
+from .translations import interface_text
+
+
+@dataclass(frozen=True)
+class Warning:
+    """text: translated; operator: `bl_idname` of what mends it, empty where that is in the artist's hands."""
+
+    text: str
+    operator: str = ""
+
+
+def warnings_of(surface, parts):
+    """[Warning] about a mesh object, or None where it is missing, and the guide and hair Curves that grow on it."""
+    return [*_of_library(surface, parts), *_of_surface(surface, parts), *_of_uv_map(surface, parts), *_of_guides(parts)]
+
+
+def _of_library(surface, parts):
+    linked = next((block for block in (surface, *parts) if block is not None and block.library is not None), None)
+    if linked is not None:
+        yield Warning(interface_text('"{name}" is linked: make a library override.', name=linked.name))
+
+
+def _of_surface(surface, parts):
+    if surface is None:
+        if parts:
+            yield Warning(interface_text("The surface is missing: pick a mesh."), "vellus.attach_to_surface")
+        return
+    if any(abs(component - 1.0) > 1e-4 for component in surface.scale):
+        yield Warning(interface_text("The scale is not applied."), "vellus.apply_scale")
+    if surface.mode != "OBJECT" and any(part.vellus.is_stale for part in parts):
+        yield Warning(interface_text("Hair waits until you leave this mode."))
+
+
+def _of_uv_map(surface, parts):
+    if surface is None:
+        return
+    maps = surface.data.uv_layers
+    if not maps:
+        yield Warning(interface_text("No UV map: hair nodes need one."), "vellus.make_uv_map")
+        return
+    lost = next((part for part in parts if part.surface_uv_map not in maps), None)
+    if lost is not None:
+        text = 'UV map "{name}" is gone.' if lost.surface_uv_map else "The hair has no UV coordinates."
+        yield Warning(interface_text(text, name=lost.surface_uv_map), "vellus.use_uv_map")
+    elif any(part.vellus.uv_status for part in parts):
+        yield Warning(interface_text("UVs overlap: hair nodes go astray."), "vellus.make_uv_map")
+
+
+def _of_guides(parts):
+    hair = [part.vellus for part in parts if part.vellus.kind == "HAIR"]
+    if any(state.guide_curves is None for state in hair):
+        yield Warning(interface_text("The hair has lost its guides: pick others."))
+    elif any(_is_without_object(state.guide_curves) for state in hair):
+        yield Warning(interface_text("The guides' object was deleted."), "vellus.restore_guides")
+
+
+def _is_without_object(guides):
+    """Whether nothing uses guides but the hair that follows them."""
+    return guides.users - guides.use_fake_user <= len(followers(guides))

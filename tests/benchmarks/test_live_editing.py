@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""From a guide's edit to points on the GPU, and what a surface costs that deforms: printed.
+
+Asserted: while guides are combed nothing is searched, nothing is written, and not all of the hair is uploaded.
+"""
+
+import time
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+
+import hair_addon
+from hair_addon.blender import curves, drawing, hair_cache, live_hair
+from hair_addon.core import hash_grid
+from tests.core.conftest import HEAD
+
+_GUIDE_COUNT = 200
+_COMBED = 8  # guides under a brush
+
+
+@pytest.fixture
+def head():
+    """The sample head in an empty file, as in a window."""
+    hair_addon.register()
+    gpu.init()
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.obj_import(filepath=str(HEAD))
+    head = bpy.context.selected_objects[0]
+    bpy.context.view_layer.objects.active = head
+    yield head
+    live_hair.forget()
+    hair_addon.unregister()
+
+
+def median_ms(work, repetitions=7):
+    times = []
+    for _ in range(repetitions):
+        started = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - started)
+    return 1e3 * float(np.median(times))
+
+
+def points_of(datablock):
+    return curves.read_points(datablock).reshape(len(datablock.curves), -1, 3)
+
+
+def comb(guides):
+    """One step of a brush: some guides move, and Blender updates."""
+    combed = points_of(guides)
+    near = np.linalg.norm(combed[:, 0] - combed[0, 0], axis=1).argsort()[:_COMBED]
+    combed[near, 1:] += np.float32([0.0, 0.0, 1e-3])
+    guides.attributes["position"].data.foreach_set("vector", combed.ravel())
+    guides.update_tag()
+    bpy.context.view_layer.update()
+
+
+def on_gpu(hair):
+    """Bring the hair to the GPU and wait until it is there."""
+    strands = hair_cache.strands_on_gpu(hair)
+    with gpu.types.GPUFrameBuffer(color_slots=strands.texture).bind():
+        gpu.state.active_framebuffer_get().read_color(0, 0, 1, 1, 4, 0, "FLOAT")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("strand_count", [30_000, 100_000])
+def test_live_editing(head, strand_count, monkeypatch):
+    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    bpy.ops.vellus.distribute_guides(guide_count=_GUIDE_COUNT)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    bpy.ops.vellus.interpolate_hair(strand_count=strand_count)
+    guides, hair = (bpy.data.hair_curves[name] for name in ("Guides", "Hair"))
+    on_gpu(hair)
+    comb(guides), on_gpu(hair)  # compiles the program that moves strands
+    calls = []
+    for module, name in ((hash_grid, "neighbours"), (curves, "write_strands"), (curves, "write_points")):
+        monkeypatch.setattr(module, name, lambda *_args, name=name: calls.append(name))
+    monkeypatch.setattr(drawing, "upload_strands", lambda *_args: calls.append("upload_strands"))
+    edit = median_ms(lambda: comb(guides))
+    edit_and_upload = median_ms(lambda: (comb(guides), on_gpu(hair)))
+    assert calls == []
+    monkeypatch.undo()
+    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    write = median_ms(lambda: (comb(guides), live_hair.write_all())) - edit
+    whole = median_ms(lambda: (hair_cache.forget(hair.session_uid), on_gpu(hair)))
+
+    basis = head.shape_key_add(name="Basis")
+    key = head.shape_key_add(name="Key")
+    rest = np.array([point.co for point in basis.data], np.float32)
+    key.data.foreach_set("co", (rest + 0.1 * rest[:, [1, 2, 0]]).ravel())
+
+    def deform():
+        key.value = 1.0 - 0.5 * key.value
+        bpy.context.view_layer.update()
+
+    deform()
+    follow = median_ms(deform)
+    follow_and_upload = median_ms(lambda: (deform(), on_gpu(hair)))
+    bpy.data.objects["Hair"].modifiers[0].show_viewport = False
+    without_nodes = median_ms(deform)
+    print(
+        f"\n{strand_count:7} strands, {_COMBED} of {_GUIDE_COUNT} guides: edit to computed {edit:.1f} ms, to uploaded"
+        f" {edit_and_upload:.1f} ms; writing {write:.1f} ms; uploading all {whole:.1f} ms; surface deforms: Blender's"
+        f" update {follow:.1f} ms ({without_nodes:.1f} without the nodes), with our upload {follow_and_upload:.1f} ms"
+    )

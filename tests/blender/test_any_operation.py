@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair survives any operations in any order: walk_operations.py, in a process whose crash is a failure, not an end."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_nothing_breaks_whatever_an_artist_does():
+    """200 operations a run; the seed fixes the way."""
+    walked = subprocess.run(
+        [sys.executable, "-u", "-m", "tests.blender.walk_operations", "12", "200", "1"],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=240,
+    )
+    way = "\n".join(walked.stdout.splitlines()[-40:])
+    assert walked.returncode == 0 and walked.stdout.endswith("walked\n"), f"{way}\n{walked.stderr[-4000:]}"
