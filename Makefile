@@ -1,7 +1,7 @@
 # make demo, make test: from a bare clone, everything that they need is installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
-.PHONY: help demo compare test bench build lint lock samples clean
+.PHONY: help demo compare test desktop bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
 # uv trusts the certificates that the machine trusts, as pip does: some networks have their own.
@@ -9,6 +9,7 @@ export UV_SYSTEM_CERTS = true
 
 python = .venv/bin/python
 installed = .venv/installed
+peers = .venv/peers
 
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
@@ -16,10 +17,13 @@ help: ## this list
 demo: $(installed) ## the head, 200 guides, 30,000 strands: pictures and tables in out/demo
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
 
-test: $(installed) ## every test but the long benchmarks
-	$(python) -m pytest -m "not long" $(ARGS)
+test: $(installed) ## every test but the long benchmarks and those in a window
+	$(python) -m pytest -m "not long and not desktop" $(ARGS)
 
-bench: $(installed) ## the benchmarks, with their figures
+desktop: $(installed) ## the tests in a window of Blender, OpenGL and Vulkan: pictures in out/desktop
+	$(python) -m pytest -m desktop tests/desktop $(ARGS)
+
+bench: $(installed) $(peers) ## the benchmarks, with their figures
 	$(python) -m pytest tests/benchmarks -s $(ARGS)
 
 compare: $(installed) ## the head by Cycles and by Vellus: mean colours, and both pictures, in out/compare
@@ -38,9 +42,15 @@ samples: $(installed) ## the .blend files of blend_samples
 lock: $(installed) ## requirements.lock from pyproject.toml; make lock ARGS=--upgrade for newer versions
 	$(python) -m uv pip compile --quiet --group runtime --group test --group dev --universal --python-version 3.13 \
 	  --generate-hashes --no-header --no-emit-index-url --output-file requirements.lock $(ARGS)
+	$(python) -m uv pip compile --quiet --group bench --constraint requirements.lock --universal --python-version 3.13 \
+	  --generate-hashes --no-header --no-emit-index-url --no-annotate --output-file requirements-bench.lock $(ARGS)
 
 clean: ## what was made, but not what was installed (.venv) or downloaded (wheels)
 	rm -rf build dist out .hypothesis .pytest_cache .ruff_cache
 
 $(installed): requirements.lock tools/bootstrap.sh tools/debian-packages.txt
 	@sh tools/bootstrap.sh
+
+$(peers): requirements-bench.lock $(installed)
+	$(python) -m uv pip install --quiet --require-hashes -r requirements-bench.lock
+	@touch $@

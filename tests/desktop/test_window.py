@@ -1,0 +1,136 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A window of Blender, OpenGL and Vulkan: hair is where it should be, looks as it should, and follows the hand."""
+
+import re
+import xml.etree.ElementTree as ElementTree
+
+import numpy as np
+import pytest
+
+from hair_addon.blender import display_transform
+
+pytestmark = pytest.mark.desktop
+
+# Steps with a picture without hair beside the one with it; and what Blender itself draws of hair then.
+STEPS = {
+    "grown": "WIRE",
+    "no_overlays": "WIRE",
+    "standard": "WIRE",
+    "orthographic": "WIRE",
+    "mended": "WIRE",
+    "loaded": "WIRE",
+    "off": "TEXTURED",
+}
+
+
+def part(picture, rectangle):
+    """The pixels of a (left, bottom, width, height)."""
+    left, bottom, width, height = rectangle
+    return picture[bottom : bottom + height, left : left + width]
+
+
+def test_the_walk_came_to_its_end(walk):
+    assert walk.statuses == [0, 0, 0], walk.log[-4000:]
+    assert walk.facts["done"] == ["groom", "view", "mend"], walk.log[-4000:]
+
+
+def complaints(walk):
+    """What the add-on and Python tell the console."""
+    return [
+        line for line in walk.log.splitlines() if re.match(r"Vellus:|Traceback|\w*(Error|Exception)\b(?! \(0x)", line)
+    ]
+
+
+def test_the_console_tells_of_no_error(walk):
+    assert [line for line in complaints(walk) if "display.frag" not in line] == []
+
+
+def test_a_broken_shader_is_told_once_and_the_viewport_goes_on(walk):
+    told = [line for line in complaints(walk) if "display.frag" in line]
+    assert len(told) == 1
+    assert re.search(r"include/display_place\.glsl:8: .*nonsense", told[0])
+    view = walk.facts["steps"]["mended"]["view"]
+    broken, again, bare = (part(walk.picture(name), view) for name in ("broken", "broken_again", "mended_bare"))
+    np.testing.assert_array_equal(broken, again)
+    np.testing.assert_allclose(broken, bare, atol=2.0 / 255.0)
+
+
+def test_installs_into_a_clean_profile(walk):
+    assert walk.facts["installed"] == {"result": ["FINISHED"], "enabled": True}
+
+
+def test_the_panels_operators_grow_hair(walk):
+    assert walk.facts["steps"]["grown"]["results"] == [["FINISHED"], ["FINISHED"]]
+
+
+def test_the_panel_is_there(walk):
+    sidebar = walk.facts["sidebar"]
+    assert sidebar["category"] == "Hair"
+    before, after = (part(walk.picture(name), sidebar["rectangle"]) for name in ("empty", "grown"))
+    assert (np.abs(before - after).max(axis=-1) > 0.02).mean() > 0.05
+
+
+@pytest.mark.parametrize("step", STEPS)
+def test_hair_is_where_it_should_be_and_nowhere_else(walk, step):
+    facts = walk.facts["steps"][step]
+    assert facts["display_type"] == STEPS[step]
+    left, bottom, _width, _height = facts["view"]
+    changed = np.abs(walk.picture(step) - walk.picture(f"{step}_bare")).max(axis=-1) > 3.0 / 255.0
+    rows, columns = np.nonzero(part(changed, facts["view"]))
+    places = np.stack([columns + left, rows + bottom], axis=-1)
+    assert len(places) > 5000
+    least, most = np.array(facts["least"]), np.array(facts["most"])
+    assert (places >= least - 3.0).all() and (places <= most + 3.0).all()
+    # And it fills what its strands span: they hang down all around.
+    np.testing.assert_allclose(np.ptp(places, axis=0), most - least, rtol=0.1)
+
+
+def shown(light, transform):
+    """(N, 4) premultiplied linear light → (N, 3) display colours of what is covered."""
+    view, look, exposure, gamma = transform
+    settings = display_transform.DisplayTransform("sRGB", view, "" if look == "None" else look, gamma, "Linear Rec.709")
+    colors = 2.0**exposure * light[:, :3] / np.maximum(light[:, 3:], 1e-6)
+    return np.clip(display_transform.apply(settings, colors.astype(np.float32)), 0.0, 1.0)
+
+
+def test_the_window_shows_what_is_drawn_offscreen(walk):
+    """Of what hair covers, in the scene's view transform; of different samples, so that pixels differ by noise."""
+    view = walk.facts["steps"]["grown"]["view"]
+    window, bare = (part(walk.picture(name), view) for name in ("grown", "grown_bare"))
+    light = np.load(walk.folder / "offscreen.npy")
+    is_hair = light[..., 3] > 0.05
+    light, window, bare = light[is_hair], window[is_hair], bare[is_hair]
+    alpha = light[:, 3:]
+    expected = (alpha * shown(light, walk.facts["transform"]) ** 2.2 + (1.0 - alpha) * bare**2.2) ** (1.0 / 2.2)
+    np.testing.assert_allclose(window.mean(axis=0), expected.mean(axis=0), atol=2.0 / 255.0)
+    assert np.abs(window - expected).mean() < 8.0 / 255.0
+    # The bare picture, which nobody shaded, is much further away.
+    assert np.abs(window - bare).mean() > 30.0 / 255.0
+
+
+def test_hair_follows_a_stroke_of_the_comb(walk):
+    moved = walk.facts["combed"]
+    assert moved["guides moved"] > 0.005
+    assert moved["hair moved"] > 0.005
+
+
+@pytest.mark.parametrize("step", ["undo", "redo"])
+def test_a_stroke_is_undone_and_redone(walk, step):
+    assert walk.facts[step] == {"guides": 0.0, "hair": 0.0}
+
+
+def test_a_file_brings_its_hair_back(walk):
+    assert walk.facts["loaded"] == {"hair": 0.0}
+
+
+@pytest.mark.parametrize("tool", ["builtin.select_box", "builtin.select"])
+def test_a_click_on_hair_selects_it_and_one_beside_it_what_is_there(walk, tool):
+    assert walk.facts["clicks"][tool] == [["Hair"], ["Head"], ["Hair"]]
+
+
+def test_shader_functions_equal_their_twins(walk):
+    suite = ElementTree.parse(walk.folder / "twins.xml").getroot()[0]
+    wrong = [case.get("name") for case in suite if len(case)]  # failed, or not run
+    assert wrong == []
+    assert int(suite.get("tests")) > 30
+    assert walk.facts["twins"] == 0

@@ -1,0 +1,397 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What an artist does in a window: installs the extension, grows hair on the head, combs it, saves and loads.
+
+Run by a desktop Blender: walk.py -- PART ZIP HEAD OUT SITE_PACKAGES. Writes to OUT a picture of the screen for each
+step, what the tests want to know (facts.json) and the outcome of the shaders' tests (twins.xml). A walk has `PARTS`,
+each in a Blender of its own: a hundred redraws of its window in a row crash Blender 5.2.2 on Mesa's software Vulkan,
+with the add-on on or off.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import time
+import traceback
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+MODULE = "bl_ext.user_default.vellus"
+ROOT = Path(__file__).resolve().parents[2]
+PART, ZIP, HEAD, OUT, SITE_PACKAGES = sys.argv[sys.argv.index("--") + 1 :]
+OUT = Path(OUT)
+
+# Enough to cover the head; software drivers take their time for each.
+STRAND_COUNT = 3000
+RADIUS = 4e-4
+
+# Seconds after which hair that follows a stroke has been written.
+_WRITTEN = 1.0
+
+FACTS = OUT / "facts.json"
+facts = json.loads(FACTS.read_text()) if FACTS.exists() else {"steps": {}, "done": []}
+
+
+def window():
+    return bpy.context.window_manager.windows[0]
+
+
+def viewport():
+    """(area, region) of the 3-D view."""
+    area = next(area for area in window().screen.areas if area.type == "VIEW_3D")
+    return area, next(region for region in area.regions if region.type == "WINDOW")
+
+
+def in_viewport():
+    """The context that a click into the 3-D view has."""
+    area, region = viewport()
+    return bpy.context.temp_override(window=window(), area=area, region=region)
+
+
+def screen(name):
+    """Redraw until nothing is refined any more, and take a picture of the whole screen."""
+    with in_viewport():
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=9)
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+    subprocess.run(["import", "-window", "root", OUT / f"{name}.png"], check=True)
+
+
+def wait(seconds):
+    """Leave Blender to itself for a while."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        yield
+
+
+def rectangle(region):
+    """(left, bottom, width, height) of a region [pixels]."""
+    return [region.x, region.y, region.width, region.height]
+
+
+def places(points):
+    """(N, 3) world positions → (N, 2) pixels of the screen, from its lower left corner."""
+    area, region = viewport()
+    clip = np.c_[points, np.ones(len(points))] @ np.array(area.spaces.active.region_3d.perspective_matrix).T
+    return (0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * (region.width, region.height) + (region.x, region.y)
+
+
+def points(name):
+    """(N, 3) positions of an object's curves, which has the world's coordinates."""
+    curves = bpy.data.objects[name].data
+    values = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", values.ravel())
+    return values
+
+
+def show(step, **more):
+    """A picture with hair and one without, and what must be true of them."""
+    hair = bpy.data.objects["Hair"]
+    screen(step)
+    hair.hide_set(True)
+    screen(f"{step}_bare")
+    hair.hide_set(False)
+    at = places(points("Hair"))
+    _area, region = viewport()
+    facts["steps"][step] = {
+        "view": rectangle(region),
+        "least": at.min(axis=0).tolist(),
+        "most": at.max(axis=0).tolist(),
+        "display_type": hair.display_type,
+        **more,
+    }
+
+
+def install():
+    """The extension, from its zip, into an empty profile."""
+    result = bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+    facts["installed"] = {"result": list(result), "enabled": MODULE in bpy.context.preferences.addons}
+    facts["version"] = bpy.app.version_string
+    bpy.context.preferences.system.viewport_aa = "OFF"
+    yield
+
+
+def head():
+    """The sample's head alone, in the middle of the view, lit by a sun over the viewer's shoulder."""
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    with in_viewport():
+        bpy.ops.wm.obj_import(filepath=HEAD)
+        head_object = bpy.context.object
+        bpy.ops.object.transform_apply(rotation=True)
+    head_object.name = "Head"
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 4.0, (0.9, 0.2, 0.4)
+    bpy.context.scene.collection.objects.link(sun)
+    bpy.context.scene.render.dither_intensity = 0.0
+    area, _region = viewport()
+    view = area.spaces.active.region_3d
+    area.spaces.active.show_region_ui = True
+    area.spaces.active.overlay.show_floor = False
+    view.view_perspective = "PERSP"
+    view.view_rotation = Vector((0.80, -1.12, 0.25)).to_track_quat("Z", "Y")
+    view.view_location, view.view_distance = (0.06, -0.04, 0.715), 0.75
+    group = head_object.vertex_groups.new(name="scalp")
+    positions = np.empty((len(head_object.data.vertices), 3), np.float32)
+    head_object.data.vertices.foreach_get("co", positions.ravel())
+    group.add([int(v) for v in np.flatnonzero(positions[:, 2] > 0.78)], 1.0, "REPLACE")
+    yield
+
+
+def grow():
+    """The panel's operators."""
+    area, _region = viewport()
+    sidebar = next(region for region in area.regions if region.type == "UI")
+    screen("empty")
+    sidebar.active_panel_category = "Hair"
+    with in_viewport():
+        distributed = bpy.ops.vellus.distribute_guides(guide_count=60, length=0.12, density_group="scalp")
+        bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+        interpolated = bpy.ops.vellus.interpolate_hair(strand_count=STRAND_COUNT, radius=RADIUS, density_group="scalp")
+        bpy.data.objects["Hair"].data.vellus.marschner.size = 64
+        bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
+        bpy.ops.object.select_all(action="DESELECT")
+    yield
+    # Coloured guides would stand between the hair and what its pixels are held to.
+    bpy.data.objects["Guides"].hide_set(True)
+    show("grown", results=[list(distributed), list(interpolated)])
+    facts["sidebar"] = {"rectangle": rectangle(sidebar), "category": sidebar.active_panel_category}
+    np.save(OUT / "offscreen.npy", offscreen())
+    yield
+
+
+def offscreen():
+    """(height, width, 4) linear premultiplied light of what the 3-D view shows of hair, 16 samples a pixel."""
+    import gpu
+
+    blender = sys.modules[f"{MODULE}.hair_addon.blender"]
+    drawing, drawn_scene = blender.viewport.drawing, blender.viewport.drawn_scene
+    area, region = viewport()
+    view, samples = area.spaces.active.region_3d, 4
+    size = (region.width * samples, region.height * samples)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, area.spaces.active)
+    matrices = np.array(view.view_matrix, np.float64), np.array(view.window_matrix, np.float64)
+    record = drawing.view_record(*matrices, size[1], least_width=1.0)
+    buffer = blender.hair_picture.HairBuffer(*size)
+    with buffer.surfaces():
+        drawn_scene.draw_hiding(drawn, record)
+    drawn_scene.draw_hair(drawn, record, buffer)
+    resolved = gpu.types.GPUTexture((region.width, region.height), format="RGBA32F")
+    target = gpu.types.GPUFrameBuffer(color_slots=resolved)
+    with target.bind():
+        drawing.resolve(buffer.color, samples)
+        pixels = np.array(target.read_color(0, 0, region.width, region.height, 4, 0, "FLOAT"), np.float32)
+    settings = bpy.context.scene.view_settings
+    facts["transform"] = [settings.view_transform, settings.look, settings.exposure, settings.gamma]
+    return pixels.reshape(region.height, region.width, 4)
+
+
+def shading_modes():
+    """Hair in every way a viewport shades."""
+    area, _region = viewport()
+    for mode in ("WIREFRAME", "SOLID", "MATERIAL", "RENDERED"):
+        area.spaces.active.shading.type = mode
+        yield from wait(12.0 if mode in {"MATERIAL", "RENDERED"} else 0.0)  # EEVEE compiles beside
+        screen(f"mode_{mode.lower()}")
+    area.spaces.active.shading.type = "SOLID"
+    area.spaces.active.overlay.show_overlays = False
+    yield
+    show("no_overlays")
+    area.spaces.active.overlay.show_overlays = True
+    bpy.context.scene.view_settings.view_transform = "Standard"
+    bpy.context.scene.view_settings.exposure = 1.0
+    yield
+    show("standard")
+    bpy.context.scene.view_settings.view_transform = "AgX"
+    bpy.context.scene.view_settings.exposure = 0.0
+    area.spaces.active.region_3d.view_perspective = "ORTHO"
+    yield
+    show("orthographic")
+    area.spaces.active.region_3d.view_perspective = "PERSP"
+    with in_viewport():
+        bpy.ops.screen.region_quadview()
+    yield
+    screen("quad")
+    with in_viewport():
+        bpy.ops.screen.region_quadview()
+    yield
+
+
+def comb():
+    """A stroke of the Comb brush across the guides, in sculpt mode, by the mouse; undone, and redone."""
+    guides = bpy.data.objects["Guides"]
+    guides.hide_set(False)
+    with in_viewport():
+        bpy.context.view_layer.objects.active = guides
+        guides.select_set(True)
+        bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+        bpy.ops.brush.asset_activate(
+            asset_library_type="ESSENTIALS",
+            relative_asset_identifier="brushes/essentials_brushes-curve_sculpt.blend/Brush/Comb",
+        )
+        bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 120
+        bpy.ops.ed.undo_push(message="Hair")  # operators that a script runs leave no step behind
+    screen("sculpt")
+    before, hair_before = points("Guides"), points("Hair")
+    middle = places(before).mean(axis=0)
+    yield from drag(middle - np.array([60, 0]), middle + np.array([60, 40]))
+    yield from wait(_WRITTEN)
+    combed, hair_combed = points("Guides"), points("Hair")
+    screen("combed")
+    facts["combed"] = {
+        "guides moved": float(np.linalg.norm(combed - before, axis=1).max()),
+        "hair moved": float(np.linalg.norm(hair_combed - hair_before, axis=1).max()),
+    }
+    for step, guides_then, hair_then in (("undo", before, hair_before), ("redo", combed, hair_combed)):
+        with in_viewport():
+            getattr(bpy.ops.ed, step)()
+        screen(step)
+        yield from wait(_WRITTEN)
+        facts[step] = {
+            "guides": float(np.linalg.norm(points("Guides") - guides_then, axis=1).max()),
+            "hair": float(np.linalg.norm(points("Hair") - hair_then, axis=1).max()),
+        }
+    with in_viewport():
+        bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.data.objects["Guides"].hide_set(True)
+    yield
+
+
+def drag(start, end, steps=12):
+    """The left mouse button, pressed at a place of the window and let go at another."""
+    for step in range(steps + 1):
+        x, y = (int(value) for value in start + (end - start) * step / steps)
+        window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+        yield
+        if step == 0:
+            window().event_simulate(type="LEFTMOUSE", value="PRESS", x=x, y=y)
+            yield
+    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=x, y=y)
+    yield
+
+
+def click():
+    """On hair and beside it, with each of the tools that select."""
+    blender = sys.modules[f"{MODULE}.hair_addon.blender"]
+    area, region = viewport()
+    hair, head_object = bpy.data.objects["Hair"], bpy.data.objects["Head"]
+    screen("clicks")
+    with in_viewport():
+        near = [(int(x) - region.x, int(y) - region.y) for x, y in places(points("Hair"))[20::41]]
+        on_hair = next(place for place in near if blender.viewport.hair_at(bpy.context, *place) == hair)
+    # What of the head is closest to the viewer is in front of everything.
+    eye = area.spaces.active.region_3d.view_matrix.inverted().translation
+    nose = min((head_object.matrix_world @ v.co for v in head_object.data.vertices), key=lambda p: (p - eye).length)
+    face = places(np.array([nose]))[0] - (region.x, region.y)
+    facts["clicks"] = {}
+    for tool in ("builtin.select_box", "builtin.select"):
+        with in_viewport():
+            bpy.ops.wm.tool_set_by_id(name=tool)
+            bpy.ops.object.select_all(action="DESELECT")
+        bpy.context.view_layer.objects.active = None
+        selected = []
+        for place in (on_hair, face, on_hair):
+            at = np.add(place, (region.x, region.y))
+            yield from drag(at, at, steps=1)
+            yield from wait(0.3)
+            selected.append([o.name for o in (head_object, hair) if o.select_get()])
+        facts["clicks"][tool] = selected
+
+
+def save_and_load():
+    """The file as it is, opened again."""
+    hair = points("Hair")
+    bpy.ops.wm.save_as_mainfile(filepath=str(OUT / "head.blend"))
+    with in_viewport():
+        bpy.ops.wm.open_mainfile(filepath=str(OUT / "head.blend"))
+    yield
+    facts["loaded"] = {"hair": float(np.linalg.norm(points("Hair") - hair, axis=1).max())}
+    show("loaded")
+    yield
+
+
+def switch_off():
+    """Without the add-on, Blender draws the hair."""
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    yield
+    show("off")
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    yield
+
+
+def twins():
+    """The tests of the shaders' functions, on this window's backend."""
+    sys.path += [str(ROOT), SITE_PACKAGES]  # behind what this Blender has of its own
+    os.chdir(ROOT)  # where pytest finds its settings
+    os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # those that are there are built for another Python
+    import pytest
+
+    options = ["--noconftest", "-p", "tests.conftest", "-p", "no:cacheprovider", f"--junitxml={OUT / 'twins.xml'}"]
+    facts["twins"] = pytest.main(["-q", *options, "tests/blender/test_glsl.py", "tests/blender/test_varied_glsl.py"])
+    yield
+
+
+def break_shader():
+    """A driver that refuses the shader that lays hair over the viewport: twice, and mended again."""
+    shaders = sys.modules[f"{MODULE}.hair_addon.blender.shaders"]
+    file = shaders.FOLDER / "include" / "display_place.glsl"
+    text = file.read_text()
+    file.write_text(text.replace("return log2", "return nonsense + log2"))
+    shaders.display_program.cache_clear()
+    screen("broken")
+    screen("broken_again")
+    file.write_text(text)
+    shaders._complaints.clear()
+    yield
+    show("mended")
+
+
+def reopen():
+    """The file of the parts before, and the settings that are not in it."""
+    bpy.context.preferences.system.viewport_aa = "OFF"
+    with in_viewport():
+        bpy.ops.wm.open_mainfile(filepath=str(OUT / "head.blend"))
+    yield
+
+
+def hurry():
+    """Four samples a pixel in each pass, as with a graphics card: a picture is fine after eight redraws, not 32."""
+    sys.modules[f"{MODULE}.hair_addon.blender.hair_picture"].samples_per_side = lambda: 2
+    yield
+
+
+PARTS = {
+    "groom": (install, hurry, head, grow, comb, save_and_load),
+    "view": (hurry, reopen, click, shading_modes),
+    "mend": (hurry, reopen, break_shader, switch_off, twins),
+}
+
+
+def walk():
+    """The steps of a part; between them Blender handles its events and redraws."""
+    for step in PARTS[PART]:
+        print(f"walk: {step.__name__}", flush=True)
+        yield from step()
+
+
+def advance(steps):
+    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
+    try:
+        next(steps)
+        return 0.05
+    except StopIteration:
+        facts["done"].append(PART)
+    except Exception:
+        traceback.print_exc()
+    FACTS.write_text(json.dumps(facts, indent=1, default=int))
+    bpy.ops.wm.quit_blender()
+    return None
+
+
+if __name__ == "__main__":
+    bpy.context.preferences.view.show_splash = False
+    walking = walk()
+    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
