@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import head  # beside this file
 
 import hair_addon
-from hair_addon.blender import drawing, drawn_scene, hair_cache, scene
+from hair_addon.blender import drawing, drawn_scene, hair_buffer, hair_cache, scene
 from hair_addon.core import bspline
 
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
@@ -95,19 +95,20 @@ def _frames_per_second(drawn, width=1280, height=720, frame_count=2):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
     view = drawing.view_record(*camera, height, least_width=1.0)
-    color = gpu.types.GPUTexture((width, height), format="RGBA16F")
-    depth = gpu.types.GPUTexture((width, height), format="DEPTH_COMPONENT32F")
-    framebuffer = gpu.types.GPUFrameBuffer(color_slots=color, depth_slot=depth)
+    buffer = hair_buffer.HairBuffer(width, height)
+    pixel = gpu.types.GPUTexture((1, 1), format="RGBA16F")
+    end = gpu.types.GPUFrameBuffer(color_slots=pixel)
 
     def draw():
-        framebuffer.clear(color=(0.0, 0.0, 0.0, 1.0), depth=1.0)
-        drawn_scene.draw_surfaces(drawn, view)
-        drawn_scene.draw_hair(drawn, view)
-        framebuffer.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # waits until the frame is drawn
+        with buffer.surfaces((0.0, 0.0, 0.0, 1.0)):
+            drawn_scene.draw_surfaces(drawn, view)
+        drawn_scene.draw_hair(drawn, view, buffer)
+        with end.bind():
+            drawing.resolve(buffer.color, 1)
+            end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # waits until the frame is drawn
 
-    with framebuffer.bind():
-        draw()
-        return frame_count / _seconds(lambda: [draw() for _ in range(frame_count)])
+    draw()
+    return frame_count / _seconds(lambda: [draw() for _ in range(frame_count)])
 
 
 def _seconds(work):
