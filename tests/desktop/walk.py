@@ -9,9 +9,7 @@ with the add-on on or off.
 
 import json
 import os
-import subprocess
 import sys
-import time
 import traceback
 from pathlib import Path
 
@@ -21,6 +19,9 @@ from mathutils import Vector
 
 MODULE = "bl_ext.user_default.vellus"
 ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+from tests.desktop.window import drag, in_viewport, places, rectangle, take_picture, viewport, wait  # noqa: E402
+
 PART, ZIP, HEAD, OUT, SITE_PACKAGES = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 
@@ -35,47 +36,9 @@ FACTS = OUT / "facts.json"
 facts = json.loads(FACTS.read_text()) if FACTS.exists() else {"steps": {}, "done": []}
 
 
-def window():
-    return bpy.context.window_manager.windows[0]
-
-
-def viewport():
-    """(area, region) of the 3-D view."""
-    area = next(area for area in window().screen.areas if area.type == "VIEW_3D")
-    return area, next(region for region in area.regions if region.type == "WINDOW")
-
-
-def in_viewport():
-    """The context that a click into the 3-D view has."""
-    area, region = viewport()
-    return bpy.context.temp_override(window=window(), area=area, region=region)
-
-
 def screen(name):
-    """Redraw until nothing is refined any more, and take a picture of the whole screen."""
-    with in_viewport():
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=9)
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
-    subprocess.run(["import", "-window", "root", OUT / f"{name}.png"], check=True)
-
-
-def wait(seconds):
-    """Leave Blender to itself for a while."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        yield
-
-
-def rectangle(region):
-    """(left, bottom, width, height) of a region [pixels]."""
-    return [region.x, region.y, region.width, region.height]
-
-
-def places(points):
-    """(N, 3) world positions → (N, 2) pixels of the screen, from its lower left corner."""
-    area, region = viewport()
-    clip = np.c_[points, np.ones(len(points))] @ np.array(area.spaces.active.region_3d.perspective_matrix).T
-    return (0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * (region.width, region.height) + (region.x, region.y)
+    """A picture of the whole screen."""
+    take_picture(OUT / f"{name}.png")
 
 
 def points(name):
@@ -260,17 +223,10 @@ def comb():
     yield
 
 
-def drag(start, end, steps=12):
-    """The left mouse button, pressed at a place of the window and let go at another."""
-    for step in range(steps + 1):
-        x, y = (int(value) for value in start + (end - start) * step / steps)
-        window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
-        yield
-        if step == 0:
-            window().event_simulate(type="LEFTMOUSE", value="PRESS", x=x, y=y)
-            yield
-    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=x, y=y)
-    yield
+def no_hair_near(drawn, place):
+    """Whether a pixel has no hair within the distance at which Blender takes a click for a hit."""
+    around = np.add(place, np.indices((5, 5)).reshape(2, -1).T * 5 - 10)
+    return not any(drawn.hair_at(bpy.context, int(x), int(y)) for x, y in around)
 
 
 def click():
@@ -282,10 +238,13 @@ def click():
     with in_viewport():
         near = [(int(x) - region.x, int(y) - region.y) for x, y in places(points("Hair"))[20::41]]
         on_hair = next(place for place in near if blender.viewport.hair_at(bpy.context, *place) == hair)
-    # What of the head is closest to the viewer is in front of everything.
-    eye = area.spaces.active.region_3d.view_matrix.inverted().translation
-    nose = min((head_object.matrix_world @ v.co for v in head_object.data.vertices), key=lambda p: (p - eye).length)
-    face = places(np.array([nose]))[0] - (region.x, region.y)
+        # What of the head is closest to the viewer is in front of everything else of it.
+        eye = area.spaces.active.region_3d.view_matrix.inverted().translation
+        skin = sorted(
+            (head_object.matrix_world @ v.co for v in head_object.data.vertices), key=lambda p: (p - eye).length
+        )
+        near = places(np.array(skin)) - (region.x, region.y)
+        on_head = next(place for place in near if no_hair_near(blender.viewport, place))
     facts["clicks"] = {}
     for tool in ("builtin.select_box", "builtin.select"):
         with in_viewport():
@@ -293,7 +252,7 @@ def click():
             bpy.ops.object.select_all(action="DESELECT")
         bpy.context.view_layer.objects.active = None
         selected = []
-        for place in (on_hair, face, on_hair):
+        for place in (on_hair, on_head, on_hair):
             at = np.add(place, (region.x, region.y))
             yield from drag(at, at, steps=1)
             yield from wait(0.3)

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's window as the walk handles it: its 3-D view, pictures of the screen, the mouse."""
+
+import subprocess
+import time
+
+import bpy
+import numpy as np
+
+
+def window():
+    return bpy.context.window_manager.windows[0]
+
+
+def viewport():
+    """(area, region) of the 3-D view."""
+    area = next(area for area in window().screen.areas if area.type == "VIEW_3D")
+    return area, next(region for region in area.regions if region.type == "WINDOW")
+
+
+def in_viewport():
+    """The context that a click into the 3-D view has."""
+    area, region = viewport()
+    return bpy.context.temp_override(window=window(), area=area, region=region)
+
+
+def take_picture(path):
+    """Redraw until nothing is refined any more, and write a picture of the whole screen."""
+    with in_viewport():
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=9)
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+    subprocess.run(["import", "-window", "root", path], check=True)
+
+
+def wait(seconds):
+    """Leave Blender to itself for a while."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        yield
+
+
+def rectangle(region):
+    """(left, bottom, width, height) of a region [pixels]."""
+    return [region.x, region.y, region.width, region.height]
+
+
+def places(points):
+    """(N, 3) world positions → (N, 2) pixels of the screen, from its lower left corner."""
+    area, region = viewport()
+    clip = np.c_[points, np.ones(len(points))] @ np.array(area.spaces.active.region_3d.perspective_matrix).T
+    return (0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * (region.width, region.height) + (region.x, region.y)
+
+
+def drag(start, end, steps=12):
+    """The left mouse button, pressed at a place of the window and let go at another."""
+    for step in range(steps + 1):
+        x, y = (int(value) for value in start + (end - start) * step / steps)
+        window().event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+        yield
+        if step == 0:
+            window().event_simulate(type="LEFTMOUSE", value="PRESS", x=x, y=y)
+            yield
+    window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=x, y=y)
+    yield
