@@ -6,7 +6,7 @@ import numpy as np
 from bpy.app.handlers import persistent
 
 from . import curves as curves_door
-from . import hair_cache, live_hair, pipeline, running, viewport
+from . import hair_cache, keyed, live_hair, pipeline, running, viewport
 
 # Guides as they were when their geometry was last reported: session_uid → (N, 3) points. Blender reports the geometry
 # of Curves as updated when no more than their surface's place has changed.
@@ -47,6 +47,7 @@ def after_depsgraph_update(_scene, depsgraph):
             hair_cache.forget_unless_same(datablock)
             if datablock.vellus.kind == "GUIDES" and _has_moved(datablock):
                 combed.append(datablock)
+    keyed.follow(depsgraph)
     _evaluate(depsgraph, combed)
 
 
@@ -110,13 +111,24 @@ def _is_surface_at_rest(curves):
 
 
 @persistent
-def after_frame_change(_scene, depsgraph):
-    """Strands are carried to where their surfaces are in this frame; nothing is written."""
-    if depsgraph.mode != "VIEWPORT":
-        return
-    viewport.forget()
-    for surface_object in _deformed(depsgraph):
-        hair_cache.forget_pose(surface_object)
+def before_frame_change(_scene, _depsgraph):
+    """Keep what hair is made of, to see what is keyed otherwise."""
+    keyed.remember()
+
+
+@persistent
+def after_frame_change(scene, depsgraph):
+    """Strands are carried to where their surfaces are in this frame; what is keyed is made again, in renders too."""
+    if depsgraph.mode == "VIEWPORT":
+        viewport.forget()
+        for surface_object in _deformed(depsgraph):
+            hair_cache.forget_pose(surface_object)
+    if keyed.may_follow(scene, depsgraph) and keyed.follow(depsgraph):
+        # A render may divide surfaces otherwise; hair is rooted on what the viewport shows.
+        is_render = depsgraph.mode == "RENDER"
+        _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, [])
+        if is_render:
+            live_hair.write_all()
 
 
 @persistent
@@ -148,11 +160,13 @@ def forget_everything(*_args):
     viewport.forget()
     live_hair.forget()
     hair_cache.clear()
+    keyed.forget()
     _guide_points.clear()
 
 
 _HANDLERS = (
     (bpy.app.handlers.depsgraph_update_post, after_depsgraph_update),
+    (bpy.app.handlers.frame_change_pre, before_frame_change),
     (bpy.app.handlers.frame_change_post, after_frame_change),
     (bpy.app.handlers.save_pre, before_reading),
     (bpy.app.handlers.render_init, before_reading),
@@ -174,4 +188,5 @@ def unregister():
         handlers.remove(handler)
     live_hair.write_all()
     live_hair.forget()
+    keyed.forget()
     _guide_points.clear()

@@ -49,11 +49,7 @@ def _shows_another_look(material, curves):
 
 
 def _values(group):
-    names = properties.names_of(appearance.Appearance)
-    return [
-        value[:] if isinstance(value, bpy.types.bpy_prop_array) else value
-        for value in (getattr(group, n) for n in names)
-    ]
+    return properties.values_of(group, properties.names_of(appearance.Appearance))
 
 
 def is_hair_material(material):

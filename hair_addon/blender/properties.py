@@ -248,6 +248,12 @@ def unregister():
     del bpy.types.Curves.vellus
 
 
+def values_of(owner, names):
+    """{name: value} of an operator's or group's properties, as they are and to be compared."""
+    values = {name: getattr(owner, name) for name in names}
+    return {n: value[:] if isinstance(value, bpy.types.bpy_prop_array) else value for n, value in values.items()}
+
+
 def copy(source, target, settings_class):
     """Copy the properties of a `Settings` class from one owner to another, as they are."""
     for name, _default, _details in declared(settings_class):

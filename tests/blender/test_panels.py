@@ -107,6 +107,14 @@ def test_what_is_amiss_is_said_beside_what_mends_it(hair, case):
     assert draw(named("surface")).drawn[operator] == 1
 
 
+@pytest.mark.parametrize("is_locked", [False, True])
+def test_what_keys_need_of_a_render_is_offered_while_it_is_not_so(hair, is_locked):
+    bpy.context.scene.render.use_lock_interface = is_locked
+    assert not draw(named("output")).drawn["use_lock_interface"]
+    hair.data.keyframe_insert("vellus.appearance.melanin", frame=1)
+    assert draw(named("output")).drawn["use_lock_interface"] == (not is_locked)
+
+
 def test_sentences_are_wrapped_to_the_sidebar(hair):
     hair.data.vellus.status = '"Hair" was combed and is kept: run its operator again to replace it.'
     lines = draw(named("interpolation")).texts

@@ -3,7 +3,10 @@
 
 import bpy
 
-from .tab import HairTab
+from .. import keyed
+from ..selection import hair_of
+from ..translations import interface_text
+from .tab import HairTab, write
 
 
 class VELLUS_PT_output(HairTab, bpy.types.Panel):
@@ -17,6 +20,10 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         layout = self.layout
         layout.operator("vellus.render_picture", icon="IMAGE_DATA")
         layout.operator("vellus.toggle_drawing", icon="SHADING_RENDERED")
+        hair = hair_of(context.object)
+        if hair is not None and keyed.are_keyed(hair) and not context.scene.render.use_lock_interface:
+            write(layout, context, interface_text("Keyed settings are rendered with a locked interface only."), "ERROR")
+            layout.prop(context.scene.render, "use_lock_interface")
 
 
 CLASSES = (VELLUS_PT_output,)
