@@ -61,9 +61,8 @@ def bake_tables(settings, folder, has_plots=False):
 def render(path, settings, out):
     """Draw a .blend file's hair from its camera into a picture file. Raises `HairError`."""
     open_file(path)
-    context = bpy.context
-    pixels = offscreen.draw_picture(context.scene, context.view_layer, context.evaluated_depsgraph_get(), settings)
-    offscreen.write_picture(pixels, out, context.scene)
+    pixels = offscreen.draw_picture(settings)
+    offscreen.write_picture(pixels, out, bpy.context.scene)
 
 
 def open_file(path):

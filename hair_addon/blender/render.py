@@ -11,6 +11,7 @@ import gpu
 import numpy as np
 
 from ..core.errors import HairError
+from ..core.long_work import Stage, run_now
 from ..core.params import Settings, param
 from . import drawing, drawn_scene, hair_buffer, scene, surroundings
 
@@ -27,30 +28,51 @@ class PictureSettings(Settings):
     is_transparent: bool = param(False, "Leave the background empty instead of filling it with the world's colour")
 
 
-def draw_picture(blender_scene, view_layer, depsgraph, settings):
-    """(height, width, 4) float32: scene-linear, premultiplied, first row at the bottom. Raises `HairError`."""
+def draw_picture(settings):
+    """(height, width, 4) float32 of the context's scene: scene-linear, premultiplied, first row at the bottom.
+
+    Raises `HairError`.
+    """
+    return run_now(drawing_picture(settings))
+
+
+def drawing_picture(settings):
+    """`draw_picture` as work in stages (core/long_work.py), all of which run where the graphics are."""
     _start_gpu()
     samples = settings.samples_per_side
     width, height = settings.width * samples, settings.height * samples
     largest = gpu.capabilities.max_texture_size_get()
     if max(width, height) > largest:
         raise HairError(f"{width} × {height} samples do not fit this graphics driver's {largest}: use fewer.")
-    world_to_view, view_to_clip = scene.read_camera(blender_scene, depsgraph, settings.width, settings.height)
+    yield Stage("Drawing shadows", 0.0)
+    context = bpy.context
+    depsgraph = context.evaluated_depsgraph_get()
+    world_to_view, view_to_clip = scene.read_camera(context.scene, depsgraph, settings.width, settings.height)
     # No strand is thinner than one of a pixel's samples: it would break into dots.
     view = drawing.view_record(world_to_view, view_to_clip, height, least_width=1.0)
-    drawn = drawn_scene.read(blender_scene, view_layer, depsgraph)
-    background = (0.0, 0.0, 0.0, 0.0) if settings.is_transparent else (*drawn.world.color, 1.0)
-
+    drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
     buffer = hair_buffer.HairBuffer(width, height)
-    with buffer.surfaces(background):
-        if drawn.world.image is not None and not settings.is_transparent:
-            surroundings.draw_background(drawn.world, view, width, height)
-        drawn_scene.draw_surfaces(drawn, view)
+    yield Stage("Drawing surfaces", 0.4)
+    _draw_surfaces(drawn, view, buffer, settings.is_transparent)
+    yield Stage("Drawing hair", 0.5)
     drawn_scene.draw_hair(drawn, view, buffer)
+    return _resolved(buffer, settings)
+
+
+def _draw_surfaces(drawn, view, buffer, is_transparent):
+    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
+    with buffer.surfaces(background):
+        if drawn.world.image is not None and not is_transparent:
+            surroundings.draw_background(drawn.world, view, *buffer.size)
+        drawn_scene.draw_surfaces(drawn, view)
+
+
+def _resolved(buffer, settings):
+    """The means of a buffer's samples over pixels, as an array."""
     resolved = gpu.types.GPUTexture((settings.width, settings.height), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=resolved)
     with target.bind():
-        drawing.resolve(buffer.color, samples)
+        drawing.resolve(buffer.color, settings.samples_per_side)
         pixels = target.read_color(0, 0, settings.width, settings.height, 4, 0, "FLOAT")
     return np.array(pixels, np.float32).reshape(settings.height, settings.width, 4)
 

@@ -15,6 +15,7 @@ _TEXEL_BYTES = 16  # RGBA, single precision
 _ROUND_SECONDS = 1e-5  # one guide, one round of relaxation
 _GUIDE_SECONDS = 5e-5
 _STRAND_SECONDS = 4e-6
+_TEXEL_SECONDS = 1.5e-6  # of all of the Marschner tables together
 
 
 def curves_bytes(strand_count, point_count=POINT_COUNT):
@@ -35,3 +36,8 @@ def guide_seconds(settings):
 def hair_seconds(settings):
     """How long growing strands between guides takes [s]; settings: `HairSettings`."""
     return settings.strand_count * _STRAND_SECONDS
+
+
+def table_seconds(settings):
+    """How long baking the Marschner tables takes [s]; settings: `lookup_tables.Settings`."""
+    return settings.size**2 * _TEXEL_SECONDS

@@ -7,6 +7,7 @@ Kernels run without Python's lock, so a window is drawn meanwhile.
 """
 
 import threading
+from dataclasses import dataclass
 
 
 class Stopped(Exception):
@@ -15,6 +16,17 @@ class Stopped(Exception):
 
 def unheard(_step, _part):
     """Progress that nobody watches. step: what is being done, in a word or two; part: of the whole, in [0, 1]."""
+
+
+@dataclass(frozen=True)
+class Stage:
+    """What work yields before a stage that must run on the caller's thread: there it is told, and may be stopped."""
+
+    step: str
+    part: float
+
+    def __call__(self, progress):
+        progress(self.step, self.part)
 
 
 def part_of(progress, first, last):
@@ -41,6 +53,8 @@ class Job:
         self._is_stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(compute,), name="vellus", daemon=True)
         self._thread.start()
+        if isinstance(compute, Stage):
+            self.wait()
 
     def _run(self, compute):
         try:
@@ -76,4 +90,6 @@ class Job:
         self.wait()
         if self._error is not None:
             raise self._error
+        if self.is_stopping:
+            raise Stopped
         return self._result

@@ -11,7 +11,16 @@ from hair_addon import blender
 ADDON = Path(blender.__file__).resolve().parents[1]
 
 # Functions whose first argument, or progress's step, is read by an artist.
-_SPEAKING = {"interface_text", "report_text", "HairError", "poll_message_set", "progress", "relaxing", "Warning"}
+_SPEAKING = {
+    "interface_text",
+    "report_text",
+    "HairError",
+    "poll_message_set",
+    "progress",
+    "relaxing",
+    "Stage",
+    "Warning",
+}
 
 
 def strings_of_classes():

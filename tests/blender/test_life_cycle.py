@@ -228,7 +228,7 @@ def test_no_module_keeps_blenders_data(hair):
     bpy.context.scene.camera = camera
     hair_cache.strands_on_gpu(bpy.data.objects["Guides"].data)
     small = render.PictureSettings(width=8, height=8, samples_per_side=1)
-    render.draw_picture(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get(), small)
+    render.draw_picture(small)
     modules = {name: module for name, module in sys.modules.items() if name.startswith("hair_addon.")}
     for name, module in modules.items():
         for variable, value in vars(module).items():

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender import handlers, pipeline, properties, running
+from hair_addon.blender import handlers, pipeline, properties, render, running
 from hair_addon.blender.operators.modal import LongOperator
 from hair_addon.core.errors import HairError
 from hair_addon.core.groom import GuideSettings, HairSettings
@@ -155,6 +155,34 @@ def test_work_ends_with_its_window_and_with_the_addon(window, end):
     else:
         running.end(window)
         assert operator.modal(window, TIMER) == {"CANCELLED"}
+
+
+@pytest.fixture
+def camera(hair):
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location.z = 5.0
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+
+
+def test_a_picture_in_stages_is_that_of_one_go_and_esc_ends_it_in_each(camera, window):
+    settings = render.PictureSettings(width=24, height=16, samples_per_side=2)
+    made = []
+
+    def work():
+        made.append((yield from render.drawing_picture(settings)))
+        return 1
+
+    assert drive(Operator(work()), window) == {"FINISHED"}
+    assert np.array_equal(made.pop(), render.draw_picture(settings))
+    for stage in range(3):
+        operator = Operator(work())
+        operator.begin(window)
+        for _ in range(stage):
+            assert operator.modal(window, TIMER) == {"RUNNING_MODAL"}
+        operator.modal(window, ESC)
+        assert operator.modal(window, TIMER) == {"CANCELLED"}
+        assert operator.reported == [("INFO", "Stopped: nothing was changed.")] and not made
 
 
 def in_a_thread(work):

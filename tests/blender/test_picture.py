@@ -31,8 +31,7 @@ from tests.blender.reading import points
 def picture(**settings):
     """(H, W, 4) linear pixels, first row at the bottom."""
     settings = {"width": 96, "height": 96, "samples_per_side": 2, "is_transparent": True} | settings
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    return render.draw_picture(bpy.context.scene, bpy.context.view_layer, depsgraph, render.PictureSettings(**settings))
+    return render.draw_picture(render.PictureSettings(**settings))
 
 
 def thicken(hair):

@@ -122,7 +122,7 @@ def test_the_picture_is_seen_behind_the_scene(scene, rng, tmp_path):
     scene.camera = camera
     settings = render.PictureSettings(48, 32, 2)
     bpy.context.view_layer.update()
-    drawn = render.draw_picture(scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get(), settings)
+    drawn = render.draw_picture(settings)
     scene.render.engine, scene.render.resolution_percentage = "CYCLES", 100
     scene.render.resolution_x, scene.render.resolution_y = 48, 32
     scene.cycles.samples, scene.cycles.use_denoising = 32, False

@@ -365,7 +365,7 @@ class Artist(RuleBasedStateMachine):
             changed("camera")
         small = render.PictureSettings(width=24, height=24, samples_per_side=1)
         try:
-            pixels = render.draw_picture(context.scene, context.view_layer, context.evaluated_depsgraph_get(), small)
+            pixels = render.draw_picture(small)
         except HairError:
             return  # it says what cannot be drawn
         assert np.isfinite(pixels).all()

@@ -9,7 +9,7 @@ import pytest
 from hair_addon.core import groom
 from hair_addon.core.errors import HairError
 from hair_addon.core.groom import GuideSettings
-from hair_addon.core.long_work import Job, Stopped, part_of, run_now
+from hair_addon.core.long_work import Job, Stage, Stopped, part_of, run_now
 
 
 def test_a_generator_gets_what_was_computed():
@@ -48,6 +48,23 @@ def test_a_job_says_how_far_it_is_and_stops_when_asked():
     with pytest.raises(Stopped):
         job.result()
     assert job.is_done and job.step == "first"
+
+
+def test_a_stage_is_told_and_may_be_stopped_before_it_begins():
+    done = []
+
+    def work():
+        yield Stage("Drawing", 0.5)
+        done.append("drawn")
+        return 3
+
+    assert run_now(work()) == 3 and done == ["drawn"]
+    job = Job(next(work()))
+    assert (job.step, job.part, job.is_done, job.result()) == ("Drawing", 0.5, True, None)
+    job.stop()
+    with pytest.raises(Stopped):
+        job.result()
+    assert done == ["drawn"]
 
 
 def test_parts_nest():

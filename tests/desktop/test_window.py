@@ -3,11 +3,13 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hair_addon.blender import display_transform
+from hair_addon.core import exr
 
 pytestmark = pytest.mark.desktop
 
@@ -134,3 +136,10 @@ def test_shader_functions_equal_their_twins(walk):
     assert wrong == []
     assert int(suite.get("tests")) > 30
     assert walk.facts["twins"] == 0
+
+
+def test_pictures_and_tables_are_written_while_the_window_lives_on(walk):
+    assert np.ptp(walk.picture("picture")) > 0.1
+    folder = walk.folder / "tables"
+    assert Path(walk.facts["table_folder"]) == folder
+    assert exr.read_tables(folder).settings == exr.read_dual_tables(folder).settings

@@ -20,7 +20,7 @@ from mathutils import Vector
 MODULE = "bl_ext.user_default.vellus"
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
-from tests.desktop.window import drag, in_viewport, places, rectangle, take_picture, viewport, wait  # noqa: E402
+from tests.desktop.window import drag, in_viewport, places, press, rectangle, take_picture, viewport, wait, wait_for  # noqa: E402
 
 PART, ZIP, HEAD, OUT, SITE_PACKAGES = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
@@ -260,6 +260,32 @@ def click():
         facts["clicks"][tool] = selected
 
 
+def write_files():
+    """A picture and tables, the latter where the file browser is told to: both while the window lives on."""
+    with in_viewport():
+        bpy.ops.object.camera_add()
+        camera = bpy.context.scene.camera = bpy.context.object
+        camera.matrix_world = viewport()[0].spaces.active.region_3d.view_matrix.inverted()
+        bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
+        bpy.ops.vellus.render_picture("INVOKE_DEFAULT", filepath=str(OUT / "picture.png"), width=320, height=240)
+    yield from wait_for((OUT / "picture.png").exists)
+    with in_viewport():
+        bpy.ops.vellus.bake_tables("INVOKE_DEFAULT")
+    yield from wait(1.0)
+    browser_window, browser = next(
+        (window, area)
+        for window in bpy.context.window_manager.windows
+        for area in window.screen.areas
+        if area.type == "FILE_BROWSER"
+    )
+    folder = OUT / "tables"
+    folder.mkdir()
+    browser.spaces.active.params.directory = str(folder).encode()
+    yield from press("RET", browser_window, browser)
+    yield from wait_for((folder / "n_g.exr").exists)
+    facts["table_folder"] = bpy.data.hair_curves["Hair"].vellus.table_folder
+
+
 def save_and_load():
     """The file as it is, opened again."""
     hair = points("Hair")
@@ -325,7 +351,7 @@ def hurry():
 PARTS = {
     "groom": (install, hurry, head, grow, comb, save_and_load),
     "view": (hurry, reopen, click, shading_modes),
-    "mend": (hurry, reopen, break_shader, switch_off, twins),
+    "mend": (hurry, reopen, break_shader, write_files, switch_off, twins),
 }
 
 

@@ -7,6 +7,9 @@ import time
 import bpy
 import numpy as np
 
+# Seconds after which a window that was drawn is seen.
+_SHOWN = 0.5
+
 
 def window():
     return bpy.context.window_manager.windows[0]
@@ -27,8 +30,10 @@ def in_viewport():
 def take_picture(path):
     """Redraw until nothing is refined any more, and write a picture of the whole screen."""
     with in_viewport():
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=9)
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=1)
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=7)
+        # Vulkan draws and shows beside Blender, up to two pictures late.
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
+    time.sleep(_SHOWN)
     subprocess.run(["import", "-window", "root", path], check=True)
 
 
@@ -36,6 +41,13 @@ def wait(seconds):
     """Leave Blender to itself for a while."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
+        yield
+
+
+def wait_for(happened, seconds=60.0):
+    """Leave Blender to itself until something has happened, or will not any more."""
+    end = time.monotonic() + seconds
+    while not happened() and time.monotonic() < end:
         yield
 
 
@@ -61,4 +73,13 @@ def drag(start, end, steps=12):
             window().event_simulate(type="LEFTMOUSE", value="PRESS", x=x, y=y)
             yield
     window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=x, y=y)
+    yield
+
+
+def press(key, in_window, area):
+    """A key while the mouse is in the middle of an area; not let go, for which the window may be gone already."""
+    at = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
+    in_window.event_simulate(type="MOUSEMOVE", value="NOTHING", **at)
+    yield
+    in_window.event_simulate(type=key, value="PRESS", **at)
     yield

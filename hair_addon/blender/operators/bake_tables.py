@@ -3,15 +3,15 @@
 
 import bpy
 
-from ...core import exr
-from ...core.errors import HairError
-from ...core.shading import lookup_tables
-from .. import files, properties
+from ...core import estimate, exr
+from ...core.shading import dual_scattering, lookup_tables
+from .. import files, preferences, properties
+from ..datablocks import Remembered
 from ..selection import hair_of
-from .base import HairOperator
+from .file_browser import BrowsedOperator
 
 
-class VELLUS_OT_bake_tables(HairOperator, bpy.types.Operator):
+class VELLUS_OT_bake_tables(BrowsedOperator, bpy.types.Operator):
     """Bake the active hair's Marschner tables to a folder, from which it reads them while its settings stay"""
 
     bl_idname = "vellus.bake_tables"
@@ -20,17 +20,11 @@ class VELLUS_OT_bake_tables(HairOperator, bpy.types.Operator):
         "directory": properties.folder("Folder that the tables are written to"),
         **properties.annotations(lookup_tables.Settings),
     }
+    asked = "directory"
 
-    def invoke(self, context, _event):
-        try:
-            self._take_from(hair_of(context.object))
-        except HairError as error:
-            return self.refuse(error)
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
-
-    def _take_from(self, hair):
+    def prefill(self, context):
         """Fill what was not asked for with the settings of the hair, if there is one."""
+        hair = hair_of(context.object)
         if hair is None:
             return
         settings = properties.table_settings_of(hair.vellus)
@@ -38,12 +32,21 @@ class VELLUS_OT_bake_tables(HairOperator, bpy.types.Operator):
             if not self.properties.is_property_set(name):
                 setattr(self, name, getattr(settings, name))
 
-    def change(self, context):
-        hair = hair_of(context.object)
-        self._take_from(hair)
+    def seconds(self, context):
+        return estimate.table_seconds(properties.to_settings(self, lookup_tables.Settings))
+
+    def work(self, context):
+        hair = Remembered(hair_of(context.object))
         settings = properties.to_settings(self, lookup_tables.Settings)
-        folder = files.resolve(self.directory)
-        exr.write_tables(folder, lookup_tables.bake(settings), files.addon_version())
-        if hair is not None:
-            hair.vellus.table_folder = self.directory
-        return "Tables written to {folder}", {"folder": folder}
+        folder, named, device = files.resolve(self.directory), self.directory, preferences.device()
+        tables = yield lambda progress: lookup_tables.bake(settings, device, progress)
+        dual = yield lambda progress: dual_scattering.bake(tables)
+        exr.write_tables(folder, tables, files.addon_version())
+        exr.write_dual_tables(folder, dual, files.addon_version())
+        target = hair.find()
+        if target is not None:
+            target.vellus.table_folder = named
+        return folder
+
+    def message(self, made):
+        return "Tables written to {folder}", {"folder": made}

@@ -93,6 +93,7 @@ class LongOperator(HairOperator):
     def _advance(self, context, job):
         try:
             running.begin(context, Job(self._work.send(job.result())))
+            self._show(context)
             return {"RUNNING_MODAL"}
         except StopIteration as end:
             return self._end(context, self._done(context, end.value))

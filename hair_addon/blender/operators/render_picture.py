@@ -3,11 +3,12 @@
 
 import bpy
 
+from ...core.long_work import Stage
 from .. import files, properties, render
-from .base import HairOperator
+from .file_browser import BrowsedOperator
 
 
-class VELLUS_OT_render_picture(HairOperator, bpy.types.Operator):
+class VELLUS_OT_render_picture(BrowsedOperator, bpy.types.Operator):
     """Draw the hair as the viewport shades it, from the scene's camera, into a file"""
 
     bl_idname = "vellus.render_picture"
@@ -17,20 +18,23 @@ class VELLUS_OT_render_picture(HairOperator, bpy.types.Operator):
         "filepath": properties.file("File that the picture is written to, .png or .exr"),
         **properties.annotations(render.PictureSettings),
     }
+    asked = "filepath"
 
     @classmethod
     def poll(cls, context):
         cls.poll_message_set("The scene has no camera to look through: add one.")
         return context.scene.camera is not None
 
-    def invoke(self, context, _event):
-        context.window_manager.fileselect_add(self)
-        return {"RUNNING_MODAL"}
+    def seconds(self, context):
+        return float("inf")  # graphics drivers differ a hundredfold
 
-    def change(self, context):
+    def work(self, context):
         settings = properties.to_settings(self, render.PictureSettings)
         path = files.resolve(self.filepath)
-        depsgraph = context.evaluated_depsgraph_get()
-        pixels = render.draw_picture(context.scene, context.view_layer, depsgraph, settings)
-        render.write_picture(pixels, path, context.scene)
-        return "Picture written to {path}", {"path": path}
+        pixels = yield from render.drawing_picture(settings)
+        yield Stage("Writing the picture", 0.95)
+        render.write_picture(pixels, path, bpy.context.scene)
+        return path
+
+    def message(self, made):
+        return "Picture written to {path}", {"path": made}

@@ -7,26 +7,30 @@ rays that leave through a cell into that cell.
 
 import numpy as np
 
+from ..long_work import unheard
 from . import paths
 from .fresnel import bravais_indices
 from .marschner import Caustic
 
 # Gauss-Legendre within a cell: attenuation is smooth in gamma, and four nodes leave less than half floats can hold.
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)
+BAKING = "Baking tables"  # the step that progress tells of
+
 _ROWS_AT_ONCE = 32  # keeps a block's rays in the processor's cache
 # Gauss-Legendre over half the fibre, for what leaves evenly.
 _WIDE_NODES, _WIDE_WEIGHTS = np.polynomial.legendre.leggauss(64)
 
 
-def smooth_means(edges, cosines, settings, sigma_a):
+def smooth_means(edges, cosines, settings, sigma_a, progress=unheard):
     """N_R (H, W, 1), N_TT and N_TRT (H, W, C) as means over the cells between `edges`, float32.
 
     edges: W + 1 monotone values of phi from 0 to pi or back; cosines (H,): of theta_d; sigma_a (C,). The caustic is
-    treated as `settings` have it in the classic mode; in the other it stays.
+    treated as `settings` have it in the classic mode; in the other it stays. progress(step, part): told how far it is.
     """
     shape = (len(cosines), len(edges) - 1)
     n_r, n_tt, n_trt = (np.empty((*shape, count), np.float32) for count in (1, len(sigma_a), len(sigma_a)))
     for start in range(0, len(cosines), _ROWS_AT_ONCE):
+        progress(BAKING, start / len(cosines))
         block = slice(start, start + _ROWS_AT_ONCE)
         n_r[block] = _cell_means(paths.R, edges, cosines[block], settings.eta, sigma_a)
         n_tt[block] = _cell_means(paths.TT, edges, cosines[block], settings.eta, sigma_a)

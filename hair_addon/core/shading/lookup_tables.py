@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..long_work import unheard
 from ..params import param
 from . import energy_conserving, marschner
 from .angles import cos_theta_d
@@ -61,14 +62,17 @@ class Tables:
         return self.n[..., 3:], self.n[..., :3], self.n_trt, self.n_res
 
 
-def bake(settings, device="cpu"):
-    """`Settings` → `Tables`; device: a Warp device such as "cuda:0", or the processor."""
-    n_r, n_tt, n_trt, n_res = azimuthal_lobes(settings, settings.sigma_a, device)
+def bake(settings, device="cpu", progress=unheard):
+    """`Settings` → `Tables`; device: a Warp device such as "cuda:0", or the processor.
+
+    progress(step, part): told how far it is, and may raise to stop it.
+    """
+    n_r, n_tt, n_trt, n_res = azimuthal_lobes(settings, settings.sigma_a, device, progress)
     m = _longitudinal(settings, device)
     return Tables(m, np.concatenate([n_tt, n_r], axis=-1), n_trt, settings, n_res)
 
 
-def azimuthal_lobes(settings, sigma_a, device="cpu"):
+def azimuthal_lobes(settings, sigma_a, device="cpu", progress=unheard):
     """N_R (H, W, 1), N_TT and N_TRT (H, W, C) and the residual's N (H, 1, C) or None, for sigma_a (C,); float32."""
     edges, cosines = phi_edges(settings), row_cosines(settings)
     is_rough = settings.mode == "energy"
@@ -80,7 +84,7 @@ def azimuthal_lobes(settings, sigma_a, device="cpu"):
         from . import texel_kernels
 
         return *texel_kernels.azimuthal_means(edges, cosines, settings, sigma_a, spread, device), n_res
-    smooth = smooth_means(edges, cosines, settings, sigma_a)
+    smooth = smooth_means(edges, cosines, settings, sigma_a, progress)
     return *(smooth if spread is None else spread_columns(smooth, spread)), n_res
 
 
