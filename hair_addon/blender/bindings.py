@@ -38,9 +38,9 @@ class BoundHair:
     @cached_property
     def reach(self):
         """The strands that follow each guide."""
-        from ..core import interpolation
+        from ..core import guide_weights
 
-        return interpolation.reach(self.binding.guide_weights, len(self.guides))
+        return guide_weights.reach(self.binding.guide_weights, len(self.guides))
 
 
 _bound = {}  # session_uid → BoundHair
