@@ -23,6 +23,7 @@ class BoundHair:
     binding: HairBinding
     settings: HairSettings
     root_key: str  # of `pipeline.root_key`
+    parting_key: str  # of `partings.Partings`
     guides: Strands  # as they were when the hair followed them last
     guide_uid: int  # session_uid of their Curves
     surface: Surface

@@ -107,7 +107,7 @@ class HairSettings(Settings):
     )
     region_group: str = param("", "Vertex group that parts hair: no strand follows guides inside and outside; or none")
     region_attribute: str = param(
-        "", "Whole numbers of the surface's faces or vertices, or of guides: no strand follows guides of two; or none"
+        "", "Integers on the surface's faces or vertices, or on guides: no strand follows guides of two; or none"
     )
     part_lines: str = param(
         "", "Curve object on the surface: no strand follows guides on the other side of its lines; empty: none"
@@ -222,7 +222,7 @@ def bind_hair(
     settings,
     *,
     density=None,
-    regions=None,
+    regions=(),
     lines=None,
     drawn_on=None,
     roots=None,
@@ -240,7 +240,7 @@ def bind_hair(
     import warp as wp
 
     from . import guide_weights, hash_grid, interpolation, part_lines, sampling, surface_query
-    from .regions import regions_at
+    from .regions import kept_apart
 
     _load_kernels(device, guide_weights, hash_grid, interpolation)
     if lines is not None:
@@ -258,9 +258,6 @@ def bind_hair(
     root_positions = on_device(positions(mesh, roots))
     root_normals = on_device(normals(mesh, roots))
     progress("Finding guides", 0.4)
-    if regions is not None:
-        its_guides = regions_at(regions.corners, guides.roots) if regions.guides is None else regions.guides
-        regions = regions_at(regions.corners, roots), its_guides
     weights = guide_weights.find_guides(
         root_positions,
         root_normals,
@@ -268,7 +265,7 @@ def bind_hair(
         guide_normals,
         None if settings.automatic_influence else settings.influence_distance,
         settings.neighbour_limit,
-        regions=regions,
+        regions=kept_apart(regions, roots, guides.roots),
         lines=lines,
     )
     limits = guide_weights.Limits(settings.angle_limit, settings.length_limit)
@@ -326,11 +323,11 @@ def _follow(binding, guides, roots, root_normals, weights):
     return interpolation.interpolate(roots, root_normals, points, binding.guide_normals, weights, binding.keep_length)
 
 
-def generate_hair(mesh, guides, settings, *, density=None, regions=None, lines=None, device="cpu") -> Strands:
+def generate_hair(mesh, guides, settings, *, density=None, regions=(), lines=None, device="cpu") -> Strands:
     """(strand_count, P) strands between the guides, P the guides' own point count.
 
     mesh: `TriMesh` [m] with the guides' roots on it; settings: `HairSettings`; density as in `distribute_guides`;
-    regions: `Regions` that no strand mixes guides of, or None; lines: (L, 2, 3) segments [m] near the surface that no
+    regions: tuple of `Regions` that no strand mixes guides of; lines: (L, 2, 3) segments [m] near the surface that no
     strand mixes guides across, one that begins where the last ended going on, or None.
     """
     binding = bind_hair(mesh, guides, settings, density=density, regions=regions, lines=lines, device=device)

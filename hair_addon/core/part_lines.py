@@ -80,6 +80,37 @@ def lay(mesh, segments, device="cpu", drawn_on=None):
     )
 
 
+def in_order(edges):
+    """(L, 2) indices of points → the same edges, each where the one before it ends if it can be: lines end to end.
+
+    Lines end where one edge alone ends, or more than two meet; rings begin at their first edge.
+    """
+    edges = [tuple(edge) for edge in np.asarray(edges).tolist()]
+    at = {}
+    for number, edge in enumerate(edges):
+        for point in edge:
+            at.setdefault(point, []).append(number)
+    left, walked = dict.fromkeys(range(len(edges))), []
+
+    def walk(point, number):
+        while number is not None:
+            del left[number]
+            first, second = edges[number]
+            before, point = point, second if point == first else first
+            walked.append((before, point))
+            number = next((other for other in at[point] if other in left), None) if len(at[point]) == 2 else None
+
+    for point, numbers in at.items():
+        if len(numbers) != 2:
+            for number in numbers:
+                if number in left:
+                    walk(point, number)
+    for number in range(len(edges)):
+        if number in left:
+            walk(edges[number][0], number)
+    return np.array(walked, np.int64).reshape(-1, 2)
+
+
 def _chained(segments):
     """[(N, 3)]: segments that begin where the last ended become one polyline."""
     breaks = np.flatnonzero((segments[1:, 0] != segments[:-1, 1]).any(axis=1)) + 1
