@@ -114,6 +114,8 @@ def _read_edges(drawn, depsgraph):
     """(N, 3) float64 points and (L, 2) loose edges of what an object is evaluated to."""
     evaluated = drawn.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
+    if mesh is None:  # a curve without a point
+        return np.empty((0, 3)), np.empty((0, 2), np.int32)
     try:
         points = np.empty((len(mesh.vertices), 3), np.float32)
         mesh.vertices.foreach_get("co", points.ravel())
