@@ -23,6 +23,7 @@ class BoundHair:
     binding: HairBinding
     settings: HairSettings
     root_key: str  # of `pipeline.root_key`
+    parting_key: str  # of `partings.Partings`
     guides: Strands  # as they were when the hair followed them last
     guide_uid: int  # session_uid of their Curves
     surface: Surface
@@ -38,9 +39,9 @@ class BoundHair:
     @cached_property
     def reach(self):
         """The strands that follow each guide."""
-        from ..core import interpolation
+        from ..core import guide_weights
 
-        return interpolation.reach(self.binding.guide_weights, len(self.guides))
+        return guide_weights.reach(self.binding.guide_weights, len(self.guides))
 
 
 _bound = {}  # session_uid → BoundHair

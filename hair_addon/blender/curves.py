@@ -18,6 +18,8 @@ from . import follow_nodes
 # How an attribute's values are called by its data type.
 _VALUE_NAMES = {"FLOAT": "value", "INT": "value", "FLOAT2": "vector", "FLOAT_VECTOR": "vector"}
 
+_GUIDE_MAP = ("guide_index", "guide_weight")
+
 # A stored root further than this part of the surface's size from the curve's first point is out of date.
 _ROOT_TOLERANCE = 1e-4
 
@@ -95,6 +97,38 @@ def write_strands(curves, surface, points, roots, radii, guide_index):
     _write_attribute(curves, "id", "INT", "CURVE", np.arange(strand_count))
     _write_attribute(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
     write_roots(curves, surface, roots)
+
+
+def write_guide_map(curves, guide_weights):
+    """Store the `GuideWeights` of strands, a pair of attributes for each guide that one follows; None removes them.
+
+    guide_index_0 to guide_weight_0 are the nearest's; guides that a strand does without have the index -1.
+    """
+    slot_count = 0 if guide_weights is None else guide_weights.indices.shape[1]
+    for attribute in list(curves.attributes):
+        kind, _, slot = attribute.name.rpartition("_")
+        if kind in _GUIDE_MAP and slot.isdecimal() and int(slot) >= slot_count:
+            curves.attributes.remove(attribute)
+    if not slot_count:
+        return
+    indices, weights = guide_weights.indices.numpy(), guide_weights.weights.numpy()
+    indices = np.where(weights > 0.0, indices, -1)
+    for slot in range(slot_count):
+        for name, data_type, values in zip(_GUIDE_MAP, ("INT", "FLOAT"), (indices, weights), strict=True):
+            _write_attribute(curves, f"{name}_{slot}", data_type, "CURVE", values[:, slot])
+
+
+def read_guide_map(curves):
+    """(S, k) int32 and (S, k) float32 of `write_guide_map`, or None where there is none."""
+    slots = [slot for slot in range(len(curves.attributes)) if f"{_GUIDE_MAP[0]}_{slot}" in curves.attributes]
+    if not slots:
+        return None
+    indices = np.empty((len(slots), len(curves.curves)), np.int32)
+    weights = np.empty(indices.shape, np.float32)
+    for slot in slots:
+        for name, values in zip(_GUIDE_MAP, (indices, weights), strict=True):
+            curves.attributes[f"{name}_{slot}"].data.foreach_get("value", values[slot])
+    return np.ascontiguousarray(indices.T), np.ascontiguousarray(weights.T)
 
 
 def write_roots(curves, surface, roots):

@@ -35,6 +35,8 @@ def after_depsgraph_update(_scene, depsgraph):
         # Nobody is in the middle of editing or painting it: hair waits until they leave that mode.
         if surface_object.mode == "OBJECT":
             live_hair.follow_surface(surface_object, depsgraph, surface_object.data in changed)
+    moved = [u.id.original for u in depsgraph.updates if u.is_updated_geometry or u.is_updated_transform]
+    live_hair.follow_partings(moved, depsgraph)
     live_hair.remember_axes()
     if _is_undone:
         _is_undone = False

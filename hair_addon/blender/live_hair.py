@@ -162,10 +162,30 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         if hair.surface != surface_object or state.kind != "HAIR" or not state.is_live:
             continue
         try:
-            if pipeline.has_other_density(hair, depsgraph):
+            if pipeline.has_other_density(hair, depsgraph) or pipeline.has_other_parting(hair, depsgraph):
                 _mark(hair)
         except HairError as error:
             state.status = str(error)
+
+
+def follow_partings(changed, depsgraph):
+    """Mark hair whose part lines, or whose guides' regions, are among some datablocks and are others than they were."""
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR" or not state.is_live or not _parts_by(state, changed):
+            continue
+        try:
+            if pipeline.has_other_parting(hair, depsgraph):
+                _mark(hair)
+        except HairError as error:
+            state.status = str(error)
+
+
+def _parts_by(state, changed):
+    lines = bpy.data.objects.get(state.hair.part_lines) if state.hair.part_lines else None
+    if lines is not None and (lines in changed or lines.data in changed):
+        return True
+    return bool(state.hair.region_attribute) and state.guide_curves in changed
 
 
 def mark_followers(guide_curves):

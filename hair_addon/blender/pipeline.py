@@ -15,7 +15,7 @@ from ..core import groom, strands
 from ..core.errors import HairError
 from ..core.long_work import part_of, run_now
 from ..core.mesh import require_finite
-from . import bindings, curves, materials, preferences, properties, scene
+from . import bindings, curves, materials, partings, preferences, properties, scene
 from .bindings import BoundHair
 from .datablocks import Remembered
 
@@ -74,9 +74,10 @@ def _binding_hair(guide_curves, settings, depsgraph, target):
     guides = read_guides(guide_curves, surface)
     key = root_key(settings, density)
     roots = _kept_roots(target, surface, key)
+    parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
     device, guide_uid = preferences.device(), guide_curves.session_uid
-    binding, points = yield lambda progress: _bind(surface, guides, settings, density, roots, device, progress)
-    return BoundHair(binding, settings, key, guides, guide_uid, surface, points)
+    binding, points = yield lambda progress: _bind(surface, guides, settings, density, parting, roots, device, progress)
+    return BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, points)
 
 
 def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
@@ -86,6 +87,7 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
     """
     surface, density = _read_surface(surface_object, guide_settings, depsgraph)
     texture = scene.read_texture(surface, guide_settings.density_image)
+    parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
     device, place = preferences.device(), Remembered(surface_object)
 
     def compute(progress):
@@ -98,22 +100,27 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
             device=device,
             progress=part_of(progress, 0.0, 0.5),
         )
-        return guides, *_bind(surface, guides, hair_settings, density, None, device, part_of(progress, 0.5, 1.0))
+        binding = _bind(surface, guides, hair_settings, density, parting, None, device, part_of(progress, 0.5, 1.0))
+        return guides, *binding
 
     guides, binding, points = yield compute
     guide_curves = _write_guides(None, place.find(), surface, guides, guide_settings, root_key(guide_settings, density))
     key = root_key(hair_settings, density)
-    bound = BoundHair(binding, hair_settings, key, guides, guide_curves.session_uid, surface, points)
+    guide_uid = guide_curves.session_uid
+    bound = BoundHair(binding, hair_settings, key, parting.key, guides, guide_uid, surface, points)
     return guide_curves, _write_bound(None, place.find(), guide_curves, bound)
 
 
-def _bind(surface, guides, settings, density, roots, device, progress):
+def _bind(surface, guides, settings, density, parting, roots, device, progress):
     """`HairBinding`, and strands (S, P, 3) float32 in the surface's local coordinates."""
     binding = groom.bind_hair(
         surface.mesh,
         guides,
         settings,
         density=density,
+        regions=parting.regions,
+        lines=parting.lines,
+        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
         roots=roots,
         device=device,
         progress=part_of(progress, 0.0, 0.8),
@@ -150,10 +157,12 @@ def write_hair(target):
         curves.write_points(target, bound.points)
     else:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
-        state.root_key = bound.root_key
+        state.root_key, state.parting_key = bound.root_key, bound.parting_key
         radii = groom.strand_radii(bound.settings, bound.points.shape[1])
         nearest = bound.binding.guide_weights.indices.numpy()[:, 0]
         curves.write_strands(target, bound.surface, bound.points, bound.binding.roots, radii, nearest)
+    guide_map = groom.weights_now(bound.binding, bound.guides) if bound.settings.guide_map else None
+    curves.write_guide_map(target, guide_map)
     state.is_stale = False  # as which another choice of guides marks it
     state.followed = guides_digest(state.guide_curves)
     bound.is_written = bound.has_moved_only = True
@@ -281,6 +290,16 @@ def _root_again(guide_curves, surface):
     points = surface.from_local(curves.read_points(guide_curves)[firsts])
     curves.write_roots(guide_curves, surface, curves.read_roots(guide_curves, surface, points))
     curves.keep_surface(guide_curves, surface)
+
+
+def has_other_parting(target, depsgraph):
+    """Whether what hair was parted by has changed: regions, or lines. Raises `HairError`."""
+    group = target.vellus.hair
+    if not partings.is_wanted(group) or target.surface is None:
+        return False
+    surface = scene.read_surface(target.surface, depsgraph)
+    parting = partings.read(target.surface, surface, target.vellus.guide_curves, group, depsgraph)
+    return parting.key != target.vellus.parting_key
 
 
 def has_other_density(target, depsgraph):

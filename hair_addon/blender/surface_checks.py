@@ -6,6 +6,8 @@ Panels ask for this with every redraw, so nothing here reads geometry.
 
 from dataclasses import dataclass
 
+import bpy
+
 from .pipeline import followers
 from .translations import interface_text
 
@@ -20,7 +22,20 @@ class Warning:
 
 def warnings_of(surface, parts):
     """[Warning] about a mesh object, or None where it is missing, and the guide and hair Curves that grow on it."""
-    return [*_of_library(surface, parts), *_of_surface(surface, parts), *_of_uv_map(surface, parts), *_of_guides(parts)]
+    partings = [warning for part in parts if part.vellus.kind == "HAIR" for warning in parting_warnings(part)]
+    first = [*_of_library(surface, parts), *_of_surface(surface, parts), *_of_uv_map(surface, parts)]
+    return [*first, *_of_guides(parts), *dict.fromkeys(partings)]
+
+
+def parting_warnings(hair):
+    """[Warning] about what a hair Curves datablock is to be parted by and is not there."""
+    group, found = hair.vellus.hair, []
+    if group.part_lines and group.part_lines not in bpy.data.objects:
+        found.append(Warning(interface_text('No object "{name}": pick another part line.', name=group.part_lines)))
+    if hair.surface is not None and group.region_group and group.region_group not in hair.surface.vertex_groups:
+        text = 'No vertex group "{name}": pick another for regions.'
+        found.append(Warning(interface_text(text, name=group.region_group)))
+    return found
 
 
 def _of_library(surface, parts):

@@ -10,6 +10,7 @@ from .groom import POINT_COUNT
 # UV (8), normal (12), guide, id, random number (4 each); the
 # root: triangle (4), its corners and barycentric coordinates (12 each).
 _POINT_BYTES, _CURVE_BYTES = 28, 65
+_SLOT_BYTES = 8  # which guide, and its weight
 _TEXEL_BYTES = 16  # RGBA, single precision
 
 _ROUND_SECONDS = 1e-5  # one guide, one round of relaxation
@@ -18,9 +19,9 @@ _STRAND_SECONDS = 4e-6
 _TEXEL_SECONDS = 1.5e-6  # of all of the Marschner tables together
 
 
-def curves_bytes(strand_count, point_count=POINT_COUNT):
-    """Memory of strands as a Curves datablock [bytes]."""
-    return strand_count * (point_count * _POINT_BYTES + _CURVE_BYTES)
+def curves_bytes(strand_count, point_count=POINT_COUNT, slot_count=0):
+    """Memory of strands as a Curves datablock [bytes]; slot_count: guides of each strand that are stored with it."""
+    return strand_count * (point_count * _POINT_BYTES + _CURVE_BYTES + slot_count * _SLOT_BYTES)
 
 
 def gpu_bytes(strand_count, point_count=POINT_COUNT):

@@ -70,7 +70,9 @@ class HairSettings(Settings):
     )
     seed: int = param(1, "Number that all randomness follows from", low=0, high=2**31 - 1)
     density_group: str = param("", "Vertex group that strands follow; empty: the whole surface")
-    automatic_influence: bool = param(True, "Choose the influence distance from the spacing of the guides")
+    automatic_influence: bool = param(
+        True, "Choose the influence distance from the spacing of the guides around a root"
+    )
     influence_distance: float = param(
         0.03,
         "Guides nearer to a root than this shape its strand",
@@ -81,6 +83,36 @@ class HairSettings(Settings):
         subtype="DISTANCE",
     )
     neighbour_limit: int = param(8, "Most guides that one strand follows: the nearest", low=1, high=32)
+    keep_length: float = param(
+        1.0,
+        "How far strands are made as long as their guides, which a mean of guides that disagree is not",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    angle_limit: float = param(
+        math.radians(60.0),
+        "Guides that lean further away than this from a strand's nearest guide do not shape it; 180°: all do",
+        low=0.0,
+        high=math.pi,
+        unit="ROTATION",
+        subtype="ANGLE",
+    )
+    length_limit: float = param(
+        3.0,
+        "Guides this many times longer or shorter than a strand's nearest guide do not shape it",
+        low=1.0,
+        high=1e6,
+        soft_high=10.0,
+    )
+    region_group: str = param("", "Vertex group that parts hair: no strand follows guides inside and outside; or none")
+    region_attribute: str = param(
+        "", "Integers on the surface's faces or vertices, or on guides: no strand follows guides of two; or none"
+    )
+    part_lines: str = param(
+        "", "Curve object on the surface: no strand follows guides on the other side of its lines; empty: none"
+    )
+    guide_map: bool = param(True, "Store each strand's guides and weights as attributes of its curve")
     radius: float = param(
         0.00008, "Radius of a strand at its root", above=0.0, high=1e3, soft_high=0.01, unit="LENGTH", precision=6
     )
@@ -97,7 +129,9 @@ class HairBinding:
     positions: "wp.array[wp.vec3]"  # noqa: F821 (S,) [m]
     normals: "wp.array[wp.vec3]"  # noqa: F821 (S,) unit
     guide_normals: "wp.array[wp.vec3]"  # noqa: F821 (G,) unit, at the guides' roots
-    guide_weights: "interpolation.GuideWeights"  # noqa: F821 (S, k)
+    guide_weights: "guide_weights.GuideWeights"  # noqa: F821 (S, k), before guides that differ are left out
+    limits: "guide_weights.Limits"  # noqa: F821
+    keep_length: float
 
 
 def distribute_guides(
@@ -182,19 +216,36 @@ def _symmetric(controls, places, mirror):
     return controls
 
 
-def bind_hair(mesh, guides, settings, *, density=None, roots=None, device="cpu", progress=unheard) -> HairBinding:
+def bind_hair(
+    mesh,
+    guides,
+    settings,
+    *,
+    density=None,
+    regions=(),
+    lines=None,
+    drawn_on=None,
+    roots=None,
+    device="cpu",
+    progress=unheard,
+) -> HairBinding:
     """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape.
 
-    Arguments as in `generate_hair`; roots: `SurfacePoints` that strands have already, None to place them.
+    Arguments as in `generate_hair`; drawn_on: (V, 3) vertices that the part lines are near to, if not the mesh's own;
+    roots: `SurfacePoints` that strands have already, None to place them.
     """
     check_mesh(mesh)
     check_points(mesh, guides.roots)
     progress(COMPILING, 0.0)
     import warp as wp
 
-    from . import hash_grid, interpolation, sampling
+    from . import guide_weights, hash_grid, interpolation, part_lines, sampling, surface_query
+    from .regions import kept_apart
 
-    _load_kernels(device, hash_grid, interpolation)
+    _load_kernels(device, guide_weights, hash_grid, interpolation)
+    if lines is not None:
+        _load_kernels(device, part_lines, surface_query)
+        lines = part_lines.lay(mesh, lines, device, drawn_on)
     progress("Placing strands", 0.1)
     if roots is None:
         roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)
@@ -207,13 +258,18 @@ def bind_hair(mesh, guides, settings, *, density=None, roots=None, device="cpu",
     root_positions = on_device(positions(mesh, roots))
     root_normals = on_device(normals(mesh, roots))
     progress("Finding guides", 0.4)
-    distance = settings.influence_distance
-    if settings.automatic_influence:
-        distance = interpolation.automatic_influence_distance(guide_positions)
-    guide_weights = interpolation.find_guides(
-        root_positions, root_normals, guide_positions, guide_normals, distance, settings.neighbour_limit
+    weights = guide_weights.find_guides(
+        root_positions,
+        root_normals,
+        guide_positions,
+        guide_normals,
+        None if settings.automatic_influence else settings.influence_distance,
+        settings.neighbour_limit,
+        regions=kept_apart(regions, roots, guides.roots),
+        lines=lines,
     )
-    return HairBinding(roots, root_positions, root_normals, guide_normals, guide_weights)
+    limits = guide_weights.Limits(settings.angle_limit, settings.length_limit)
+    return HairBinding(roots, root_positions, root_normals, guide_normals, weights, limits, settings.keep_length)
 
 
 def _load_kernels(device, *modules):
@@ -225,50 +281,57 @@ def _load_kernels(device, *modules):
 
 def follow_guides(binding, guides) -> Strands:
     """Strands of a binding for the guides as they are combed now: no search, this is what live editing repeats."""
-    from . import interpolation
-
-    if len(guides) != len(binding.guide_normals):
-        raise HairError(
-            f"The hair was bound to {len(binding.guide_normals)} guides and there are {len(guides)} now: bind it again."
-        )
-    # A kernel that is handed memory of another device reads rubbish, or ends all work on its own.
-    guide_points = guides.points.to(binding.positions.device)
-    points = interpolation.interpolate(
-        binding.positions, binding.normals, guide_points, binding.guide_normals, binding.guide_weights
-    )
-    return Strands(points, binding.roots)
+    weights = weights_now(binding, guides)
+    return Strands(_follow(binding, guides, binding.positions, binding.normals, weights), binding.roots)
 
 
 def follow_some(binding, guides, chosen):
     """(M, P, 3) float32 [m]: the points that `follow_guides` gives some strands, and no others are computed.
 
-    chosen: (M,) indices of strands, such as `interpolation.Reach` finds for the guides that moved.
+    chosen: (M,) indices of strands, such as `guide_weights.Reach` finds for the guides that moved.
     """
     import warp as wp
 
+    from .guide_weights import rows
+
+    chosen = wp.array(chosen, dtype=int, device=binding.positions.device)
+    roots, root_normals = rows(binding.positions, chosen), rows(binding.normals, chosen)
+    return _follow(binding, guides, roots, root_normals, weights_now(binding, guides, chosen)).numpy()
+
+
+def weights_now(binding, guides, chosen=None):
+    """The `GuideWeights` by which strands follow the guides as combed now; chosen: int32 Warp array, None for all."""
+    from . import guide_weights
+
+    if len(guides) != len(binding.guide_normals):
+        raise HairError(
+            f"The hair was bound to {len(binding.guide_normals)} guides and there are {len(guides)} now: bind it again."
+        )
+    weights = binding.guide_weights if chosen is None else binding.guide_weights.of(chosen)
+    return guide_weights.limited(weights, _guide_points(binding, guides), binding.guide_normals, binding.limits)
+
+
+def _guide_points(binding, guides):
+    # A kernel that is handed memory of another device reads rubbish, or ends all work on its own.
+    return guides.points.to(binding.positions.device)
+
+
+def _follow(binding, guides, roots, root_normals, weights):
     from . import interpolation
 
-    device = binding.positions.device
-    chosen = wp.array(chosen, dtype=int, device=device)
-    weights = binding.guide_weights
-    points = interpolation.interpolate(
-        interpolation.rows(binding.positions, chosen),
-        interpolation.rows(binding.normals, chosen),
-        guides.points.to(device),
-        binding.guide_normals,
-        interpolation.GuideWeights(
-            *(interpolation.rows(array, chosen) for array in (weights.indices, weights.weights, weights.turns))
-        ),
-    )
-    return points.numpy()
+    points = _guide_points(binding, guides)
+    return interpolation.interpolate(roots, root_normals, points, binding.guide_normals, weights, binding.keep_length)
 
 
-def generate_hair(mesh, guides, settings, *, density=None, device="cpu") -> Strands:
+def generate_hair(mesh, guides, settings, *, density=None, regions=(), lines=None, device="cpu") -> Strands:
     """(strand_count, P) strands between the guides, P the guides' own point count.
 
-    mesh: `TriMesh` [m] with the guides' roots on it; settings: `HairSettings`; density as in `distribute_guides`.
+    mesh: `TriMesh` [m] with the guides' roots on it; settings: `HairSettings`; density as in `distribute_guides`;
+    regions: tuple of `Regions` that no strand mixes guides of; lines: (L, 2, 3) segments [m] near the surface that no
+    strand mixes guides across, one that begins where the last ended going on, or None.
     """
-    return follow_guides(bind_hair(mesh, guides, settings, density=density, device=device), guides)
+    binding = bind_hair(mesh, guides, settings, density=density, regions=regions, lines=lines, device=device)
+    return follow_guides(binding, guides)
 
 
 def strand_radii(settings, point_count=POINT_COUNT):

@@ -1,9 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands between guides: Gaussian-weighted means of guides' offsets  ([Report12] section 2.4, Eq. 8-10).
+"""Strands between guides: weighted means of guides' offsets  ([Report12] section 2.4, Eq. 10).
 
-Weights do not depend on the point, so the recursion of Eq. 10 is a sum: p'_i = q + sum_j w_j R_j (P_j,i - P_j,0), where
-R_j turns the surface at guide j's root into the surface at the strand's. `find_guides` searches and weighs, which
-depends on roots alone; `interpolate` is what combing repeats.
+With weights w_j that add up to one, o_j,i the offsets of guide j (Eq. 7) and R_j what turns the surface at its root
+into the surface at the strand's, the strand is p'_0 = q and
+
+    p'_i = p'_(i-1) + λ_i m_i,    m_i = sum_j w_j R_j o_j,i,    l_i = sum_j w_j |o_j,i|,    λ_i = l_i / |m_i|
+
+Eq. 10 is λ_i = 1, which makes a strand shorter than its guides wherever they disagree, to nothing where they oppose
+each other. With λ_i as above each segment is as long as its guides' are on average. Weights do not depend on the point
+(guide_weights.py): `interpolate` is what combing repeats.
 
 R_j is the least rotation that takes the guide's normal to the strand's: it needs no UV map and is continuous wherever
 normals are. With a frame F (tangent, bitangent, normal) at either root it is F_strand Z F_guide^T, Z being a turn about
@@ -11,107 +16,36 @@ the normal. So guides are put into their frames once, a neighbour costs five mul
 and the strand's frame is applied to the sum.
 """
 
-from dataclasses import dataclass
-
-import numpy as np
 import warp as wp
 
-from . import hash_grid
+from .guide_weights import frame
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-BLOCK = 16  # points that one vector holds on the processor
+BLOCK = 40  # segments that one vector holds on the processor: a strand of 41 points in one go
 block = wp.types.vector(length=BLOCK, dtype=float)
 
-SHARE = 4  # points of one strand that a GPU's thread makes
+SHARE = 4  # segments of one strand that a GPU's thread makes
 share = wp.types.vector(length=SHARE, dtype=float)
 
+# Of l_i, below which |m_i| counts as this: where guides cancel, a direction is rounding and nothing else.
+CANCELLED = 1.0e-3
 
-@dataclass(frozen=True)
-class GuideWeights:
-    """The guides that each strand follows, nearest first: (S, k) arrays on one device.
 
-    indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
-    cosine and sine of the angle about the normal from the guide's frame to the strand's.
+def interpolate(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0):
+    """(S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,) that follow guides (G, P) [m], normals (G,).
+
+    keep_length: how much of the way from Eq. 10 to segments as long as the guides' on average, 0 to 1.
     """
-
-    indices: "wp.array2d[int]"
-    weights: "wp.array2d[float]"
-    turns: "wp.array2d[wp.vec2]"
-
-
-@dataclass(frozen=True)
-class Reach:
-    """The strands that follow each guide, as compressed rows: guide g's are strands[starts[g]:starts[g + 1]]."""
-
-    starts: np.ndarray  # (G+1,) int64
-    strands: np.ndarray  # int32
-
-    def of(self, guides):
-        """Indices, rising, of the strands that follow any of some guides."""
-        is_reached = np.zeros(int(self.strands.max(initial=-1)) + 1, bool)
-        for guide in guides:
-            is_reached[self.strands[self.starts[guide] : self.starts[guide + 1]]] = True
-        return np.flatnonzero(is_reached)
-
-
-def reach(guide_weights, guide_count):
-    """The `Reach` of guides, from the `GuideWeights` of the strands that follow them."""
-    indices = guide_weights.indices.numpy()
-    strands, slots = np.nonzero(indices >= 0)
-    guides = indices[strands, slots]
-    order = np.argsort(guides, kind="stable")
-    starts = np.concatenate([[0], np.cumsum(np.bincount(guides, minlength=guide_count))])
-    return Reach(starts, strands[order].astype(np.int32))
-
-
-def rows(array, chosen):
-    """Some rows of a Warp array, in an array of their own; chosen: int32 Warp array on its device."""
-    return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()
-
-
-def automatic_influence_distance(guide_roots):
-    """Twice the mean distance [m] from a guide's root to the next one's; guide_roots (G,) vec3 [m].
-
-    Any root then has about eleven evenly placed guides in reach. A lone guide is followed from anywhere: 1 m will do.
-    """
-    extent = float(np.linalg.norm(np.ptp(guide_roots.numpy(), axis=0)))
-    if extent == 0.0:
-        return 1.0
-    _, distances = hash_grid.neighbours(guide_roots, guide_roots, 2.0 * extent, 2)
-    return 2.0 * float(distances.numpy()[:, 1].mean())
-
-
-def find_guides(roots, normals, guide_roots, guide_normals, influence_distance, neighbour_limit):
-    """`GuideWeights` of strands at roots (S,) [m] with unit normals (S,), for guides (G,) likewise; all vec3 arrays.
-
-    A guide counts when its root is nearer than the influence distance [m]; of those, the `neighbour_limit` nearest. A
-    root with none in reach follows the nearest one alone.
-    """
-    indices, distances = hash_grid.neighbours(guide_roots, roots, influence_distance, neighbour_limit)
-    weights = wp.empty_like(distances)
-    turns = wp.empty(indices.shape, dtype=wp.vec2, device=roots.device)
-    wp.launch(
-        _weigh,
-        dim=len(roots),
-        inputs=[indices, distances, normals, guide_normals, influence_distance],
-        outputs=[weights, turns],
-        device=roots.device,
-    )
-    return GuideWeights(indices, weights, turns)
-
-
-def interpolate(roots, normals, guide_points, guide_normals, guide_weights):
-    """(S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,) that follow guides (G, P) [m], normals (G,)."""
     by = by_strands if roots.device.is_cpu else by_points
-    return by(roots, normals, guide_points, guide_normals, guide_weights)
+    return by(roots, normals, guide_points, guide_normals, guide_weights, keep_length)
 
 
-def by_strands(roots, normals, guide_points, guide_normals, guide_weights):
+def by_strands(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0):
     """What `interpolate` returns, a strand at a time: the processor's way."""
     guide_count, point_count = guide_points.shape
-    blocks = wp.empty((guide_count, -(-point_count // BLOCK), 3), dtype=block, device=roots.device)
+    blocks = wp.empty((guide_count, -(-(point_count - 1) // BLOCK), 4), dtype=block, device=roots.device)
     wp.launch(
         _blocks_of_offsets,
         dim=blocks.shape[:2],
@@ -123,20 +57,20 @@ def by_strands(roots, normals, guide_points, guide_normals, guide_weights):
     wp.launch(
         _strands,
         dim=len(roots),
-        inputs=[roots, normals, blocks, guide_weights.indices, guide_weights.weights, guide_weights.turns],
+        inputs=[roots, normals, blocks, guide_weights.indices, guide_weights.weights, guide_weights.turns, keep_length],
         outputs=[points],
         device=roots.device,
     )
     return points
 
 
-def by_points(roots, normals, guide_points, guide_normals, guide_weights):
-    """What `interpolate` returns, neighbouring points by neighbouring threads: the GPU's way, six times as fast there.
+def by_points(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0):
+    """What `interpolate` returns, neighbouring segments by neighbouring threads: the GPU's way.
 
-    So they read and write memory side by side; each makes a few points far apart, for which it reads weights once.
+    So they read and write memory side by side; each makes a few segments far apart, for which it reads weights once.
     """
     point_count = guide_points.shape[1]
-    offsets = wp.empty_like(guide_points)
+    offsets = wp.empty(guide_points.shape, dtype=wp.vec4, device=roots.device)
     wp.launch(
         _framed_offsets,
         dim=offsets.shape,
@@ -147,73 +81,31 @@ def by_points(roots, normals, guide_points, guide_normals, guide_weights):
     points = wp.empty((len(roots), point_count), dtype=wp.vec3, device=roots.device)
     lane_count = -(-point_count // SHARE)
     wp.launch(
-        _points,
+        _segments,
         dim=(len(roots), lane_count),
-        inputs=[
-            roots,
-            normals,
-            offsets,
-            guide_weights.indices,
-            guide_weights.weights,
-            guide_weights.turns,
-            lane_count,
-        ],
+        inputs=[offsets, guide_weights.indices, guide_weights.weights, guide_weights.turns, lane_count, keep_length],
         outputs=[points],
         device=roots.device,
     )
+    wp.launch(_sums, dim=len(roots), inputs=[roots, normals], outputs=[points], device=roots.device)
     return points
 
 
 @wp.func
-def _frame(normal: wp.vec3):
-    """Tangent and bitangent of a unit normal, without a branch or a pole [Duff17]."""
-    sign = wp.where(normal[2] >= 0.0, 1.0, -1.0)
-    a = -1.0 / (sign + normal[2])
-    b = normal[0] * normal[1] * a
-    tangent = wp.vec3(1.0 + sign * normal[0] * normal[0] * a, sign * b, -sign * normal[0])
-    return tangent, wp.vec3(b, sign + normal[1] * normal[1] * a, -normal[1])
+def _framed_offset(guide_points: wp.array2d[wp.vec3], guide: int, point: int, normal: wp.vec3):
+    """Eq. 7's offset in the guide's frame, and how long it is; nothing at the root and past the tip."""
+    tangent, bitangent = frame(normal)
+    if point == 0 or point >= guide_points.shape[1]:
+        return wp.vec4()
+    offset = guide_points[guide, point] - guide_points[guide, point - 1]
+    return wp.vec4(wp.dot(tangent, offset), wp.dot(bitangent, offset), wp.dot(normal, offset), wp.length(offset))
 
 
 @wp.func
-def _turn(guide_normal: wp.vec3, normal: wp.vec3):
-    """Cosine and sine of Z: where the least rotation from one normal to the other leaves the guide's tangent."""
-    guide_tangent, _guide_bitangent = _frame(guide_normal)
-    tangent, bitangent = _frame(normal)
-    # For t across a: R t = t - (t·b) (a + b) / (1 + a·b). Opposite normals have no least rotation: any will do.
-    lean = wp.dot(guide_tangent, normal) / wp.max(1.0 + wp.dot(guide_normal, normal), 1.0e-6)
-    turned = guide_tangent - lean * (guide_normal + normal)
-    return wp.normalize(wp.vec2(wp.dot(tangent, turned), wp.dot(bitangent, turned)))
-
-
-@wp.kernel
-def _weigh(
-    indices: wp.array2d[int],
-    distances: wp.array2d[float],
-    normals: wp.array[wp.vec3],
-    guide_normals: wp.array[wp.vec3],
-    influence_distance: float,
-    # outputs
-    out_weights: wp.array2d[float],
-    out_turns: wp.array2d[wp.vec2],
-):
-    strand = wp.tid()
-    sigma = 0.5 * influence_distance  # Eq. 9
-    nearest = distances[strand, 0]
-    total = float(0.0)
-    for slot in range(indices.shape[1]):
-        weight = float(0.0)
-        turn = wp.vec2(1.0, 0.0)
-        guide = indices[strand, slot]
-        if guide >= 0:
-            distance = distances[strand, slot]
-            # Relative to the nearest guide's, which cancels in Eq. 10: no weight of a far root is lost to rounding.
-            weight = wp.exp((nearest * nearest - distance * distance) / (2.0 * sigma * sigma))
-            turn = _turn(guide_normals[guide], normals[strand])
-        out_weights[strand, slot] = weight
-        out_turns[strand, slot] = turn
-        total += weight
-    for slot in range(indices.shape[1]):
-        out_weights[strand, slot] = out_weights[strand, slot] / total
+def _stretch(x: float, y: float, z: float, length: float, keep_length: float):
+    """λ_i of a mean offset, or what part of it is wanted."""
+    found = wp.max(wp.sqrt(x * x + y * y + z * z), wp.max(CANCELLED * length, 1.0e-30))
+    return 1.0 + keep_length * (length / found - 1.0)
 
 
 @wp.kernel
@@ -224,20 +116,20 @@ def _blocks_of_offsets(
     out_blocks: wp.array3d[block],
 ):
     guide, part = wp.tid()
-    normal = guide_normals[guide]
-    tangent, bitangent = _frame(normal)
     x = block(0.0)
     y = block(0.0)
     z = block(0.0)
-    first = BLOCK * part
-    for point in range(wp.min(BLOCK, guide_points.shape[1] - first)):
-        offset = guide_points[guide, first + point] - guide_points[guide, 0]  # the sum of Eq. 7's offsets
-        x[point] = wp.dot(tangent, offset)
-        y[point] = wp.dot(bitangent, offset)
-        z[point] = wp.dot(normal, offset)
+    lengths = block(0.0)
+    for i in range(BLOCK):
+        offset = _framed_offset(guide_points, guide, 1 + BLOCK * part + i, guide_normals[guide])
+        x[i] = offset[0]
+        y[i] = offset[1]
+        z[i] = offset[2]
+        lengths[i] = offset[3]
     out_blocks[guide, part, 0] = x
     out_blocks[guide, part, 1] = y
     out_blocks[guide, part, 2] = z
+    out_blocks[guide, part, 3] = lengths
 
 
 @wp.kernel
@@ -248,23 +140,27 @@ def _strands(
     indices: wp.array2d[int],
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],
+    keep_length: float,
     # outputs
     out_points: wp.array2d[wp.vec3],
 ):
     strand = wp.tid()
     root = roots[strand]
     normal = normals[strand]
-    tangent, bitangent = _frame(normal)
+    tangent, bitangent = frame(normal)
     row = out_points[strand]
+    row[0] = root
+    along = wp.vec3()
     for part in range(blocks.shape[1]):
-        # A block of points at once, coordinate by coordinate: that is what fills vector registers.
+        # A block of segments at once, coordinate by coordinate: that is what fills vector registers.
         x = block(0.0)
         y = block(0.0)
         z = block(0.0)
+        lengths = block(0.0)
         for slot in range(indices.shape[1]):
-            guide = indices[strand, slot]
-            if guide >= 0:
-                weight = weights[strand, slot]
+            weight = weights[strand, slot]
+            if weight > 0.0:
+                guide = indices[strand, slot]
                 cosine = weight * turns[strand, slot][0]
                 sine = weight * turns[strand, slot][1]
                 guide_x = blocks[guide, part, 0]
@@ -272,9 +168,14 @@ def _strands(
                 x += cosine * guide_x - sine * guide_y
                 y += sine * guide_x + cosine * guide_y
                 z += weight * blocks[guide, part, 2]
-        first = BLOCK * part
-        for point in range(wp.min(BLOCK, row.shape[0] - first)):
-            row[first + point] = root + x[point] * tangent + y[point] * bitangent + z[point] * normal  # Eq. 10
+                lengths += weight * blocks[guide, part, 3]
+        stretch = block(0.0)
+        for i in range(wp.static(BLOCK)):
+            stretch[i] = _stretch(x[i], y[i], z[i], lengths[i], keep_length)
+        first = 1 + BLOCK * part
+        for i in range(wp.min(BLOCK, row.shape[0] - first)):
+            along += stretch[i] * wp.vec3(x[i], y[i], z[i])
+            row[first + i] = root + along[0] * tangent + along[1] * bitangent + along[2] * normal  # Eq. 10
 
 
 @wp.kernel
@@ -282,36 +183,34 @@ def _framed_offsets(
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
     # outputs
-    out_offsets: wp.array2d[wp.vec3],
+    out_offsets: wp.array2d[wp.vec4],
 ):
     guide, point = wp.tid()
-    normal = guide_normals[guide]
-    tangent, bitangent = _frame(normal)
-    offset = guide_points[guide, point] - guide_points[guide, 0]  # the sum of Eq. 7's offsets
-    out_offsets[guide, point] = wp.vec3(wp.dot(tangent, offset), wp.dot(bitangent, offset), wp.dot(normal, offset))
+    out_offsets[guide, point] = _framed_offset(guide_points, guide, point, guide_normals[guide])
 
 
 @wp.kernel
-def _points(
-    roots: wp.array[wp.vec3],
-    normals: wp.array[wp.vec3],
-    offsets: wp.array2d[wp.vec3],
+def _segments(
+    offsets: wp.array2d[wp.vec4],
     indices: wp.array2d[int],
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],
     lane_count: int,
+    keep_length: float,
     # outputs
-    out_points: wp.array2d[wp.vec3],
+    out_segments: wp.array2d[wp.vec3],
 ):
+    """λ_i m_i in the strand's frame."""
     strand, lane = wp.tid()
-    last = out_points.shape[1] - 1
+    last = out_segments.shape[1] - 1
     x = share(0.0)
     y = share(0.0)
     z = share(0.0)
+    lengths = share(0.0)
     for slot in range(indices.shape[1]):
-        guide = indices[strand, slot]
-        if guide >= 0:
-            weight = weights[strand, slot]
+        weight = weights[strand, slot]
+        if weight > 0.0:
+            guide = indices[strand, slot]
             cosine = weight * turns[strand, slot][0]
             sine = weight * turns[strand, slot][1]
             for i in range(wp.static(SHARE)):  # unrolled, so that sums stay in registers
@@ -319,10 +218,28 @@ def _points(
                 x[i] += cosine * offset[0] - sine * offset[1]
                 y[i] += sine * offset[0] + cosine * offset[1]
                 z[i] += weight * offset[2]
-    root = roots[strand]
-    normal = normals[strand]
-    tangent, bitangent = _frame(normal)
+                lengths[i] += weight * offset[3]
     for i in range(wp.static(SHARE)):
         point = lane + i * lane_count
         if point <= last:
-            out_points[strand, point] = root + x[i] * tangent + y[i] * bitangent + z[i] * normal  # Eq. 10
+            stretch = _stretch(x[i], y[i], z[i], lengths[i], keep_length)
+            out_segments[strand, point] = stretch * wp.vec3(x[i], y[i], z[i])
+
+
+@wp.kernel
+def _sums(
+    roots: wp.array[wp.vec3],
+    normals: wp.array[wp.vec3],
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    """Segments in the strand's frame → points."""
+    strand = wp.tid()
+    root = roots[strand]
+    normal = normals[strand]
+    tangent, bitangent = frame(normal)
+    row = out_points[strand]
+    along = wp.vec3()
+    for point in range(row.shape[0]):
+        along += row[point]
+        row[point] = root + along[0] * tangent + along[1] * bitangent + along[2] * normal  # Eq. 10

@@ -37,7 +37,7 @@ class Layout:
         assert name in owner.bl_rna.properties
         self.drawn[name] += 1
 
-    def prop_search(self, owner, name, source, collection):
+    def prop_search(self, owner, name, source, collection, results_are_suggestions=False):
         assert hasattr(source, collection)
         self.prop(owner, name)
 

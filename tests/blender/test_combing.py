@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon.blender import bindings, hair_cache, handlers, live_hair, pipeline, strand_textures
 from hair_addon.core import groom
-from hair_addon.core.interpolation import reach
+from hair_addon.core.guide_weights import reach
 from tests.blender.counting import counts_of
 from tests.blender.reading import attribute, points, write_points
 

@@ -87,7 +87,7 @@ def test_the_cost_that_is_shown_is_what_curves_take(guides, strand_count):
     curves = bpy.data.hair_curves["Hair"]
     widths = {"FLOAT": 4, "INT": 4, "INT8": 1, "FLOAT2": 8, "FLOAT_VECTOR": 12, "BOOLEAN": 1}
     taken = sum(len(a.data) * widths[a.data_type] for a in curves.attributes) + 4 * strand_count
-    assert estimate.curves_bytes(strand_count) == taken
+    assert estimate.curves_bytes(strand_count, slot_count=curves.vellus.hair.neighbour_limit) == taken
 
 
 WARNINGS = {
@@ -113,6 +113,14 @@ def test_what_keys_need_of_a_render_is_offered_while_it_is_not_so(hair, is_locke
     assert not draw(named("output")).drawn["use_lock_interface"]
     hair.data.keyframe_insert("vellus.appearance.melanin", frame=1)
     assert draw(named("output")).drawn["use_lock_interface"] == (not is_locked)
+
+
+@pytest.mark.parametrize(("setting", "words"), [("part_lines", "part line"), ("region_group", "vertex group")])
+def test_what_parts_hair_and_is_missing_is_said(hair, setting, words):
+    assert not any(words in " ".join(draw(named(name)).texts) for name in ("surface", "interpolation_parting"))
+    setattr(hair.data.vellus.hair, setting, "Lost")
+    for name in ("surface", "interpolation_parting"):
+        assert words in " ".join(draw(named(name)).texts) and "Lost" in " ".join(draw(named(name)).texts)
 
 
 def test_sentences_are_wrapped_to_the_sidebar(hair):

@@ -118,13 +118,17 @@ def test_one_guide_is_enough(square):
 
 
 def test_influence_distance_is_obeyed(square):
-    """In reach of one guide only, or of all: with the least distance each strand repeats its nearest guide."""
+    """In reach of one guide only, or of all."""
     guides = distribute_guides(square, GuideSettings(guide_count=30))
     settings = {"strand_count": 300, "automatic_influence": False}
     narrow = generate_hair(square, guides, HairSettings(influence_distance=1e-6, **settings)).numpy()
     shapes, guide_shapes = narrow - narrow[:, :1], guides.numpy() - guides.numpy()[:, :1]
-    nearest = np.linalg.norm(narrow[:, None, 0] - guides.numpy()[None, :, 0], axis=-1).argmin(axis=1)
-    np.testing.assert_allclose(shapes, guide_shapes[nearest], atol=1e-5)
+    apart = np.linalg.norm(narrow[:, None, 0] - guides.numpy()[None, :, 0], axis=-1)
+    nearest, ordered = apart.argmin(axis=1), np.sort(apart, axis=1)
+    alone = ordered[:, 1] > 1.25 * ordered[:, 0]
+    assert alone.sum() > 200
+    np.testing.assert_allclose(shapes[alone], guide_shapes[nearest][alone], atol=1e-5)
+    settings |= {"keep_length": 0.0, "angle_limit": np.pi, "length_limit": 1e6}
     wide = generate_hair(square, guides, HairSettings(influence_distance=100.0, neighbour_limit=30, **settings))
     mean = np.broadcast_to(guide_shapes.mean(axis=0), narrow.shape)
     np.testing.assert_allclose(wide.numpy() - wide.numpy()[:, :1], mean, atol=1e-4)

@@ -1,0 +1,331 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which guides each strand follows, and how much of each  ([Report12] section 2.4, Eq. 8-9).
+
+A strand with its root at q follows the k guides nearest to it. With r_j the way from q to guide j's root and r' the way
+to the first guide that is left out, the weight is the Gaussian of Eq. 9, brought to zero by a second factor:
+
+    w_j = exp(-r_j² / 2σ²) (1 - r_j² / ρ²)²    where r_j < ρ,    ρ = min(d, r'),    σ = d / 2
+
+Both r_j and r' are continuous in q, so weights are: a guide that comes or goes does so at ρ, where its weight is zero,
+whether it passes the influence distance d or changes places with another one. Automatic: d = r', so the spacing around
+each root decides. Where no guide is within d / STRETCH, d is STRETCH times the way to the nearest one.
+
+Then guides whose shape differs from the nearest one's lose their share: `limited`, which depends on the guides' shape
+and not on roots. It searches nothing: combing repeats it.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from . import hash_grid, part_lines
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+STRETCH = 1.25
+EVERYWHERE = 1e18  # [m]: a distance to search that leaves nothing out
+SURPLUS = 3  # as many times the guides wanted are looked at where part lines are in the way of some
+
+UNLIMITED = 200.0  # in logarithms of lengths: more than any two floats differ by
+FADE = math.radians(30.0)  # of the angle limit, over which a guide's share fades
+
+
+@dataclass(frozen=True)
+class GuideWeights:
+    """The guides that each strand follows, nearest first: (S, k) arrays on one device.
+
+    indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
+    cosine and sine of the angle about the normal from the guide's frame to the strand's.
+    """
+
+    indices: "wp.array2d[int]"
+    weights: "wp.array2d[float]"
+    turns: "wp.array2d[wp.vec2]"
+
+    def of(self, chosen):
+        """The same of some strands; chosen: int32 Warp array on the device."""
+        return GuideWeights(rows(self.indices, chosen), rows(self.weights, chosen), rows(self.turns, chosen))
+
+
+@dataclass(frozen=True)
+class Limits:
+    """How much guides may differ from the nearest one to be mixed with it.
+
+    angle [rad]: between their directions, turned as the surface is; pi: however much. length: ratio of their lengths.
+    """
+
+    angle: float = math.pi
+    length: float = math.inf
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The strands that follow each guide, as compressed rows: guide g's are strands[starts[g]:starts[g + 1]]."""
+
+    starts: np.ndarray  # (G+1,) int64
+    strands: np.ndarray  # int32
+
+    def of(self, guides):
+        """Indices, rising, of the strands that follow any of some guides."""
+        is_reached = np.zeros(int(self.strands.max(initial=-1)) + 1, bool)
+        for guide in guides:
+            is_reached[self.strands[self.starts[guide] : self.starts[guide + 1]]] = True
+        return np.flatnonzero(is_reached)
+
+
+def reach(guide_weights, guide_count):
+    """The `Reach` of guides, from the `GuideWeights` of the strands that follow them."""
+    indices = guide_weights.indices.numpy()
+    strands, slots = np.nonzero(indices >= 0)
+    guides = indices[strands, slots]
+    order = np.argsort(guides, kind="stable")
+    starts = np.concatenate([[0], np.cumsum(np.bincount(guides, minlength=guide_count))])
+    return Reach(starts, strands[order].astype(np.int32))
+
+
+def rows(array, chosen):
+    """Some rows of a Warp array, in an array of their own; chosen: int32 Warp array on its device."""
+    return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()
+
+
+def find_guides(
+    roots, normals, guide_roots, guide_normals, influence_distance, neighbour_limit, *, regions=None, lines=None
+):
+    """`GuideWeights` of strands at roots (S,) [m] with unit normals (S,), for guides (G,) likewise; all vec3 arrays.
+
+    influence_distance: d [m], None for automatic; neighbour_limit: k; regions: (S,) and (G,) int32, no strand follows
+    guides of two, nor of another than its own if that has any; lines: `PartLines` that no way to a guide crosses.
+    """
+    count = neighbour_limit + 1 if lines is None else SURPLUS * (neighbour_limit + 1)
+    candidates, ways = _nearest_guides(guide_roots, roots, count, regions)
+    unseen = ways[:, count - 1].contiguous()
+    if lines is not None:
+        part_lines.go_round(lines, roots, normals, guide_roots, guide_normals, candidates, ways)
+    device = roots.device
+    indices = wp.empty((len(roots), neighbour_limit), dtype=int, device=device)
+    weights = wp.empty(indices.shape, dtype=float, device=device)
+    turns = wp.empty(indices.shape, dtype=wp.vec2, device=device)
+    wp.launch(
+        _weigh,
+        dim=len(roots),
+        inputs=[candidates, ways, unseen, normals, guide_normals, influence_distance or 0.0],
+        outputs=[indices, weights, turns],
+        device=device,
+    )
+    return GuideWeights(indices, weights, turns)
+
+
+def _nearest_guides(guide_roots, roots, count, regions):
+    """Indices and distances (S, count) as `hash_grid.neighbours` gives them, of guides in each root's own region."""
+    if regions is None:
+        return hash_grid.neighbours(guide_roots, roots, EVERYWHERE, count)
+    strand_regions, guide_regions = regions
+    device = roots.device
+    strays = np.flatnonzero(~np.isin(strand_regions, guide_regions))
+    if len(strays):  # in a region without guides: as if in that of the nearest guide
+        found, _distances = hash_grid.neighbours(guide_roots, _some(roots, strays), EVERYWHERE, 1)
+        strand_regions = strand_regions.copy()
+        strand_regions[strays] = guide_regions[found.numpy()[:, 0]]
+    indices = np.full((len(roots), count), -1, np.int32)
+    distances = np.full((len(roots), count), np.inf, np.float32)
+    for region in np.unique(strand_regions):
+        own, its = np.flatnonzero(guide_regions == region), np.flatnonzero(strand_regions == region)
+        found, apart = hash_grid.neighbours(_some(guide_roots, own), _some(roots, its), EVERYWHERE, count)
+        found = found.numpy()
+        indices[its] = np.where(found >= 0, own[found], -1)
+        distances[its] = apart.numpy()
+    return wp.array(indices, device=device), wp.array(distances, device=device)
+
+
+def _some(array, chosen):
+    return rows(array, wp.array(chosen, dtype=int, device=array.device))
+
+
+def limited(guide_weights, guide_points, guide_normals, limits):
+    """`GuideWeights` without the guides that differ too much from the nearest, as combed now; (G, P) [m], normals (G,).
+
+    A guide's share fades over the last `FADE` of the angle limit, and from the square root of the length limit on.
+    """
+    device = guide_points.device
+    guide_count = len(guide_points)
+    leans = wp.empty((guide_count, 2), dtype=wp.vec3, device=device)
+    lengths = wp.empty(guide_count, dtype=float, device=device)
+    wp.launch(_shapes, guide_count, [guide_points, guide_normals], outputs=[leans, lengths], device=device)
+    weights = wp.empty_like(guide_weights.weights)
+    wp.launch(
+        _limit,
+        dim=len(weights),
+        inputs=[
+            guide_weights.indices,
+            guide_weights.weights,
+            guide_weights.turns,
+            leans,
+            lengths,
+            *_fade_of_cosine(limits.angle),
+            min(math.log(limits.length), UNLIMITED),
+        ],
+        outputs=[weights],
+        device=device,
+    )
+    return GuideWeights(guide_weights.indices, weights, guide_weights.turns)
+
+
+def _fade_of_cosine(angle):
+    """(none, all): the cosines at which a guide has no share any more, and at which it begins to lose it."""
+    if angle >= math.pi:
+        return -3.0, -2.0
+    return math.cos(angle), math.cos(max(angle - FADE, 0.0))
+
+
+@wp.func
+def frame(normal: wp.vec3):
+    """Tangent and bitangent of a unit normal, without a branch or a pole [Duff17]."""
+    sign = wp.where(normal[2] >= 0.0, 1.0, -1.0)
+    a = -1.0 / (sign + normal[2])
+    b = normal[0] * normal[1] * a
+    tangent = wp.vec3(1.0 + sign * normal[0] * normal[0] * a, sign * b, -sign * normal[0])
+    return tangent, wp.vec3(b, sign + normal[1] * normal[1] * a, -normal[1])
+
+
+@wp.func
+def _turn(guide_normal: wp.vec3, normal: wp.vec3):
+    """Cosine and sine of Z: where the least rotation from one normal to the other leaves the guide's tangent."""
+    guide_tangent, _guide_bitangent = frame(guide_normal)
+    tangent, bitangent = frame(normal)
+    # For t across a: R t = t - (t·b) (a + b) / (1 + a·b). Opposite normals have no least rotation: any will do.
+    lean = wp.dot(guide_tangent, normal) / wp.max(1.0 + wp.dot(guide_normal, normal), 1.0e-6)
+    turned = guide_tangent - lean * (guide_normal + normal)
+    return wp.normalize(wp.vec2(wp.dot(tangent, turned), wp.dot(bitangent, turned)))
+
+
+@wp.kernel
+def _weigh(
+    candidates: wp.array2d[int],
+    ways: wp.array2d[float],
+    unseen: wp.array[float],
+    normals: wp.array[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    influence_distance: float,
+    # outputs
+    out_indices: wp.array2d[int],
+    out_weights: wp.array2d[float],
+    out_turns: wp.array2d[wp.vec2],
+):
+    strand = wp.tid()
+    limit = out_indices.shape[1]
+    nearest = ways[strand, 0]
+    # The first guide that is left out, or that was not looked at.
+    left_out = wp.min(ways[strand, limit], unseen[strand])
+    distance = influence_distance
+    if distance == 0.0:
+        distance = left_out
+        for slot in range(limit):
+            # There are no more than k: none is left out, and the farthest one is well within.
+            if left_out == wp.inf and ways[strand, slot] < wp.inf:
+                distance = STRETCH * ways[strand, slot]
+    distance = wp.max(distance, STRETCH * nearest)
+    reach = wp.min(distance, left_out)
+    sigma = wp.max(0.5 * distance, 1.0e-30)  # Eq. 9
+    total = float(0.0)
+    for slot in range(limit):
+        weight = float(0.0)
+        turn = wp.vec2(1.0, 0.0)
+        guide = candidates[strand, slot]
+        way = ways[strand, slot]
+        if guide >= 0 and way < reach:
+            part = way / reach
+            fall = 1.0 - part * part
+            # Relative to the nearest guide's, which cancels in Eq. 10: no weight of a far root is lost to rounding.
+            weight = wp.exp((nearest - way) * (nearest + way) / (2.0 * sigma * sigma)) * fall * fall
+        if slot == 0 and weight == 0.0:
+            weight = 1.0  # all are as far as the one that is left out
+        if weight > 0.0:
+            turn = _turn(guide_normals[guide], normals[strand])
+        else:
+            guide = -1
+        out_indices[strand, slot] = guide
+        out_weights[strand, slot] = weight
+        out_turns[strand, slot] = turn
+        total += weight
+    for slot in range(limit):
+        out_weights[strand, slot] = out_weights[strand, slot] / total
+
+
+@wp.kernel
+def _shapes(
+    guide_points: wp.array2d[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    # outputs
+    out_leans: wp.array2d[wp.vec3],
+    out_lengths: wp.array[float],
+):
+    """Unit directions in the guide's frame, of its lower half and from root to tip, and the logarithm of its length."""
+    guide = wp.tid()
+    normal = guide_normals[guide]
+    tangent, bitangent = frame(normal)
+    root = guide_points[guide, 0]
+    last = guide_points.shape[1] - 1
+    half = (last + 1) / 2
+    lower = wp.vec3()
+    length = float(0.0)
+    for point in range(1, last + 1):
+        length += wp.length(guide_points[guide, point] - guide_points[guide, point - 1])
+        if point <= half:
+            lower += wp.normalize(guide_points[guide, point] - root)
+    tip = guide_points[guide, last] - root
+    lower = wp.vec3(wp.dot(tangent, lower), wp.dot(bitangent, lower), wp.dot(normal, lower))
+    tip = wp.vec3(wp.dot(tangent, tip), wp.dot(bitangent, tip), wp.dot(normal, tip))
+    out_leans[guide, 0] = wp.normalize(lower)
+    out_leans[guide, 1] = wp.normalize(tip)
+    out_lengths[guide] = wp.log(wp.max(length, 1.0e-30))
+
+
+@wp.func
+def _turned(turn: wp.vec2, vector: wp.vec3):
+    return wp.vec3(turn[0] * vector[0] - turn[1] * vector[1], turn[1] * vector[0] + turn[0] * vector[1], vector[2])
+
+
+@wp.func
+def _fade(none: float, all: float, value: float):
+    """0 at `none`, 1 at `all`, smooth between."""
+    part = wp.clamp((value - none) / wp.max(all - none, 1.0e-6), 0.0, 1.0)
+    return part * part * (3.0 - 2.0 * part)
+
+
+@wp.kernel
+def _limit(
+    indices: wp.array2d[int],
+    weights: wp.array2d[float],
+    turns: wp.array2d[wp.vec2],
+    leans: wp.array2d[wp.vec3],
+    lengths: wp.array[float],
+    cosine_none: float,
+    cosine_all: float,
+    length_limit: float,
+    # outputs
+    out_weights: wp.array2d[float],
+):
+    strand = wp.tid()
+    nearest = indices[strand, 0]
+    turn = turns[strand, 0]
+    lower = _turned(turn, leans[nearest, 0])
+    tip = _turned(turn, leans[nearest, 1])
+    length = lengths[nearest]
+    total = weights[strand, 0]
+    out_weights[strand, 0] = total
+    for slot in range(1, indices.shape[1]):
+        weight = float(0.0)
+        guide = indices[strand, slot]
+        if guide >= 0:
+            turn = turns[strand, slot]
+            cosine = wp.min(wp.dot(lower, _turned(turn, leans[guide, 0])), wp.dot(tip, _turned(turn, leans[guide, 1])))
+            apart = wp.abs(lengths[guide] - length)
+            weight = weights[strand, slot] * _fade(cosine_none, cosine_all, cosine)
+            weight = weight * (1.0 - _fade(0.5 * length_limit, length_limit, apart))
+            total += weight
+        out_weights[strand, slot] = weight
+    for slot in range(indices.shape[1]):
+        out_weights[strand, slot] = out_weights[strand, slot] / total
