@@ -16,7 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from . import hash_grid
+from . import cores, hash_grid
+from .cores import Rows
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -92,10 +93,10 @@ def find_guides(roots, normals, guide_roots, guide_normals, influence_distance, 
     indices, distances = hash_grid.neighbours(guide_roots, roots, influence_distance, neighbour_limit)
     weights = wp.empty_like(distances)
     turns = wp.empty(indices.shape, dtype=wp.vec2, device=roots.device)
-    wp.launch(
+    cores.launch(
         _weigh,
-        dim=len(roots),
-        inputs=[indices, distances, normals, guide_normals, influence_distance],
+        len(roots),
+        inputs=[Rows(indices), Rows(distances), Rows(normals), guide_normals, influence_distance],
         outputs=[weights, turns],
         device=roots.device,
     )
@@ -119,11 +120,18 @@ def by_strands(roots, normals, guide_points, guide_normals, guide_weights):
         outputs=[blocks],
         device=roots.device,
     )
-    points = wp.empty((len(roots), point_count), dtype=wp.vec3, device=roots.device)
-    wp.launch(
+    points = cores.empty_vectors((len(roots), point_count), roots.device)
+    cores.launch(
         _strands,
-        dim=len(roots),
-        inputs=[roots, normals, blocks, guide_weights.indices, guide_weights.weights, guide_weights.turns],
+        len(roots),
+        inputs=[
+            Rows(roots),
+            Rows(normals),
+            blocks,
+            Rows(guide_weights.indices),
+            Rows(guide_weights.weights),
+            Rows(guide_weights.turns),
+        ],
         outputs=[points],
         device=roots.device,
     )

@@ -9,7 +9,6 @@ need and nothing else, and each way has guides of its own, so that one's edit is
 from dataclasses import dataclass, replace
 
 import bpy
-import numpy as np
 
 from hair_addon.blender import curves, live_hair, pipeline, preferences
 from hair_addon.core import groom

@@ -14,8 +14,6 @@ import sys
 import time
 from pathlib import Path
 
-import bpy
-import numpy as np
 import pytest
 import warp as wp
 from scipy.spatial import cKDTree
@@ -168,9 +166,7 @@ def test_search(count):
     calls = {
         "ours": lambda: hash_grid.neighbours(points_there, queries_there, distance, 8),
         "cKDTree, all of the nearest eight": lambda: cKDTree(points).query(queries, 8, workers=2),
-        "cKDTree, those in reach": lambda: cKDTree(points).query(
-            queries, 8, distance_upper_bound=distance, workers=2
-        ),
+        "cKDTree, those in reach": lambda: cKDTree(points).query(queries, 8, distance_upper_bound=distance, workers=2),
     }
     calls["ours"]()  # compiles
     times = best_times(calls, 5)
