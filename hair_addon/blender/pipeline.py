@@ -156,7 +156,7 @@ def write_hair(target):
         curves.write_strands(target, bound.surface, bound.points, bound.binding.roots, radii, nearest)
     state.is_stale = False  # as which another choice of guides marks it
     state.followed = guides_digest(state.guide_curves)
-    bound.is_written = bound.has_moved_only = True
+    bound.is_written = bound.has_moved_only = bound.is_report_due = True
     _store_roots(state.guide_curves, bound)
 
 
