@@ -101,11 +101,11 @@ def draw_natively(curves, is_shown):
             user.display_type = "TEXTURED" if is_shown else "WIRE"
 
 
-def write_strands(curves, surface, points, roots, radii, guide_index):
+def write_strands(curves, surface, points, roots, radii, guide_index, normals=None):
     """Fill Curves with strands.
 
     points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) [m]; guide_index: (S,) int32,
-    the guide that each strand follows first.
+    the guide that each strand follows first; normals: (S, 3) float32 of the surface at the roots, if they are known.
     """
     strand_count, point_count, _xyz = points.shape
     if strand_count == 0:
@@ -116,13 +116,13 @@ def write_strands(curves, surface, points, roots, radii, guide_index):
     _write_attribute(curves, "guide_curve_index", "INT", "CURVE", guide_index)
     _write_attribute(curves, "id", "INT", "CURVE", np.arange(strand_count))
     _write_attribute(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
-    write_roots(curves, surface, roots)
+    write_roots(curves, surface, roots, normals)
 
 
-def write_roots(curves, surface, roots):
+def write_roots(curves, surface, roots, normals=None):
     """Store where strands are rooted: for ourselves, for the nodes that carry them, and for Blender's own tools."""
     stored = surface.swap_winding(roots)
-    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots))
+    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots) if normals is None else normals)
     _write_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
     _write_attribute(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
     _write_attribute(curves, "root_triangle", "INT", "CURVE", stored.triangle)

@@ -152,8 +152,9 @@ def write_hair(target):
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.root_key = bound.root_key
         radii = groom.strand_radii(bound.settings, bound.points.shape[1])
-        nearest = bound.binding.guide_weights.indices.numpy()[:, 0]
-        curves.write_strands(target, bound.surface, bound.points, bound.binding.roots, radii, nearest)
+        binding = bound.binding
+        nearest, normals = binding.guide_weights.indices.numpy()[:, 0], binding.normals.numpy()
+        curves.write_strands(target, bound.surface, bound.points, binding.roots, radii, nearest, normals)
     state.is_stale = False  # as which another choice of guides marks it
     state.followed = guides_digest(state.guide_curves)
     bound.is_written = bound.has_moved_only = bound.is_report_due = True

@@ -12,7 +12,7 @@ import numpy as np
 
 from .errors import HairError
 from .long_work import part_of, unheard
-from .mesh import SurfacePoints, check_mesh, check_points, normals, positions
+from .mesh import SurfacePoints, check_mesh, check_points, positions
 from .params import Settings, param
 from .strands import Strands
 
@@ -125,6 +125,7 @@ def distribute_guides(
         curvature,
         cut_cells,
         cvt,
+        fingerprint,
         ground,
         guides,
         hash_grid,
@@ -135,7 +136,7 @@ def distribute_guides(
     )
 
     _load_kernels(device, bspline, cut_cells, guides, hash_grid, sampled_cells, surface_query, voronoi)
-    _load_kernels("cpu", islands)
+    _load_kernels("cpu", fingerprint, islands)
     relaxing = part_of(progress, 0.1, 0.9)
     mirror = ground.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
     if roots is None:
@@ -190,22 +191,16 @@ def bind_hair(mesh, guides, settings, *, density=None, roots=None, device="cpu",
     check_mesh(mesh)
     check_points(mesh, guides.roots)
     progress(COMPILING, 0.0)
-    import warp as wp
+    from . import fingerprint, hash_grid, interpolation, rooting, sampling
 
-    from . import hash_grid, interpolation, sampling
-
-    _load_kernels(device, hash_grid, interpolation)
+    _load_kernels(device, hash_grid, interpolation, rooting)
+    _load_kernels("cpu", fingerprint)
     progress("Placing strands", 0.1)
     if roots is None:
         roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)
 
-    def on_device(vectors):
-        return wp.array(vectors, dtype=wp.vec3, device=device, copy=False)
-
-    guide_positions = on_device(positions(mesh, guides.roots))
-    guide_normals = on_device(normals(mesh, guides.roots))
-    root_positions = on_device(positions(mesh, roots))
-    root_normals = on_device(normals(mesh, roots))
+    guide_positions, guide_normals = rooting.rooted(mesh, guides.roots, device)
+    root_positions, root_normals = rooting.rooted(mesh, roots, device)
     progress("Finding guides", 0.4)
     distance = settings.influence_distance
     if settings.automatic_influence:
