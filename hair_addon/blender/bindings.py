@@ -30,6 +30,7 @@ class BoundHair:
     points: np.ndarray  # (S, P, 3) float32 at rest, in the surface's local coordinates
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether what is not written is where points are, and nothing else
+    is_report_due: bool = False  # whether Blender has yet to report what was written, which is no news
 
     @property
     def radii(self):
@@ -65,6 +66,12 @@ def forget(datablock):
 def clear():
     """Drop everything: after undo, with a new file."""
     _bound.clear()
+
+
+def is_reported():
+    """Blender has reported all that was written until now: the next report is of somebody else's doing."""
+    for bound in _bound.values():
+        bound.is_report_due = False
 
 
 def has_unwritten():

@@ -25,14 +25,37 @@ _ROOT_TOLERANCE = 1e-4
 
 
 def _write_attribute(curves, name, data_type, domain, values):
+    """Give every point or curve a value, unless each has it already: what is written is copied, and read by others."""
     attribute = curves.attributes.get(name)
     if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, domain):
         curves.attributes.remove(attribute)
         attribute = None
+    scalar, value_name = np.int32 if data_type == "INT" else np.float32, _VALUE_NAMES[data_type]
+    values = np.ascontiguousarray(values, scalar).ravel()
     if attribute is None:
         attribute = curves.attributes.new(name, data_type, domain)
-    scalar = np.int32 if data_type == "INT" else np.float32
-    attribute.data.foreach_set(_VALUE_NAMES[data_type], np.ascontiguousarray(values, scalar).ravel())
+    else:
+        present = np.empty_like(values)
+        attribute.data.foreach_get(value_name, present)
+        if np.array_equal(present, values):
+            return
+    attribute.data.foreach_set(value_name, values)
+
+
+def _write_positions(curves, points):
+    """Points (..., 3) float32 of all curves, and what `is_combed` knows them by again."""
+    from ..core.fingerprint import fingerprint  # Warp takes longer to import than the add-on may take to start
+
+    curves.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
+    curves.vellus.written = fingerprint(points)
+
+
+def _write_radii(curves, radii):
+    """The same radii (P,) along every strand, unless they are there already."""
+    radii = np.asarray(radii, np.float32)
+    present = read_radii(curves)
+    if "radius" not in curves.attributes or not (present.reshape(-1, len(radii)) == radii).all():
+        _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
 
 
 def _read_attribute(curves, name, width):
@@ -80,23 +103,22 @@ def draw_natively(curves, is_shown):
             user.display_type = "TEXTURED" if is_shown else "WIRE"
 
 
-def write_strands(curves, surface, points, roots, radii, guide_index):
+def write_strands(curves, surface, points, roots, radii, guide_index, normals=None):
     """Fill Curves with strands.
 
     points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) [m]; guide_index: (S,) int32,
-    the guide that each strand follows first.
+    the guide that each strand follows first; normals: (S, 3) float32 of the surface at the roots, if they are known.
     """
     strand_count, point_count, _xyz = points.shape
     if strand_count == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
     _resize(curves, strand_count, point_count)
-    _write_attribute(curves, "position", "FLOAT_VECTOR", "POINT", points)
-    _write_attribute(curves, "rest_position", "FLOAT_VECTOR", "POINT", points)
-    _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii / surface.scale, strand_count))
+    _write_positions(curves, points)
+    _write_radii(curves, radii / surface.scale)
     _write_attribute(curves, "guide_curve_index", "INT", "CURVE", guide_index)
     _write_attribute(curves, "id", "INT", "CURVE", np.arange(strand_count))
     _write_attribute(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
-    write_roots(curves, surface, roots)
+    write_roots(curves, surface, roots, normals)
 
 
 def write_guide_map(curves, guide_weights):
@@ -131,10 +153,10 @@ def read_guide_map(curves):
     return np.ascontiguousarray(indices.T), np.ascontiguousarray(weights.T)
 
 
-def write_roots(curves, surface, roots):
+def write_roots(curves, surface, roots, normals=None):
     """Store where strands are rooted: for ourselves, for the nodes that carry them, and for Blender's own tools."""
     stored = surface.swap_winding(roots)
-    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots))
+    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots) if normals is None else normals)
     _write_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
     _write_attribute(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
     _write_attribute(curves, "root_triangle", "INT", "CURVE", stored.triangle)
@@ -164,8 +186,7 @@ def write_uvs(curves, surface):
 
 def write_points(curves, points):
     """Move strands that `write_strands` made; points: (S, P, 3) float32 in local coordinates."""
-    _write_attribute(curves, "position", "FLOAT_VECTOR", "POINT", points)
-    _write_attribute(curves, "rest_position", "FLOAT_VECTOR", "POINT", points)
+    _write_positions(curves, points)
     curves.update_tag()
 
 
@@ -188,31 +209,34 @@ def stood_on(curves):
 
 
 def carry(curves, motion):
-    """Move strands, and what is remembered of how they were generated, with their surface's `SurfaceMotion`."""
+    """Move strands with their surface's `SurfaceMotion`."""
     from ..core import surface_frames  # Warp takes longer to import than the add-on may take to start
 
-    roots, counts = read_root_places(curves), point_counts(curves)
-    for name in ("position", "rest_position"):
-        points = _read_attribute(curves, name, 3)
-        if points is None:
-            continue
-        if (counts == counts[0]).all():
-            points = surface_frames.carry(points.reshape(len(counts), -1, 3), motion, *roots)
-        else:  # each point as a strand of its own
-            points = surface_frames.carry(points[:, None], motion, *(np.repeat(part, counts, axis=0) for part in roots))
-        _write_attribute(curves, name, "FLOAT_VECTOR", "POINT", points)
+    roots, counts, was_combed = read_root_places(curves), point_counts(curves), is_combed(curves)
+    points = read_points(curves)
+    if (counts == counts[0]).all():
+        points = surface_frames.carry(points.reshape(len(counts), -1, 3), motion, *roots)
+    else:  # each point as a strand of its own
+        points = surface_frames.carry(points[:, None], motion, *(np.repeat(part, counts, axis=0) for part in roots))
+    _write_moved(curves, points, was_combed)
+
+
+def _write_moved(curves, points, was_combed):
+    """Positions of strands that went where their surface went: combed ones stay combed."""
+    before = curves.vellus.written
+    _write_positions(curves, points)
+    if was_combed:
+        curves.vellus.written = before
 
 
 def transform(curves, matrix):
-    """Multiply all points, and what is remembered of how they were generated, by a (3, 3) matrix.
+    """Multiply all points by a (3, 3) matrix.
 
     So that strands stay where they are in the world when the opposite was applied to their surface, whose child they
     are: what Blender has put between parent and child to keep the child in place is taken away again.
     """
-    for name in ("position", "rest_position"):
-        points = _read_attribute(curves, name, 3)
-        if points is not None:
-            _write_attribute(curves, name, "FLOAT_VECTOR", "POINT", points @ matrix.T)
+    if len(curves.points):
+        _write_moved(curves, read_points(curves) @ matrix.T, is_combed(curves))
     for user in bpy.data.objects:
         if user.data == curves and user.parent == curves.surface:
             user.matrix_local = Matrix()
@@ -285,8 +309,10 @@ def _has_randoms(curves):
 
 def is_combed(curves):
     """Whether points were moved, added or removed since `write_strands`."""
-    written = _read_attribute(curves, "rest_position", 3)
-    return written is not None and len(written) > 0 and not np.array_equal(written, read_points(curves))
+    from ..core.fingerprint import fingerprint  # Warp takes longer to import than the add-on may take to start
+
+    written = curves.vellus.written
+    return written != "" and len(curves.points) > 0 and written != fingerprint(read_points(curves))
 
 
 def read_roots(curves, surface, first_points):

@@ -9,7 +9,7 @@ number of vertices, such as a finer subdivision for renders, by the nearest plac
 import bpy
 
 _NAME = "Vellus Follow Surface"
-_VERSION = 1  # of the nodes below: a group of another one, from an older file, is left to what uses it
+_VERSION = 2  # of the nodes below: a group of another one, from an older file, is left to what uses it
 ROOT_VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
 
 
@@ -73,6 +73,13 @@ class _Tree:
         # In the surface's own coordinates, which are those of its children.
         info = self._node("GeometryNodeObjectInfo", {"Object": given["Surface"]}, transform_space="ORIGINAL")
         position = self._node("GeometryNodeInputPosition").outputs[0]
+        # Where strands are before anything moves them, for the nodes that ask: Blender shares the array, at no cost.
+        at_rest = self._node(
+            "GeometryNodeStoreNamedAttribute",
+            {"Geometry": given["Curves"], "Name": "rest_position", "Value": position},
+            data_type="FLOAT_VECTOR",
+            domain="POINT",
+        ).outputs[0]
         surface, (after, *axes) = self._with_motion(info.outputs["Geometry"], position)
         before, after, x_axis, y_axis = self._at_roots(
             surface, info.outputs["Geometry"], given["Vertices"], [self._rest(position), after, *axes]
@@ -87,7 +94,7 @@ class _Tree:
         # Computed once a strand, not once a point.
         offset = self._on_domain(self._vector("SUBTRACT", after, turned), "FLOAT_VECTOR", "CURVE")
         rotation = self._on_domain(rotation, "QUATERNION", "CURVE")
-        curves, (position,) = self._capture(given["Curves"], [position])
+        curves, (position,) = self._capture(at_rest, [position])
         turned = self._node("FunctionNodeRotateVector", {0: position, 1: rotation}).outputs[0]
         moved = self._node(
             "GeometryNodeSetPosition",
@@ -98,7 +105,7 @@ class _Tree:
         )
         # A surface that rests costs no more than looking at it.
         is_deformed = self._is_deformed(info.outputs["Geometry"])
-        inputs = {"Switch": is_deformed, "False": given["Curves"], "True": moved.outputs[0]}
+        inputs = {"Switch": is_deformed, "False": at_rest, "True": moved.outputs[0]}
         self._node("NodeGroupOutput", {0: self._node("GeometryNodeSwitch", inputs, input_type="GEOMETRY").outputs[0]})
 
     def _is_deformed(self, surface):

@@ -102,11 +102,12 @@ def forget_pose(surface_object):
 def forget_unless_same(datablock):
     """Drop what is known of a datablock that Blender reports as changed, if it was.
 
-    Blender reports Curves whose surface moved, or that have another property. What waits to be written is no change.
+    Blender reports Curves whose surface moved, or that have another property. What waits to be written is no change,
+    nor is what we have just written.
     """
     uid, bound = datablock.session_uid, bindings.of(datablock)
     if bound is not None:
-        if not bound.is_written:
+        if not bound.is_written or bound.is_report_due:
             return
         if not _are_points(datablock, bound.points):
             bindings.forget(datablock)

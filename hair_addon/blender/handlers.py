@@ -5,8 +5,8 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
+from . import bindings, hair_cache, keyed, live_hair, pipeline, running, viewport
 from . import curves as curves_door
-from . import hair_cache, keyed, live_hair, pipeline, running, viewport
 
 # Guides as they were when their geometry was last reported: session_uid → (N, 3) points. Blender reports the geometry
 # of Curves as updated when no more than their surface's place has changed.
@@ -49,6 +49,7 @@ def after_depsgraph_update(_scene, depsgraph):
             hair_cache.forget_unless_same(datablock)
             if datablock.vellus.kind == "GUIDES" and _has_moved(datablock):
                 combed.append(datablock)
+    bindings.is_reported()
     keyed.follow(depsgraph)
     _evaluate(depsgraph, combed)
 

@@ -159,13 +159,14 @@ def write_hair(target):
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
         radii = groom.strand_radii(bound.settings, bound.points.shape[1])
-        nearest = bound.binding.guide_weights.indices.numpy()[:, 0]
-        curves.write_strands(target, bound.surface, bound.points, bound.binding.roots, radii, nearest)
+        binding = bound.binding
+        nearest, normals = binding.guide_weights.indices.numpy()[:, 0], binding.normals.numpy()
+        curves.write_strands(target, bound.surface, bound.points, binding.roots, radii, nearest, normals)
     guide_map = groom.weights_now(bound.binding, bound.guides) if bound.settings.guide_map else None
     curves.write_guide_map(target, guide_map)
     state.is_stale = False  # as which another choice of guides marks it
     state.followed = guides_digest(state.guide_curves)
-    bound.is_written = bound.has_moved_only = True
+    bound.is_written = bound.has_moved_only = bound.is_report_due = True
     _store_roots(state.guide_curves, bound)
 
 

@@ -224,6 +224,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     topology: bpy.props.StringProperty(description="The triangles that roots are stored by", options={"HIDDEN"})
     root_key: bpy.props.StringProperty(description="What the roots were placed by", options={"HIDDEN"})
     parting_key: bpy.props.StringProperty(description="What the hair was parted by", options={"HIDDEN"})
+    written: bpy.props.StringProperty(description="Fingerprint of the points as they were made", options={"HIDDEN"})
     followed: bpy.props.StringProperty(description="The guides that the strands were written for", options={"HIDDEN"})
     shading_status: bpy.props.StringProperty(description="Why this cannot be shaded", options={"HIDDEN"})
     uv_status: bpy.props.StringProperty(description="What is wrong with the surface's UV map", options={"HIDDEN"})

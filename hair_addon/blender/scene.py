@@ -74,8 +74,10 @@ class Surface:
 
     def to_local_normals(self, normals):
         """(N, 3) unit normals → unit normals in local coordinates: the inverse transpose of `to_local`."""
-        local = normals @ self.to_world_axes
-        return (local / np.linalg.norm(local, axis=-1, keepdims=True)).astype(np.float32)
+        if np.array_equal(self.to_world_axes, np.eye(3)):
+            return normals
+        local = normals @ self.to_world_axes.astype(np.float32)
+        return local / np.linalg.norm(local, axis=-1, keepdims=True)
 
     def uvs(self, points):
         """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from .errors import HairError
 from .long_work import part_of, unheard
-from .mesh import SurfacePoints, check_mesh, check_points, normals, positions
+from .mesh import SurfacePoints, check_mesh, check_points, positions
 from .params import Settings, param
 from .strands import Strands
 
@@ -159,6 +159,7 @@ def distribute_guides(
         curvature,
         cut_cells,
         cvt,
+        fingerprint,
         ground,
         guides,
         hash_grid,
@@ -169,7 +170,7 @@ def distribute_guides(
     )
 
     _load_kernels(device, bspline, cut_cells, guides, hash_grid, sampled_cells, surface_query, voronoi)
-    _load_kernels("cpu", islands)
+    _load_kernels("cpu", fingerprint, islands)
     relaxing = part_of(progress, 0.1, 0.9)
     mirror = ground.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
     if roots is None:
@@ -237,12 +238,11 @@ def bind_hair(
     check_mesh(mesh)
     check_points(mesh, guides.roots)
     progress(COMPILING, 0.0)
-    import warp as wp
-
-    from . import guide_weights, hash_grid, interpolation, part_lines, sampling, surface_query
+    from . import fingerprint, guide_weights, hash_grid, interpolation, part_lines, rooting, sampling, surface_query
     from .regions import kept_apart
 
-    _load_kernels(device, guide_weights, hash_grid, interpolation)
+    _load_kernels(device, guide_weights, hash_grid, interpolation, rooting)
+    _load_kernels("cpu", fingerprint)
     if lines is not None:
         _load_kernels(device, part_lines, surface_query)
         lines = part_lines.lay(mesh, lines, device, drawn_on)
@@ -250,13 +250,8 @@ def bind_hair(
     if roots is None:
         roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)
 
-    def on_device(vectors):
-        return wp.array(vectors, dtype=wp.vec3, device=device, copy=False)
-
-    guide_positions = on_device(positions(mesh, guides.roots))
-    guide_normals = on_device(normals(mesh, guides.roots))
-    root_positions = on_device(positions(mesh, roots))
-    root_normals = on_device(normals(mesh, roots))
+    guide_positions, guide_normals = rooting.rooted(mesh, guides.roots, device)
+    root_positions, root_normals = rooting.rooted(mesh, roots, device)
     progress("Finding guides", 0.4)
     weights = guide_weights.find_guides(
         root_positions,

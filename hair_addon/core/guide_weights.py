@@ -20,7 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from . import hash_grid, part_lines
+from . import cores, hash_grid, part_lines
+from .cores import Rows
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -99,7 +100,7 @@ def find_guides(
     influence_distance: d [m], None for automatic; neighbour_limit: k; regions: (S,) and (G,) int32, no strand follows
     guides of two, nor of another than its own if that has any; lines: `PartLines` that no way to a guide crosses.
     """
-    count = neighbour_limit + 1 if lines is None else SURPLUS * (neighbour_limit + 1)
+    count = neighbour_limit + 1 if lines is None else min(SURPLUS * (neighbour_limit + 1), hash_grid.LIMIT)
     candidates, ways = _nearest_guides(guide_roots, roots, count, regions)
     unseen = ways[:, count - 1].contiguous()
     if lines is not None:
@@ -108,10 +109,17 @@ def find_guides(
     indices = wp.empty((len(roots), neighbour_limit), dtype=int, device=device)
     weights = wp.empty(indices.shape, dtype=float, device=device)
     turns = wp.empty(indices.shape, dtype=wp.vec2, device=device)
-    wp.launch(
+    cores.launch(
         _weigh,
-        dim=len(roots),
-        inputs=[candidates, ways, unseen, normals, guide_normals, influence_distance or 0.0],
+        len(roots),
+        inputs=[
+            Rows(candidates),
+            Rows(ways),
+            Rows(unseen),
+            Rows(normals),
+            guide_normals,
+            influence_distance or 0.0,
+        ],
         outputs=[indices, weights, turns],
         device=device,
     )
@@ -155,13 +163,13 @@ def limited(guide_weights, guide_points, guide_normals, limits):
     lengths = wp.empty(guide_count, dtype=float, device=device)
     wp.launch(_shapes, guide_count, [guide_points, guide_normals], outputs=[leans, lengths], device=device)
     weights = wp.empty_like(guide_weights.weights)
-    wp.launch(
+    cores.launch(
         _limit,
-        dim=len(weights),
+        len(weights),
         inputs=[
-            guide_weights.indices,
-            guide_weights.weights,
-            guide_weights.turns,
+            Rows(guide_weights.indices),
+            Rows(guide_weights.weights),
+            Rows(guide_weights.turns),
             leans,
             lengths,
             *_fade_of_cosine(limits.angle),

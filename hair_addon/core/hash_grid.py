@@ -9,6 +9,8 @@ import math
 import numpy as np
 import warp as wp
 
+from . import cores
+from .cores import Rows
 from .errors import HairError
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
@@ -16,31 +18,163 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 GRID_SIZE = 32  # cells along each axis; farther ones wrap around and share a bucket, which costs time, never truth
 CELLS_PER_RADIUS = 2.0  # cell width / first search radius: fewer cells to visit beats fewer points to compare
+CELL_WIDTH = 0.6  # of the cells that queries are sorted by / first search radius
+CELLS_ALONG = 1024  # of those cells, at most, along each axis
+CANDIDATE_LIMIT = 128  # points that the queries of one cell share
+candidate_indices = wp.types.vector(length=CANDIDATE_LIMIT, dtype=int)
+candidate_values = wp.types.vector(length=CANDIDATE_LIMIT, dtype=float)
+LIMIT = 64  # points that a query finds, at most
+key_list = wp.types.vector(length=LIMIT, dtype=wp.uint64)
+NO_KEY = wp.constant(wp.uint64(2**64 - 1))
 WIDENINGS = 3  # doublings of the search radius before all points are read instead
 
 
 @wp.func
-def _insert(point: int, distance: float, count: int, indices: wp.array[int], distances: wp.array[float]):
-    """Put a point in its place among the nearest so far, by distance and then by index; returns the new count."""
-    limit = indices.shape[0]
-    slot = count
-    if count == limit:
-        slot = limit - 1
-        if distance > distances[slot] or (distance == distances[slot] and point > indices[slot]):
-            return count
-    while slot > 0 and (
-        distances[slot - 1] > distance or (distances[slot - 1] == distance and indices[slot - 1] > point)
-    ):
-        distances[slot] = distances[slot - 1]
-        indices[slot] = indices[slot - 1]
-        slot -= 1
-    distances[slot] = distance
-    indices[slot] = point
-    return wp.min(count + 1, limit)
+def _key(squared: float, point: int):
+    """A number that sorts as a squared distance, and then as an index: bits of floats that are not negative do."""
+    return wp.bit_or(wp.lshift(wp.uint64(wp.cast(squared, dtype=wp.uint32)), wp.uint64(32)), wp.uint64(point))
+
+
+@wp.func
+def _inserted(nearest: key_list, key: wp.uint64, limit: int):
+    """Keys with another one in its place, the last of them dropped; without a branch that nobody could foretell."""
+    for slot in range(limit):
+        other = nearest[slot]
+        nearest[slot] = wp.min(other, key)
+        key = wp.max(other, key)
+    return nearest
+
+
+@wp.func
+def _squared_distance(point: wp.vec3, position: wp.vec3):
+    return wp.length_sq(point - position)
+
+
+@wp.func
+def _widened(
+    points: wp.array[wp.vec3],
+    position: wp.vec3,
+    grid: wp.uint64,
+    distance: float,
+    first_radius: float,
+    widening: int,
+    limit: int,
+):
+    """Keys of a search that goes wider until they are enough, or the whole distance was searched and held something."""
+    nearest = key_list(NO_KEY)
+    searching = bool(True)
+    while searching and widening <= WIDENINGS:
+        radius = first_radius * float(1 << widening)
+        nearest = key_list(NO_KEY)
+        for point in wp.hash_grid_query(grid, position, radius):
+            squared = _squared_distance(points[point], position)
+            if squared < radius * radius:
+                nearest = _inserted(nearest, _key(squared, point), limit)
+        searching = nearest[limit - 1] == NO_KEY and (radius < distance or nearest[0] == NO_KEY)
+        widening += 1
+    if searching:
+        nearest = key_list(NO_KEY)
+        for point in range(points.shape[0]):
+            nearest = _inserted(nearest, _key(_squared_distance(points[point], position), point), limit)
+    return nearest
+
+
+@wp.func
+def _write(nearest: key_list, distance: float, out_indices: wp.array[int], out_distances: wp.array[float]):
+    for slot in range(out_indices.shape[0]):
+        key = nearest[slot]
+        point = int(wp.bit_and(key, wp.uint64(0xFFFFFFFF)))
+        apart = wp.sqrt(wp.cast(wp.uint32(wp.rshift(key, wp.uint64(32))), dtype=float))
+        # What is out of reach does not count, except for the very nearest.
+        if key == NO_KEY or (slot > 0 and apart >= distance):
+            point = -1
+            apart = wp.inf
+        out_indices[slot] = point
+        out_distances[slot] = apart
 
 
 @wp.kernel
-def _neighbours(
+def _cells(
+    queries: wp.array[wp.vec3],
+    low: wp.vec3,
+    per_width: float,
+    # outputs
+    out_cells: wp.array[int],
+):
+    query = wp.tid()
+    cell = int(0)
+    for axis in range(3):
+        along = wp.clamp(per_width * (queries[query][axis] - low[axis]), 0.0, float(CELLS_ALONG - 1))
+        cell = CELLS_ALONG * cell + int(along)
+    out_cells[query] = cell
+
+
+@wp.kernel
+def _by_cells(
+    points: wp.array[wp.vec3],
+    queries: wp.array[wp.vec3],
+    order: wp.array[int],
+    firsts: wp.array[int],
+    ends: wp.array[int],
+    grid: wp.uint64,
+    distance: float,
+    first_radius: float,
+    # outputs
+    out_indices: wp.array2d[int],
+    out_distances: wp.array2d[float],
+):
+    cell = wp.tid()
+    low = queries[order[firsts[cell]]]
+    high = low
+    for place in range(firsts[cell] + 1, ends[cell]):
+        low = wp.min(low, queries[order[place]])
+        high = wp.max(high, queries[order[place]])
+    # All points in reach of any query of the cell: found once, compared with each.
+    candidates = candidate_indices()
+    x = candidate_values()
+    y = candidate_values()
+    z = candidate_values()
+    candidate_count = int(0)
+    for point in wp.hash_grid_query(grid, 0.5 * (low + high), first_radius + 0.5 * wp.length(high - low)):
+        position = points[point]
+        if _squared_distance(position, wp.min(wp.max(position, low), high)) < first_radius * first_radius:
+            if candidate_count < CANDIDATE_LIMIT:
+                candidates[candidate_count] = point
+                x[candidate_count] = position[0]
+                y[candidate_count] = position[1]
+                z[candidate_count] = position[2]
+            candidate_count += 1
+    limit = out_indices.shape[1]
+    listed = candidate_indices()
+    squared = candidate_values()
+    for place in range(firsts[cell], ends[cell]):
+        query = order[place]
+        position = queries[query]
+        nearest = key_list(NO_KEY)
+        if candidate_count <= CANDIDATE_LIMIT:
+            # Which of them are in reach is listed without a branch.
+            count = int(0)
+            for candidate in range(candidate_count):
+                away = wp.vec3(x[candidate], y[candidate], z[candidate]) - position
+                apart = wp.length_sq(away)
+                listed[count] = candidates[candidate]
+                squared[count] = apart
+                count += wp.where(apart < first_radius * first_radius, 1, 0)
+            for listing in range(count):
+                key = _key(squared[listing], listed[listing])
+                for slot in range(wp.min(listing + 1, limit)):
+                    other = nearest[slot]
+                    nearest[slot] = wp.min(other, key)
+                    key = wp.max(other, key)
+            if nearest[limit - 1] == NO_KEY and (first_radius < distance or nearest[0] == NO_KEY):
+                nearest = _widened(points, position, grid, distance, first_radius, 1, limit)
+        else:
+            nearest = _widened(points, position, grid, distance, first_radius, 0, limit)
+        _write(nearest, distance, out_indices[query], out_distances[query])
+
+
+@wp.kernel
+def _by_queries(
     points: wp.array[wp.vec3],
     queries: wp.array[wp.vec3],
     grid: wp.uint64,
@@ -51,34 +185,8 @@ def _neighbours(
     out_distances: wp.array2d[float],
 ):
     query = wp.tid()
-    position = queries[query]
-    indices = out_indices[query]
-    distances = out_distances[query]
-    limit = indices.shape[0]
-    count = int(0)
-    radius = first_radius
-    widenings = int(0)
-    searching = bool(True)
-    while searching and widenings <= WIDENINGS:
-        count = int(0)
-        for point in wp.hash_grid_query(grid, position, radius):
-            apart = wp.length(points[point] - position)
-            if apart < radius:
-                count = _insert(point, apart, count, indices, distances)
-        # Done when the row is full, or when the whole distance has been searched and held something.
-        searching = count < limit and (radius < distance or count == 0)
-        radius = 2.0 * radius
-        widenings += 1
-    if searching:
-        count = int(0)
-        for point in range(points.shape[0]):
-            count = _insert(point, wp.length(points[point] - position), count, indices, distances)
-    # What is out of reach does not count, except for the very nearest.
-    while count > 1 and distances[count - 1] >= distance:
-        count -= 1
-    for slot in range(count, limit):
-        indices[slot] = -1
-        distances[slot] = wp.inf
+    nearest = _widened(points, queries[query], grid, distance, first_radius, 0, out_indices.shape[1])
+    _write(nearest, distance, out_indices[query], out_distances[query])
 
 
 def neighbours(points, queries, distance, limit):
@@ -92,20 +200,75 @@ def neighbours(points, queries, distance, limit):
         raise HairError(f"The distance to search must be positive and finite, not {distance:g} m.")
     if len(points) == 0:
         raise HairError("There are no guides to follow: distribute guides first.")
+    if limit > LIMIT:
+        raise ValueError(f"at most {LIMIT} neighbours can be found, not {limit}")
     device = points.device
     indices = wp.empty((len(queries), limit), dtype=int, device=device)
     distances = wp.empty((len(queries), limit), dtype=float, device=device)
     first_radius = _first_radius(points.numpy(), distance)
     grid = wp.HashGrid(GRID_SIZE, GRID_SIZE, GRID_SIZE, device=device)
     grid.build(points, CELLS_PER_RADIUS * first_radius)
+    by = by_cells if device.is_cpu else by_queries
+    by(points, queries, grid, distance, first_radius, indices, distances)
+    return indices, distances
+
+
+def by_queries(points, queries, grid, distance, first_radius, out_indices, out_distances):
+    """Fill the rows of `neighbours`, each query on its own: the GPU's way."""
     wp.launch(
-        _neighbours,
+        _by_queries,
         dim=len(queries),
         inputs=[points, queries, grid.id, distance, first_radius],
-        outputs=[indices, distances],
-        device=device,
+        outputs=[out_indices, out_distances],
+        device=points.device,
     )
-    return indices, distances
+
+
+def by_cells(points, queries, grid, distance, first_radius, out_indices, out_distances):
+    """Fill the rows of `neighbours`, all queries of a cell together: the processor's way, twice as fast there."""
+    device = points.device
+    order, bounds = _sorted_by_cell(points.numpy(), queries, CELL_WIDTH * first_radius)
+    order, firsts, ends = (wp.array(part, dtype=int, device=device) for part in (order, bounds[:-1], bounds[1:]))
+    cores.launch(
+        _by_cells,
+        len(firsts),
+        inputs=[
+            points,
+            queries,
+            order,
+            Rows(firsts),
+            Rows(ends),
+            grid.id,
+            distance,
+            first_radius,
+            out_indices,
+            out_distances,
+        ],
+        outputs=[],
+        device=device,
+        least_rows=256,
+    )
+
+
+def _sorted_by_cell(points, queries, width):
+    """Indices (Q,) int32 of queries cell after cell, and where each cell's begin, the end included.
+
+    Cells of a width [m] fill the box around points (N, 3); queries outside share those of its border.
+    """
+    low, high = points.min(axis=0), points.max(axis=0)
+    width = max(width, float((high - low).max()) / CELLS_ALONG)
+    cells = wp.empty(len(queries), dtype=int, device=queries.device)
+    cores.launch(
+        _cells,
+        len(queries),
+        inputs=[Rows(queries), wp.vec3(*low.tolist()), 1.0 / width],
+        outputs=[cells],
+        device=queries.device,
+    )
+    cells = cells.numpy()
+    order = np.argsort(cells).astype(np.int32)
+    changes = np.flatnonzero(np.diff(cells[order])) + 1
+    return order, np.concatenate([[0], changes, [len(cells)]]).astype(np.int32)
 
 
 def _first_radius(points, distance):
@@ -114,4 +277,6 @@ def _first_radius(points, distance):
     spacing = extent / math.sqrt(len(points))  # of points that lie on a surface
     # Cells narrower than the rounding of the coordinates could not tell points apart.
     finest = max(1e-6 * float(np.abs(points).max()), 1e-30)
-    return max(min(distance, 2.0 * spacing), 0.5 * spacing, finest)
+    if distance > 3.0 * spacing:
+        distance = 2.0 * spacing
+    return max(distance, 0.5 * spacing, finest)

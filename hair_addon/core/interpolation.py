@@ -18,6 +18,8 @@ and the strand's frame is applied to the sum.
 
 import warp as wp
 
+from . import cores
+from .cores import Rows
 from .guide_weights import frame
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
@@ -53,11 +55,19 @@ def by_strands(roots, normals, guide_points, guide_normals, guide_weights, keep_
         outputs=[blocks],
         device=roots.device,
     )
-    points = wp.empty((len(roots), point_count), dtype=wp.vec3, device=roots.device)
-    wp.launch(
+    points = cores.empty_vectors((len(roots), point_count), roots.device)
+    cores.launch(
         _strands,
-        dim=len(roots),
-        inputs=[roots, normals, blocks, guide_weights.indices, guide_weights.weights, guide_weights.turns, keep_length],
+        len(roots),
+        inputs=[
+            Rows(roots),
+            Rows(normals),
+            blocks,
+            Rows(guide_weights.indices),
+            Rows(guide_weights.weights),
+            Rows(guide_weights.turns),
+            keep_length,
+        ],
         outputs=[points],
         device=roots.device,
     )

@@ -187,6 +187,22 @@ def test_hair_from_a_file_follows_by_the_roots_that_it_stores(hair, tmp_path):
     assert np.array_equal(points(hair), grown_from_nothing(hair))
 
 
+def test_what_was_just_written_is_not_read_again(hair, monkeypatch):
+    """Blender reports it, and it is no news; what somebody else changes after that report is."""
+    compared, real = [], hair_cache._are_points
+    monkeypatch.setattr(hair_cache, "_are_points", lambda *args: (compared.append(1), real(*args))[1])
+    calls = counts_of(monkeypatch)
+    pipeline.interpolate_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get(), hair.data)
+    bpy.context.view_layer.update()
+    assert compared == [] and (calls["writes"], calls["searches"]) == (1, 2)  # one for the influence distance
+    assert bindings.of(hair.data) is not None
+    sculpted = points(hair)
+    sculpted[7, -1] += 0.1
+    write_points(hair, sculpted)
+    assert compared == [1]
+    assert bindings.of(hair.data) is None
+
+
 def test_hair_that_was_sculpted_itself_is_kept(hair):
     guides = bpy.data.objects["Guides"]
     sculpted = points(hair)

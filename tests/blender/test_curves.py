@@ -12,7 +12,6 @@ from tests.blender.reading import attribute, points, vertex_positions
 
 EXPECTED_ATTRIBUTES = {
     "position": ("FLOAT_VECTOR", "POINT"),
-    "rest_position": ("FLOAT_VECTOR", "POINT"),
     "radius": ("FLOAT", "POINT"),
     "surface_uv_coordinate": ("FLOAT2", "CURVE"),
     "surface_normal": ("FLOAT_VECTOR", "CURVE"),
@@ -36,6 +35,8 @@ def test_curves_carry_what_blender_expects(kind, request, sphere):
     assert made.matrix_local == Matrix()
     assert (attribute(made, "radius") > 0.0).all()
     assert len(set(attribute(made, "id"))) == len(made.data.curves)
+    evaluated = made.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert np.array_equal(attribute(evaluated, "rest_position", 3), points(made).reshape(-1, 3))
 
 
 def test_roots_lie_on_the_surface_with_its_normal_and_uv(hair, sphere):

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+import warp as wp
 
 from hair_addon.core import groom, hash_grid, strands
 from hair_addon.core import mesh as mesh_math
@@ -199,3 +200,16 @@ def test_settings_do_not_import_warp():
     """Blender imports this file while it starts, and Warp takes longer than that may."""
     code = "import sys, hair_addon.core.groom; sys.exit('warp' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_every_kernel_is_compiled_in_the_step_that_says_so(head, monkeypatch):
+    """So that nobody waits for a compiler without being told: what is launched was loaded before."""
+    loaded, launched, launch = set(), set(), wp.launch
+    monkeypatch.setattr(wp, "force_load", lambda _device, modules: loaded.update(m.name for m in modules))
+    monkeypatch.setattr(
+        wp, "launch", lambda kernel, *a, **k: (launched.add(kernel.module.name), launch(kernel, *a, **k))
+    )
+    guides = groom.distribute_guides(head, groom.GuideSettings(guide_count=50), device=DEVICE)
+    groom.generate_hair(head, guides, groom.HairSettings(strand_count=100), device=DEVICE)
+    assert {name.rsplit(".", 1)[1] for name in launched} >= {"hash_grid", "interpolation", "rooting"}
+    assert launched <= loaded

@@ -96,3 +96,18 @@ def test_refused_distances(distance):
 def test_no_points_are_refused():
     with pytest.raises(HairError, match="no guides"):
         found(np.zeros((0, 3)), np.eye(3), 1.0, 3)
+
+
+@pytest.mark.parametrize("cluster", [0.02, 1.0])  # so close that a cell of queries has more near it than it may list
+def test_cells_of_queries_and_single_ones_find_the_same(rng, monkeypatch, cluster):
+    points, queries = cluster * rng.random((600, 3)), rng.random((5000, 3))
+    points[0] = 1.0
+    together = found(points, queries, 0.3, 8, "cpu")
+    monkeypatch.setattr(hash_grid, "by_cells", hash_grid.by_queries)
+    for one, other in zip(together, found(points, queries, 0.3, 8, "cpu"), strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
+def test_no_more_than_a_row_holds():
+    with pytest.raises(ValueError, match="at most 32"):
+        found(np.eye(3), np.eye(3), 1.0, 33)

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair between the same guides, by Vellus and by Blender's own nodes, to be timed beside each other.
+
+Each way is a `Way`: `remake` grows other strands (another seed), `edit` moves every guide a little; both end with
+Blender's own update, after which renderers and other modifiers can read the hair. Peers' guides carry what their nodes
+need and nothing else, and each way has guides of its own, so that one's edit is no work for another.
+"""
+
+from dataclasses import dataclass, replace
+
+import bpy
+
+from hair_addon.blender import curves, live_hair, pipeline, preferences
+from hair_addon.core import groom
+from tests.core.conftest import HEAD
+
+GUIDE_COUNT = 4000
+NODE_ASSETS = "/procedural_hair_node_assets.blend"
+
+# Of the asset's inputs, as geometry nodes call them.
+_DENSITY, _SEED = "Input_15", "Input_16"
+
+
+def head_with_guides():
+    """(mesh object, guide Curves object): the sample head in an empty file; the add-on is registered."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.obj_import(filepath=str(HEAD))
+    head = bpy.context.selected_objects[0]
+    bpy.context.view_layer.objects.active = head
+    bpy.ops.object.transform_apply(location=True, rotation=True, scale=True)
+    bpy.ops.vellus.distribute_guides(guide_count=GUIDE_COUNT)
+    guides = bpy.data.objects["Guides"]
+    bpy.context.view_layer.update()
+    return head, guides
+
+
+@dataclass
+class Way:
+    """How hair is made: its object, and that of the guides that `edit` moves."""
+
+    guides: bpy.types.Object
+    hair: bpy.types.Object
+    step: int = 0
+
+    def edit(self):
+        """Move every guide a little, as a slider or a large brush does, and bring the hair up to date."""
+        move(self.guides, slice(None))
+
+    def edit_one(self):
+        """Move a single guide."""
+        move(self.guides, slice(0, 1))
+
+    @property
+    def strand_count(self):
+        """Of the hair as Blender evaluates it."""
+        return len(self._evaluated().curves)
+
+    def remove(self):
+        """Take the objects away."""
+        for datablock in {self.hair.data, self.guides.data}:
+            bpy.data.hair_curves.remove(datablock)
+        bpy.context.view_layer.update()
+
+    def _evaluated(self):
+        return self.hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+
+
+def move(guides, chosen):
+    """Move some guides by a tenth of a millimetre, and let Blender update."""
+    points = curves.read_points(guides.data).reshape(GUIDE_COUNT, -1, 3)
+    points[chosen, 1:, 2] += 1e-4
+    guides.data.attributes["position"].data.foreach_set("vector", points.ravel())
+    guides.data.update_tag()
+    bpy.context.view_layer.update()
+
+
+class Ours(Way):
+    """Vellus, registered: what its operators, sliders and handlers do in a Blender without a window."""
+
+    @classmethod
+    def grown(cls, guides, strand_count):
+        """Hair between guides, for the first time."""
+        way = cls(guides, None)
+        way.settings = groom.HairSettings(strand_count=strand_count)
+        way.grow()
+        return way
+
+    def grow(self):
+        """Hair where there was none."""
+        self.hair = None
+        self._interpolate(None)
+
+    def remake(self):
+        """Search, weights, interpolation, the write into Curves, and Blender's own update."""
+        self.step += 1
+        self.settings = replace(self.settings, seed=self.step)
+        self._interpolate(self.hair.data)
+
+    def edit(self):
+        """The handler follows the guides and writes the hair, of which Blender then takes note."""
+        super().edit()
+        bpy.context.view_layer.update()
+
+    def edit_one(self):
+        super().edit_one()
+        bpy.context.view_layer.update()
+
+    def drop(self):
+        """Take away the hair, and leave the guides."""
+        bpy.data.hair_curves.remove(self.hair.data)
+        live_hair.forget()
+        bpy.context.view_layer.update()
+
+    def _interpolate(self, target):
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        made = pipeline.interpolate_hair(self.guides.data, self.settings, depsgraph, target)
+        bpy.context.view_layer.update()
+        if self.hair is None:
+            self.hair = next(o for o in bpy.data.objects if o.data == made)
+
+
+class Asset(Way):
+    """Blender's "Interpolate Hair Curves", on curves of the type that its guides have."""
+
+    @classmethod
+    def grown(cls, guides, head, strand_count, curve_type):
+        made = _bare_copy(guides, head, f"Asset {curve_type}", curve_type)
+        way = cls(made, made)
+        modifier = made.modifiers.new("Interpolate Hair Curves", "NODES")
+        modifier.node_group = _asset()
+        way.inputs = modifier.properties.inputs
+        getattr(way.inputs, _DENSITY).value = strand_count / area(head)
+        bpy.context.view_layer.update()
+        assert [w.message for w in modifier.node_warnings] == []
+        return way
+
+    def remake(self):
+        getattr(self.inputs, _SEED).value += 1
+        self.hair.update_tag()
+        bpy.context.view_layer.update()
+
+    @property
+    def modifier_time(self):
+        """Seconds [s] that the modifier alone took in the last update."""
+        return self.hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).modifiers[0].execution_time
+
+
+class LeanGraph(Way):
+    """The fewest of Blender's nodes that grow strands between guides, into poly lines."""
+
+    @classmethod
+    def grown(cls, guides, head, strand_count):
+        made = _bare_copy(guides, head, "Lean graph", "POLY")
+        way = cls(made, made)
+        group, way.points = _lean_graph(head, strand_count / area(head))
+        made.modifiers.new("Lean graph", "NODES").node_group = group
+        bpy.context.view_layer.update()
+        return way
+
+    def remake(self):
+        self.points.inputs["Seed"].default_value += 1
+        bpy.context.view_layer.update()
+
+
+def area(surface_object):
+    """[m²] of a mesh object whose transform is applied."""
+    return sum(polygon.area for polygon in surface_object.data.polygons)
+
+
+def _bare_copy(guides, head, name, curve_type):
+    """Guides as Blender's own tools make them: positions and UV coordinates, on their surface."""
+    data = guides.data.copy()
+    data.vellus.kind = "NONE"
+    for attribute in [a.name for a in data.attributes]:
+        if attribute not in {"position", "surface_uv_coordinate", "curve_type"}:
+            data.attributes.remove(data.attributes[attribute])
+    data.set_types(type=curve_type)
+    made = bpy.data.objects.new(name, data)
+    made.parent = head
+    bpy.context.scene.collection.objects.link(made)
+    return made
+
+
+def _asset():
+    name = "Interpolate Hair Curves"
+    if name not in bpy.data.node_groups:
+        folder = bpy.utils.system_resource("DATAFILES", path="assets/nodes")
+        with bpy.data.libraries.load(folder + NODE_ASSETS, link=False) as (_there, here):
+            here.node_groups = [name]
+    return bpy.data.node_groups[name]
+
+
+def _lean_graph(head, density):
+    """(node group, the node that distributes points)."""
+    group = bpy.data.node_groups.new("Lean graph", "GeometryNodeTree")
+    group.is_modifier = True
+    for in_out in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    names = {
+        "into": "NodeGroupInput",
+        "surface": "GeometryNodeObjectInfo",
+        "points": "GeometryNodeDistributePointsOnFaces",
+        "strands": "GeometryNodeInterpolateCurves",
+        "poly": "GeometryNodeCurveSplineType",
+        "out": "NodeGroupOutput",
+    }
+    nodes = {name: group.nodes.new(kind) for name, kind in names.items()}
+    nodes["surface"].inputs["Object"].default_value = head
+    nodes["points"].inputs["Density"].default_value = density
+    nodes["poly"].spline_type = "POLY"
+    for source, output, target, into in (
+        ("surface", "Geometry", "points", "Mesh"),
+        ("into", 0, "strands", "Guide Curves"),
+        ("points", "Points", "strands", "Points"),
+        ("strands", "Curves", "poly", "Curve"),
+        ("poly", "Curve", "out", 0),
+    ):
+        group.links.new(nodes[source].outputs[output], nodes[target].inputs[into])
+    return group, nodes["points"]
+
+
+def is_on_processor():
+    """Whether the add-on computes on the processor, as its peers do."""
+    return preferences.device() == "cpu"
