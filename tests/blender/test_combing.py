@@ -194,7 +194,7 @@ def test_what_was_just_written_is_not_read_again(hair, monkeypatch):
     calls = counts_of(monkeypatch)
     pipeline.interpolate_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get(), hair.data)
     bpy.context.view_layer.update()
-    assert compared == [] and (calls["writes"], calls["searches"]) == (1, 2)  # one for the influence distance
+    assert compared == [] and (calls["writes"], calls["searches"]) == (1, 1)
     assert bindings.of(hair.data) is not None
     sculpted = points(hair)
     sculpted[7, -1] += 0.1

@@ -34,7 +34,7 @@ def assert_equal_to_brute_force(points, queries, distance, limit):
 @given(
     seed=st.integers(0, 2**32 - 1),
     point_count=st.integers(1, 80),
-    limit=st.integers(1, 32),
+    limit=st.integers(1, hash_grid.LIMIT),
     reach=st.floats(-3.0, 2.0),
     scale=st.integers(-6, 6),
 )
@@ -109,5 +109,5 @@ def test_cells_of_queries_and_single_ones_find_the_same(rng, monkeypatch, cluste
 
 
 def test_no_more_than_a_row_holds():
-    with pytest.raises(ValueError, match="at most 32"):
-        found(np.eye(3), np.eye(3), 1.0, 33)
+    with pytest.raises(ValueError, match=f"at most {hash_grid.LIMIT}"):
+        found(np.eye(3), np.eye(3), 1.0, hash_grid.LIMIT + 1)
