@@ -78,11 +78,11 @@ def draw_natively(curves, is_shown):
             user.display_type = "TEXTURED" if is_shown else "WIRE"
 
 
-def write_strands(curves, surface, points, roots, radii, guide_index):
+def write_strands(curves, surface, points, roots, radii, leaders=None):
     """Fill Curves with strands.
 
-    points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) [m]; guide_index: (S,) int32,
-    the guide that each strand follows first.
+    points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) [m]; leaders: (S,) int32, the
+    strand that stands for the guide of each, or None where strands are guides themselves.
     """
     strand_count, point_count, _xyz = points.shape
     if strand_count == 0:
@@ -91,7 +91,9 @@ def write_strands(curves, surface, points, roots, radii, guide_index):
     _write_attribute(curves, "position", "FLOAT_VECTOR", "POINT", points)
     _write_attribute(curves, "rest_position", "FLOAT_VECTOR", "POINT", points)
     _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii / surface.scale, strand_count))
-    _write_attribute(curves, "guide_curve_index", "INT", "CURVE", guide_index)
+    if leaders is not None:
+        # Blender's hair nodes look for this curve among the strands themselves: around it they clump, curl and braid.
+        _write_attribute(curves, "guide_curve_index", "INT", "CURVE", leaders)
     _write_attribute(curves, "id", "INT", "CURVE", np.arange(strand_count))
     _write_attribute(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
     write_roots(curves, surface, roots)

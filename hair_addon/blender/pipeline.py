@@ -126,9 +126,8 @@ def _write_guides(target, surface_object, surface, guides, settings, key):
     target = target or curves.new_object("Guides", surface_object).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
     target.vellus.root_key = key
-    indices = np.arange(len(guides.roots), dtype=np.int32)
     radii = np.full(guides.points.shape[1], 0.5e-3, np.float32)
-    curves.write_strands(target, surface, surface.to_local(guides.numpy()), guides.roots, radii, indices)
+    curves.write_strands(target, surface, surface.to_local(guides.numpy()), guides.roots, radii)
     curves.keep_surface(target, surface)
     return target
 
@@ -152,8 +151,8 @@ def write_hair(target):
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.root_key = bound.root_key
         radii = groom.strand_radii(bound.settings, bound.points.shape[1])
-        nearest = bound.binding.guide_weights.indices.numpy()[:, 0]
-        curves.write_strands(target, bound.surface, bound.points, bound.binding.roots, radii, nearest)
+        leaders = groom.leading_strands(bound.surface.mesh, bound.guides, bound.binding)
+        curves.write_strands(target, bound.surface, bound.points, bound.binding.roots, radii, leaders)
     state.is_stale = False  # as which another choice of guides marks it
     state.followed = guides_digest(state.guide_curves)
     bound.is_written = bound.has_moved_only = True

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import guide_map
 from .errors import HairError
 from .long_work import part_of, unheard
 from .mesh import SurfacePoints, check_mesh, check_points, normals, positions
@@ -261,6 +262,12 @@ def follow_some(binding, guides, chosen):
         ),
     )
     return points.numpy()
+
+
+def leading_strands(mesh, guides, binding):
+    """(S,) int32: the strand of a `HairBinding` that stands for the guide that each follows first."""
+    first = binding.guide_weights.indices.numpy()[:, 0]
+    return guide_map.leaders(first, binding.positions.numpy(), positions(mesh, guides.roots))
 
 
 def generate_hair(mesh, guides, settings, *, density=None, device="cpu") -> Strands:

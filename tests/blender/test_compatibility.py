@@ -9,22 +9,6 @@ import pytest
 
 from tests.blender.reading import points
 
-NODE_ASSETS = bpy.utils.system_resource("DATAFILES", path="assets/nodes") + "/procedural_hair_node_assets.blend"
-
-
-@pytest.fixture
-def node_group():
-    """Appends a node group of Blender's hair assets by name."""
-
-    def append(name):
-        with bpy.data.libraries.load(NODE_ASSETS, link=False) as (_there, here):
-            here.node_groups = [name]
-        (group,) = here.node_groups
-        assert group is not None, f"Blender ships no hair node group {name}"
-        return group
-
-    return append
-
 
 @pytest.mark.parametrize("kind", ["guides", "hair"])
 def test_sculpt_mode_opens(kind, request):
@@ -34,43 +18,6 @@ def test_sculpt_mode_opens(kind, request):
     assert bpy.ops.object.mode_set(mode="SCULPT_CURVES") == {"FINISHED"}
     bpy.ops.object.mode_set(mode="OBJECT")
     assert np.array_equal(points(made), before)
-
-
-# Those that take hair and give hair, of the shipped groups.
-HAIR_NODES = [
-    "Attach Hair Curves to Surface",
-    "Blend Hair Curves",
-    "Braid Hair Curves",
-    "Clump Hair Curves",
-    "Create Guide Index Map",
-    "Curl Hair Curves",
-    "Displace Hair Curves",
-    "Duplicate Hair Curves",
-    "Frizz Hair Curves",
-    "Hair Curves Noise",
-    "Interpolate Hair Curves",
-    "Redistribute Curve Points",
-    "Restore Curve Segment Length",
-    "Roll Hair Curves",
-    "Rotate Hair Curves",
-    "Set Hair Curve Profile",
-    "Shrinkwrap Hair Curves",
-    "Smooth Hair Curves",
-    "Straighten Hair Curves",
-    "Trim Hair Curves",
-]
-
-
-@pytest.mark.parametrize("name", HAIR_NODES)
-def test_hair_nodes_evaluate_without_a_warning(hair, node_group, name):
-    hair.modifiers.new(name, "NODES").node_group = node_group(name)
-    bpy.context.view_layer.update()
-    evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    positions = np.empty((len(evaluated.points), 3), np.float32)
-    evaluated.attributes["position"].data.foreach_get("vector", positions.ravel())
-    assert len(positions) and np.isfinite(positions).all()
-    warnings = [w.message for w in hair.modifiers[name].node_warnings if w.type in {"WARNING", "ERROR"}]
-    assert warnings == []
 
 
 @pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_EEVEE"])
