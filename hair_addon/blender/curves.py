@@ -137,8 +137,9 @@ def write_points(curves, points):
     curves.update_tag()
 
 
-# The name of the property that says where a surface was when guides were rooted on it.
-_STOOD_ON = "vellus_surface"
+# The name of the property that says where a surface was when guides were rooted on it. In a group: of a bare array
+# Blender's USD exporter says that it does not know what to do with it.
+_STOOD_ON = "vellus_stood_on"
 
 
 def keep_surface(curves, surface):
@@ -146,13 +147,13 @@ def keep_surface(curves, surface):
     if _STOOD_ON in curves:
         # Blender 5.2 writes an array over a shorter one, past its end.
         del curves[_STOOD_ON]
-    curves[_STOOD_ON] = surface.rest.ravel()
+    curves[_STOOD_ON] = {"rest": surface.rest.ravel()}
 
 
 def stood_on(curves):
     """(V, 3) float32 that `keep_surface` remembered, or None."""
     kept = curves.get(_STOOD_ON)
-    return None if kept is None else np.array(kept, np.float32).reshape(-1, 3)
+    return None if kept is None else np.array(kept["rest"], np.float32).reshape(-1, 3)
 
 
 def carry(curves, motion):
