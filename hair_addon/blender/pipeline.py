@@ -42,6 +42,7 @@ def distributing_guides(surface_object, settings, depsgraph, target=None, keeps_
         density=density,
         texture=texture,
         mirror_normal=surface.mirror_normal,
+        shape=surface.shape,
         roots=roots,
         device=device,
         progress=progress,
@@ -95,6 +96,7 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
             density=density,
             texture=texture,
             mirror_normal=surface.mirror_normal,
+            shape=surface.shape,
             device=device,
             progress=part_of(progress, 0.0, 0.5),
         )
@@ -114,6 +116,7 @@ def _bind(surface, guides, settings, density, roots, device, progress):
         guides,
         settings,
         density=density,
+        shape=surface.shape,
         roots=roots,
         device=device,
         progress=part_of(progress, 0.0, 0.8),

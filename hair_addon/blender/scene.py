@@ -51,6 +51,20 @@ class Surface:
         normal = np.linalg.inv(self.to_world_axes)[0]
         return normal / np.linalg.norm(normal)
 
+    @property
+    def shape(self):
+        """The `TriMesh` at rest that the object only turns and scales evenly to be `mesh`; None where it does more.
+
+        Roots are placed on it: neither turning an object nor scaling it moves them, not even by the rounding that
+        relaxation would amplify.
+        """
+        axes = self.to_world_axes
+        squares = axes.T @ axes
+        if not np.allclose(squares, np.eye(3) * np.trace(squares) / 3.0, rtol=0.0, atol=1e-5 * np.trace(squares)):
+            return None
+        # A mirrored object's triangles are wound the other way, as those of the rest mirrored at its origin are.
+        return TriMesh(-self.rest if self.is_mirrored else self.rest, self.mesh.triangles)
+
     def root_vertices(self, points):
         """(N, 3) int32: the vertices that surface points lie between, in Blender's order of corners."""
         vertices = self.mesh.triangles[points.triangle]

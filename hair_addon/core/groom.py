@@ -108,6 +108,7 @@ def distribute_guides(
     density=None,
     texture=None,
     mirror_normal=(1.0, 0.0, 0.0),
+    shape=None,
     roots=None,
     device="cpu",
     progress=unheard,
@@ -116,8 +117,10 @@ def distribute_guides(
 
     mesh: `TriMesh` [m]; settings: `GuideSettings`; density: (V,) per vertex, at least 0, or None for uniform; texture:
     `Texture` that multiplies it, or None; mirror_normal: of the plane through the origin that symmetric guides mirror;
-    roots: `SurfacePoints` that guides have already, None to place them; progress(step, part): told how far the work is,
-    and may raise to stop it.
+    shape: `TriMesh` that was turned and scaled evenly to be `mesh`, its mirror across the X axis: guides are placed on
+    it, and so in the same places however it was turned and scaled; None where there is none; roots: `SurfacePoints`
+    that guides have already, None to place them; progress(step, part): told how far the work is, and may raise to stop
+    it.
     """
     check_mesh(mesh)
     progress(COMPILING, 0.0)
@@ -140,17 +143,18 @@ def distribute_guides(
     relaxing = part_of(progress, 0.1, 0.9)
     mirror = ground.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
     if roots is None:
+        placed_on = mesh if shape is None else shape
         if settings.curvature:
-            bend = curvature.bend_density(mesh, settings.curvature)
+            bend = curvature.bend_density(placed_on, settings.curvature)
             density = bend if density is None else bend * density
         roots = cvt.place(
-            mesh,
+            placed_on,
             settings.guide_count,
             settings.seed,
             settings.relax_iterations,
             density=density,
             texture=texture,
-            mirror=mirror,
+            mirror=mirror if mirror is None or shape is None else ground.Mirror(np.array([1.0, 0.0, 0.0])),
             device=device,
             progress=lambda part: relaxing("Spreading guides", part),
         )
@@ -183,10 +187,13 @@ def _symmetric(controls, places, mirror):
     return controls
 
 
-def bind_hair(mesh, guides, settings, *, density=None, roots=None, device="cpu", progress=unheard) -> HairBinding:
+def bind_hair(
+    mesh, guides, settings, *, density=None, shape=None, roots=None, device="cpu", progress=unheard
+) -> HairBinding:
     """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape.
 
-    Arguments as in `generate_hair`; roots: `SurfacePoints` that strands have already, None to place them.
+    Arguments as in `generate_hair`; shape as in `distribute_guides`; roots: `SurfacePoints` that strands have already,
+    None to place them.
     """
     check_mesh(mesh)
     check_points(mesh, guides.roots)
@@ -198,7 +205,8 @@ def bind_hair(mesh, guides, settings, *, density=None, roots=None, device="cpu",
     _load_kernels(device, hash_grid, interpolation)
     progress("Placing strands", 0.1)
     if roots is None:
-        roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)
+        placed_on = mesh if shape is None else shape
+        roots = sampling.sample_surface(placed_on, settings.strand_count, settings.seed, density)
 
     def on_device(vectors):
         return wp.array(vectors, dtype=wp.vec3, device=device, copy=False)
