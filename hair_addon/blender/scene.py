@@ -145,6 +145,13 @@ def read_surface(surface_object, depsgraph):
     return Surface(surface_object.name, mesh, faces, rest, posed, corner_uvs, uv_map, to_world_axes, is_mirrored)
 
 
+def triangle_count(surface_object, view_layer):
+    """How many triangles a mesh object has as it is evaluated: by its counts, without reading it."""
+    depsgraph = view_layer.depsgraph
+    mesh = surface_object.data if depsgraph is None else surface_object.evaluated_get(depsgraph).data
+    return len(mesh.loops) - 2 * len(mesh.polygons)
+
+
 def _rest_positions(mesh, posed):
     """(V, 3) float32 of the attribute that Blender adds before it deforms; where there is none, `posed`."""
     attribute = mesh.attributes.get("rest_position")
