@@ -103,11 +103,12 @@ def draw_natively(curves, is_shown):
             user.display_type = "TEXTURED" if is_shown else "WIRE"
 
 
-def write_strands(curves, surface, points, roots, radii, guide_index, normals=None):
+def write_strands(curves, surface, points, roots, radii, leaders=None, normals=None):
     """Fill Curves with strands.
 
-    points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) [m]; guide_index: (S,) int32,
-    the guide that each strand follows first; normals: (S, 3) float32 of the surface at the roots, if they are known.
+    points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) [m]; leaders: (S,) int32, the
+    strand that stands for the guide of each, or None where strands are guides themselves; normals: (S, 3) float32 of
+    the surface at the roots, if they are known.
     """
     strand_count, point_count, _xyz = points.shape
     if strand_count == 0:
@@ -115,7 +116,9 @@ def write_strands(curves, surface, points, roots, radii, guide_index, normals=No
     _resize(curves, strand_count, point_count)
     _write_positions(curves, points)
     _write_radii(curves, radii / surface.scale)
-    _write_attribute(curves, "guide_curve_index", "INT", "CURVE", guide_index)
+    if leaders is not None:
+        # Blender's hair nodes look for this curve among the strands themselves: around it they clump, curl and braid.
+        _write_attribute(curves, "guide_curve_index", "INT", "CURVE", leaders)
     _write_attribute(curves, "id", "INT", "CURVE", np.arange(strand_count))
     _write_attribute(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
     write_roots(curves, surface, roots, normals)
@@ -190,8 +193,9 @@ def write_points(curves, points):
     curves.update_tag()
 
 
-# The name of the property that says where a surface was when guides were rooted on it.
-_STOOD_ON = "vellus_surface"
+# The name of the property that says where a surface was when guides were rooted on it. In a group: of a bare array
+# Blender's USD exporter says that it does not know what to do with it.
+_STOOD_ON = "vellus_stood_on"
 
 
 def keep_surface(curves, surface):
@@ -199,13 +203,13 @@ def keep_surface(curves, surface):
     if _STOOD_ON in curves:
         # Blender 5.2 writes an array over a shorter one, past its end.
         del curves[_STOOD_ON]
-    curves[_STOOD_ON] = surface.rest.ravel()
+    curves[_STOOD_ON] = {"rest": surface.rest.ravel()}
 
 
 def stood_on(curves):
     """(V, 3) float32 that `keep_surface` remembered, or None."""
     kept = curves.get(_STOOD_ON)
-    return None if kept is None else np.array(kept, np.float32).reshape(-1, 3)
+    return None if kept is None else np.array(kept["rest"], np.float32).reshape(-1, 3)
 
 
 def carry(curves, motion):

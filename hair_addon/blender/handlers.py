@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 from bpy.app.handlers import persistent
 
-from . import bindings, hair_cache, keyed, live_hair, pipeline, running, viewport
+from . import bindings, hair_cache, keyed, live_hair, looks, pipeline, running, viewport
 from . import curves as curves_door
 
 # Guides as they were when their geometry was last reported: session_uid → (N, 3) points. Blender reports the geometry
@@ -105,7 +105,7 @@ def _evaluate(depsgraph, combed):
         elif follows:
             live_hair.follow_guides(hair, depsgraph)
         if state.is_shading_stale:
-            pipeline.evaluate_shading(hair)
+            looks.evaluate_shading(hair)
 
 
 def _is_surface_at_rest(curves):

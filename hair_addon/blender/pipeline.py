@@ -6,7 +6,6 @@ and its inputs, so `evaluate` can make it again.
 """
 
 import hashlib
-from dataclasses import replace
 
 import bpy
 import numpy as np
@@ -15,7 +14,7 @@ from ..core import groom, strands
 from ..core.errors import HairError
 from ..core.long_work import part_of, run_now
 from ..core.mesh import require_finite
-from . import bindings, curves, materials, partings, preferences, properties, scene
+from . import bindings, curves, looks, partings, preferences, properties, scene
 from .bindings import BoundHair
 from .datablocks import Remembered
 
@@ -42,6 +41,7 @@ def distributing_guides(surface_object, settings, depsgraph, target=None, keeps_
         density=density,
         texture=texture,
         mirror_normal=surface.mirror_normal,
+        shape=surface.shape,
         roots=roots,
         device=device,
         progress=progress,
@@ -97,6 +97,7 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
             density=density,
             texture=texture,
             mirror_normal=surface.mirror_normal,
+            shape=surface.shape,
             device=device,
             progress=part_of(progress, 0.0, 0.5),
         )
@@ -121,6 +122,7 @@ def _bind(surface, guides, settings, density, parting, roots, device, progress):
         regions=parting.regions,
         lines=parting.lines,
         drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
+        shape=surface.shape,
         roots=roots,
         device=device,
         progress=part_of(progress, 0.0, 0.8),
@@ -133,9 +135,8 @@ def _write_guides(target, surface_object, surface, guides, settings, key):
     target = target or curves.new_object("Guides", surface_object).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
     target.vellus.root_key = key
-    indices = np.arange(len(guides.roots), dtype=np.int32)
     radii = np.full(guides.points.shape[1], 0.5e-3, np.float32)
-    curves.write_strands(target, surface, surface.to_local(guides.numpy()), guides.roots, radii, indices)
+    curves.write_strands(target, surface, surface.to_local(guides.numpy()), guides.roots, radii)
     curves.keep_surface(target, surface)
     return target
 
@@ -146,7 +147,7 @@ def _write_bound(target, surface_object, guide_curves, bound):
     target.vellus.guide_curves = guide_curves
     bindings.keep(target, bound)
     write_hair(target)
-    evaluate_shading(target)
+    looks.evaluate_shading(target)
     return target
 
 
@@ -160,8 +161,9 @@ def write_hair(target):
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
         radii = groom.strand_radii(bound.settings, bound.points.shape[1])
         binding = bound.binding
-        nearest, normals = binding.guide_weights.indices.numpy()[:, 0], binding.normals.numpy()
-        curves.write_strands(target, bound.surface, bound.points, binding.roots, radii, nearest, normals)
+        leaders = groom.leading_strands(bound.surface.mesh, bound.guides, binding)
+        normals = binding.normals.numpy()
+        curves.write_strands(target, bound.surface, bound.points, binding.roots, radii, leaders, normals)
     guide_map = groom.weights_now(bound.binding, bound.guides) if bound.settings.guide_map else None
     curves.write_guide_map(target, guide_map)
     state.is_stale = False  # as which another choice of guides marks it
@@ -354,34 +356,6 @@ def _read_surface(surface_object, settings, depsgraph):
     curves.keep_rest(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
     return surface, scene.read_vertex_group(surface_object, depsgraph, settings.density_group)
-
-
-def evaluate_shading(target):
-    """Bring a hair's material in line with its settings, and what Blender draws with who draws it."""
-    target.vellus.is_shading_stale = False
-    curves.draw_natively(target, not target.vellus.is_drawn)
-    try:
-        materials.write_hair_material(target)
-        target.vellus.shading_status = ""
-    except HairError as error:
-        target.vellus.shading_status = str(error)
-
-
-def apply_look(target, look):
-    """Give hair an `Appearance`, but for its mode: how to draw is no part of a look. Raises `HairError`."""
-    curves.require_editable(target)
-    group = target.vellus.appearance
-    properties.assign(group, replace(look, mode=group.mode))
-    evaluate_shading(target)
-
-
-def show_shaded(hair, is_drawn):
-    """Let Vellus draw hair datablocks in viewports, or Blender. Raises `HairError`."""
-    for target in hair:
-        curves.require_editable(target)
-    for target in hair:
-        target.vellus.is_drawn = is_drawn
-        evaluate_shading(target)
 
 
 def _check_surface(surface_object):

@@ -51,6 +51,20 @@ class Surface:
         normal = np.linalg.inv(self.to_world_axes)[0]
         return normal / np.linalg.norm(normal)
 
+    @property
+    def shape(self):
+        """The `TriMesh` at rest that the object only turns and scales evenly to be `mesh`; None where it does more.
+
+        Roots are placed on it: neither turning an object nor scaling it moves them, not even by the rounding that
+        relaxation would amplify.
+        """
+        axes = self.to_world_axes
+        squares = axes.T @ axes
+        if not np.allclose(squares, np.eye(3) * np.trace(squares) / 3.0, rtol=0.0, atol=1e-5 * np.trace(squares)):
+            return None
+        # A mirrored object's triangles are wound the other way, as those of the rest mirrored at its origin are.
+        return TriMesh(-self.rest if self.is_mirrored else self.rest, self.mesh.triangles)
+
     def root_vertices(self, points):
         """(N, 3) int32: the vertices that surface points lie between, in Blender's order of corners."""
         vertices = self.mesh.triangles[points.triangle]
@@ -131,6 +145,13 @@ def read_surface(surface_object, depsgraph):
     with np.errstate(invalid="ignore"):  # what is not finite is refused where the mesh is checked
         mesh = TriMesh(_transformed(rest, to_world_axes), triangles)
     return Surface(surface_object.name, mesh, faces, rest, posed, corner_uvs, uv_map, to_world_axes, is_mirrored)
+
+
+def triangle_count(surface_object, view_layer):
+    """How many triangles a mesh object has as it is evaluated: by its counts, without reading it."""
+    depsgraph = view_layer.depsgraph
+    mesh = surface_object.data if depsgraph is None else surface_object.evaluated_get(depsgraph).data
+    return len(mesh.loops) - 2 * len(mesh.polygons)
 
 
 def _rest_positions(mesh, posed):

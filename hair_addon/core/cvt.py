@@ -15,6 +15,8 @@ painted, so rho = D².
 """
 
 from dataclasses import dataclass
+from itertools import product
+from operator import add
 
 import numpy as np
 
@@ -30,6 +32,7 @@ LONGEST_STEP = 0.5  # of the way to the next site
 FEWEST_SITES = 260  # from so many on, fewer are placed first
 LEAST_PAIR = 0.4  # of the part of the surface that two neighbours share in a honeycomb: others get no site between
 GAP_ROUNDS = 4  # gaps that share a corner are filled one after the other
+BESIDE = tuple(product((-1, 0, 1), repeat=3))  # steps from a cell of a grid to those around it, and itself
 SAMPLES_PER_SITE = 64  # while they are few
 LEAST_SAMPLES = 2000
 FIRST_ITERATIONS, COARSE_ITERATIONS = 30, 10
@@ -252,14 +255,18 @@ def _widest_gaps(ground, cells, points, sites, count, device):
     gaps = _firsts(first, -widths)
     gaps = gaps[np.argsort(-widths[gaps], kind="stable")]
     islands, wanted = ground.islands[points.triangle], _wanted(ground, sites, count)
-    lone = []
-    for gap in gaps:
+    lone, taken = [], {}
+    # Only gaps in cells side by side can be too near to each other.
+    width = 1.001 * float(np.sqrt(max(squares[gaps].max(initial=0.0), 1e-12)))
+    for gap, cell in zip(gaps, np.floor(cells.places[gaps] / width).astype(int).tolist(), strict=True):
         if len(lone) == count - len(sites):
             break
-        apart = np.sum((cells.places[lone] - cells.places[gap]) ** 2, axis=1)
+        near = [g for step in BESIDE for g in taken.get(tuple(map(add, cell, step)), ())]
+        apart = np.sum((cells.places[near] - cells.places[gap]) ** 2, axis=1)
         # A gap is the farthest place of several cells.
         if wanted[islands[gap]] > 0 and np.all(apart > squares[gap]):
             lone.append(gap)
+            taken.setdefault(tuple(cell), []).append(gap)
             wanted[islands[gap]] -= 1
     return np.array(lone, int)
 

@@ -1,21 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What guides and hair cost, by counts alone: said before the work, and how long work is told from short.
 
-Times are those of one plain core, measured; other computers take half to twice as long.
+Times are those of two plain cores, measured (tests/benchmarks/test_estimates.py); other computers take half to twice as
+long.
 """
 
 from .groom import POINT_COUNT
 
-# Bytes of Blender's Curves. A point: position and rest position (12 each), radius (4). A curve: offset (4), type (1),
-# UV (8), normal (12), guide, id, random number (4 each); the
+# Bytes of Blender's Curves. A point: position (12), radius (4). A curve: offset (4), type (1),
+# UV (8), normal (12), the strand that stands for its guide, id, random number (4 each); the
 # root: triangle (4), its corners and barycentric coordinates (12 each).
-_POINT_BYTES, _CURVE_BYTES = 28, 65
+_POINT_BYTES, _CURVE_BYTES = 16, 65
 _SLOT_BYTES = 8  # which guide, and its weight
 _TEXEL_BYTES = 16  # RGBA, single precision
 
-_ROUND_SECONDS = 1e-5  # one guide, one round of relaxation
-_GUIDE_SECONDS = 5e-5
-_STRAND_SECONDS = 4e-6
+# While it is worked on. A triangle of the surface, a guide, a strand.
+_FACE_WORK_BYTES, _GUIDE_WORK_BYTES, _STRAND_WORK_BYTES = 760, 3300, 680
+
+# Placing: a triangle of the surface and a guide, once, and once in each round.
+_FACE_SECONDS, _FACE_ROUND_SECONDS = 5e-6, 2e-7
+_GUIDE_SECONDS, _GUIDE_ROUND_SECONDS = 4e-5, 9e-6
+_SPREAD_SECONDS = 2e-4  # a guide that few coarse ones became, from level to level
+_MOST_ROUNDS = 60  # that it takes until guides rest
+
+# Growing strands: a triangle, whose normals it takes, and a strand.
+_HAIR_FACE_SECONDS, _STRAND_SECONDS = 2.5e-6, 4e-6
+
 _TEXEL_SECONDS = 1.5e-6  # of all of the Marschner tables together
 
 
@@ -29,14 +39,26 @@ def gpu_bytes(strand_count, point_count=POINT_COUNT):
     return strand_count * point_count * _TEXEL_BYTES
 
 
-def guide_seconds(settings):
-    """How long distributing guides takes [s]; settings: `GuideSettings`."""
-    return settings.guide_count * (settings.relax_iterations * _ROUND_SECONDS + _GUIDE_SECONDS)
+def guide_work_bytes(settings, face_count):
+    """Memory that distributing guides takes while it runs [bytes]; arguments as for `guide_seconds`."""
+    return face_count * _FACE_WORK_BYTES + settings.guide_count * _GUIDE_WORK_BYTES
 
 
-def hair_seconds(settings):
-    """How long growing strands between guides takes [s]; settings: `HairSettings`."""
-    return settings.strand_count * _STRAND_SECONDS
+def hair_work_bytes(settings, face_count):
+    """Memory that growing strands takes while it runs [bytes]; arguments as for `hair_seconds`."""
+    return face_count * _FACE_WORK_BYTES // 3 + settings.strand_count * _STRAND_WORK_BYTES
+
+
+def guide_seconds(settings, face_count):
+    """How long distributing guides takes [s]; settings: `GuideSettings`; face_count: triangles of the surface."""
+    rounds = min(settings.relax_iterations, _MOST_ROUNDS)
+    guide = _GUIDE_SECONDS + rounds * _GUIDE_ROUND_SECONDS + (_SPREAD_SECONDS if rounds else 0.0)
+    return settings.guide_count * guide + face_count * (_FACE_SECONDS + rounds * _FACE_ROUND_SECONDS)
+
+
+def hair_seconds(settings, face_count):
+    """How long growing strands between guides takes [s]; settings: `HairSettings`; face_count as above."""
+    return settings.strand_count * _STRAND_SECONDS + face_count * _HAIR_FACE_SECONDS
 
 
 def table_seconds(settings):

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from . import leaders
 from .errors import HairError
 from .long_work import part_of, unheard
 from .mesh import SurfacePoints, check_mesh, check_points, positions
@@ -141,6 +142,7 @@ def distribute_guides(
     density=None,
     texture=None,
     mirror_normal=(1.0, 0.0, 0.0),
+    shape=None,
     roots=None,
     device="cpu",
     progress=unheard,
@@ -149,8 +151,10 @@ def distribute_guides(
 
     mesh: `TriMesh` [m]; settings: `GuideSettings`; density: (V,) per vertex, at least 0, or None for uniform; texture:
     `Texture` that multiplies it, or None; mirror_normal: of the plane through the origin that symmetric guides mirror;
-    roots: `SurfacePoints` that guides have already, None to place them; progress(step, part): told how far the work is,
-    and may raise to stop it.
+    shape: `TriMesh` that was turned and scaled evenly to be `mesh`, its mirror across the X axis: guides are placed on
+    it, and so in the same places however it was turned and scaled; None where there is none; roots: `SurfacePoints`
+    that guides have already, None to place them; progress(step, part): told how far the work is, and may raise to stop
+    it.
     """
     check_mesh(mesh)
     progress(COMPILING, 0.0)
@@ -174,17 +178,18 @@ def distribute_guides(
     relaxing = part_of(progress, 0.1, 0.9)
     mirror = ground.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
     if roots is None:
+        placed_on = mesh if shape is None else shape
         if settings.curvature:
-            bend = curvature.bend_density(mesh, settings.curvature)
+            bend = curvature.bend_density(placed_on, settings.curvature)
             density = bend if density is None else bend * density
         roots = cvt.place(
-            mesh,
+            placed_on,
             settings.guide_count,
             settings.seed,
             settings.relax_iterations,
             density=density,
             texture=texture,
-            mirror=mirror,
+            mirror=mirror if mirror is None or shape is None else ground.Mirror(np.array([1.0, 0.0, 0.0])),
             device=device,
             progress=lambda part: relaxing("Spreading guides", part),
         )
@@ -226,6 +231,7 @@ def bind_hair(
     regions=(),
     lines=None,
     drawn_on=None,
+    shape=None,
     roots=None,
     device="cpu",
     progress=unheard,
@@ -233,7 +239,7 @@ def bind_hair(
     """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape.
 
     Arguments as in `generate_hair`; drawn_on: (V, 3) vertices that the part lines are near to, if not the mesh's own;
-    roots: `SurfacePoints` that strands have already, None to place them.
+    shape as in `distribute_guides`; roots: `SurfacePoints` that strands have already, None to place them.
     """
     check_mesh(mesh)
     check_points(mesh, guides.roots)
@@ -248,7 +254,8 @@ def bind_hair(
         lines = part_lines.lay(mesh, lines, device, drawn_on)
     progress("Placing strands", 0.1)
     if roots is None:
-        roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)
+        placed_on = mesh if shape is None else shape
+        roots = sampling.sample_surface(placed_on, settings.strand_count, settings.seed, density)
 
     guide_positions, guide_normals = rooting.rooted(mesh, guides.roots, device)
     root_positions, root_normals = rooting.rooted(mesh, roots, device)
@@ -316,6 +323,12 @@ def _follow(binding, guides, roots, root_normals, weights):
 
     points = _guide_points(binding, guides)
     return interpolation.interpolate(roots, root_normals, points, binding.guide_normals, weights, binding.keep_length)
+
+
+def leading_strands(mesh, guides, binding):
+    """(S,) int32: the strand of a `HairBinding` that stands for the guide that each follows first."""
+    first = binding.guide_weights.indices.numpy()[:, 0]
+    return leaders.leaders(first, binding.positions.numpy(), positions(mesh, guides.roots))
 
 
 def generate_hair(mesh, guides, settings, *, density=None, regions=(), lines=None, device="cpu") -> Strands:

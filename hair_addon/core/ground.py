@@ -61,13 +61,13 @@ class Ground:
     """
 
     def __init__(self, mesh, site_count, density=None, texture=None, mirror=None, device="cpu"):
-        values = check_density(mesh, density)
-        self.densest = float(values.max())
-        self._values, self._texture = values / self.densest, texture
         lowest, highest = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
         self.size = float((highest - lowest).max())
         self.origin = lowest.astype(np.float64)
         self.mesh = TriMesh(((mesh.vertices - lowest) / np.float32(self.size)).astype(np.float32), mesh.triangles)
+        values = check_density(self.mesh, density)
+        self.densest = float(values.max())
+        self._values, self._texture = values / self.densest, texture
         lengths = np.linalg.norm(self.mesh.scaled_normals, axis=1, keepdims=True)
         self.normals = self.mesh.scaled_normals / np.where(lengths > 0.0, lengths, 1.0)
         self.islands = islands(self.mesh)

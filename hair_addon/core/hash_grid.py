@@ -274,7 +274,8 @@ def _sorted_by_cell(points, queries, width):
 def _first_radius(points, distance):
     """Radius [m] to search first: the distance, unless that holds nearly all points, or none as a rule."""
     extent = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
-    spacing = extent / math.sqrt(len(points))  # of points that lie on a surface
+    # Of points that lie on a surface; a lone one is looked for in wide cells, which are few.
+    spacing = extent / math.sqrt(len(points)) if extent else distance
     # Cells narrower than the rounding of the coordinates could not tell points apart.
     finest = max(1e-6 * float(np.abs(points).max()), 1e-30)
     if distance > 3.0 * spacing:

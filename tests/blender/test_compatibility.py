@@ -1,29 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Blender's own tools take our Curves: sculpt mode, hair node groups, Cycles and EEVEE."""
-
-import math
+"""Blender's own tools take our Curves: sculpt mode, Cycles and EEVEE."""
 
 import bpy
 import numpy as np
 import pytest
 
-from tests.blender.reading import points
+from hair_addon.blender.scene import read_camera
+from tests.blender.reading import evaluated_points, points
 
-NODE_ASSETS = bpy.utils.system_resource("DATAFILES", path="assets/nodes") + "/procedural_hair_node_assets.blend"
-
-
-@pytest.fixture
-def node_group():
-    """Appends a node group of Blender's hair assets by name."""
-
-    def append(name):
-        with bpy.data.libraries.load(NODE_ASSETS, link=False) as (_there, here):
-            here.node_groups = [name]
-        (group,) = here.node_groups
-        assert group is not None, f"Blender ships no hair node group {name}"
-        return group
-
-    return append
+PIXELS = 96
 
 
 @pytest.mark.parametrize("kind", ["guides", "hair"])
@@ -36,65 +21,43 @@ def test_sculpt_mode_opens(kind, request):
     assert np.array_equal(points(made), before)
 
 
-# Those that take hair and give hair, of the shipped groups.
-HAIR_NODES = [
-    "Attach Hair Curves to Surface",
-    "Blend Hair Curves",
-    "Braid Hair Curves",
-    "Clump Hair Curves",
-    "Create Guide Index Map",
-    "Curl Hair Curves",
-    "Displace Hair Curves",
-    "Duplicate Hair Curves",
-    "Frizz Hair Curves",
-    "Hair Curves Noise",
-    "Interpolate Hair Curves",
-    "Redistribute Curve Points",
-    "Restore Curve Segment Length",
-    "Roll Hair Curves",
-    "Rotate Hair Curves",
-    "Set Hair Curve Profile",
-    "Shrinkwrap Hair Curves",
-    "Smooth Hair Curves",
-    "Straighten Hair Curves",
-    "Trim Hair Curves",
-]
-
-
-@pytest.mark.parametrize("name", HAIR_NODES)
-def test_hair_nodes_evaluate_without_a_warning(hair, node_group, name):
-    hair.modifiers.new(name, "NODES").node_group = node_group(name)
-    bpy.context.view_layer.update()
-    evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    positions = np.empty((len(evaluated.points), 3), np.float32)
-    evaluated.attributes["position"].data.foreach_get("vector", positions.ravel())
-    assert len(positions) and np.isfinite(positions).all()
-    warnings = [w.message for w in hair.modifiers[name].node_warnings if w.type in {"WARNING", "ERROR"}]
-    assert warnings == []
-
-
 @pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_EEVEE"])
-def test_blender_renders_the_hair(hair, engine, tmp_path):
-    """The same picture with and without hair differs outside the sphere's outline: strands are drawn, and lit."""
-    scene = bpy.context.scene
-    scene.camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    scene.camera.location, scene.camera.rotation_euler = (0.0, -8.0, 0.0), (math.pi / 2, 0.0, 0.0)
-    light = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
-    light.data.energy, light.rotation_euler = 5.0, (math.pi / 3, 0.0, 0.0)
-    for new in (scene.camera, light):
-        scene.collection.objects.link(new)
+def test_blender_renders_the_hair(lit, engine, tmp_path):
+    """Strands cover the pixels that they run through and no others, on a surface that is twisted; and they are lit."""
+    scene, surface = bpy.context.scene, bpy.data.objects["Sphere"]
+    lit.data.vellus.hair.radius, lit.data.vellus.hair.tip_taper = 0.03, 1.0
+    twist = surface.modifiers.new("Twist", "SIMPLE_DEFORM")
+    twist.deform_method, twist.angle = "TWIST", 1.0
+    surface.hide_render = bpy.data.objects["Guides"].hide_render = True
+    bpy.context.view_layer.update()
     scene.render.engine = engine
-    scene.render.resolution_x = scene.render.resolution_y = 64
-    scene.render.film_transparent = True
+    scene.render.resolution_x = scene.render.resolution_y = PIXELS
+    scene.render.film_transparent, scene.view_settings.view_transform = True, "Standard"
     scene.cycles.samples, scene.eevee.taa_render_samples = 8, 4
-    pictures = []
-    for hidden in (False, True):
-        hair.hide_render = bpy.data.objects["Guides"].hide_render = hidden
-        scene.render.filepath = str(tmp_path / f"{hidden}.png")
-        bpy.ops.render.render(write_still=True)
-        image = bpy.data.images.load(scene.render.filepath)
-        pictures.append(np.array(image.pixels).reshape(64, 64, 4))
-    with_hair, without = pictures
-    outside = without[..., 3] == 0.0
-    assert (with_hair[outside][:, 3] > 0.1).sum() > 50
-    assert with_hair[outside][:, :3].max() > 0.02
+    scene.render.filepath = str(tmp_path / "hair.png")
+    bpy.ops.render.render(write_still=True)
+    picture = np.array(bpy.data.images.load(scene.render.filepath).pixels).reshape(PIXELS, PIXELS, 4)
+    rows, columns = pixels_of(evaluated_points(lit).reshape(-1, 3))
+    covered = picture[..., 3] > 0.1
+    assert covered[rows, columns].mean() > 0.97
+    reference = np.zeros_like(covered)
+    reference[rows, columns] = True
+    assert not (covered & ~grown(reference)).any()
+    assert 0.1 < covered.mean() < 0.9
+    assert np.median(picture[covered][:, :3].max(axis=1)) > 0.05
+
+
+def pixels_of(places):
+    """Rows, from the bottom, and columns of places (N, 3) in the scene's square picture."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    world_to_view, view_to_clip = read_camera(bpy.context.scene, depsgraph, PIXELS, PIXELS)
+    clip = np.c_[places, np.ones(len(places))] @ (view_to_clip @ world_to_view).T
+    pixels = ((0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * PIXELS).astype(int)
+    return pixels[:, 1], pixels[:, 0]
+
+
+def grown(mask):
+    """A mask with two pixels more on every side: strands are two pixels thick, and filters blur edges."""
+    padded = np.pad(mask, 2)
+    shifts = [(y, x) for y in range(5) for x in range(5)]
+    return np.any([padded[y : y + PIXELS, x : x + PIXELS] for y, x in shifts], axis=0)

@@ -15,7 +15,6 @@ EXPECTED_ATTRIBUTES = {
     "radius": ("FLOAT", "POINT"),
     "surface_uv_coordinate": ("FLOAT2", "CURVE"),
     "surface_normal": ("FLOAT_VECTOR", "CURVE"),
-    "guide_curve_index": ("INT", "CURVE"),
     "id": ("INT", "CURVE"),
 }
 

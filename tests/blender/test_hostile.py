@@ -79,16 +79,41 @@ def test_hair_grows_on_odd_meshes(scene, name):
     assert forbidden is None or not forbidden(points(hair)[:, 0]).any()
 
 
-@pytest.mark.parametrize("scale", [1e6, 1e-6])
+@pytest.mark.parametrize("scale", [1e6, 3.7, 1e-6])
 def test_hair_scales_with_its_surface(sphere, scale):
     """The same head in nanometres or in thousands of kilometres has the same hair."""
-    expected = points(grow(length=0.3)[1])
+    sphere.rotation_euler = (0.4, 0.0, 0.3)
+    bpy.context.view_layer.update()
+    expected = [points(curves_object) for curves_object in grow(length=0.3, gravity=0.0)]
     bpy.ops.vellus.delete_hair()
     sphere.scale = (scale,) * 3
     bpy.context.view_layer.update()
-    found = points(grow(length=0.3 * scale)[1])
-    # Relaxation amplifies the rounding of coordinates; roots are 0.5 apart.
-    np.testing.assert_allclose(found, expected, atol=0.05)
+    found = [points(curves_object) for curves_object in grow(length=0.3 * scale, gravity=0.0)]
+    for strands, others in zip(found, expected, strict=True):
+        np.testing.assert_allclose(strands, others, atol=1e-5)
+
+
+@pytest.mark.parametrize("rotation", [(0.4, 0.0, 0.3), (math.pi, 1.0, 0.0)])
+@pytest.mark.parametrize("curvature", [0.0, 1.0])
+def test_turning_a_surface_moves_no_root(sphere, rotation, curvature):
+    """Placed on the turned mesh, roots came a third of their distance elsewhere: relaxation amplifies rounding."""
+    expected = [points(curves_object)[:, 0] for curves_object in grow(guide_count=100, curvature=curvature)]
+    bpy.ops.vellus.delete_hair()
+    sphere.rotation_euler = rotation
+    bpy.context.view_layer.update()
+    found = [points(curves_object)[:, 0] for curves_object in grow(guide_count=100, curvature=curvature)]
+    for roots, others in zip(found, expected, strict=True):
+        np.testing.assert_allclose(roots, others, atol=1e-6)
+
+
+@pytest.mark.parametrize("scale", [(2, 2, 2), (-2, 2, 2), (2, 1, 1), (-1, 2, 1)])
+def test_symmetric_guides_mirror_the_objects_own_axis(sphere, scale):
+    """However it is turned and scaled; an ico sphere is its own image to a few thousandths."""
+    sphere.rotation_euler, sphere.scale = (0.3, 0.2, 0.5), scale
+    bpy.context.view_layer.update()
+    bpy.ops.vellus.distribute_guides(guide_count=20, symmetric=True, relax_iterations=3, length=0.3)
+    strands = points(bpy.data.objects["Guides"])
+    np.testing.assert_allclose(strands[10:], strands[:10] * np.float32([-1, 1, 1]), atol=5e-3)
 
 
 @pytest.mark.parametrize("scale", [(-1, 1, 1), (1, -2, 1), (-1, -1, -1)])

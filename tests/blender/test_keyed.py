@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender import materials, pipeline
+from hair_addon.blender import looks, materials, pipeline
 from hair_addon.core.shading import appearance
 from tests.blender.reading import points
 
@@ -49,7 +49,7 @@ def test_a_frame_is_the_same_whichever_came_before(keyed_hair):
 def test_nothing_is_made_again_that_is_not_keyed_or_stands_still(keyed_hair, monkeypatch):
     made = []
     monkeypatch.setattr(pipeline, "interpolate_hair", lambda *args: made.append("hair"))
-    monkeypatch.setattr(pipeline, "evaluate_shading", lambda *args: made.append("shading"))
+    monkeypatch.setattr(looks, "evaluate_shading", lambda *args: made.append("shading"))
     scene = bpy.context.scene
     scene.frame_set(20)
     assert made == ["hair", "shading"]

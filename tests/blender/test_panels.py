@@ -6,7 +6,7 @@ import math
 import bpy
 import pytest
 
-from hair_addon.blender import menus, panels, running
+from hair_addon.blender import menus, panels, running, scene
 from hair_addon.core import estimate
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.long_work import Job
@@ -144,7 +144,34 @@ def test_work_under_way_is_a_bar_and_nothing_else(hair, monkeypatch):
 
 def test_memory_grows_with_the_count():
     assert estimate.gpu_bytes(2000) == 2 * estimate.gpu_bytes(1000)
-    assert math.isfinite(estimate.hair_seconds(HairSettings())) and estimate.guide_seconds(GuideSettings()) > 0.0
+    assert math.isfinite(estimate.hair_seconds(HairSettings(), 1)) and estimate.guide_seconds(GuideSettings(), 1) > 0.0
+
+
+def test_long_work_is_announced_and_short_work_is_not(hair):
+    """By what the surface has once its modifiers are evaluated, and by what was asked for."""
+    sphere, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
+
+    def announced():
+        return [
+            any(text.startswith("Takes about") for text in draw(named(name)).texts)
+            for name in ("guides", "interpolation")
+        ]
+
+    assert announced() == [False, False]
+    guides.data.vellus.is_live = hair.data.vellus.is_live = False
+    guides.data.vellus.guides.guide_count = 50_000
+    assert announced() == [True, False]
+    hair.data.vellus.hair.strand_count = 1_000_000
+    assert announced() == [True, True]
+    guides.data.vellus.guides.guide_count, hair.data.vellus.hair.strand_count = 60, 500
+    sphere.modifiers.new("Subdivision", "SUBSURF").levels = 4
+    bpy.context.view_layer.update()
+    assert scene.triangle_count(sphere, bpy.context.view_layer) == 1280 * 3 * 4**3 * 2
+    assert announced() == [True, False]
+    bpy.data.hair_curves.remove(guides.data)
+    bpy.data.hair_curves.remove(hair.data)
+    bpy.context.view_layer.objects.active = sphere
+    assert any(text.startswith("Takes about") for text in draw(named("guides")).texts)
 
 
 def test_labels_leave_room_for_their_values():

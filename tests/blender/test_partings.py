@@ -257,7 +257,8 @@ def test_the_guide_map_is_what_strands_follow(guides):
         indices, weights = curves.read_guide_map(hair.data)
         np.testing.assert_array_equal(weights, expected.weights.numpy())
         np.testing.assert_array_equal(indices, np.where(weights > 0.0, expected.indices.numpy(), -1))
-        np.testing.assert_array_equal(indices[:, 0], attribute(hair, "guide_curve_index"))
+        leaders = attribute(hair, "guide_curve_index")
+        np.testing.assert_array_equal(indices[leaders, 0], indices[:, 0])
 
     assert_stored()
     _, before = curves.read_guide_map(hair.data)

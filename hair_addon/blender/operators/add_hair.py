@@ -5,7 +5,7 @@ import bpy
 
 from ...core import estimate
 from ...core.groom import GuideSettings, HairSettings
-from .. import pipeline, properties
+from .. import pipeline, properties, scene
 from ..selection import make_active, object_of, surface_of
 from .modal import LongOperator
 
@@ -26,7 +26,8 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
 
     def seconds(self, context):
         guide_settings, hair_settings = self._settings()
-        return estimate.guide_seconds(guide_settings) + estimate.hair_seconds(hair_settings)
+        face_count = scene.triangle_count(context.object, context.view_layer)
+        return estimate.guide_seconds(guide_settings, face_count) + estimate.hair_seconds(hair_settings, face_count)
 
     def work(self, context):
         return pipeline.adding_hair(surface_of(context.object), *self._settings(), context.evaluated_depsgraph_get())

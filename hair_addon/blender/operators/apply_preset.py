@@ -4,7 +4,7 @@
 import bpy
 
 from ...core.shading.presets import PRESETS
-from .. import pipeline, properties
+from .. import looks, properties
 from ..selection import hair_of
 from .base import HairOperator
 
@@ -27,5 +27,5 @@ class VELLUS_OT_apply_preset(HairOperator, bpy.types.Operator):
 
     def change(self, context):
         label, look = PRESETS[self.preset]
-        pipeline.apply_look(hair_of(context.object), look)
+        looks.apply_look(hair_of(context.object), look)
         return label, {}

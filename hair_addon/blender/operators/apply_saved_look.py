@@ -3,7 +3,7 @@
 
 import bpy
 
-from .. import pipeline, properties, saved_looks
+from .. import looks, properties, saved_looks
 from ..selection import hair_of
 from .base import HairOperator
 
@@ -21,4 +21,4 @@ class VELLUS_OT_apply_saved_look(HairOperator, bpy.types.Operator):
         return hair_of(context.object) is not None
 
     def change(self, context):
-        pipeline.apply_look(hair_of(context.object), saved_looks.read(self.name))
+        looks.apply_look(hair_of(context.object), saved_looks.read(self.name))

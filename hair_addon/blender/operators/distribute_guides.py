@@ -5,7 +5,7 @@ import bpy
 
 from ...core import estimate
 from ...core.groom import GuideSettings
-from .. import pipeline, properties
+from .. import pipeline, properties, scene
 from ..selection import guides_again, surface_of
 from .modal import LongOperator
 
@@ -28,7 +28,8 @@ class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
             properties.copy(guides.vellus.guides, self, GuideSettings)
 
     def seconds(self, context):
-        return estimate.guide_seconds(properties.to_settings(self, GuideSettings))
+        face_count = scene.triangle_count(surface_of(context.object), context.view_layer)
+        return estimate.guide_seconds(properties.to_settings(self, GuideSettings), face_count)
 
     def work(self, context):
         settings = properties.to_settings(self, GuideSettings)

@@ -5,7 +5,7 @@ import bpy
 
 from ...core import estimate
 from ...core.groom import HairSettings
-from .. import pipeline, properties
+from .. import pipeline, properties, scene
 from ..selection import active_of_kind, guides_of
 from .modal import LongOperator
 
@@ -28,7 +28,9 @@ class VELLUS_OT_interpolate_hair(LongOperator, bpy.types.Operator):
             properties.copy(hair.vellus.hair, self, HairSettings)
 
     def seconds(self, context):
-        return estimate.hair_seconds(properties.to_settings(self, HairSettings))
+        surface = guides_of(context.object).surface
+        face_count = 0 if surface is None else scene.triangle_count(surface, context.view_layer)
+        return estimate.hair_seconds(properties.to_settings(self, HairSettings), face_count)
 
     def work(self, context):
         settings = properties.to_settings(self, HairSettings)

@@ -3,7 +3,7 @@
 
 import bpy
 
-from .. import pipeline
+from .. import looks
 from ..selection import drawn_with
 from .base import HairOperator
 
@@ -21,4 +21,4 @@ class VELLUS_OT_toggle_drawing(HairOperator, bpy.types.Operator):
 
     def change(self, context):
         hair = drawn_with(context.object)
-        pipeline.show_shaded(hair, not all(datablock.vellus.is_drawn for datablock in hair))
+        looks.show_shaded(hair, not all(datablock.vellus.is_drawn for datablock in hair))

@@ -3,10 +3,12 @@
 
 import bpy
 
+from ...core import estimate
 from ...core.groom import GuideSettings
+from ..scene import triangle_count
 from ..selection import guides_again, guides_of, surface_of
 from ..translations import interface_text
-from .tab import HairTab, others, rows, split, write
+from .tab import HairTab, draw_work, others, rows, split, write
 
 _GROWTH = ("length_variation", "tilt", "gravity")
 _PLACES = ("seed", "relax_iterations", "curvature", "symmetric")
@@ -27,6 +29,7 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
         layout = split(self.layout)
         guides, surface = guides_of(context.object), surface_of(context.object)
         if guides is None:
+            _draw_work(layout, context, surface, GuideSettings())
             layout.operator("vellus.distribute_guides", icon="OUTLINER_OB_CURVES")
             return
         if guides.vellus.status:
@@ -39,10 +42,19 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
         layout.prop(guides.vellus, "is_live")
         if len(guides.curves) != group.guide_count:  # somebody added or removed some
             layout.label(text=interface_text("{count} guides", count=len(guides.curves)), icon="INFO", translate=False)
+        if surface is not None:
+            _draw_work(layout, context, surface, group)
         if guides_again(context.object) is not None:
             layout.operator("vellus.distribute_guides", text="Distribute Again", icon="FILE_REFRESH")
         else:
             layout.operator("vellus.distribute_guides", text="Add More Guides", icon="ADD")
+
+
+def _draw_work(layout, context, surface, settings):
+    """settings: `GuideSettings`, or properties of the same names."""
+    face_count = triangle_count(surface, context.view_layer)
+    seconds, byte_count = (cost(settings, face_count) for cost in (estimate.guide_seconds, estimate.guide_work_bytes))
+    draw_work(layout, seconds, byte_count)
 
 
 class _OfGuides(HairTab):

@@ -5,10 +5,11 @@ import bpy
 
 from ...core import estimate
 from ...core.groom import HairSettings
+from ..scene import triangle_count
 from ..selection import active_of_kind, guides_of, hair_of
 from ..surface_checks import parting_warnings
 from ..translations import interface_text
-from .tab import HairTab, megabytes, others, rows, split, write
+from .tab import HairTab, draw_work, megabytes, others, rows, split, write
 
 _OWN_ROW = ("density_group", "influence_distance", "region_group", "region_attribute", "part_lines")
 _LIMITS = ("angle_limit", "length_limit")
@@ -40,6 +41,10 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             layout.prop_search(state.hair, "density_group", hair.surface, "vertex_groups")
         layout.prop(state, "is_live")
         _draw_cost(layout, state.hair)
+        if hair.surface is not None:
+            face_count = triangle_count(hair.surface, context.view_layer)
+            costs = estimate.hair_seconds, estimate.hair_work_bytes
+            draw_work(layout, *(cost(state.hair, face_count) for cost in costs))
         is_again = active_of_kind(context.object, "HAIR") is not None
         text, icon = ("Interpolate Again", "FILE_REFRESH") if is_again else ("Add More Hair", "ADD")
         layout.operator("vellus.interpolate_hair", text=text, icon=icon)

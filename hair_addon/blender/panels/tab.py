@@ -11,6 +11,8 @@ _CHARACTER_WIDTH = 6.8  # pixels of Blender's interface font on average, at a sc
 _ICON_AND_MARGINS = 66.0
 _NARROWEST = 18  # characters
 
+LONG, LARGE = 2.0, 500e6  # [s], [bytes]: work that takes less is not spoken of
+
 
 class HairTab:
     """Mixed into every panel of the tab."""
@@ -54,6 +56,20 @@ def write(layout, context, text, icon="NONE"):
 def megabytes(count):
     """Bytes as an artist reads them."""
     return f"{count / 1e6:.0f} MB" if count >= 1e7 else f"{count / 1e6:.1f} MB"
+
+
+def draw_work(layout, seconds, byte_count):
+    """What work will take, where that is much."""
+    if seconds >= LONG or byte_count >= LARGE:
+        text = interface_text(
+            "Takes about {seconds} s, {memory}", seconds=_rounded(seconds), memory=megabytes(byte_count)
+        )
+        layout.label(text=text, icon="SORTTIME", translate=False)
+
+
+def _rounded(seconds):
+    """To one digit: nobody knows better."""
+    return f"{float(f'{seconds:.0e}'):g}"
 
 
 def draw_progress(layout):

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What work is said to take beside what it takes: as ratios between sizes, in one run."""
+
+import time
+
+import numpy as np
+import pytest
+import warp as wp
+
+from hair_addon.core import estimate, groom, hash_grid
+from hair_addon.core.groom import GuideSettings, HairSettings
+from hair_addon.core.mesh import TriMesh
+from tests.core.conftest import flat_grid
+
+FACTOR = 3.0  # that a ratio between two sizes may be off by
+
+
+def hills(side_count):
+    """An open square of hills, 2 side_count² triangles."""
+    flat = flat_grid(side_count)
+    vertices = flat.vertices.copy()
+    vertices[:, 2] = 0.1 * np.sin(7.0 * vertices[:, 0]) * np.cos(5.0 * vertices[:, 1])
+    return TriMesh(vertices, flat.triangles)
+
+
+def seconds(work, repetitions=2):
+    """The best time of several."""
+    times = []
+    for _ in range(repetitions):
+        start = time.perf_counter()
+        work()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def place(mesh, settings):
+    """Guides on a mesh of which nothing is known from the last run."""
+    return groom.distribute_guides(TriMesh(mesh.vertices, mesh.triangles), settings)
+
+
+def assert_proportional(cases):
+    """cases: {what: (measured, estimated)}; the quotients of any two differ by at most the factor."""
+    quotients = {what: measured / estimated for what, (measured, estimated) in cases.items()}
+    for what, quotient in quotients.items():
+        print(f"{what}: {cases[what][0]:.3f} s, {quotient:.2f} of what is said")
+    assert max(quotients.values()) <= FACTOR * min(quotients.values())
+
+
+def test_placing_takes_what_is_said():
+    place(hills(10), GuideSettings(guide_count=300))  # kernels are loaded
+    cases = {}
+    for side_count, guide_count in ((32, 1000), (32, 8000), (200, 1000), (350, 200), (350, 4000)):
+        mesh, settings = hills(side_count), GuideSettings(guide_count=guide_count)
+        face_count = len(mesh.triangles)
+        measured = seconds(lambda mesh=mesh, settings=settings: place(mesh, settings))
+        cases[f"{face_count} triangles, {guide_count} guides"] = measured, estimate.guide_seconds(settings, face_count)
+    assert_proportional(cases)
+
+
+def test_growing_takes_what_is_said():
+    cases = {}
+    for side_count, strand_count in ((32, 100_000), (32, 300_000), (350, 30_000), (350, 300_000)):
+        mesh, settings = hills(side_count), HairSettings(strand_count=strand_count)
+        guides = place(mesh, GuideSettings(guide_count=500, relax_iterations=0))
+        face_count = len(mesh.triangles)
+
+        def grow(mesh=mesh, guides=guides, settings=settings):
+            return groom.generate_hair(TriMesh(mesh.vertices, mesh.triangles), guides, settings)
+
+        measured = seconds(grow)
+        cases[f"{face_count} triangles, {strand_count} strands"] = measured, estimate.hair_seconds(settings, face_count)
+    assert_proportional(cases)
+
+
+@pytest.mark.long
+def test_time_goes_with_the_number_of_guides():
+    """Ten times as many take no more than thirty times as long; looking at all pairs took a hundred."""
+    mesh = hills(30)
+    few, many = (GuideSettings(guide_count=count, relax_iterations=1) for count in (6000, 60_000))
+    assert seconds(lambda: place(mesh, many), 1) < 30.0 * seconds(lambda: place(mesh, few))
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_lone_point_is_found_as_quickly_as_one_of_two(rng, count):
+    queries = wp.array(rng.random((100_000, 3), dtype=np.float32), dtype=wp.vec3, device="cpu")
+
+    def search(point_count):
+        points = wp.array(np.tile(np.float32([0.5, 0.5, 0.5]), (point_count, 1)), dtype=wp.vec3, device="cpu")
+        return seconds(lambda: hash_grid.neighbours(points, queries, 4.0, 1))
+
+    pair = wp.array(np.float32([[0.2, 0.5, 0.5], [0.8, 0.5, 0.5]]), dtype=wp.vec3, device="cpu")
+    assert search(count) < 4.0 * seconds(lambda: hash_grid.neighbours(pair, queries, 4.0, 1))
