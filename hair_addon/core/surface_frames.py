@@ -55,9 +55,21 @@ def vertex_axes(before, after, faces):
     sums = np.stack(
         [np.bincount(faces.corner_vertices, of_corners[:, i], minlength=len(before)) for i in range(9)], axis=1
     )
-    # The mean but for its length, of which the nearest rotation knows nothing.
-    left, _stretches, right = np.linalg.svd(sums.reshape(-1, 3, 3))
-    return np.ascontiguousarray(np.swapaxes(left @ right, 1, 2)[:, :2], np.float32)
+    # The mean but for its length, of which the nearest rotation knows nothing; none at all where nothing moves.
+    is_moved = _has_moving_face(before, after, faces)
+    left, _stretches, right = np.linalg.svd(sums[is_moved].reshape(-1, 3, 3))
+    axes = np.tile(np.eye(3, dtype=np.float32)[:2], (len(before), 1, 1))
+    axes[is_moved] = np.swapaxes(left @ right, 1, 2)[:, :2]
+    return axes
+
+
+def _has_moving_face(before, after, faces):
+    """(V,) bool: whether any corner of a vertex' faces moves."""
+    corners_move = (before != after).any(axis=1)[faces.corner_vertices]
+    faces_move = np.logical_or.reduceat(corners_move, faces.starts[:-1]) if len(corners_move) else corners_move
+    is_moved = np.zeros(len(before), bool)
+    is_moved[faces.corner_vertices[np.repeat(faces_move, np.diff(faces.starts))]] = True
+    return is_moved
 
 
 def _bases(vertices, corners):
@@ -118,6 +130,7 @@ def _carry(
     to_root = wp.vec3()
     x_axis = wp.vec3()
     y_axis = wp.vec3()
+    change = float(0.0)
     for corner in range(3):
         vertex = root_vertices[strand][corner]
         weight = barycentric[strand][corner]
@@ -125,6 +138,13 @@ def _carry(
         to_root += weight * after[vertex]
         x_axis += weight * axes[vertex, 0]
         y_axis += weight * axes[vertex, 1]
+        change += wp.length_sq(after[vertex] - before[vertex])
+        change += wp.length_sq(axes[vertex, 0] - wp.vec3(1.0, 0.0, 0.0))
+        change += wp.length_sq(axes[vertex, 1] - wp.vec3(0.0, 1.0, 0.0))
+    if change == 0.0:
+        for point in range(points.shape[1]):  # what rests stays where it is, to the last bit
+            out_points[strand, point] = points[strand, point]
+        return
     x_axis = _unit(x_axis, wp.vec3(1.0, 0.0, 0.0))
     z_axis = _unit(wp.cross(x_axis, y_axis), wp.vec3(0.0, 0.0, 1.0))
     rotation = wp.matrix_from_cols(x_axis, wp.cross(z_axis, x_axis), z_axis)
