@@ -298,7 +298,7 @@ def _shapes(
     tip = wp.vec3(wp.dot(tangent, tip), wp.dot(bitangent, tip), wp.dot(normal, tip))
     out_leans[guide, 0] = wp.normalize(lower)
     out_leans[guide, 1] = wp.normalize(tip)
-    out_lengths[guide] = wp.log(wp.max(length, 1.0e-30))
+    out_lengths[guide] = wp.log(wp.clamp(length, 1.0e-30, 1.0e30))
 
 
 @wp.func

@@ -82,13 +82,13 @@ def test_hair_grows_on_odd_meshes(scene, name):
 @pytest.mark.parametrize("scale", [1e6, 1e-6])
 def test_hair_scales_with_its_surface(sphere, scale):
     """The same head in nanometres or in thousands of kilometres has the same hair."""
-    expected = points(grow(length=0.3)[1])
+    expected = points(grow(length=0.3, angle_limit=math.pi)[1])  # without the steps of a parting
     bpy.ops.vellus.delete_hair()
     sphere.scale = (scale,) * 3
     bpy.context.view_layer.update()
-    found = points(grow(length=0.3 * scale)[1])
-    # Relaxation amplifies the rounding of coordinates; roots are 0.5 apart.
-    np.testing.assert_allclose(found, expected, atol=0.05)
+    found = points(grow(length=0.3 * scale, angle_limit=math.pi)[1])
+    # Relaxation amplifies the rounding of coordinates: guides' roots, 1 apart, come to lie 0.1 elsewhere.
+    np.testing.assert_allclose(found, expected, atol=0.1)
 
 
 @pytest.mark.parametrize("scale", [(-1, 1, 1), (1, -2, 1), (-1, -1, -1)])
