@@ -24,7 +24,7 @@ SIDE = 500  # pixels of one picture
 CAPTION = 64
 RADIUS = 1.1e-4  # [m]
 NEAR = 0.012  # [m] from the part line
-HAIR, STRAY = (0.13, 0.055, 0.022, 1.0), (1.0, 0.32, 0.02, 1.0)
+BROWN, SHEEN, ORANGE = (0.10, 0.045, 0.020, 1.0), (0.10, 0.07, 0.05, 1.0), (1.0, 0.32, 0.02, 1.0)
 
 
 def main():
@@ -125,15 +125,25 @@ def strays(strands, combed):
 
 
 def light():
-    """A camera above the head, and lights that show where hair lies."""
+    """A camera above the head, a sun from the left and one from behind, and a grey world."""
     scene = bpy.context.scene
-    head.light()
-    camera = scene.camera
-    camera.data.lens = 120.0
-    camera.location = (head.PARTING, -0.12, 1.45)
-    head_top = Vector((head.PARTING, -0.045, 0.80))
-    camera.rotation_euler = (head_top - camera.location).to_track_quat("-Z", "Y").to_euler()
-    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 16, False
+    top = Vector((head.PARTING - 0.012, -0.055, 0.80))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.lens, camera.data.clip_start = 90.0, 0.01
+    camera.location = top + Vector((0.0, -0.14, 0.75))
+    camera.rotation_euler = (top - camera.location).to_track_quat("-Z", "Y").to_euler()
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    for direction, strength in (((-0.7, -0.5, 0.6), 3.0), ((0.5, 0.9, 0.6), 1.5)):
+        sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+        sun.data.energy = strength
+        sun.rotation_euler = Vector(direction).to_track_quat("Z", "Y").to_euler()
+        scene.collection.objects.link(sun)
+    world = scene.world = bpy.data.worlds.new("World")
+    background = next(n for n in world.node_tree.nodes if n.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (0.25, 0.26, 0.28, 1.0)
+    scene.render.engine, scene.cycles.samples, scene.cycles.use_denoising = "CYCLES", 24, False
+    scene.cycles.max_bounces = 1
     scene.render.resolution_x = scene.render.resolution_y = SIDE
     scene.render.image_settings.file_format = "PNG"
 
@@ -162,17 +172,20 @@ def picture(strands, stray, skull):
 
 
 def _material():
-    """Hair, and plain orange where the attribute `stray` is one."""
+    """Brown with a sheen along the strands, and plain orange where the attribute `stray` is one."""
     material = bpy.data.materials.new("Hair")
     nodes, links = material.node_tree.nodes, material.node_tree.links
     nodes.clear()
-    output, mix = nodes.new("ShaderNodeOutputMaterial"), nodes.new("ShaderNodeMixShader")
-    hair, stray = nodes.new("ShaderNodeBsdfHairPrincipled"), nodes.new("ShaderNodeBsdfDiffuse")
+    output, mix, both = (nodes.new(f"ShaderNode{name}") for name in ("OutputMaterial", "MixShader", "AddShader"))
+    sheen, brown, stray = (nodes.new(f"ShaderNodeBsdf{name}") for name in ("Hair", "Diffuse", "Diffuse"))
     mask = nodes.new("ShaderNodeAttribute")
     mask.attribute_name = "stray"
-    hair.inputs["Color"].default_value, stray.inputs["Color"].default_value = HAIR, STRAY
+    sheen.inputs["Color"].default_value = SHEEN
+    brown.inputs["Color"].default_value, stray.inputs["Color"].default_value = BROWN, ORANGE
+    links.new(brown.outputs[0], both.inputs[0])
+    links.new(sheen.outputs[0], both.inputs[1])
     links.new(mask.outputs["Fac"], mix.inputs["Fac"])
-    links.new(hair.outputs[0], mix.inputs[1])
+    links.new(both.outputs[0], mix.inputs[1])
     links.new(stray.outputs[0], mix.inputs[2])
     links.new(mix.outputs[0], output.inputs["Surface"])
     return material
