@@ -161,11 +161,11 @@ def write_hair(target):
         radii = groom.strand_radii(bound.settings, bound.points.shape[1])
         nearest = bound.binding.guide_weights.indices.numpy()[:, 0]
         curves.write_strands(target, bound.surface, bound.points, bound.binding.roots, radii, nearest)
-    guide_map = groom.weights_now(bound.binding, bound.guides) if bound.settings.guide_map else None
-    curves.write_guide_map(target, guide_map)
+    if not bound.is_map_written:
+        curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
     state.is_stale = False  # as which another choice of guides marks it
     state.followed = guides_digest(state.guide_curves)
-    bound.is_written = bound.has_moved_only = True
+    bound.is_written = bound.has_moved_only = bound.is_map_written = True
     _store_roots(state.guide_curves, bound)
 
 
@@ -238,6 +238,8 @@ def follow_guides(target):
     moved = bound.reach.of(combed)
     if len(moved):
         bound.points[moved] = bound.surface.to_local(groom.follow_some(bound.binding, guides, moved))
+        if bound.settings.guide_map:
+            bound.weigh_again(moved)
         bound.has_moved_only = bound.is_written or bound.has_moved_only
         bound.is_written = False
     return moved
