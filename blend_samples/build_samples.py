@@ -9,6 +9,7 @@ import bpy
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import head  # beside this file
+import parting
 
 import hair_addon
 
@@ -21,7 +22,16 @@ def build_head():
     head.light()
 
 
-SAMPLES = {"head": build_head}
+def build_parting():
+    """The head with a line drawn along its parting, which no strand follows guides across."""
+    skull = head.build()
+    _guides, hair = head.grow(skull, guide_count=300)
+    hair.data.vellus.hair.part_lines = parting.draw_part_line(skull).name
+    bpy.context.view_layer.update()
+    head.light()
+
+
+SAMPLES = {"head": build_head, "parting": build_parting}
 
 
 def main():

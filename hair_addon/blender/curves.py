@@ -124,22 +124,18 @@ def write_strands(curves, surface, points, roots, radii, leaders=None, normals=N
     write_roots(curves, surface, roots, normals)
 
 
-def write_guide_map(curves, guide_weights):
-    """Store the `GuideWeights` of strands, a pair of attributes for each guide that one follows; None removes them.
+def write_guide_map(curves, guide_map):
+    """Store (S, k) int32 guides of strands and (S, k) float32 weights, a pair of attributes for each k; None: remove.
 
-    guide_index_0 to guide_weight_0 are the nearest's; guides that a strand does without have the index -1.
+    guide_index_0 and guide_weight_0 are the nearest's.
     """
-    slot_count = 0 if guide_weights is None else guide_weights.indices.shape[1]
+    slot_count = 0 if guide_map is None else guide_map[0].shape[1]
     for attribute in list(curves.attributes):
         kind, _, slot = attribute.name.rpartition("_")
         if kind in _GUIDE_MAP and slot.isdecimal() and int(slot) >= slot_count:
             curves.attributes.remove(attribute)
-    if not slot_count:
-        return
-    indices, weights = guide_weights.indices.numpy(), guide_weights.weights.numpy()
-    indices = np.where(weights > 0.0, indices, -1)
     for slot in range(slot_count):
-        for name, data_type, values in zip(_GUIDE_MAP, ("INT", "FLOAT"), (indices, weights), strict=True):
+        for name, data_type, values in zip(_GUIDE_MAP, ("INT", "FLOAT"), guide_map, strict=True):
             _write_attribute(curves, f"{name}_{slot}", data_type, "CURVE", values[:, slot])
 
 

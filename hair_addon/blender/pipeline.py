@@ -164,11 +164,11 @@ def write_hair(target):
         leaders = groom.leading_strands(bound.surface.mesh, bound.guides, binding)
         normals = binding.normals.numpy()
         curves.write_strands(target, bound.surface, bound.points, binding.roots, radii, leaders, normals)
-    guide_map = groom.weights_now(bound.binding, bound.guides) if bound.settings.guide_map else None
-    curves.write_guide_map(target, guide_map)
+    if not bound.is_map_written:
+        curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
     state.is_stale = False  # as which another choice of guides marks it
     state.followed = guides_digest(state.guide_curves)
-    bound.is_written = bound.has_moved_only = bound.is_report_due = True
+    bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
     _store_roots(state.guide_curves, bound)
 
 
@@ -241,6 +241,8 @@ def follow_guides(target):
     moved = bound.reach.of(combed)
     if len(moved):
         bound.points[moved] = bound.surface.to_local(groom.follow_some(bound.binding, guides, moved))
+        if bound.settings.guide_map:
+            bound.weigh_again(moved)
         bound.has_moved_only = bound.is_written or bound.has_moved_only
         bound.is_written = False
     return moved

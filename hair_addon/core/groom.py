@@ -296,20 +296,24 @@ def follow_some(binding, guides, chosen):
 
     from .guide_weights import rows
 
+    weights = weights_now(binding, guides, chosen)
     chosen = wp.array(chosen, dtype=int, device=binding.positions.device)
-    roots, root_normals = rows(binding.positions, chosen), rows(binding.normals, chosen)
-    return _follow(binding, guides, roots, root_normals, weights_now(binding, guides, chosen)).numpy()
+    return _follow(binding, guides, rows(binding.positions, chosen), rows(binding.normals, chosen), weights).numpy()
 
 
 def weights_now(binding, guides, chosen=None):
-    """The `GuideWeights` by which strands follow the guides as combed now; chosen: int32 Warp array, None for all."""
+    """The `GuideWeights` by which strands follow the guides as combed now; chosen: (M,) indices of some, None: all."""
+    import warp as wp
+
     from . import guide_weights
 
     if len(guides) != len(binding.guide_normals):
         raise HairError(
             f"The hair was bound to {len(binding.guide_normals)} guides and there are {len(guides)} now: bind it again."
         )
-    weights = binding.guide_weights if chosen is None else binding.guide_weights.of(chosen)
+    weights = binding.guide_weights
+    if chosen is not None:
+        weights = weights.of(wp.array(chosen, dtype=int, device=binding.positions.device))
     return guide_weights.limited(weights, _guide_points(binding, guides), binding.guide_normals, binding.limits)
 
 

@@ -28,7 +28,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 STRETCH = 1.25
 EVERYWHERE = 1e18  # [m]: a distance to search that leaves nothing out
-SURPLUS = 3  # as many times the guides wanted are looked at where part lines are in the way of some
+SURPLUS = 3  # times the guides wanted are looked at where a part line may be in the way of some
 
 UNLIMITED = 200.0  # in logarithms of lengths: more than any two floats differ by
 FADE = math.radians(30.0)  # of the angle limit, over which a guide's share fades
@@ -100,11 +100,9 @@ def find_guides(
     influence_distance: d [m], None for automatic; neighbour_limit: k; regions: (S,) and (G,) int32, no strand follows
     guides of two, nor of another than its own if that has any; lines: `PartLines` that no way to a guide crosses.
     """
-    count = neighbour_limit + 1 if lines is None else min(SURPLUS * (neighbour_limit + 1), hash_grid.LIMIT)
-    candidates, ways = _nearest_guides(guide_roots, roots, count, regions)
-    unseen = ways[:, count - 1].contiguous()
+    candidates, ways = _nearest_guides(guide_roots, roots, neighbour_limit + 1, regions)
     if lines is not None:
-        part_lines.go_round(lines, roots, normals, guide_roots, guide_normals, candidates, ways)
+        candidates, ways = _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions)
     device = roots.device
     indices = wp.empty((len(roots), neighbour_limit), dtype=int, device=device)
     weights = wp.empty(indices.shape, dtype=float, device=device)
@@ -112,14 +110,7 @@ def find_guides(
     cores.launch(
         _weigh,
         len(roots),
-        inputs=[
-            Rows(candidates),
-            Rows(ways),
-            Rows(unseen),
-            Rows(normals),
-            guide_normals,
-            influence_distance or 0.0,
-        ],
+        inputs=[Rows(candidates), Rows(ways), Rows(normals), guide_normals, influence_distance or 0.0],
         outputs=[indices, weights, turns],
         device=device,
     )
@@ -146,6 +137,29 @@ def _nearest_guides(guide_roots, roots, count, regions):
         indices[its] = np.where(found >= 0, own[found], -1)
         distances[its] = apart.numpy()
     return wp.array(indices, device=device), wp.array(distances, device=device)
+
+
+def _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions):
+    """Candidates and ways (S, k + 1) as they are around part lines.
+
+    More guides are looked at where a line is near: those behind it make room. The last way is no longer than to a guide
+    that was not looked at.
+    """
+    near = part_lines.near(lines, roots, ways)
+    if not len(near):
+        return candidates, ways
+    count = candidates.shape[1]
+    its_regions = None if regions is None else (regions[0][near], regions[1])
+    its_roots = _some(roots, near)
+    most = min(SURPLUS * count, hash_grid.LIMIT)
+    found, lengths = _nearest_guides(guide_roots, its_roots, most, its_regions)
+    unseen = lengths.numpy()[:, -1].copy()
+    part_lines.go_round(lines, its_roots, _some(normals, near), guide_roots, guide_normals, found, lengths)
+    lengths = lengths.numpy()[:, :count].copy()
+    lengths[:, -1] = np.minimum(lengths[:, -1], unseen)
+    candidates, ways = candidates.numpy().copy(), ways.numpy().copy()
+    candidates[near], ways[near] = found.numpy()[:, :count], lengths
+    return wp.array(candidates, device=roots.device), wp.array(ways, device=roots.device)
 
 
 def _some(array, chosen):
@@ -213,7 +227,6 @@ def _turn(guide_normal: wp.vec3, normal: wp.vec3):
 def _weigh(
     candidates: wp.array2d[int],
     ways: wp.array2d[float],
-    unseen: wp.array[float],
     normals: wp.array[wp.vec3],
     guide_normals: wp.array[wp.vec3],
     influence_distance: float,
@@ -225,8 +238,7 @@ def _weigh(
     strand = wp.tid()
     limit = out_indices.shape[1]
     nearest = ways[strand, 0]
-    # The first guide that is left out, or that was not looked at.
-    left_out = wp.min(ways[strand, limit], unseen[strand])
+    left_out = ways[strand, limit]
     distance = influence_distance
     if distance == 0.0:
         distance = left_out
@@ -288,7 +300,7 @@ def _shapes(
     tip = wp.vec3(wp.dot(tangent, tip), wp.dot(bitangent, tip), wp.dot(normal, tip))
     out_leans[guide, 0] = wp.normalize(lower)
     out_leans[guide, 1] = wp.normalize(tip)
-    out_lengths[guide] = wp.log(wp.max(length, 1.0e-30))
+    out_lengths[guide] = wp.log(wp.clamp(length, 1.0e-30, 1.0e30))
 
 
 @wp.func

@@ -33,6 +33,7 @@ share = wp.types.vector(length=SHARE, dtype=float)
 
 # Of l_i, below which |m_i| counts as this: where guides cancel, a direction is rounding and nothing else.
 CANCELLED = 1.0e-3
+LONGEST = 1.0e18  # [m]: of a segment whose square is still a float
 
 
 def interpolate(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0):
@@ -115,7 +116,8 @@ def _framed_offset(guide_points: wp.array2d[wp.vec3], guide: int, point: int, no
 def _stretch(x: float, y: float, z: float, length: float, keep_length: float):
     """λ_i of a mean offset, or what part of it is wanted."""
     found = wp.max(wp.sqrt(x * x + y * y + z * z), wp.max(CANCELLED * length, 1.0e-30))
-    return 1.0 + keep_length * (length / found - 1.0)
+    stretch = 1.0 + keep_length * (length / found - 1.0)
+    return wp.where(found < LONGEST, stretch, 1.0)
 
 
 @wp.kernel

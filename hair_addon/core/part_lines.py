@@ -150,6 +150,13 @@ def _nearest_on(segments, place):
     return nearest[np.linalg.norm(nearest - place, axis=1).argmin()]
 
 
+def near(lines, roots, ways):
+    """(N,) int32: those of roots (S,) [m] that a line is nearer to than the last of their ways (S, K) [m] is long."""
+    is_near = wp.empty(len(roots), dtype=bool, device=roots.device)
+    wp.launch(_near, len(roots), [roots, ways, lines.points, lines.starts], outputs=[is_near], device=roots.device)
+    return np.flatnonzero(is_near.numpy()).astype(np.int32)
+
+
 def go_round(lines, roots, normals, guide_roots, guide_normals, candidates, ways):
     """Lengthen ways (S, K) [m] from roots to their candidate guides (S, K) where lines are between; sorts both again.
 
@@ -227,6 +234,27 @@ def _way_round(
         else:
             even = wp.inf
     return wp.min(even, odd)
+
+
+@wp.kernel
+def _near(
+    roots: wp.array[wp.vec3],
+    ways: wp.array2d[float],
+    points: wp.array[wp.vec3],
+    starts: wp.array[int],
+    # outputs
+    out_is_near: wp.array[bool],
+):
+    strand = wp.tid()
+    root = roots[strand]
+    farthest = ways[strand, ways.shape[1] - 1]
+    is_near = bool(False)
+    for line in range(starts.shape[0] - 1):
+        point = starts[line]
+        while point < starts[line + 1] - 1 and not is_near:
+            is_near = _distance_to_segment(root, points[point], points[point + 1]) <= farthest
+            point += 1
+    out_is_near[strand] = is_near
 
 
 @wp.kernel

@@ -196,7 +196,8 @@ def test_an_edited_vertex_moves_only_the_hair_around_it(sphere):
 
     edit(sphere, pull)
     far = np.linalg.norm(before[:, 0] - place, axis=1) > 1.5
-    assert far.any() and np.array_equal(points(hair)[far], before[far])
+    assert far.any()
+    np.testing.assert_allclose(points(hair)[far], before[far], atol=1e-6)  # guides are carried to rounding
 
 
 def test_other_faces_root_guides_again_and_say_so(sphere):

@@ -174,10 +174,11 @@ class Artist(RuleBasedStateMachine):
             (state.guides, "tilt"),
             (state.hair, "radius"),
             (state.hair, "influence_distance"),
+            *((state.hair, name) for name in ("angle_limit", "length_limit", "keep_length")),
             (state.appearance, "roughness"),
             (state.appearance, "melanin"),
             (state.marschner, "glint_gain"),
-        ][number % 7]
+        ][number % 10]
         setattr(group, name, value)
         changed("setting")
 

@@ -91,6 +91,23 @@ def test_segments_are_as_long_as_the_guides_are_on_average(scene):
     assert (shrunk / wanted).min() < 0.5 and np.all(shrunk <= wanted * (1.0 + 1e-4))
 
 
+@pytest.mark.parametrize("distance", [None, 0.2])
+def test_strands_change_without_a_step(rng, distance):
+    """The finer roots are walked past random guides, the less all points of the strand move from step to step."""
+    up = np.array([0.0, 0.0, 1.0])
+    roots = np.pad(rng.random((150, 2)), [(0, 0), (0, 1)])
+    curls = np.cumsum(0.03 * rng.normal(size=(150, 20, 3)) + 0.05 * up, axis=1)
+    guides = roots[:, None] + np.pad(curls, [(0, 0), (1, 0), (0, 0)])
+    along = np.linspace(0.1, 0.9, 20_001)
+    path = np.stack([along, 0.5 + 0.3 * np.sin(7.0 * along), 0.0 * along], axis=1)
+    strands = strands_between(path, np.tile(up, (20_001, 1)), guides, np.tile(up, (150, 1)), distance)
+    steepest = {}
+    for every in (1, 10):
+        moved = np.linalg.norm(np.diff(strands[::every], axis=0), axis=-1).max(axis=1)
+        steepest[every] = (moved / np.linalg.norm(np.diff(path[::every], axis=0), axis=1)).max()
+    assert steepest[1] < 40.0 and steepest[1] < 1.5 * steepest[10]
+
+
 def test_guides_that_cancel_make_no_noise():
     """Opposite guides leave no direction: the strand stays at its root, and does not grow along rounding errors."""
     guides = np.stack([np.linspace(0.0, 1.0, 9)[:, None] * np.array([side, 0.0, 0.0]) for side in (1.0, -1.0)])
