@@ -132,11 +132,12 @@ def distribute_guides(
         islands,
         sampled_cells,
         surface_query,
+        transform,
         voronoi,
     )
 
     _load_kernels(device, bspline, cut_cells, guides, hash_grid, sampled_cells, surface_query, voronoi)
-    _load_kernels("cpu", fingerprint, islands)
+    _load_kernels("cpu", fingerprint, islands, transform)
     relaxing = part_of(progress, 0.1, 0.9)
     mirror = ground.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
     if roots is None:
@@ -191,10 +192,10 @@ def bind_hair(mesh, guides, settings, *, density=None, roots=None, device="cpu",
     check_mesh(mesh)
     check_points(mesh, guides.roots)
     progress(COMPILING, 0.0)
-    from . import fingerprint, hash_grid, interpolation, rooting, sampling
+    from . import fingerprint, hash_grid, interpolation, rooting, sampling, transform
 
     _load_kernels(device, hash_grid, interpolation, rooting)
-    _load_kernels("cpu", fingerprint)
+    _load_kernels("cpu", fingerprint, transform)
     progress("Placing strands", 0.1)
     if roots is None:
         roots = sampling.sample_surface(mesh, settings.strand_count, settings.seed, density)

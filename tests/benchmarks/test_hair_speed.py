@@ -2,7 +2,8 @@
 """Strands between 4,000 guides of 41 points: ours beside Blender's own nodes and scipy, in one run.
 
 Prints tables and a line of JSON for each row: the best time of several, called in turns so that all meet the same
-machine, and the peer's time by ours. Asserted are ratios alone, with room for a machine that has other work.
+machine, and the peer's time by ours. Asserted are ratios alone, with room for a machine that has other work: those of
+the work that a process did, which is less moved by it.
 """
 
 import importlib.metadata
@@ -12,8 +13,10 @@ import platform
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pytest
 import warp as wp
 from scipy.spatial import cKDTree
@@ -52,27 +55,42 @@ def machine():
     return versions | {"processor": model, "processors": os.process_cpu_count(), "load": os.getloadavg()[0]}
 
 
+@dataclass(frozen=True)
+class Time:
+    """Seconds [s] on the clock, and of work on all cores together, which other programs hardly change."""
+
+    clock: float
+    work: float
+
+
 def best_times(calls, repetitions):
-    """{name: shortest time [s]} of calls that are made in turns."""
-    times = {name: [] for name in calls}
+    """{name: `Time`}, the shortest of each, of calls that are made in turns."""
+    clock, work = ({name: [] for name in calls} for _ in range(2))
     for _ in range(repetitions):
         for name, call in calls.items():
-            start = time.perf_counter()
+            start, start_of_work = time.perf_counter(), time.process_time()
             call()
-            times[name].append(time.perf_counter() - start)
-    return {name: min(measured) for name, measured in times.items()}
+            clock[name].append(time.perf_counter() - start)
+            work[name].append(time.process_time() - start_of_work)
+    return {name: Time(min(clock[name]), min(work[name])) for name in calls}
 
 
-def report(title, count, times, ours, asked=None):
-    """Print a table with a line of JSON for each row; {name: time by ours}."""
-    ratios = {name: seconds / times[ours] for name, seconds in times.items()}
-    print(f"\n{f'{title}, {count:,} strands':54} {'ms':>9}  by ours  asked")
-    for name, seconds in times.items():
-        wanted = (asked or {}).get(name)
-        print(f"  {name:52} {1e3 * seconds:9.1f} {ratios[name]:8.2f}  {'' if wanted is None else wanted}")
-    for name, seconds in times.items():
-        line = {"table": title, "strands": count, "row": name, "seconds": seconds, "by_ours": ratios[name]}
-        print(json.dumps(line | {"asked": (asked or {}).get(name)}))
+def report(title, count, times, asked, ours="ours"):
+    """Print a table with a line of JSON for each row; {name: `Time` by ours}."""
+    ratios = {
+        name: Time(found.clock / times[ours].clock, found.work / times[ours].work if found.work else np.nan)
+        for name, found in times.items()
+    }
+    print(f"\n{f'{title}, {count:,} strands':54} {'ms':>8} {'by ours':>8} {'work ms':>9} {'by ours':>8}  asked")
+    for name, found in times.items():
+        print(
+            f"  {name:52} {1e3 * found.clock:8.1f} {ratios[name].clock:8.2f}"
+            f" {1e3 * found.work:9.1f} {ratios[name].work:8.2f}  {asked.get(name, '')}"
+        )
+    for name, found in times.items():
+        line = {"table": title, "strands": count, "row": name, "seconds": found.clock, "work_seconds": found.work}
+        line |= {"by_ours": ratios[name].clock, "work_by_ours": ratios[name].work, "asked": asked.get(name)}
+        print(json.dumps(line))
     return ratios
 
 
@@ -101,18 +119,16 @@ def test_making_strands(head_and_guides, count):
     calls = {"ours": ours.remake} | {name: way.remake for name, way in ways.items()}
     repetitions = {100_000: 9, 300_000: 5, 1_000_000: 3}[count]
     times = best_times(calls, repetitions)
-    first_times = []
+    firsts = []
     for _ in range(repetitions):
         ours.drop()
-        first_times.append(best_times({"grow": ours.grow}, 1)["grow"])
-    times["ours, where there was none"] = min(first_times)
-    # Writing Curves and Blender's own update alone, which no way of making strands can undercut.
-    floor = best_times({"write": ours.write}, repetitions)["write"]
-    times["of which writing points and Blender's update"] = floor
-    ratios = report("Making strands", count, times, "ours", {AS_ADDED: 12, POLY: 5, LEAN: 2.5})
-    assert ratios[LEAN] > 0.3
+        firsts.append(best_times({"grow": ours.grow}, 1)["grow"])
+    times["ours, where there was none"] = Time(min(t.clock for t in firsts), min(t.work for t in firsts))
+    times |= best_times({"of which writing points and Blender's update": ours.write}, repetitions)
+    ratios = report("Making strands", count, times, {AS_ADDED: 12, POLY: 5, LEAN: 2.5})
+    assert ratios[LEAN].work > 0.4
     if AS_ADDED in ratios:
-        assert ratios[AS_ADDED] > 2.5 and ratios[POLY] > 1.0
+        assert ratios[AS_ADDED].work > 3.0 and ratios[POLY].work > 1.2
 
 
 @pytest.mark.long
@@ -128,8 +144,8 @@ def test_editing_guides(head_and_guides, count, monkeypatch):
     calls = {"ours, all guides": ours.edit, "ours, one guide": ours.edit_one}
     times = best_times(calls | {name: way.edit for name, way in ways.items()}, 5)
     assert searches == []
-    ratios = report("Editing guides, into Curves", count, times, "ours, all guides", {POLY: 8})
-    assert ratios[POLY] > 1.2
+    ratios = report("Editing guides, into Curves", count, times, {POLY: 8}, "ours, all guides")
+    assert ratios[POLY].work > 1.5
 
     bound = bindings.of(ours.hair.data)
     moved = bound.reach.of([0])
@@ -148,9 +164,9 @@ def test_editing_guides(head_and_guides, count, monkeypatch):
     for _ in range(3):
         ways[AS_ADDED].edit()
         modifier_times.append(ways[AS_ADDED].modifier_time)
-    times[MODIFIER] = min(modifier_times)
-    ratios = report("Editing guides, up to arrays", count, times, "ours, all guides", {MODIFIER: 50})
-    assert ratios[MODIFIER] > 1.5
+    times[MODIFIER] = Time(min(modifier_times), 0.0)  # Blender measures it on the clock
+    ratios = report("Editing guides, up to arrays", count, times, {MODIFIER: 50}, "ours, all guides")
+    assert ratios[MODIFIER].clock > 1.5
 
 
 @pytest.mark.long
@@ -170,8 +186,8 @@ def test_search(count):
     calls["ours"]()  # compiles
     times = best_times(calls, 5)
     asked = dict.fromkeys(list(calls)[1:], 2.5)
-    ratios = report("Search", count, times, "ours", asked)
-    assert min(ratios[name] for name in asked) > 1.5
+    ratios = report("Search", count, times, asked)
+    assert min(ratios[name].work for name in asked) > 1.5
 
 
 @pytest.mark.long
