@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from hair_addon.blender import bindings, curves, live_hair, pipeline
+from hair_addon.blender import curves, live_hair, pipeline
 from hair_addon.core import groom
 from tests.core.conftest import HEAD
 
@@ -106,8 +106,8 @@ class Ours(Way):
         bpy.context.view_layer.update()
 
     def write(self):
-        """No strand is made: what there is is written, and Blender takes note."""
-        curves.write_points(self.hair.data, bindings.of(self.hair.data).points)
+        """No strand is made: points that are there are written, and Blender takes note."""
+        pipeline.write_hair(self.hair.data)
         bpy.context.view_layer.update()
 
     def drop(self):
