@@ -281,8 +281,12 @@ def _strands(
                 y += sine * guide_x + cosine * guide_y
                 z += weight * blocks[guide, part, 2]
         first = BLOCK * part
+        # Out of the strand's frame (Eq. 10), again a block at once: point by point it would take as long as all sums.
+        out_x = block(root[0]) + tangent[0] * x + bitangent[0] * y + normal[0] * z
+        out_y = block(root[1]) + tangent[1] * x + bitangent[1] * y + normal[1] * z
+        out_z = block(root[2]) + tangent[2] * x + bitangent[2] * y + normal[2] * z
         for point in range(wp.min(BLOCK, row.shape[0] - first)):
-            row[first + point] = root + x[point] * tangent + y[point] * bitangent + z[point] * normal  # Eq. 10
+            row[first + point] = wp.vec3(out_x[point], out_y[point], out_z[point])
 
 
 @wp.kernel
