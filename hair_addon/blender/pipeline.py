@@ -240,7 +240,10 @@ def follow_guides(target):
     bound.guides = guides
     moved = bound.reach.of(combed)
     if len(moved):
-        bound.points[moved] = bound.surface.to_local(groom.follow_some(bound.binding, guides, moved))
+        if len(moved) > len(bound.points) // 2:  # to sort out those that stay would take longer
+            bound.points[:] = bound.surface.to_local(groom.follow_guides(bound.binding, guides).numpy())
+        else:
+            bound.points[moved] = bound.surface.to_local(groom.follow_some(bound.binding, guides, moved))
         if bound.settings.guide_map:
             bound.weigh_again(moved)
         bound.has_moved_only = bound.is_written or bound.has_moved_only

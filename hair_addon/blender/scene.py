@@ -32,9 +32,11 @@ class Surface:
     to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → these
     is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
 
-    def to_local(self, positions):
-        """(..., 3) positions → the object's local coordinates, float32."""
-        return _transformed(positions, np.linalg.inv(self.to_world_axes))
+    def to_local(self, points):
+        """(S, P, 3) points of strands → the object's local coordinates, float32."""
+        from ..core.transform import transformed  # Warp takes longer to import than the add-on may take to start
+
+        return transformed(points, np.linalg.inv(self.to_world_axes))
 
     def from_local(self, positions):
         """(..., 3) local coordinates → positions here, float32."""

@@ -170,11 +170,12 @@ def distribute_guides(
         islands,
         sampled_cells,
         surface_query,
+        transform,
         voronoi,
     )
 
     _load_kernels(device, bspline, cut_cells, guides, hash_grid, sampled_cells, surface_query, voronoi)
-    _load_kernels("cpu", fingerprint, islands)
+    _load_kernels("cpu", fingerprint, islands, transform)
     relaxing = part_of(progress, 0.1, 0.9)
     mirror = ground.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
     if roots is None:
@@ -244,11 +245,21 @@ def bind_hair(
     check_mesh(mesh)
     check_points(mesh, guides.roots)
     progress(COMPILING, 0.0)
-    from . import fingerprint, guide_weights, hash_grid, interpolation, part_lines, rooting, sampling, surface_query
+    from . import (
+        fingerprint,
+        guide_weights,
+        hash_grid,
+        interpolation,
+        part_lines,
+        rooting,
+        sampling,
+        surface_query,
+        transform,
+    )
     from .regions import kept_apart
 
     _load_kernels(device, guide_weights, hash_grid, interpolation, rooting)
-    _load_kernels("cpu", fingerprint)
+    _load_kernels("cpu", fingerprint, transform)
     if lines is not None:
         _load_kernels(device, part_lines, surface_query)
         lines = part_lines.lay(mesh, lines, device, drawn_on)

@@ -184,10 +184,17 @@ def _strands(
         stretch = block(0.0)
         for i in range(wp.static(BLOCK)):
             stretch[i] = _stretch(x[i], y[i], z[i], lengths[i], keep_length)
+        x = wp.cw_mul(stretch, x)
+        y = wp.cw_mul(stretch, y)
+        z = wp.cw_mul(stretch, z)
+        # Out of the strand's frame, again a block at once: point by point it would take as long as all sums.
+        out_x = tangent[0] * x + bitangent[0] * y + normal[0] * z
+        out_y = tangent[1] * x + bitangent[1] * y + normal[1] * z
+        out_z = tangent[2] * x + bitangent[2] * y + normal[2] * z
         first = 1 + BLOCK * part
         for i in range(wp.min(BLOCK, row.shape[0] - first)):
-            along += stretch[i] * wp.vec3(x[i], y[i], z[i])
-            row[first + i] = root + along[0] * tangent + along[1] * bitangent + along[2] * normal  # Eq. 10
+            along += wp.vec3(out_x[i], out_y[i], out_z[i])
+            row[first + i] = root + along  # Eq. 10
 
 
 @wp.kernel

@@ -22,7 +22,7 @@ def grow(way, head, guides, strand_count):
         return Ours.grown(guides, strand_count)
     if way == "lean":
         return LeanGraph.grown(guides, head, strand_count)
-    return Asset.grown(guides, head, strand_count, way)
+    return Asset.grown(guides, head, strand_count, is_poly=way == "poly")
 
 
 def main(way, strand_count):

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from hair_addon.blender import curves, live_hair, pipeline, preferences
+from hair_addon.blender import curves, live_hair, pipeline
 from hair_addon.core import groom
 from tests.core.conftest import HEAD
 
@@ -55,11 +55,11 @@ class Way:
         """Of the hair as Blender evaluates it."""
         return len(self._evaluated().curves)
 
-    def remove(self):
-        """Take the objects away."""
-        for datablock in {self.hair.data, self.guides.data}:
-            bpy.data.hair_curves.remove(datablock)
-        bpy.context.view_layer.update()
+    @property
+    def is_poly(self):
+        """Whether that is poly lines; Catmull-Rom curves say nothing of their type."""
+        kind = self._evaluated().attributes.get("curve_type")
+        return kind is not None and {item.value for item in kind.data} == {1}
 
     def _evaluated(self):
         return self.hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
@@ -105,6 +105,11 @@ class Ours(Way):
         super().edit_one()
         bpy.context.view_layer.update()
 
+    def write(self):
+        """No strand is made: points that are there are written, and Blender takes note."""
+        pipeline.write_hair(self.hair.data)
+        bpy.context.view_layer.update()
+
     def drop(self):
         """Take away the hair, and leave the guides."""
         bpy.data.hair_curves.remove(self.hair.data)
@@ -120,16 +125,18 @@ class Ours(Way):
 
 
 class Asset(Way):
-    """Blender's "Interpolate Hair Curves", on curves of the type that its guides have."""
+    """Blender's "Interpolate Hair Curves": Catmull-Rom curves, or with a node after it poly lines."""
 
     @classmethod
-    def grown(cls, guides, head, strand_count, curve_type):
-        made = _bare_copy(guides, head, f"Asset {curve_type}", curve_type)
+    def grown(cls, guides, head, strand_count, is_poly):
+        made = _bare_copy(guides, head, "Asset")
         way = cls(made, made)
         modifier = made.modifiers.new("Interpolate Hair Curves", "NODES")
         modifier.node_group = _asset()
         way.inputs = modifier.properties.inputs
         getattr(way.inputs, _DENSITY).value = strand_count / area(head)
+        if is_poly:
+            made.modifiers.new("Poly Lines", "NODES").node_group = _poly_lines()
         bpy.context.view_layer.update()
         assert [w.message for w in modifier.node_warnings] == []
         return way
@@ -150,7 +157,7 @@ class LeanGraph(Way):
 
     @classmethod
     def grown(cls, guides, head, strand_count):
-        made = _bare_copy(guides, head, "Lean graph", "POLY")
+        made = _bare_copy(guides, head, "Lean graph")
         way = cls(made, made)
         group, way.points = _lean_graph(head, strand_count / area(head))
         made.modifiers.new("Lean graph", "NODES").node_group = group
@@ -167,14 +174,13 @@ def area(surface_object):
     return sum(polygon.area for polygon in surface_object.data.polygons)
 
 
-def _bare_copy(guides, head, name, curve_type):
+def _bare_copy(guides, head, name):
     """Guides as Blender's own tools make them: positions and UV coordinates, on their surface."""
     data = guides.data.copy()
     data.vellus.kind = "NONE"
     for attribute in [a.name for a in data.attributes]:
         if attribute not in {"position", "surface_uv_coordinate", "curve_type"}:
             data.attributes.remove(data.attributes[attribute])
-    data.set_types(type=curve_type)
     made = bpy.data.objects.new(name, data)
     made.parent = head
     bpy.context.scene.collection.objects.link(made)
@@ -192,10 +198,7 @@ def _asset():
 
 def _lean_graph(head, density):
     """(node group, the node that distributes points)."""
-    group = bpy.data.node_groups.new("Lean graph", "GeometryNodeTree")
-    group.is_modifier = True
-    for in_out in ("INPUT", "OUTPUT"):
-        group.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    group = _group("Lean Graph")
     names = {
         "into": "NodeGroupInput",
         "surface": "GeometryNodeObjectInfo",
@@ -219,6 +222,21 @@ def _lean_graph(head, density):
     return group, nodes["points"]
 
 
-def is_on_processor():
-    """Whether the add-on computes on the processor, as its peers do."""
-    return preferences.device() == "cpu"
+def _poly_lines():
+    """A node group that makes any curves poly lines."""
+    group = _group("Poly Lines")
+    into, poly, out = (
+        group.nodes.new(kind) for kind in ("NodeGroupInput", "GeometryNodeCurveSplineType", "NodeGroupOutput")
+    )
+    poly.spline_type = "POLY"
+    group.links.new(into.outputs[0], poly.inputs["Curve"])
+    group.links.new(poly.outputs["Curve"], out.inputs[0])
+    return group
+
+
+def _group(name):
+    group = bpy.data.node_groups.new(name, "GeometryNodeTree")
+    group.is_modifier = True
+    for in_out in ("INPUT", "OUTPUT"):
+        group.interface.new_socket("Geometry", in_out=in_out, socket_type="NodeSocketGeometry")
+    return group
