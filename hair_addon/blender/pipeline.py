@@ -266,7 +266,8 @@ def follow_surface(guide_curves, depsgraph, axes_before=None):
     else:
         from ..core import surface_frames  # Warp takes longer to import than the add-on may take to start
 
-        curves.carry(guide_curves, surface_frames.motion(before, surface.rest, surface.faces))
+        vertices, _barycentric = curves.read_root_places(guide_curves)
+        curves.carry(guide_curves, surface_frames.motion(before, surface.rest, surface.faces, vertices))
     curves.write_roots(guide_curves, surface, curves.stored_roots(guide_curves, surface))
     curves.keep_surface(guide_curves, surface)
     return True
