@@ -126,7 +126,7 @@ def _bind(surface, guides, settings, density, roots, device, progress):
 
 
 def _write_guides(target, surface_object, surface, guides, settings, key):
-    target = target or curves.new_object("Guides", surface_object).data
+    target = target or curves.new_object("Guides", surface_object, is_rendered=False).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
     target.vellus.root_key = key
     radii = np.full(guides.points.shape[1], 0.5e-3, np.float32)
