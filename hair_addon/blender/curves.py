@@ -68,17 +68,25 @@ def _read_attribute(curves, name, width):
     return values
 
 
-def new_object(name, surface_object):
+_RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+
+
+def new_object(name, surface_object, is_rendered=True):
     """An empty Curves object on a surface, in the surface's collection."""
     curves = bpy.data.hair_curves.new(name)
     curves.surface = surface_object
-    return link_object(name, curves, surface_object)
+    return link_object(name, curves, surface_object, is_rendered)
 
 
-def link_object(name, curves, surface_object):
-    """A new object for Curves, a child of their surface and in its collection."""
+def link_object(name, curves, surface_object, is_rendered=True):
+    """A new object for Curves, a child of their surface and in its collection.
+
+    is_rendered: whether Cycles and EEVEE show it. By rays: what renders leave out as a whole, exporters do too.
+    """
     curves_object = bpy.data.objects.new(name, curves)
     curves_object.parent = surface_object
+    for ray in _RAYS:
+        setattr(curves_object, f"visible_{ray}", is_rendered)
     collections = surface_object.users_collection or (bpy.context.scene.collection,)
     collections[0].objects.link(curves_object)
     follow_nodes.add_modifier(curves_object)

@@ -132,7 +132,7 @@ def _bind(surface, guides, settings, density, parting, roots, device, progress):
 
 
 def _write_guides(target, surface_object, surface, guides, settings, key):
-    target = target or curves.new_object("Guides", surface_object).data
+    target = target or curves.new_object("Guides", surface_object, is_rendered=False).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
     target.vellus.root_key = key
     radii = np.full(guides.points.shape[1], 0.5e-3, np.float32)
@@ -281,7 +281,8 @@ def follow_surface(guide_curves, depsgraph, axes_before=None):
     else:
         from ..core import surface_frames  # Warp takes longer to import than the add-on may take to start
 
-        curves.carry(guide_curves, surface_frames.motion(before, surface.rest, surface.faces))
+        vertices, _barycentric = curves.read_root_places(guide_curves)
+        curves.carry(guide_curves, surface_frames.motion(before, surface.rest, surface.faces, vertices))
     curves.write_roots(guide_curves, surface, curves.stored_roots(guide_curves, surface))
     curves.keep_surface(guide_curves, surface)
     return True

@@ -37,7 +37,7 @@ def restore_object(guides):
     curves.require_editable(guides)
     if guides.surface is None:
         raise HairError("The surface is missing: pick a mesh.")
-    return curves.link_object(guides.name, guides, guides.surface)
+    return curves.link_object(guides.name, guides, guides.surface, is_rendered=False)
 
 
 def attach(parts, surface_object):

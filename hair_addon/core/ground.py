@@ -61,10 +61,14 @@ class Ground:
     """
 
     def __init__(self, mesh, site_count, density=None, texture=None, mirror=None, device="cpu"):
-        lowest, highest = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+        has_area = mesh.areas > 0.0
+        used = mesh.vertices[mesh.triangles[has_area].ravel()]
+        lowest, highest = used.min(axis=0), used.max(axis=0)
         self.size = float((highest - lowest).max())
         self.origin = lowest.astype(np.float64)
-        self.mesh = TriMesh(((mesh.vertices - lowest) / np.float32(self.size)).astype(np.float32), mesh.triangles)
+        # Vertices that no face uses may be anywhere, and would leave the rest without digits.
+        inside = np.clip(mesh.vertices, lowest, highest)
+        self.mesh = TriMesh(((inside - lowest) / np.float32(self.size)).astype(np.float32), mesh.triangles)
         values = check_density(self.mesh, density)
         self.densest = float(values.max())
         self._values, self._texture = values / self.densest, texture
@@ -72,19 +76,19 @@ class Ground:
         self.normals = self.mesh.scaled_normals / np.where(lengths > 0.0, lengths, 1.0)
         self.islands = islands(self.mesh)
         self._mirror = mirror
-        grown = np.flatnonzero(corner_masses(self.mesh, self._values).any(axis=1))
+        grown = np.flatnonzero(has_area & corner_masses(self.mesh, self._values).any(axis=1))
         self.query = SurfaceQuery(self.mesh, grown, device)
         self.grid = wp.HashGrid(GRID_SIZE, GRID_SIZE, GRID_SIZE, device=device)
         whole = Parts(grown, np.broadcast_to(np.eye(3), (len(grown), 3, 3)), self.mesh.areas[grown])
         if mirror is not None:
             whole = self._heavier_side(whole)
         if texture is not None:  # whose details triangles know nothing of
-            whole = self._cut(whole, np.sqrt(whole.areas.sum() / LEAST_PIECES), lambda points: 1.0)
+            whole = self._cut(whole, _spacing(whole.areas.sum(), LEAST_PIECES), lambda points: 1.0)
         # Where the density is high sites are close, and pieces small.
         amount = whole.areas @ self.density_at(whole.centres())
         if not amount > 0.0:
             raise HairError("The density is zero on every face: paint some weight where hair should grow.")
-        spacing = np.sqrt(amount / max(site_count, LEAST_PIECES))
+        spacing = _spacing(amount, max(site_count, LEAST_PIECES))
         self.parts = self._cut(whole, spacing, lambda points: np.maximum(self.density_at(points), 1e-3))
         self.densities = self.density_at(self.parts.centres())
         self.parts, self.densities = self.parts.chosen(self.densities > 0.0), self.densities[self.densities > 0.0]
@@ -210,6 +214,14 @@ class Ground:
                 ]
             pieces += [Parts(parts.triangle[crossed], barycentric, areas) for barycentric, areas in corners]
         return pieces[0].joined(*pieces[1:])
+
+
+def _spacing(amount, count):
+    """Of so many sites on an area, at unit size; no less than leaves a sliver's pieces to a dozen sites in a row.
+
+    Else slivers alone would be cut to bits of their width, millions of them.
+    """
+    return max(np.sqrt(amount / count), 8.0 / count)
 
 
 def _halved(parts, edge):

@@ -260,5 +260,6 @@ def _sums(
     row = out_points[strand]
     along = wp.vec3()
     for point in range(row.shape[0]):
-        along += row[point]
-        row[point] = root + along[0] * tangent + along[1] * bitangent + along[2] * normal  # Eq. 10
+        segment = row[point]
+        along += segment[0] * tangent + segment[1] * bitangent + segment[2] * normal
+        row[point] = root + along  # Eq. 10

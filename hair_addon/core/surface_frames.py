@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from .mesh import require_finite
+from .mesh import Faces, require_finite
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -31,14 +31,26 @@ class SurfaceMotion:
     axes: np.ndarray
 
 
-def motion(before, after, faces):
+def motion(before, after, faces, vertices=None):
     """The `SurfaceMotion` of vertices (V, 3) that went from `before` to `after`; faces: the mesh's `Faces`.
 
+    vertices: indices, in any shape, of those whose rotation matters, of a large mesh perhaps few; None for all.
     Raises `HairError` where vertices are not finite numbers: no rotation could be found for them.
     """
     require_finite(before)
     require_finite(after)
+    faces = faces if vertices is None else _around(faces, vertices, len(before))
     return SurfaceMotion(before, after, vertex_axes(before, after, faces))
+
+
+def _around(faces, vertices, vertex_count):
+    """The `Faces` that some vertices are corners of."""
+    is_asked = np.zeros(vertex_count, bool)
+    is_asked[vertices] = True
+    chosen = np.logical_or.reduceat(is_asked[faces.corner_vertices], faces.starts[:-1])
+    sizes = np.diff(faces.starts)
+    starts = np.append(0, np.cumsum(sizes[chosen]))
+    return Faces(faces.corner_vertices[np.repeat(chosen, sizes)], starts)
 
 
 def vertex_axes(before, after, faces):
@@ -56,7 +68,7 @@ def vertex_axes(before, after, faces):
         [np.bincount(faces.corner_vertices, of_corners[:, i], minlength=len(before)) for i in range(9)], axis=1
     )
     # The mean but for its length, of which the nearest rotation knows nothing; none at all where nothing moves.
-    is_moved = _has_moving_face(before, after, faces)
+    is_moved = _has_moving_face(before, after, faces) & sums.any(axis=1)
     left, _stretches, right = np.linalg.svd(sums[is_moved].reshape(-1, 3, 3))
     axes = np.tile(np.eye(3, dtype=np.float32)[:2], (len(before), 1, 1))
     axes[is_moved] = np.swapaxes(left @ right, 1, 2)[:, :2]

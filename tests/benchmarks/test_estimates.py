@@ -1,7 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What work is said to take beside what it takes: as ratios between sizes, in one run."""
 
+import json
+import subprocess
+import sys
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,6 +59,63 @@ def test_placing_takes_what_is_said():
         measured = seconds(lambda mesh=mesh, settings=settings: place(mesh, settings))
         cases[f"{face_count} triangles, {guide_count} guides"] = measured, estimate.guide_seconds(settings, face_count)
     assert_proportional(cases)
+
+
+# In a process of its own, whose memory is the work's alone: its most, beside what it held before the work.
+WORK = """
+import json, resource, sys, time
+sys.path.insert(0, ".")
+from hair_addon.core import groom
+from tests.benchmarks.test_estimates import hills, place
+
+def most():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+
+side_count, guide_count, strand_count = map(int, sys.argv[1:])
+small = hills(20)
+settings = groom.HairSettings(strand_count=strand_count)
+groom.generate_hair(small, place(small, groom.GuideSettings(guide_count=300)), groom.HairSettings(strand_count=100))
+mesh = hills(side_count)
+start, before = time.perf_counter(), most()
+guides = place(mesh, groom.GuideSettings(guide_count=guide_count))
+placed, placing = time.perf_counter(), most() - before
+hair = groom.generate_hair(mesh, guides, settings)
+print(json.dumps({"seconds": [placed - start, time.perf_counter() - placed], "bytes": [placing, most() - before],
+                  "counts": [len(guides), len(hair)]}))
+"""
+
+
+def worked(*counts):
+    """What placing and growing took: side_count, guide_count, strand_count → seconds, bytes and counts."""
+    command = [sys.executable, "-W", "ignore", "-c", WORK, *map(str, counts)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=Path(__file__).parents[2])
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def assert_memory_is_as_said(side_count, guide_count, strand_count):
+    found, face_count = worked(side_count, guide_count, strand_count), 2 * side_count**2
+    said = estimate.guide_work_bytes(GuideSettings(guide_count=guide_count), face_count)
+    said = max(said, estimate.hair_work_bytes(HairSettings(strand_count=strand_count), face_count))
+    took = found["bytes"][1]
+    print(
+        f"{face_count} triangles, {guide_count} guides, {strand_count} strands: {took / 1e6:.0f} MB, said "
+        f"{said / 1e6:.0f} MB; {found['seconds'][0]:.1f} s and {found['seconds'][1]:.1f} s"
+    )
+    assert found["counts"] == [guide_count, strand_count]
+    assert said / FACTOR < took < said * FACTOR
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no measure of a process's most memory")
+@pytest.mark.parametrize("counts", [(400, 500, 1000), (30, 20_000, 1000), (30, 500, 500_000)])
+def test_memory_is_as_said(counts):
+    assert_memory_is_as_said(*counts)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="no measure of a process's most memory")
+def test_two_million_triangles():
+    """1,000 guides and 100,000 strands."""
+    assert_memory_is_as_said(1000, 1000, 100_000)
 
 
 def test_growing_takes_what_is_said():

@@ -23,12 +23,14 @@ def test_sculpt_mode_opens(kind, request):
 
 @pytest.mark.parametrize("engine", ["CYCLES", "BLENDER_EEVEE"])
 def test_blender_renders_the_hair(lit, engine, tmp_path):
-    """Strands cover the pixels that they run through and no others, on a surface that is twisted; and they are lit."""
+    """Strands cover the pixels that they run through, on a twisted surface, and are lit; guides are not seen."""
     scene, surface = bpy.context.scene, bpy.data.objects["Sphere"]
     lit.data.vellus.hair.radius, lit.data.vellus.hair.tip_taper = 0.03, 1.0
     twist = surface.modifiers.new("Twist", "SIMPLE_DEFORM")
     twist.deform_method, twist.angle = "TWIST", 1.0
-    surface.hide_render = bpy.data.objects["Guides"].hide_render = True
+    surface.hide_render = True
+    guides = bpy.data.objects["Guides"].data
+    guides.attributes["radius"].data.foreach_set("value", np.full(len(guides.points), 0.2, np.float32))
     bpy.context.view_layer.update()
     scene.render.engine = engine
     scene.render.resolution_x = scene.render.resolution_y = PIXELS

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.reading import attribute, points
+from tests.blender.reading import attribute, evaluated_points, points
 
 NODE_ASSETS = bpy.utils.system_resource("DATAFILES", path="assets/nodes") + "/procedural_hair_node_assets.blend"
 
@@ -287,6 +287,19 @@ def test_a_group_of_fields_knows_our_curves(groom, name):
         keeps_all(before, after)
         for output, expected in FIELDS[name].items():
             np.testing.assert_allclose(after.values[output], expected(before, made), atol=1e-4)
+
+
+def test_hair_nodes_work_where_the_surface_is_now(groom):
+    """They come after the nodes that carry strands: on a twisted sphere, what is trimmed keeps its root there."""
+    twist = bpy.data.objects["Sphere"].modifiers.new("Twist", "SIMPLE_DEFORM")
+    twist.deform_method, twist.angle = "TWIST", 2.0
+    bpy.context.view_layer.update()
+    for made in groom:
+        carried = evaluated_points(made)
+        assert np.abs(carried[:, 0] - points(made)[:, 0]).max() > 0.1
+        _at_rest, after = evaluated(made, appended("Trim Hair Curves"), Length=0.2)
+        np.testing.assert_allclose(after.roots, carried[:, 0], atol=1e-5)
+        np.testing.assert_allclose(after.lengths, 0.2, rtol=1e-3)
 
 
 def test_clumps_are_those_of_the_guides(groom):

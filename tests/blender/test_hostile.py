@@ -34,6 +34,13 @@ MESHES = {
         None,
     ),
     "two islands": ([*SQUARE, *FAR], [(0, 1, 2, 3), (4, 5, 6, 7)], lambda roots: abs(roots[:, 0] - 3.0) < 1.9),
+    "a face twice": ([*SQUARE, *SQUARE], [(0, 1, 2, 3), (0, 1, 2, 3), (7, 6, 5, 4)], None),
+    "a loose vertex far away": ([*SQUARE, (1e7, 0, 0)], [(0, 1, 2, 3)], lambda roots: roots[:, 0] > 1.01),
+    "vertices in one place": (
+        [*SQUARE, (1, 0, 0), (2, 0, 0), (2, 1, 0), (1, 1, 0)],
+        [(0, 1, 2, 3), (4, 5, 6, 7)],
+        None,
+    ),
     "loose vertices": ([*SQUARE, (9, 9, 9)], [(0, 1, 2, 3)], lambda roots: roots[:, 0] > 1.01),
 }
 
@@ -77,6 +84,26 @@ def test_hair_grows_on_odd_meshes(scene, name):
     np.testing.assert_allclose(lengths(guides), 0.1, rtol=0.06)
     assert np.isfinite(points(hair)).all()
     assert forbidden is None or not forbidden(points(hair)[:, 0]).any()
+
+
+REFUSED = {
+    "no vertices": ([], [], "no faces"),
+    "vertices alone": (SQUARE, [], "no faces"),
+    "no area": ([(0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)], [(0, 1, 2), (1, 2, 3)], "zero area"),
+    "one place": ([(1, 1, 1)] * 4, [(0, 1, 2, 3)], "zero area"),
+    "a coordinate that is no number": ([*SQUARE, (math.nan, 0, 0)], [(0, 1, 2, 3), (0, 1, 4)], "not finite"),
+    "an infinite coordinate": ([*SQUARE, (0, math.inf, 0)], [(0, 1, 2, 3), (0, 1, 4)], "not finite"),
+    "a size beyond all": ([(1e18 * x, 1e18 * y, z) for x, y, z in SQUARE], [(0, 1, 2, 3)], "check the object's scale"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize("operator", ["add_hair", "distribute_guides"])
+def test_a_surface_that_nothing_can_grow_on_is_said(scene, name, operator):
+    vertices, faces, sentence = REFUSED[name]
+    make(vertices, faces)
+    said = refusal(getattr(bpy.ops.vellus, operator))
+    assert sentence in said and said.count("\n") <= 1
 
 
 @pytest.mark.parametrize("scale", [1e6, 3.7, 1e-6])

@@ -69,6 +69,19 @@ def test_a_surface_that_grows_leaves_strands_as_long_and_unturned(sphere, rng, s
     np.testing.assert_allclose(found - found[:, :1], strands[0] - strands[0][:, :1], atol=1e-5)
 
 
+def test_some_vertices_turn_as_they_do_among_all(sphere, rng):
+    """On a mesh of triangles and one of quads: a few strands, whose corners alone are asked for."""
+    after = (sphere.vertices * (1.0 + 0.3 * np.sin(3.0 * sphere.vertices[:, ::-1]))).astype(np.float32)
+    triangles = faces_of(sphere)
+    quads = Faces(triangles.corner_vertices[:3720], np.append(np.arange(0, 3720, 4), 3720).astype(np.int32))
+    strands = strands_on(sphere, 7, rng)
+    for faces in (triangles, quads):
+        every, some = (surface_frames.motion(sphere.vertices, after, faces, v) for v in (None, strands[1]))
+        np.testing.assert_array_equal(some.axes[strands[1]], every.axes[strands[1]])
+        expected, found = (surface_frames.carry(strands[0], m, *strands[1:]) for m in (every, some))
+        np.testing.assert_array_equal(found, expected)
+
+
 def deformations(vertices):
     """A bend, a shear, a twist and a bulge, each far from rigid."""
     x, y, z = vertices.astype(np.float64).T
