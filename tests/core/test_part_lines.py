@@ -213,6 +213,19 @@ def test_lines_lie_on_the_surface():
     assert np.all(parted[middle][across[middle]] == 0.0) and np.any(free[middle][across[middle]] > 0.05)
 
 
+def test_edges_are_put_in_order(rng):
+    """Lines, a ring and a fork, shuffled and turned around: every edge once, and each line in one go."""
+    lines = [range(5), range(5, 7), [*range(7, 12), 7], [12, 13, 14], [13, 15]]
+    edges = np.array([pair for line in lines for pair in pairwise(line)])
+    for _ in range(20):
+        shuffled = np.where(rng.random((len(edges), 1)) < 0.5, edges, edges[:, ::-1])[rng.permutation(len(edges))]
+        ordered = part_lines.in_order(shuffled)
+        np.testing.assert_array_equal(np.unique(np.sort(ordered), axis=0), np.unique(np.sort(edges), axis=0))
+        assert len(ordered) == len(edges)
+        goes_on = ordered[1:, 0] == ordered[:-1, 1]
+        assert len(edges) - goes_on.sum() <= 6  # the fork is three lines, of which two may follow on each other
+
+
 @pytest.mark.parametrize(
     ("lines", "sentence"),
     [
