@@ -264,6 +264,17 @@ def test_hair_follows_its_regions(guides, ground):
     assert in_between(points(hair)) == 0.0
 
 
+def test_hair_follows_the_regions_of_its_guides(guides):
+    numbers = guides.data.attributes.new("side", "INT", "CURVE").data
+    grown(region_attribute="side", **FREE)
+    hair = bpy.data.objects["Hair"]
+    assert in_between(points(hair)) > 0.3
+    numbers.foreach_set("value", [int(x > 0.0) for x in points(guides)[:, 0, 0]])
+    guides.data.update_tag()
+    bpy.context.view_layer.update()
+    assert in_between(points(hair)) == 0.0
+
+
 # ---------------------------------------------------------------------------------------------------- the map
 
 
