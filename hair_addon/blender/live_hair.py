@@ -185,7 +185,9 @@ def _parts_by(state, changed):
     lines = bpy.data.objects.get(state.hair.part_lines) if state.hair.part_lines else None
     if lines is not None and (lines in changed or lines.data in changed):
         return True
-    return bool(state.hair.region_attribute) and state.guide_curves in changed
+    # Read with each step of a stroke: so only where guides have regions of their own.
+    guides = state.guide_curves
+    return guides is not None and guides in changed and state.hair.region_attribute in guides.attributes
 
 
 def mark_followers(guide_curves):

@@ -118,7 +118,11 @@ def _chained(segments):
 
 
 def _divided(line, step):
-    """(N, 3) → (M, 3): more points between those of a polyline, no farther apart than a step if that can be."""
+    """(N, 3) → (M, 3): points of a polyline a step apart where they were farther, a quarter of one where nearer."""
+    along = np.cumsum(np.concatenate([[0.0], np.linalg.norm(np.diff(line, axis=0), axis=1)]))
+    is_kept = np.diff(np.floor(along / (0.25 * step)), prepend=-1.0) > 0.0
+    is_kept[-1] = True
+    line = line[is_kept]
     counts = np.clip(np.ceil(np.linalg.norm(np.diff(line, axis=0), axis=1) / step), 1, 16 * PIECES).astype(int)
     along = np.concatenate([i + np.arange(count) / count for i, count in enumerate(counts)] + [[len(counts)]])
     return np.stack([np.interp(along, np.arange(len(line)), line[:, axis]) for axis in range(3)], axis=1)

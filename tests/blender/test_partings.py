@@ -233,6 +233,26 @@ def test_hair_follows_its_part_line(guides):
     assert bindings.of(hair.data) is bound
 
 
+@pytest.mark.parametrize("kind", LINES)
+@pytest.mark.parametrize("how", ["hide_viewport", "hide_set", "unlinked"])
+def test_a_line_parts_hair_out_of_sight_too(guides, kind, how):
+    line = LINES[kind]()
+    strands = grown(part_lines="Line")
+    key = bpy.data.hair_curves["Hair"].vellus.parting_key
+    if how == "hide_set":
+        line.hide_set(True)
+    elif how == "hide_viewport":
+        line.hide_viewport = True
+    else:
+        bpy.context.scene.collection.objects.unlink(line)
+    bpy.context.view_layer.update()
+    hair = bpy.data.objects["Hair"]
+    bpy.context.view_layer.objects.active = hair
+    assert bpy.ops.vellus.interpolate_hair(strand_count=6000, part_lines="Line") == {"FINISHED"}
+    assert hair.data.vellus.parting_key == key
+    np.testing.assert_array_equal(points(hair), strands)
+
+
 def test_hair_follows_its_regions(guides, ground):
     numbers = ground.data.attributes.new("side", "INT", "FACE").data
     grown(region_attribute="side", **FREE)
@@ -240,6 +260,17 @@ def test_hair_follows_its_regions(guides, ground):
     assert in_between(points(hair)) > 0.3
     numbers.foreach_set("value", [int(p.center.x > 0.0) for p in ground.data.polygons])
     ground.data.update()
+    bpy.context.view_layer.update()
+    assert in_between(points(hair)) == 0.0
+
+
+def test_hair_follows_the_regions_of_its_guides(guides):
+    numbers = guides.data.attributes.new("side", "INT", "CURVE").data
+    grown(region_attribute="side", **FREE)
+    hair = bpy.data.objects["Hair"]
+    assert in_between(points(hair)) > 0.3
+    numbers.foreach_set("value", [int(x > 0.0) for x in points(guides)[:, 0, 0]])
+    guides.data.update_tag()
     bpy.context.view_layer.update()
     assert in_between(points(hair)) == 0.0
 

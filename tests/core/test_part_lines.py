@@ -213,6 +213,33 @@ def test_lines_lie_on_the_surface():
     assert np.all(parted[middle][across[middle]] == 0.0) and np.any(free[middle][across[middle]] > 0.05)
 
 
+def test_a_line_of_thousands_of_points_is_laid_with_hundreds(ground, rng):
+    """Strands look at each of them."""
+    turn = np.linspace(0.0, np.pi, 5000)
+    fine = 0.5 + 0.3 * np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    assert len(part_lines.lay(ground, segments(*fine), DEVICE).points) < 300
+    roots, guides = 0.1 + 0.8 * rng.random((40, 2)), 0.1 + 0.8 * rng.random((40, 2))
+    of_fine, of_coarse = (
+        ways_between(ground, segments(*np.concatenate([fine[:-1:every], fine[-1:]])), roots, guides)
+        for every in (1, 40)
+    )
+    near = np.isclose(of_fine, of_coarse, rtol=5e-3)
+    assert near.mean() > 0.99  # but where a way just touches one of the two
+
+
+def test_edges_are_put_in_order(rng):
+    """Lines, a ring and a fork, shuffled and turned around: every edge once, and each line in one go."""
+    lines = [range(5), range(5, 7), [*range(7, 12), 7], [12, 13, 14], [13, 15]]
+    edges = np.array([pair for line in lines for pair in pairwise(line)])
+    for _ in range(20):
+        shuffled = np.where(rng.random((len(edges), 1)) < 0.5, edges, edges[:, ::-1])[rng.permutation(len(edges))]
+        ordered = part_lines.in_order(shuffled)
+        np.testing.assert_array_equal(np.unique(np.sort(ordered), axis=0), np.unique(np.sort(edges), axis=0))
+        assert len(ordered) == len(edges)
+        goes_on = ordered[1:, 0] == ordered[:-1, 1]
+        assert len(edges) - goes_on.sum() <= 6  # the fork is three lines, of which two may follow on each other
+
+
 @pytest.mark.parametrize(
     ("lines", "sentence"),
     [
