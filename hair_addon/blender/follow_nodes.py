@@ -73,7 +73,7 @@ class _Tree:
         # In the surface's own coordinates, which are those of its children.
         info = self._node("GeometryNodeObjectInfo", {"Object": given["Surface"]}, transform_space="ORIGINAL")
         position = self._node("GeometryNodeInputPosition").outputs[0]
-        # Where strands are before anything moves them, for the nodes that ask: Blender shares the array, at no cost.
+        # Where strands are before anything moves them, for the nodes that ask: Blender shares the array.
         at_rest = self._node(
             "GeometryNodeStoreNamedAttribute",
             {"Geometry": given["Curves"], "Name": "rest_position", "Value": position},

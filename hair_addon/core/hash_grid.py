@@ -205,7 +205,7 @@ def neighbours(points, queries, distance, limit):
     device = points.device
     indices = wp.empty((len(queries), limit), dtype=int, device=device)
     distances = wp.empty((len(queries), limit), dtype=float, device=device)
-    first_radius = _first_radius(points.numpy(), distance)
+    first_radius = _first_radius(points.numpy(), distance, limit)
     grid = wp.HashGrid(GRID_SIZE, GRID_SIZE, GRID_SIZE, device=device)
     grid.build(points, CELLS_PER_RADIUS * first_radius)
     by = by_cells if device.is_cpu else by_queries
@@ -271,13 +271,12 @@ def _sorted_by_cell(points, queries, width):
     return order, np.concatenate([[0], changes, [len(cells)]]).astype(np.int32)
 
 
-def _first_radius(points, distance):
-    """Radius [m] to search first: the distance, unless that holds nearly all points, or none as a rule."""
+def _first_radius(points, distance, limit):
+    """Radius [m] to search first: the distance, unless that holds far more points than wanted, or none as a rule."""
     extent = float(np.linalg.norm(points.max(axis=0) - points.min(axis=0)))
     # Of points that lie on a surface; a lone one is looked for in wide cells, which are few.
     spacing = extent / math.sqrt(len(points)) if extent else distance
     # Cells narrower than the rounding of the coordinates could not tell points apart.
     finest = max(1e-6 * float(np.abs(points).max()), 1e-30)
-    if distance > 3.0 * spacing:
-        distance = 2.0 * spacing
-    return max(distance, 0.5 * spacing, finest)
+    enough = max(math.sqrt(0.5 * limit), 1.0) * spacing  # half as many again as are wanted, on the whole
+    return max(distance if distance < 1.5 * enough else enough, 0.5 * spacing, finest)
