@@ -127,17 +127,14 @@ def read_surface(surface_object, depsgraph):
         posed = _vertex_positions(mesh)
         rest = _rest_positions(mesh, posed)
         faces = _faces(mesh)
-        mesh.calc_loop_triangles()
-        triangles = np.empty((len(mesh.loop_triangles), 3), np.int32)
-        mesh.loop_triangles.foreach_get("vertices", triangles.ravel())
+        corners = _triangle_corners(mesh)
+        triangles = faces.corner_vertices[corners]
         corner_uvs, uv_map = None, ""
         if mesh.uv_layers.active is not None:
             uv_map = mesh.uv_layers.active.name
             uvs = np.empty((len(mesh.loops), 2), np.float32)
             mesh.uv_layers.active.uv.foreach_get("vector", uvs.ravel())
-            loops = np.empty((len(triangles), 3), np.int32)
-            mesh.loop_triangles.foreach_get("loops", loops.ravel())
-            corner_uvs = uvs[loops]
+            corner_uvs = uvs[corners]
     finally:
         evaluated.to_mesh_clear()
     is_mirrored = bool(determinant < 0.0)
@@ -168,10 +165,19 @@ def _rest_positions(mesh, posed):
 
 def _faces(mesh):
     corner_vertices = np.empty(len(mesh.loops), np.int32)
-    mesh.loops.foreach_get("vertex_index", corner_vertices)
+    if len(corner_vertices):  # two hundred times as fast as by `mesh.loops`
+        mesh.attributes[".corner_vert"].data.foreach_get("value", corner_vertices)
     starts = np.empty(len(mesh.polygons), np.int32)
     mesh.polygons.foreach_get("loop_start", starts)
     return Faces(corner_vertices, np.append(starts, np.int32(len(corner_vertices))))
+
+
+def _triangle_corners(mesh):
+    """(F, 3) int32: the corners, in `Faces`, of the triangles that Blender cuts polygons into."""
+    mesh.calc_loop_triangles()
+    corners = np.empty((len(mesh.loop_triangles), 3), np.int32)
+    mesh.loop_triangles.foreach_get("loops", corners.ravel())
+    return corners
 
 
 def _vertex_positions(mesh):
@@ -277,13 +283,9 @@ def _is_surface_seen(instance, viewport):
 def _read_drawn_mesh(mesh_object, to_world):
     mesh = mesh_object.to_mesh()
     try:
-        mesh.calc_loop_triangles()
-        count = len(mesh.loop_triangles)
         vertices = _vertex_positions(mesh)
-        corners = np.empty(3 * count, np.int32)
-        mesh.loop_triangles.foreach_get("vertices", corners)
-        loops = np.empty(3 * count, np.int32)
-        mesh.loop_triangles.foreach_get("loops", loops)
+        loops = _triangle_corners(mesh).ravel()
+        corners = _faces(mesh).corner_vertices[loops]
         loop_normals = np.empty((len(mesh.loops), 3), np.float32)
         mesh.corner_normals.foreach_get("vector", loop_normals.ravel())
     finally:

@@ -86,6 +86,14 @@ def test_hair_grows_on_odd_meshes(scene, name):
     assert forbidden is None or not forbidden(points(hair)[:, 0]).any()
 
 
+@pytest.mark.parametrize("name", MESHES)
+def test_triangles_are_those_that_blender_cuts(scene, name):
+    odd = make(*MESHES[name][:2])
+    odd.data.calc_loop_triangles()
+    found = scene_door.read_surface(odd, bpy.context.evaluated_depsgraph_get()).mesh.triangles
+    np.testing.assert_array_equal(found, [triangle.vertices[:] for triangle in odd.data.loop_triangles])
+
+
 REFUSED = {
     "no vertices": ([], [], "no faces"),
     "vertices alone": (SQUARE, [], "no faces"),
