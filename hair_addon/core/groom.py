@@ -250,6 +250,7 @@ def bind_hair(
         guide_weights,
         hash_grid,
         interpolation,
+        lane_interpolation,
         part_lines,
         rooting,
         sampling,
@@ -258,7 +259,8 @@ def bind_hair(
     )
     from .regions import kept_apart
 
-    _load_kernels(device, guide_weights, hash_grid, interpolation, rooting)
+    sums = interpolation if device == "cpu" else lane_interpolation
+    _load_kernels(device, guide_weights, hash_grid, sums, rooting)
     _load_kernels("cpu", fingerprint, transform)
     if lines is not None:
         _load_kernels(device, part_lines, surface_query)

@@ -39,16 +39,32 @@ class GuideWeights:
     """The guides that each strand follows, nearest first: (S, k) arrays on one device.
 
     indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
-    cosine and sine of the angle about the normal from the guide's frame to the strand's.
+    cosine and sine of the angle about the normal from the guide's frame to the strand's. On a GPU also order: (S,)
+    int32, the strands in the order of the guides that they follow first.
     """
 
     indices: "wp.array2d[int]"
     weights: "wp.array2d[float]"
     turns: "wp.array2d[wp.vec2]"
+    order: "wp.array[int] | None" = None
 
     def of(self, chosen):
         """The same of some strands; chosen: int32 Warp array on the device."""
-        return GuideWeights(rows(self.indices, chosen), rows(self.weights, chosen), rows(self.turns, chosen))
+        parts = (rows(array, chosen) for array in (self.indices, self.weights, self.turns))
+        return GuideWeights(*parts, _order_on(self.indices.device, len(chosen)))
+
+
+def _order_on(device, count, first=None):
+    """The order of `GuideWeights` by the first guides (S,) int32, or any if they are not told; None on a processor."""
+    if device.is_cpu:
+        return None
+    # Radix sort wants room for as many again.
+    order = wp.array(np.arange(2 * count, dtype=np.int32), device=device)
+    if first is not None:
+        keys = wp.empty(2 * count, dtype=int, device=device)
+        wp.copy(keys, first, count=count)
+        wp.utils.radix_sort_pairs(keys, order, count)
+    return order[:count]
 
 
 @dataclass(frozen=True)
@@ -114,7 +130,7 @@ def find_guides(
         outputs=[indices, weights, turns],
         device=device,
     )
-    return GuideWeights(indices, weights, turns)
+    return GuideWeights(indices, weights, turns, _order_on(device, len(roots), indices[:, 0].contiguous()))
 
 
 def _nearest_guides(guide_roots, roots, count, regions):
@@ -192,7 +208,7 @@ def limited(guide_weights, guide_points, guide_normals, limits):
         outputs=[weights],
         device=device,
     )
-    return GuideWeights(guide_weights.indices, weights, guide_weights.turns)
+    return GuideWeights(guide_weights.indices, weights, guide_weights.turns, guide_weights.order)
 
 
 def _fade_of_cosine(angle):

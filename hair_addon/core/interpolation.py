@@ -21,6 +21,7 @@ import warp as wp
 from . import cores
 from .cores import Rows
 from .guide_weights import frame
+from .lane_interpolation import CANCELLED, LONGEST, by_lanes, framed_offset
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -28,20 +29,13 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 BLOCK = 40  # segments that one vector holds on the processor: a strand of 41 points in one go
 block = wp.types.vector(length=BLOCK, dtype=float)
 
-SHARE = 4  # segments of one strand that a GPU's thread makes
-share = wp.types.vector(length=SHARE, dtype=float)
-
-# Of l_i, below which |m_i| counts as this: where guides cancel, a direction is rounding and nothing else.
-CANCELLED = 1.0e-3
-LONGEST = 1.0e18  # [m]: of a segment whose square is still a float
-
 
 def interpolate(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0):
     """(S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,) that follow guides (G, P) [m], normals (G,).
 
     keep_length: how much of the way from Eq. 10 to segments as long as the guides' on average, 0 to 1.
     """
-    by = by_strands if roots.device.is_cpu else by_points
+    by = by_strands if roots.device.is_cpu else by_lanes
     return by(roots, normals, guide_points, guide_normals, guide_weights, keep_length)
 
 
@@ -75,43 +69,6 @@ def by_strands(roots, normals, guide_points, guide_normals, guide_weights, keep_
     return points
 
 
-def by_points(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0):
-    """What `interpolate` returns, neighbouring segments by neighbouring threads: the GPU's way.
-
-    So they read and write memory side by side; each makes a few segments far apart, for which it reads weights once.
-    """
-    point_count = guide_points.shape[1]
-    offsets = wp.empty(guide_points.shape, dtype=wp.vec4, device=roots.device)
-    wp.launch(
-        _framed_offsets,
-        dim=offsets.shape,
-        inputs=[guide_points, guide_normals],
-        outputs=[offsets],
-        device=roots.device,
-    )
-    points = wp.empty((len(roots), point_count), dtype=wp.vec3, device=roots.device)
-    lane_count = -(-point_count // SHARE)
-    wp.launch(
-        _segments,
-        dim=(len(roots), lane_count),
-        inputs=[offsets, guide_weights.indices, guide_weights.weights, guide_weights.turns, lane_count, keep_length],
-        outputs=[points],
-        device=roots.device,
-    )
-    wp.launch(_sums, dim=len(roots), inputs=[roots, normals], outputs=[points], device=roots.device)
-    return points
-
-
-@wp.func
-def _framed_offset(guide_points: wp.array2d[wp.vec3], guide: int, point: int, normal: wp.vec3):
-    """Eq. 7's offset in the guide's frame, and how long it is; nothing at the root and past the tip."""
-    tangent, bitangent = frame(normal)
-    if point == 0 or point >= guide_points.shape[1]:
-        return wp.vec4()
-    offset = guide_points[guide, point] - guide_points[guide, point - 1]
-    return wp.vec4(wp.dot(tangent, offset), wp.dot(bitangent, offset), wp.dot(normal, offset), wp.length(offset))
-
-
 @wp.func
 def _stretch(x: float, y: float, z: float, length: float, keep_length: float):
     """λ_i of a mean offset, or what part of it is wanted."""
@@ -133,7 +90,7 @@ def _blocks_of_offsets(
     z = block(0.0)
     lengths = block(0.0)
     for i in range(BLOCK):
-        offset = _framed_offset(guide_points, guide, 1 + BLOCK * part + i, guide_normals[guide])
+        offset = framed_offset(guide_points, guide, 1 + BLOCK * part + i, guide_normals[guide])
         x[i] = offset[0]
         y[i] = offset[1]
         z[i] = offset[2]
@@ -195,71 +152,3 @@ def _strands(
         for i in range(wp.min(BLOCK, row.shape[0] - first)):
             along += wp.vec3(out_x[i], out_y[i], out_z[i])
             row[first + i] = root + along  # Eq. 10
-
-
-@wp.kernel
-def _framed_offsets(
-    guide_points: wp.array2d[wp.vec3],
-    guide_normals: wp.array[wp.vec3],
-    # outputs
-    out_offsets: wp.array2d[wp.vec4],
-):
-    guide, point = wp.tid()
-    out_offsets[guide, point] = _framed_offset(guide_points, guide, point, guide_normals[guide])
-
-
-@wp.kernel
-def _segments(
-    offsets: wp.array2d[wp.vec4],
-    indices: wp.array2d[int],
-    weights: wp.array2d[float],
-    turns: wp.array2d[wp.vec2],
-    lane_count: int,
-    keep_length: float,
-    # outputs
-    out_segments: wp.array2d[wp.vec3],
-):
-    """λ_i m_i in the strand's frame."""
-    strand, lane = wp.tid()
-    last = out_segments.shape[1] - 1
-    x = share(0.0)
-    y = share(0.0)
-    z = share(0.0)
-    lengths = share(0.0)
-    for slot in range(indices.shape[1]):
-        weight = weights[strand, slot]
-        if weight > 0.0:
-            guide = indices[strand, slot]
-            cosine = weight * turns[strand, slot][0]
-            sine = weight * turns[strand, slot][1]
-            for i in range(wp.static(SHARE)):  # unrolled, so that sums stay in registers
-                offset = offsets[guide, wp.min(lane + i * lane_count, last)]
-                x[i] += cosine * offset[0] - sine * offset[1]
-                y[i] += sine * offset[0] + cosine * offset[1]
-                z[i] += weight * offset[2]
-                lengths[i] += weight * offset[3]
-    for i in range(wp.static(SHARE)):
-        point = lane + i * lane_count
-        if point <= last:
-            stretch = _stretch(x[i], y[i], z[i], lengths[i], keep_length)
-            out_segments[strand, point] = stretch * wp.vec3(x[i], y[i], z[i])
-
-
-@wp.kernel
-def _sums(
-    roots: wp.array[wp.vec3],
-    normals: wp.array[wp.vec3],
-    # outputs
-    out_points: wp.array2d[wp.vec3],
-):
-    """Segments in the strand's frame → points."""
-    strand = wp.tid()
-    root = roots[strand]
-    normal = normals[strand]
-    tangent, bitangent = frame(normal)
-    row = out_points[strand]
-    along = wp.vec3()
-    for point in range(row.shape[0]):
-        segment = row[point]
-        along += segment[0] * tangent + segment[1] * bitangent + segment[2] * normal
-        row[point] = root + along  # Eq. 10
