@@ -6,15 +6,14 @@ Times are those of one plain core, measured; other computers take half to twice 
 
 from .groom import POINT_COUNT
 
-# Bytes of Blender's Curves. A point: position and rest position (12 each), radius (4). A curve: offset (4), type (1),
-# UV (8), normal (12), guide, id, random number (4 each); the
-# root: triangle (4), its corners and barycentric coordinates (12 each).
-_POINT_BYTES, _CURVE_BYTES = 28, 65
+# Bytes of Blender's Curves. A point: position (12), radius (4). A curve: offset (4), type (1), UV (8), normal (12),
+# guide, id, random number (4 each); the root: triangle (4), its corners and barycentric coordinates (12 each).
+_POINT_BYTES, _CURVE_BYTES = 16, 65
 _TEXEL_BYTES = 16  # RGBA, single precision
 
 _ROUND_SECONDS = 1e-5  # one guide, one round of relaxation
 _GUIDE_SECONDS = 5e-5
-_STRAND_SECONDS = 4e-6
+_STRAND_SECONDS = 2e-6
 
 
 def curves_bytes(strand_count, point_count=POINT_COUNT):
