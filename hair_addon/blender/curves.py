@@ -53,9 +53,9 @@ def _write_positions(curves, points):
 def _write_radii(curves, radii):
     """The same radii (P,) along every strand, unless they are there already."""
     radii = np.asarray(radii, np.float32)
-    present = read_radii(curves)
-    if "radius" not in curves.attributes or not (present.reshape(-1, len(radii)) == radii).all():
-        _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
+    if "radius" in curves.attributes and (read_radii(curves).reshape(-1, len(radii)) == radii).all():
+        return
+    _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
 
 
 def _read_attribute(curves, name, width):

@@ -40,6 +40,7 @@ def launch(kernel, row_count, inputs, outputs, device, least_rows=4096):
         whole = [value.array if isinstance(value, Rows) else value for value in given]
         wp.launch(kernel, dim=row_count, inputs=whole, device=device)
         return
+    wp.force_load(device, [kernel.module])  # once, not by each thread: microseconds where it is there
     bounds = np.linspace(0, row_count, part_count + 1).astype(int).tolist()
     with ThreadPoolExecutor(min(core_count, part_count)) as pool:
         list(pool.map(run, bounds[:-1], bounds[1:]))  # where the first exception is raised again

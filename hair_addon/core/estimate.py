@@ -24,7 +24,7 @@ _SPREAD_SECONDS = 2e-4  # a guide that few coarse ones became, from level to lev
 _MOST_ROUNDS = 60  # that it takes until guides rest
 
 # Growing strands: a triangle, whose normals it takes, and a strand.
-_HAIR_FACE_SECONDS, _STRAND_SECONDS = 2.5e-6, 4e-6
+_HAIR_FACE_SECONDS, _STRAND_SECONDS = 2.5e-6, 3e-6
 
 _TEXEL_SECONDS = 1.5e-6  # of all of the Marschner tables together
 

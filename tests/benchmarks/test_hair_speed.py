@@ -16,7 +16,6 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 import pytest
 import warp as wp
 from scipy.spatial import cKDTree
@@ -36,6 +35,12 @@ AS_ADDED = "asset, as an artist adds it (Catmull-Rom)"
 POLY = "asset, ending as poly lines"
 LEAN = "leanest graph of Blender's nodes (poly lines)"
 MODIFIER = "asset, its modifier alone"
+
+
+@pytest.fixture(scope="module", autouse=True)
+def told():
+    """What was measured, on what, before the tables."""
+    print("\n" + json.dumps(machine()))
 
 
 @pytest.fixture
@@ -78,8 +83,7 @@ def best_times(calls, repetitions):
 def report(title, count, times, asked, ours="ours"):
     """Print a table with a line of JSON for each row; {name: `Time` by ours}."""
     ratios = {
-        name: Time(found.clock / times[ours].clock, found.work / times[ours].work if found.work else np.nan)
-        for name, found in times.items()
+        name: Time(found.clock / times[ours].clock, found.work / times[ours].work) for name, found in times.items()
     }
     print(f"\n{f'{title}, {count:,} strands':54} {'ms':>8} {'by ours':>8} {'work ms':>9} {'by ours':>8}  asked")
     for name, found in times.items():
@@ -111,7 +115,6 @@ def natives(head, guides, count, is_with_asset):
 def test_making_strands(head_and_guides, count):
     """Search, weights, interpolation, the write into Curves and Blender's update, beside Blender's own nodes."""
     head, guides = head_and_guides
-    print("\n" + json.dumps(machine()))
     ways = natives(head, guides, count, is_with_asset=count < 1_000_000)
     ours = Ours.grown(guides, count)
     assert ours.strand_count == count and ours.is_poly
@@ -125,7 +128,8 @@ def test_making_strands(head_and_guides, count):
         firsts.append(best_times({"grow": ours.grow}, 1)["grow"])
     times["ours, where there was none"] = Time(min(t.clock for t in firsts), min(t.work for t in firsts))
     times |= best_times({"of which writing points and Blender's update": ours.write}, repetitions)
-    ratios = report("Making strands", count, times, {AS_ADDED: 12, POLY: 5, LEAN: 2.5})
+    asked = {AS_ADDED: 12, POLY: 5, LEAN: 2.5} | ({"ours": "0.7 s"} if count == 1_000_000 else {})
+    ratios = report("Making strands", count, times, asked)
     assert ratios[LEAN].work > 0.4
     if AS_ADDED in ratios:
         assert ratios[AS_ADDED].work > 3.0 and ratios[POLY].work > 1.2
@@ -164,7 +168,7 @@ def test_editing_guides(head_and_guides, count, monkeypatch):
     for _ in range(3):
         ways[AS_ADDED].edit()
         modifier_times.append(ways[AS_ADDED].modifier_time)
-    times[MODIFIER] = Time(min(modifier_times), 0.0)  # Blender measures it on the clock
+    times[MODIFIER] = Time(min(modifier_times), 0.0)  # on the clock alone: Blender measures it
     ratios = report("Editing guides, up to arrays", count, times, {MODIFIER: 50}, "ours, all guides")
     assert ratios[MODIFIER].clock > 1.5
 
@@ -206,4 +210,4 @@ def test_peak_memory():
         ratio = peak / peaks["ours"]
         print(f"  {name:52} {peak / 1e6:7.0f} {ratio:8.2f}  {4 if name == AS_ADDED else ''}")
         print(json.dumps({"table": "Peak memory", "strands": 300_000, "row": name, "bytes": peak, "by_ours": ratio}))
-    assert peaks[AS_ADDED] > 2.5 * peaks["ours"]
+    assert peaks[AS_ADDED] > 3.5 * peaks["ours"]

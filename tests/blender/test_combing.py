@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Combing: the picture follows at once, and Blender's data when the stroke is over; counted, not timed."""
 
+from dataclasses import replace
+
 import bpy
 import numpy as np
 import pytest
@@ -201,6 +203,16 @@ def test_what_was_just_written_is_not_read_again(hair, monkeypatch):
     write_points(hair, sculpted)
     assert compared == [1]
     assert bindings.of(hair.data) is None
+
+
+def test_hair_that_was_made_again_is_drawn_anew(hair, monkeypatch):
+    before = drawn(hair)
+    calls = counts_of(monkeypatch)
+    settings = replace(pipeline.inputs_of(hair.data)[1], seed=7)
+    pipeline.interpolate_hair(hair.data.vellus.guide_curves, settings, bpy.context.evaluated_depsgraph_get(), hair.data)
+    bpy.context.view_layer.update()
+    assert np.array_equal(drawn(hair), points(hair)) and not np.array_equal(drawn(hair), before)
+    assert (calls["uploads"], calls["moves"]) == (1, 0)
 
 
 def test_hair_that_was_sculpted_itself_is_kept(hair):

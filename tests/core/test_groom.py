@@ -205,7 +205,7 @@ def test_settings_do_not_import_warp():
 def test_every_kernel_is_compiled_in_the_step_that_says_so(head, monkeypatch):
     """So that nobody waits for a compiler without being told: what is launched was loaded before."""
     loaded, launched, launch = set(), set(), wp.launch
-    monkeypatch.setattr(wp, "force_load", lambda _device, modules: loaded.update(m.name for m in modules))
+    monkeypatch.setattr(groom, "_load_kernels", lambda _device, *modules: loaded.update(m.__name__ for m in modules))
     monkeypatch.setattr(
         wp, "launch", lambda kernel, *a, **k: (launched.add(kernel.module.name), launch(kernel, *a, **k))
     )
