@@ -15,8 +15,8 @@ from .voronoi import (
     detour_of,
     detours,
     fixed,
-    nearest_places,
     nearest_site,
+    some_sites,
     sum_cells,
 )
 
@@ -54,7 +54,7 @@ class CutCells:
     """
 
     def __init__(self, ground, site_count, device, weights=None):
-        parts, self._device = ground.parts, device
+        self._ground, parts, self._device = ground, ground.parts, device
         corners = np.einsum("qck,qkx->qcx", parts.barycentric, ground.mesh.corners[parts.triangle])
         centres = corners.mean(axis=1)
         first_axes = corners[:, 1] - corners[:, 0]
@@ -82,7 +82,7 @@ class CutCells:
     def sums(self, sites):
         """`Sums` for `Sites`."""
         if self._cells is None:
-            self._cells = nearest_places(sites, self._pieces.centres)
+            self._cells = some_sites(self._ground, sites, self._pieces.centres)
         return sum_cells(_cells, len(self._pieces.centres), [self._pieces, sites], [self._cells], sites, self._device)
 
 

@@ -23,16 +23,18 @@ from .ground import Ground
 from .lbfgs import Memory
 from .mesh import SurfacePoints, positions
 from .sampled_cells import SampledCells
-from .voronoi import sites_on
+from .springs import Springs
+from .voronoi import EVERYWHERE, sites_on
 
 STEPS_KEPT = 7
 LONGEST_STEP = 0.5  # of the way to the next site
 FEWEST_SITES = 260  # from so many on, fewer are placed first
 LEAST_PAIR = 0.4  # of the part of the surface that two neighbours share in a honeycomb: others get no site between
-GAP_ROUNDS = 4  # gaps that share a corner are filled one after the other
+GAP_ROUNDS = 4
+START_SAMPLES = 16  # for each site of the start
 SAMPLES_PER_SITE = 64  # while they are few
 LEAST_SAMPLES = 2000
-FIRST_ITERATIONS, COARSE_ITERATIONS = 30, 10
+FIRST_ITERATIONS, COARSE_ITERATIONS = 8, 3
 ENOUGH = 1e-4  # an iteration that lowers the energy by less than that part of it was the last
 
 # Second moment of a regular hexagon about its centre by its area squared: no tessellation of the plane has less.
@@ -112,7 +114,7 @@ def _place(ground, count, seed, iterations, device, progress):
     counts = [count]
     while counts[0] > FEWEST_SITES:
         counts.insert(0, _coarser(counts[0], 0.0))
-    sites, _ = ground.samples(counts[0], random)
+    sites = _start(ground, counts[0], random)
     # Where triangles are much smaller than cells, samples do for most of the way.
     is_fine = len(ground.amounts) > 2 * SAMPLES_PER_SITE * count
     for level in range(len(counts)):
@@ -131,6 +133,13 @@ def _place(ground, count, seed, iterations, device, progress):
             sites = _refined(ground, cells, points, sites, counts[level + 1], device)
     told = _share(progress, 0.3, 1.0)
     return _descend(ground, CutCells(ground, count, device), sites, iterations, device, told).sites
+
+
+def _start(ground, count, random):
+    """`count` sites that are far from each other."""
+    points, _ = ground.samples(START_SAMPLES * count, random)
+    squares = EVERYWHERE**2 * (1.0 + random.random(len(points)))
+    return points[_farthest(ground, points, squares, _wanted(ground, points[:0], count))]
 
 
 def _coarser(count, missing):
@@ -153,7 +162,7 @@ def _descend(ground, cells, sites, iterations, device, progress, steps_kept=STEP
     energies = [state.energy]
     for iteration in range(iterations):
         progress(iteration / iterations)
-        moved = _State(ground, cells, state.stepped(memory.direction(state.gradient, state.inverse)), device)
+        moved = _State(ground, cells, state.stepped(memory.direction(state.gradient, state.moves if steps_kept else state.lloyd_moves)), device)
         if moved.energy > state.energy and len(memory):
             memory.clear()
             moved = _State(ground, cells, state.stepped(state.to_centroids), device)
@@ -177,13 +186,22 @@ class _State:
     def __init__(self, ground, cells, sites, device):
         self.sites, self._ground = sites, ground
         self.places = positions(ground.mesh, sites).astype(np.float64)
-        self.sums = cells.sums(sites_on(ground, sites, device))
+        self._device, self._on = device, sites_on(ground, sites, device)
+        self.sums = cells.sums(self._on)
         self.energy = self.sums.energy
         normals = ground.normals[sites.triangle]
         gradient = -2.0 * self.sums.moments
         self.gradient = gradient - np.einsum("ni,ni->n", gradient, normals)[:, None] * normals
         filled = self.sums.masses > 0.0
         self.inverse = np.where(filled, 0.5 / np.where(filled, self.sums.masses, 1.0), 0.0)[:, None]
+
+    def moves(self, gradient):
+        """(n, 3): nearly the moves that change the gradient by (n, 3)."""
+        return Springs(self._on, self.sums.masses, self._device).moves(gradient)
+
+    def lloyd_moves(self, gradient):
+        """(n, 3): the same, where no cell knew of its neighbours."""
+        return self.inverse * gradient
 
     @property
     def to_centroids(self):
@@ -234,9 +252,11 @@ def _refined(ground, cells, points, sites, count, device):
     # In a honeycomb of n sites each of 3n pairs has as large a part.
     is_wide = (known >= 0) & (sizes > LEAST_PAIR * len(points) / (3.0 * len(sites)))
     ranked = np.argsort(-sizes, kind="stable")
-    between = _firsts(which, squares)[ranked[is_wide[ranked]]]
+    is_wide = is_wide[ranked]
+    between = _firsts(which, squares)[ranked[is_wide]]
     islands = ground.islands[points.triangle]
-    sites = sites.joined(points[_within(between, islands, _wanted(ground, sites, count))])
+    chosen = _within(between, islands, _wanted(ground, sites, count))
+    sites = sites.joined(ground.moved(points[chosen], middles[which[chosen]]))
     for _ in range(GAP_ROUNDS):
         if len(sites) < count:
             sites = sites.joined(points[_widest_gaps(ground, cells, points, sites, count, device)])
@@ -245,23 +265,38 @@ def _refined(ground, cells, points, sites, count, device):
 
 
 def _widest_gaps(ground, cells, points, sites, count, device):
-    """Samples, indices of them, that are farthest from all sites: at most as many as are lacking, and not together."""
+    """Samples, indices of them, that are farthest from all sites and from each other: as many as are lacking, at most.
+
+    Each cell has one to offer.
+    """
     first, _ = cells.nearest_two(sites_on(ground, sites, device))
     squares = np.sum((cells.places - positions(ground.mesh, sites)[first]) ** 2, axis=1)
-    widths = squares * cells.densities  # by the spacing that sites should have there
-    gaps = _firsts(first, -widths)
-    gaps = gaps[np.argsort(-widths[gaps], kind="stable")]
-    islands, wanted = ground.islands[points.triangle], _wanted(ground, sites, count)
-    lone = []
-    for gap in gaps:
-        if len(lone) == count - len(sites):
+    corners = _firsts(first, -squares * cells.densities)
+    return corners[_farthest(ground, points[corners], squares[corners], _wanted(ground, sites, count))]
+
+
+def _farthest(ground, points, squares, wanted):
+    """Points, indices of them, each as far as can be from all sites and those before [Gonzalez85]; fewer if they end.
+
+    squares (Q,) of distances from sites, which count by the spacing that sites should have there; wanted (islands,):
+    how many each island is to have.
+    """
+    islands, densities = ground.islands[points.triangle], ground.density_at(points)
+    places, normals = positions(ground.mesh, points).T, ground.normals[points.triangle].T
+    widths = np.where(wanted[islands] > 0, squares * densities, -1.0)
+    wanted, found = wanted.copy(), []
+    while len(found) < len(points):
+        best = widths.argmax()
+        if widths[best] <= 0.0:
             break
-        apart = np.sum((cells.places[lone] - cells.places[gap]) ** 2, axis=1)
-        # A gap is the farthest place of several cells.
-        if wanted[islands[gap]] > 0 and np.all(apart > squares[gap]):
-            lone.append(gap)
-            wanted[islands[gap]] -= 1
-    return np.array(lone, int)
+        found.append(best)
+        wanted[islands[best]] -= 1
+        if wanted[islands[best]] == 0:
+            widths[islands == islands[best]] = -1.0
+        x, y, z = places - places[:, best, None]
+        is_near = normals[:, best] @ normals > 0.0  # not on the other side of a thin part
+        np.minimum(widths, np.where(is_near, densities * (x * x + y * y + z * z), np.inf), out=widths)
+    return np.array(found, int)
 
 
 def _wanted(ground, sites, count):

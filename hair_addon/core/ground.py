@@ -103,7 +103,9 @@ class Ground:
         """
         if self._mirror is not None:
             places = places - np.minimum(self._heights(places), 0.0)[:, None] * self._mirror.normal
-        found = self.query.nearest(places)
+        # Where they come from is no farther; a part more than that for rounding.
+        farthest = 1.01 * np.linalg.norm(places - positions(self.mesh, points), axis=1) + 1e-5
+        found = self.query.nearest(places, farthest)
         before, after = self.normals[points.triangle], self.normals[found.triangle]
         is_good = (np.einsum("ni,ni->n", before, after) > LEAST_COSINE) & (self.density_at(found) > 0.0)
         is_good &= self.islands[found.triangle] == self.islands[points.triangle]

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from . import hash_grid
 from .mesh import positions
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
@@ -30,6 +29,9 @@ MOST_THREADS = 8
 LEAST_SHARE = 4096  # pieces for which another thread is worth its start
 
 UNIT = wp.constant(wp.float64(2.0**54))  # sums over a surface with a mass of one stay below 2^63
+
+near_list = wp.types.vector(length=SITES_AROUND, dtype=int)
+near_squares = wp.types.vector(length=SITES_AROUND, dtype=float)
 
 
 @wp.struct
@@ -138,10 +140,12 @@ def sites_on(ground, points, device):
     return sites
 
 
-def nearest_places(sites, points):
-    """(Q,) int Warp array: the site whose place is nearest to each point, for a search to begin with."""
-    nearest, _ = hash_grid.neighbours(sites.places, points, EVERYWHERE, 1)
-    return nearest.flatten()
+def some_sites(ground, sites, points):
+    """(Q,) int Warp array: a site that is not far from each point, for a search to begin with."""
+    found = wp.empty(len(points), dtype=int, device=points.device)
+    radius = float(np.sqrt(ground.parts.areas.sum() / len(sites.places)))
+    wp.launch(_some_site, len(points), [sites, points, ground.grid.id, radius], [found], device=points.device)
+    return found
 
 
 def detours(ground, densities, site_count):
@@ -188,6 +192,31 @@ def sum_cells(kernel, count, inputs, outputs, sites, device):
 
 
 @wp.kernel
+def _some_site(
+    sites: Sites,
+    points: wp.array[wp.vec3],
+    grid: wp.uint64,
+    first_radius: float,
+    # outputs
+    out_sites: wp.array[int],
+):
+    point = wp.tid()
+    place = points[point]
+    found = int(-1)
+    nearest = float(wp.inf)
+    radius = first_radius
+    while found < 0:
+        for site in wp.hash_grid_query(grid, place, radius):
+            apart = wp.length_sq(sites.places[site] - place)
+            # The order of a grid's points is not the same everywhere.
+            if apart < nearest or (apart == nearest and site < found):
+                nearest = apart
+                found = site
+        radius = 2.0 * radius
+    out_sites[point] = found
+
+
+@wp.kernel
 def _find_around(
     places: wp.array[wp.vec3],
     grid: wp.uint64,
@@ -200,24 +229,31 @@ def _find_around(
     site = first_site + wp.tid()
     limit = out_around.shape[1]
     place = places[site]
+    around = near_list()
+    squares = near_squares()
     radius = first_radius
     count = int(0)
     while count < limit:
         count = int(0)
+        last = radius * radius
         for other in wp.hash_grid_query(grid, place, radius):
-            apart = wp.length(places[other] - place)
-            if apart < radius and (count < limit or apart <= out_apart[site, limit - 1]):
-                slot = wp.min(count, limit - 1)
-                if count == limit and apart == out_apart[site, slot] and other > out_around[site, slot]:
+            square = wp.length_sq(places[other] - place)
+            if square <= last:
+                if count == limit and square == last and other > around[limit - 1]:
                     continue
+                slot = wp.min(count, limit - 1)
                 while slot > 0 and (
-                    out_apart[site, slot - 1] > apart
-                    or (out_apart[site, slot - 1] == apart and out_around[site, slot - 1] > other)
+                    squares[slot - 1] > square or (squares[slot - 1] == square and around[slot - 1] > other)
                 ):
-                    out_apart[site, slot] = out_apart[site, slot - 1]
-                    out_around[site, slot] = out_around[site, slot - 1]
+                    squares[slot] = squares[slot - 1]
+                    around[slot] = around[slot - 1]
                     slot -= 1
-                out_apart[site, slot] = apart
-                out_around[site, slot] = other
+                squares[slot] = square
+                around[slot] = other
                 count = wp.min(count + 1, limit)
+                if count == limit:
+                    last = squares[limit - 1]
         radius = 1.5 * radius
+    for slot in range(limit):
+        out_around[site, slot] = around[slot]
+        out_apart[site, slot] = wp.sqrt(squares[slot])
