@@ -55,7 +55,7 @@ class CutCells:
 
     def __init__(self, ground, site_count, device, weights=None):
         self._ground, parts, self._device = ground, ground.parts, device
-        corners = np.einsum("qck,qkx->qcx", parts.barycentric, ground.mesh.corners[parts.triangle])
+        corners = parts.corners
         centres = corners.mean(axis=1)
         first_axes = corners[:, 1] - corners[:, 0]
         first_axes /= np.linalg.norm(first_axes, axis=1, keepdims=True)

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .cut_cells import CutCells
+from .farthest import farthest
 from .ground import Ground
 from .lbfgs import Memory
 from .mesh import SurfacePoints, positions
@@ -131,15 +132,17 @@ def _place(ground, count, seed, iterations, device, progress):
                 for finer in range(len(counts) - 2, 0, -1):
                     counts[finer] = _coarser(counts[finer + 1], missing * 2.0**finer)
             sites = _refined(ground, cells, points, sites, counts[level + 1], device)
+    # Where sites begin evenly, half of the rounds do.
+    rounds = iterations if len(counts) == 1 else (iterations + 1) // 2
     told = _share(progress, 0.3, 1.0)
-    return _descend(ground, CutCells(ground, count, device), sites, iterations, device, told).sites
+    return _descend(ground, CutCells(ground, count, device), sites, rounds, device, told).sites
 
 
 def _start(ground, count, random):
     """`count` sites that are far from each other."""
     points, _ = ground.samples(START_SAMPLES * count, random)
     squares = EVERYWHERE**2 * (1.0 + random.random(len(points)))
-    return points[_farthest(ground, points, squares, _wanted(ground, points[:0], count))]
+    return points[farthest(ground, points, squares, _wanted(ground, points[:0], count))]
 
 
 def _coarser(count, missing):
@@ -272,31 +275,7 @@ def _widest_gaps(ground, cells, points, sites, count, device):
     first, _ = cells.nearest_two(sites_on(ground, sites, device))
     squares = np.sum((cells.places - positions(ground.mesh, sites)[first]) ** 2, axis=1)
     corners = _firsts(first, -squares * cells.densities)
-    return corners[_farthest(ground, points[corners], squares[corners], _wanted(ground, sites, count))]
-
-
-def _farthest(ground, points, squares, wanted):
-    """Points, indices of them, each as far as can be from all sites and those before [Gonzalez85]; fewer if they end.
-
-    squares (Q,) of distances from sites, which count by the spacing that sites should have there; wanted (islands,):
-    how many each island is to have.
-    """
-    islands, densities = ground.islands[points.triangle], ground.density_at(points)
-    places, normals = positions(ground.mesh, points).T, ground.normals[points.triangle].T
-    widths = np.where(wanted[islands] > 0, squares * densities, -1.0)
-    wanted, found = wanted.copy(), []
-    while len(found) < len(points):
-        best = widths.argmax()
-        if widths[best] <= 0.0:
-            break
-        found.append(best)
-        wanted[islands[best]] -= 1
-        if wanted[islands[best]] == 0:
-            widths[islands == islands[best]] = -1.0
-        x, y, z = places - places[:, best, None]
-        is_near = normals[:, best] @ normals > 0.0  # not on the other side of a thin part
-        np.minimum(widths, np.where(is_near, densities * (x * x + y * y + z * z), np.inf), out=widths)
-    return np.array(found, int)
+    return corners[farthest(ground, points[corners], squares[corners], _wanted(ground, sites, count))]
 
 
 def _wanted(ground, sites, count):

@@ -17,7 +17,6 @@ from .voronoi import Sites
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-FIRST_RING = 7  # a site and as many as stand around it in a honeycomb
 NEAR, FAR = 1.2, 1.6  # springs fade out between so many spacings: the second ring of a honeycomb is at 1.73
 FEWEST_SPRINGS = 4.5  # a cell with fewer is at a border
 LEAST_HOLD = 0.02  # of a cell's mass: a network without a border could drift
@@ -33,15 +32,12 @@ class Springs:
         self._stiffness = wp.empty(sites.around.shape, dtype=float, device=device)
         self._holds = wp.empty(len(masses), dtype=float, device=device)
         self._pull = wp.empty(len(masses), dtype=wp.vec3, device=device)
-        spacings = wp.empty(len(masses), dtype=float, device=device)
         shares = wp.empty(len(masses), dtype=float, device=device)
         on_device = wp.array(masses, dtype=float, device=device)
-        for kernel, inputs, outputs in (
-            (_spacings, [sites], [spacings]),
-            (_shares, [sites, spacings, on_device], [shares]),
-            (_stiffness, [sites, spacings, on_device, shares], [self._stiffness, self._holds]),
-        ):
-            wp.launch(kernel, len(masses), inputs, outputs, device=device)
+        inputs = [sites, on_device]
+        wp.launch(_shares, len(masses), inputs, [shares], device=device)
+        inputs += [shares]
+        wp.launch(_stiffness, len(masses), inputs, [self._stiffness, self._holds], device=device)
 
     def pull(self, moves):
         """(n, 3) float32: how the gradient changes where sites make small moves (n, 3) along the surface."""
@@ -73,27 +69,13 @@ class Springs:
         return YIELD * found
 
 
-@wp.kernel
-def _spacings(
-    sites: Sites,
-    # outputs
-    out_spacings: wp.array[float],
-):
-    site = wp.tid()
-    total = float(0.0)
-    count = wp.min(FIRST_RING, sites.apart.shape[1])
-    for slot in range(1, count):
-        total += sites.apart[site, slot]
-    out_spacings[site] = total / float(wp.max(count - 1, 1))
-
-
 @wp.func
-def _nearness(sites: Sites, spacings: wp.array[float], site: int, slot: int):
+def _nearness(sites: Sites, site: int, slot: int):
     other = sites.around[site, slot]
     if other == site or sites.islands[other] != sites.islands[site]:
         return 0.0
     # The smaller spacing: whoever is a neighbour by it knows of the other.
-    apart = sites.apart[site, slot] / wp.min(spacings[site], spacings[other])
+    apart = sites.apart[site, slot] / wp.min(sites.spacings[site], sites.spacings[other])
     fade = wp.clamp((FAR - apart) / (FAR - NEAR), 0.0, 1.0)
     facing = wp.clamp(wp.dot(sites.normals[site], sites.normals[other]), 0.0, 1.0)
     return fade * fade * (3.0 - 2.0 * fade) * facing
@@ -102,7 +84,6 @@ def _nearness(sites: Sites, spacings: wp.array[float], site: int, slot: int):
 @wp.kernel
 def _shares(
     sites: Sites,
-    spacings: wp.array[float],
     masses: wp.array[float],
     # outputs
     out_shares: wp.array[float],
@@ -110,14 +91,13 @@ def _shares(
     site = wp.tid()
     total = float(0.0)
     for slot in range(sites.around.shape[1]):
-        total += _nearness(sites, spacings, site, slot)
+        total += _nearness(sites, site, slot)
     out_shares[site] = masses[site] / wp.max(total, FEWEST_SPRINGS)
 
 
 @wp.kernel
 def _stiffness(
     sites: Sites,
-    spacings: wp.array[float],
     masses: wp.array[float],
     shares: wp.array[float],
     # outputs
@@ -128,7 +108,7 @@ def _stiffness(
     total = float(0.0)
     for slot in range(sites.around.shape[1]):
         stiffness = float(0.0)
-        nearness = _nearness(sites, spacings, site, slot)
+        nearness = _nearness(sites, site, slot)
         if nearness > 0.0:
             apart = sites.apart[site, slot]
             total += nearness * (shares[site] + shares[sites.around[site, slot]])

@@ -21,6 +21,7 @@ from .mesh import positions
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 SITES_AROUND = 16  # how many neighbours of a site (itself among them) are looked at before all sites are
+FIRST_RING = 7  # a site and as many as stand around it in a honeycomb
 EVERYWHERE = 4.0  # a distance that reaches across a surface of unit size
 SEARCH_RADIUS = 2.6  # by the square root of a cell's area: more than SITES_AROUND of a honeycomb
 DETOUR = 2.0  # by which a site on the other side of a thin part counts as farther, in spacings of sites
@@ -36,13 +37,14 @@ near_squares = wp.types.vector(length=SITES_AROUND, dtype=float)
 
 @wp.struct
 class Sites:
-    """Where sites are, which side they are on, and who is near them."""
+    """Where sites are, which side they are on, who is near them, and how far the first ring of these is, as a mean."""
 
     places: wp.array[wp.vec3]
     normals: wp.array[wp.vec3]
     islands: wp.array[int]
     around: wp.array2d[int]
     apart: wp.array2d[float]
+    spacings: wp.array[float]
 
 
 @wp.func
@@ -132,9 +134,10 @@ def sites_on(ground, points, device):
     shape = (len(points), min(SITES_AROUND, len(points)))
     sites.around = wp.empty(shape, dtype=int, device=device)
     sites.apart = wp.empty(shape, dtype=float, device=device)
+    sites.spacings = wp.empty(len(points), dtype=float, device=device)
     radius = SEARCH_RADIUS * float(np.sqrt(ground.parts.areas.sum() / len(points)))
     ground.grid.build(sites.places, radius)
-    inputs, outputs = [sites.places, ground.grid.id, radius], [sites.around, sites.apart]
+    inputs, outputs = [sites.places, ground.grid.id, radius], [sites.around, sites.apart, sites.spacings]
     shares = share_count(len(points), LEAST_SHARE // 8, device)
     in_threads(_find_around, len(points), inputs, [outputs] * shares, device)
     return sites
@@ -225,6 +228,7 @@ def _find_around(
     # outputs
     out_around: wp.array2d[int],
     out_apart: wp.array2d[float],
+    out_spacings: wp.array[float],
 ):
     site = first_site + wp.tid()
     limit = out_around.shape[1]
@@ -257,3 +261,8 @@ def _find_around(
     for slot in range(limit):
         out_around[site, slot] = around[slot]
         out_apart[site, slot] = wp.sqrt(squares[slot])
+    ring = wp.min(FIRST_RING, limit)
+    total = float(0.0)
+    for slot in range(1, ring):
+        total += wp.sqrt(squares[slot])
+    out_spacings[site] = total / float(wp.max(ring - 1, 1))
