@@ -35,7 +35,7 @@ GAP_ROUNDS = 4
 START_SAMPLES = 16  # for each site of the start
 SAMPLES_PER_SITE = 64  # while they are few
 LEAST_SAMPLES = 2000
-FIRST_ITERATIONS, COARSE_ITERATIONS = 8, 3
+FIRST_ITERATIONS, COARSE_ITERATIONS = 6, 3
 ENOUGH = 1e-4  # an iteration that lowers the energy by less than that part of it was the last
 
 # Second moment of a regular hexagon about its centre by its area squared: no tessellation of the plane has less.
@@ -132,8 +132,8 @@ def _place(ground, count, seed, iterations, device, progress):
                 for finer in range(len(counts) - 2, 0, -1):
                     counts[finer] = _coarser(counts[finer + 1], missing * 2.0**finer)
             sites = _refined(ground, cells, points, sites, counts[level + 1], device)
-    # Where sites begin evenly, half of the rounds do.
-    rounds = iterations if len(counts) == 1 else (iterations + 1) // 2
+    # Sites that come from fewer, evened out before, need a third of the rounds.
+    rounds = iterations if len(counts) == 1 else -(-iterations // 3)
     told = _share(progress, 0.3, 1.0)
     return _descend(ground, CutCells(ground, count, device), sites, rounds, device, told).sites
 
