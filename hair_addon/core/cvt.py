@@ -4,11 +4,12 @@
 The cell V_i of a site s_i is the part of the surface that is nearer to it than to any other (voronoi.py). With a
 density rho, the energy is E = sum_i ∫_{V_i} rho(x) |x - s_i|² dA, and its gradient 2 m_i (s_i - c_i), c_i being the
 centroid of the cell and m_i its mass. Lloyd's step, to the surface point nearest to the centroid, never raises E.
-L-BFGS takes the same step as its first guess and learns better ones [Liu09]; where one raises E, it begins again.
+L-BFGS [Liu09] begins with steps that springs between neighbours would take (springs.py), and learns better ones; where
+one raises E, it takes Lloyd's and begins again.
 
-From a random start any descent ends in grains of honeycomb that do not match. So few sites are relaxed first, and then
-each pair of neighbours gets a site in its middle, which makes a finer honeycomb out of a coarse one, again and again: a
-multilevel method, as in [Du06].
+From a random start any descent ends in grains of honeycomb that do not match. So few sites that are far from each other
+(farthest.py) are relaxed first, and then each pair of neighbours gets a site in its middle, which makes a finer
+honeycomb out of a coarse one, again and again: a multilevel method, as in [Du06].
 
 Where E is least, areas of cells go with rho^(-1/2) [Gersho79]. Sites are to go with the density D that an artist
 painted, so rho = D².
@@ -120,7 +121,7 @@ def _place(ground, count, seed, iterations, device, progress):
     is_fine = len(ground.amounts) > 2 * SAMPLES_PER_SITE * count
     for level in range(len(counts)):
         told = _share(progress, 0.3 * level / len(counts), 0.3 * (level + 1) / len(counts))
-        if level < len(counts) - 1 or level == 0 or is_fine:
+        if level < len(counts) - 1 or is_fine:
             points, part = ground.samples(max(SAMPLES_PER_SITE * len(sites), LEAST_SAMPLES))
             cells = SampledCells(ground, points, part, len(sites), device)
             rounds = COARSE_ITERATIONS if level else FIRST_ITERATIONS
@@ -132,8 +133,8 @@ def _place(ground, count, seed, iterations, device, progress):
                 for finer in range(len(counts) - 2, 0, -1):
                     counts[finer] = _coarser(counts[finer + 1], missing * 2.0**finer)
             sites = _refined(ground, cells, points, sites, counts[level + 1], device)
-    # Sites that come from fewer, evened out before, need a third of the rounds.
-    rounds = iterations if len(counts) == 1 else -(-iterations // 3)
+    # Sites that come from fewer, evened out before, need half of the rounds.
+    rounds = iterations if len(counts) == 1 else (iterations + 1) // 2
     told = _share(progress, 0.3, 1.0)
     return _descend(ground, CutCells(ground, count, device), sites, rounds, device, told).sites
 
@@ -165,7 +166,8 @@ def _descend(ground, cells, sites, iterations, device, progress, steps_kept=STEP
     energies = [state.energy]
     for iteration in range(iterations):
         progress(iteration / iterations)
-        moved = _State(ground, cells, state.stepped(memory.direction(state.gradient, state.moves if steps_kept else state.lloyd_moves)), device)
+        moves = memory.direction(state.gradient, state.moves if steps_kept else state.lloyd_moves)
+        moved = _State(ground, cells, state.stepped(moves), device)
         if moved.energy > state.energy and len(memory):
             memory.clear()
             moved = _State(ground, cells, state.stepped(state.to_centroids), device)

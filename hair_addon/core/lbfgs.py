@@ -23,7 +23,7 @@ class Memory:
             self._pairs = [*self._pairs, (step, change, curvature)][-self._limit :]
 
     def direction(self, gradient, solved):
-        """Where to go from a gradient (n, 3); solved: the moves (n, 3) that are thought to change a gradient by so much."""
+        """Where to go from a gradient (n, 3); solved: of moves, which are thought to change a gradient by so much."""
         direction, parts = gradient, []
         for step, change, curvature in reversed(self._pairs):
             parts.append(dot(step, direction) / curvature)

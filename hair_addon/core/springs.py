@@ -21,7 +21,7 @@ NEAR, FAR = 1.2, 1.6  # springs fade out between so many spacings: the second ri
 FEWEST_SPRINGS = 4.5  # a cell with fewer is at a border
 LEAST_HOLD = 0.02  # of a cell's mass: a network without a border could drift
 YIELD = np.float32(1.3)  # measured best: cells give way sideways, springs do not
-ROUNDS = 4  # of conjugate gradients: the preconditioner of a step need not be exact
+ROUNDS = 3  # of conjugate gradients: the preconditioner of a step need not be exact
 
 
 class Springs:
