@@ -37,6 +37,7 @@ START_SAMPLES = 16  # for each site of the start
 SAMPLES_PER_SITE = 64  # while they are few
 LEAST_SAMPLES = 2000
 FIRST_ITERATIONS, COARSE_ITERATIONS = 6, 3
+RISE = 0.01  # of the energy: so much a step may raise it on the way to a better place, where that is allowed
 ENOUGH = 1e-4  # an iteration that lowers the energy by less than that part of it was the last
 
 # Second moment of a regular hexagon about its centre by its area squared: no tessellation of the plane has less.
@@ -136,7 +137,7 @@ def _place(ground, count, seed, iterations, device, progress):
     # Sites that come from fewer, evened out before, need half of the rounds.
     rounds = iterations if len(counts) == 1 else (iterations + 1) // 2
     told = _share(progress, 0.3, 1.0)
-    return _descend(ground, CutCells(ground, count, device), sites, rounds, device, told).sites
+    return _descend(ground, CutCells(ground, count, device), sites, rounds, device, told, is_strict=False).sites
 
 
 def _start(ground, count, random):
@@ -157,9 +158,10 @@ def _share(progress, first, last):
 
 
 def _descend(ground, cells, sites, iterations, device, progress, steps_kept=STEPS_KEPT, is_strict=True):
-    """Sites after at most so many iterations, none of which raised the energy unless `is_strict` is false.
+    """The best sites of at most so many iterations, none of which raised the energy unless `is_strict` is false.
 
-    A site that comes to another side, by its normal, may raise it, and that may be the way to a better place.
+    A site that comes to another side, by its normal, may raise it a little: to try shorter steps instead costs as much
+    as going on does.
     """
     memory = Memory(steps_kept)
     state = best = _State(ground, cells, sites, device)
@@ -168,7 +170,7 @@ def _descend(ground, cells, sites, iterations, device, progress, steps_kept=STEP
         progress(iteration / iterations)
         moves = memory.direction(state.gradient, state.moves if steps_kept else state.lloyd_moves)
         moved = _State(ground, cells, state.stepped(moves), device)
-        if moved.energy > state.energy and len(memory):
+        if moved.energy > (1.0 if is_strict else 1.0 + RISE) * state.energy and len(memory):
             memory.clear()
             moved = _State(ground, cells, state.stepped(state.to_centroids), device)
         if is_strict and moved.energy > state.energy:
