@@ -276,7 +276,7 @@ def _widest_gaps(ground, cells, points, sites, count, device):
 
     Each cell has one to offer.
     """
-    first, _ = cells.nearest_two(sites_on(ground, sites, device))
+    first = cells.nearest(sites_on(ground, sites, device))
     squares = np.sum((cells.places - positions(ground.mesh, sites)[first]) ** 2, axis=1)
     corners = _firsts(first, -squares * cells.densities)
     return corners[farthest(ground, points[corners], squares[corners], _wanted(ground, sites, count))]
@@ -301,8 +301,10 @@ def _within(ranked, islands, wanted):
 
 
 def _firsts(groups, keys):
-    """Index of the smallest key of each group that there is, groups rising."""
-    order = np.argsort(-keys, kind="stable")
-    firsts = np.full(groups.max() + 1, -1)
-    firsts[groups[order]] = order  # the last one stays
+    """Index of the smallest key of each group that there is, groups rising; of equal ones the lowest."""
+    least = np.full(groups.max() + 1, np.inf)
+    np.minimum.at(least, groups, keys)
+    found = np.flatnonzero(keys == least[groups])[::-1]
+    firsts = np.full(len(least), -1)
+    firsts[groups[found]] = found  # the last one stays
     return firsts[firsts >= 0]

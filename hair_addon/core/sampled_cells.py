@@ -44,6 +44,11 @@ class SampledCells:
         inputs, outputs = [self._samples, sites, with_seconds], [self._cells, self._seconds]
         return sum_cells(_nearest_two, len(self.places), inputs, outputs, sites, self._device)
 
+    def nearest(self, sites):
+        """(Q,) the nearest of `Sites` to each point."""
+        self.sums(sites)
+        return self._cells.numpy().astype(np.int64)
+
     def nearest_two(self, sites):
         """(Q,) the nearest of `Sites` to each point, and (Q,) the next, -1 for none."""
         self.sums(sites, with_seconds=True)

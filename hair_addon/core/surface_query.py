@@ -5,6 +5,7 @@ import numpy as np
 import warp as wp
 
 from .mesh import SurfacePoints
+from .threads import LEAST_SHARE, in_threads, share_count
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -39,7 +40,8 @@ class SurfaceQuery:
         places = wp.array(places.astype(np.float32), dtype=wp.vec3, device=device)
         faces = wp.empty(len(places), dtype=int, device=device)
         barycentric = wp.empty(len(places), dtype=wp.vec3, device=device)
-        wp.launch(_nearest, len(places), [self.mesh.id, places, limits], outputs=[faces, barycentric], device=device)
+        outputs = [[faces, barycentric]] * share_count(len(places), LEAST_SHARE // 4, device)
+        in_threads(_nearest, len(places), [self.mesh.id, places, limits], outputs, device)
         return SurfacePoints(self._triangles[faces.numpy()], barycentric.numpy())
 
 
@@ -48,11 +50,12 @@ def _nearest(
     surface: wp.uint64,
     places: wp.array[wp.vec3],
     farthest: wp.array[float],
+    first_place: int,
     # outputs
     out_faces: wp.array[int],
     out_barycentric: wp.array[wp.vec3],
 ):
-    place = wp.tid()
+    place = first_place + wp.tid()
     query = wp.mesh_query_point_no_sign(surface, places[place], farthest[place])
     out_faces[place] = query.face
     out_barycentric[place] = wp.vec3(query.u, query.v, 1.0 - query.u - query.v)

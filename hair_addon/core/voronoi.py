@@ -8,14 +8,13 @@ Sums are kept as whole numbers, in units far below single precision: they do not
 threads, so results are the same bit for bit, on every run.
 """
 
-import os
-import threading
 from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
 from .mesh import positions
+from .threads import LEAST_SHARE, in_threads, share_count
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -25,9 +24,6 @@ FIRST_RING = 7  # a site and as many as stand around it in a honeycomb
 EVERYWHERE = 4.0  # a distance that reaches across a surface of unit size
 SEARCH_RADIUS = 2.6  # by the square root of a cell's area: more than SITES_AROUND of a honeycomb
 DETOUR = 2.0  # by which a site on the other side of a thin part counts as farther, in spacings of sites
-
-MOST_THREADS = 8
-LEAST_SHARE = 4096  # pieces for which another thread is worth its start
 
 UNIT = wp.constant(wp.float64(2.0**54))  # sums over a surface with a mass of one stay below 2^63
 
@@ -155,29 +151,6 @@ def detours(ground, densities, site_count):
     """(Q,) squared: how much farther a site on the other side counts, twice the spacing that sites have there."""
     areas = ground.amounts.sum() / (site_count * densities)
     return np.minimum(DETOUR**2 * areas, EVERYWHERE**2)
-
-
-def share_count(count, least_share, device):
-    """How many threads share so many pieces of work, at least so many each."""
-    return min(os.cpu_count() or 1, MOST_THREADS, 1 + count // least_share) if wp.get_device(device).is_cpu else 1
-
-
-def in_threads(kernel, count, inputs, outputs, device):
-    """Launch a kernel on as many shares as there are lists of outputs; its last input is where its share begins."""
-    bounds = [count * share // len(outputs) for share in range(len(outputs) + 1)]
-    if len(outputs) > 1:  # threads would compile it once each; on a processor a block is one thread
-        kernel.module.load(wp.get_device(device), 1)
-
-    def launch(share):
-        first, end = bounds[share : share + 2]
-        wp.launch(kernel, dim=end - first, inputs=[*inputs, first], outputs=outputs[share], device=device)
-
-    others = [threading.Thread(target=launch, args=(share,)) for share in range(1, len(outputs))]
-    for thread in others:
-        thread.start()
-    launch(0)
-    for thread in others:
-        thread.join()
 
 
 def sum_cells(kernel, count, inputs, outputs, sites, device):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from hair_addon.core import cvt, voronoi
+from hair_addon.core import cvt, threads, voronoi
 from hair_addon.core import mesh as mesh_math
 from hair_addon.core.curvature import bend_density
 from hair_addon.core.cut_cells import CutCells
@@ -251,7 +251,7 @@ def test_placed_sites_are_the_same_bits_twice(head, scalp):
 
 def test_threads_do_not_change_a_bit(head, scalp, monkeypatch):
     expected = place(head, 300, 4, 5, density=scalp)
-    monkeypatch.setattr(voronoi, "MOST_THREADS", 1)
+    monkeypatch.setattr(threads, "MOST_THREADS", 1)
     found = place(head, 300, 4, 5, density=scalp)
     np.testing.assert_array_equal(found.barycentric, expected.barycentric)
 
