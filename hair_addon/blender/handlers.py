@@ -12,6 +12,9 @@ from . import curves as curves_door
 # of Curves as updated when no more than their surface's place has changed.
 _guide_points = {}
 
+# Surfaces that somebody is painting an image on, by session_uid: Blender need not say so before they leave that mode.
+_painted = set()
+
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
 _is_opening = False
 
@@ -43,6 +46,7 @@ def after_depsgraph_update(_scene, depsgraph):
         for datablock in _of_kind("HAIR"):
             if datablock.vellus.is_live and live_hair.is_left_by_undo(datablock):
                 datablock.vellus.is_stale = True
+    _mark_painted({update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Image)})
     combed = []
     for datablock in changed:
         if isinstance(datablock, bpy.types.Curves):
@@ -71,6 +75,23 @@ def _deformed(depsgraph):
     """The mesh objects whose evaluated shape may have changed."""
     updated = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
     return {o for o in updated if isinstance(o, bpy.types.Object) and o.type == "MESH"}
+
+
+def _mark_painted(images):
+    """Mark guides as stale whose image was painted on: where it is as it was after all, they keep their roots."""
+    names = {image.name for image in images}
+    painting = set()
+    for guides in _of_kind("GUIDES"):
+        state, surface = guides.vellus, guides.surface
+        if surface is None or not (state.is_live and state.guides.density_image):
+            continue
+        uid = surface.session_uid
+        if surface.mode == "TEXTURE_PAINT":
+            painting.add(uid)
+        if state.guides.density_image in names or uid in _painted - painting:
+            state.is_stale = True
+    _painted.clear()
+    _painted.update(painting)
 
 
 def _has_moved(guide_curves):
@@ -165,6 +186,7 @@ def forget_everything(*_args):
     hair_cache.clear()
     keyed.forget()
     _guide_points.clear()
+    _painted.clear()
 
 
 _HANDLERS = (

@@ -31,10 +31,10 @@ def distribute_guides(surface_object, settings, depsgraph, target=None, keeps_ro
 def distributing_guides(surface_object, settings, depsgraph, target=None, keeps_roots=False):
     """`distribute_guides` as work in steps (core/long_work.py)."""
     surface, density = _read_surface(surface_object, settings, depsgraph)
-    key = root_key(settings, density)
+    texture = scene.read_texture(surface, settings.density_image)
+    key = root_key(settings, density, texture and texture.values)
     roots = _kept_roots(target, surface, key) if keeps_roots else None
     device, place, target = preferences.device(), Remembered(surface_object), Remembered(target)
-    texture = scene.read_texture(surface, settings.density_image)
     guides = yield lambda progress: groom.distribute_guides(
         surface.mesh,
         settings,
@@ -105,7 +105,8 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
         return guides, *binding
 
     guides, binding, points = yield compute
-    guide_curves = _write_guides(None, place.find(), surface, guides, guide_settings, root_key(guide_settings, density))
+    key = root_key(guide_settings, density, texture and texture.values)
+    guide_curves = _write_guides(None, place.find(), surface, guides, guide_settings, key)
     key = root_key(hair_settings, density)
     guide_uid = guide_curves.session_uid
     bound = BoundHair(binding, hair_settings, key, parting.key, guides, guide_uid, surface, points)
@@ -182,14 +183,14 @@ def _store_roots(guide_curves, bound):
         curves.write_roots(guide_curves, surface, roots)
 
 
-def root_key(settings, density):
-    """What roots are placed by, beside the surface: while it stays, so do they. Of an image its name counts alone."""
+def root_key(settings, density, image=None):
+    """What roots are placed by, beside the surface: while it stays, so do they. image: its values, if there is one."""
     names = (
         *("seed", "guide_count", "relax_iterations", "density_image", "curvature", "symmetric"),
         "strand_count",
     )
     placing = repr([getattr(settings, name, None) for name in names])
-    painted = b"" if density is None else density.tobytes()
+    painted = b"".join(values.tobytes() for values in (density, image) if values is not None)
     return hashlib.blake2b(placing.encode() + painted, digest_size=16).hexdigest()
 
 
@@ -321,7 +322,8 @@ def has_other_density(target, depsgraph):
         return False  # the surface has no say but by its shape
     settings = properties.to_settings(group, settings_class)
     density = scene.read_vertex_group(target.surface, depsgraph, settings.density_group)
-    return state.root_key != root_key(settings, density)
+    image = scene.read_image(getattr(settings, "density_image", ""))
+    return state.root_key != root_key(settings, density, image)
 
 
 def evaluate(target, depsgraph):

@@ -211,14 +211,22 @@ def read_vertex_group(surface_object, depsgraph, name):
 
 def read_texture(surface, name):
     """The `Texture` of an image on a `Surface`, the mean of its colours, or None for the empty name."""
+    values = read_image(name)
+    if values is None:
+        return None
+    if surface.corner_uvs is None:
+        sentence = '"{name}" has no UV map to find an image by: make one, or pick no image.'
+        raise HairError(sentence, name=surface.name)
+    return Texture(values, surface.corner_uvs)
+
+
+def read_image(name):
+    """(height, width) float32, at least zero, the mean of an image's colours; None for the empty name."""
     if not name:
         return None
     image = bpy.data.images.get(name)
     if image is None:
         raise HairError('There is no image "{name}": pick another one, or none.', name=name)
-    if surface.corner_uvs is None:
-        sentence = '"{name}" has no UV map to find an image by: make one, or pick no image.'
-        raise HairError(sentence, name=surface.name)
     width, height = image.size
     if not (width and height and image.channels):
         raise HairError('The image "{name}" has no pixels: load it again, or pick another one.', name=name)
@@ -227,7 +235,7 @@ def read_texture(surface, name):
     values = pixels.reshape(height, width, image.channels)[:, :, :3].mean(axis=2)
     if not (np.isfinite(values).all() and np.any(values > 0.0)):
         raise HairError('The image "{name}" is black: paint some white where hair should grow.', name=name)
-    return Texture(np.maximum(values, 0.0), surface.corner_uvs)
+    return np.maximum(values, 0.0)
 
 
 def curves_objects(view_layer, kind, viewport=None):

@@ -15,8 +15,8 @@ from .voronoi import (
     detour_of,
     detours,
     fixed,
-    nearest_places,
     nearest_site,
+    some_sites,
     sum_cells,
 )
 
@@ -54,8 +54,8 @@ class CutCells:
     """
 
     def __init__(self, ground, site_count, device, weights=None):
-        parts, self._device = ground.parts, device
-        corners = np.einsum("qck,qkx->qcx", parts.barycentric, ground.mesh.corners[parts.triangle])
+        self._ground, parts, self._device = ground, ground.parts, device
+        corners = parts.corners
         centres = corners.mean(axis=1)
         first_axes = corners[:, 1] - corners[:, 0]
         first_axes /= np.linalg.norm(first_axes, axis=1, keepdims=True)
@@ -82,22 +82,25 @@ class CutCells:
     def sums(self, sites):
         """`Sums` for `Sites`."""
         if self._cells is None:
-            self._cells = nearest_places(sites, self._pieces.centres)
+            self._cells = some_sites(self._ground, sites, self._pieces.centres)
         return sum_cells(_cells, len(self._pieces.centres), [self._pieces, sites], [self._cells], sites, self._device)
 
 
-@wp.kernel
-def _cells(
+@wp.func
+def _add_cut(
+    piece: int,
+    nearest: int,
     pieces: Pieces,
     sites: Sites,
-    first_piece: int,
-    # outputs; cells hold the sites to begin with, any at all; sums are added to
-    out_cells: wp.array[int],
+    # outputs
     out_masses: wp.array[wp.int64],
     out_moments: wp.array2d[wp.int64],
     out_energies: wp.array[wp.int64],
 ):
-    piece = first_piece + wp.tid()
+    """Add a piece to the cells that share it, of which `nearest` is one.
+
+    A function of its own: what it keeps for itself is made only for pieces that come here.
+    """
     centre = pieces.centres[piece]
     e1 = pieces.first_axes[piece]
     e2 = pieces.second_axes[piece]
@@ -105,33 +108,6 @@ def _cells(
     island = pieces.islands[piece]
     detour = pieces.detours[piece]
     weight = pieces.weights[piece]
-    nearest = nearest_site(centre, normal, island, detour, sites, out_cells[piece])
-    out_cells[piece] = nearest
-
-    # A piece whose circle no border crosses is its nearest site's as a whole.
-    offset = sites.places[nearest] - centre
-    radius = pieces.radii[piece]
-    square = wp.length_sq(offset)
-    is_whole = detour_of(normal, island, detour, sites.normals[nearest], sites.islands[nearest]) == 0.0
-    reach = 2.0 * (wp.sqrt(square) + radius)
-    slot = int(0)
-    while is_whole and slot < candidate_count(sites.around, sites.places):
-        if slot < sites.around.shape[1]:
-            if sites.apart[nearest, slot] > reach:
-                break
-        other = candidate(sites.around, nearest, slot)
-        slot += 1
-        if other != nearest:
-            apart = 2.0 * radius * wp.length(sites.places[other] - sites.places[nearest])
-            is_whole = wp.length_sq(sites.places[other] - centre) - square > apart
-    if is_whole:
-        moment = -pieces.areas[piece] * weight * offset
-        wp.atomic_add(out_masses, nearest, fixed(weight * pieces.areas[piece]))
-        for axis in range(3):
-            wp.atomic_add(out_moments, nearest, axis, fixed(moment[axis]))
-        wp.atomic_add(out_energies, nearest, fixed(weight * (pieces.inertias[piece] + pieces.areas[piece] * square)))
-        return
-
     listed = cell_list()
     listed[0] = nearest
     listed_count = int(1)
@@ -256,3 +232,49 @@ def _cells(
                 if not known:
                     listed[listed_count] = other
                     listed_count += 1
+
+
+@wp.kernel
+def _cells(
+    pieces: Pieces,
+    sites: Sites,
+    first_piece: int,
+    # outputs; cells hold the sites to begin with, any at all; sums are added to
+    out_cells: wp.array[int],
+    out_masses: wp.array[wp.int64],
+    out_moments: wp.array2d[wp.int64],
+    out_energies: wp.array[wp.int64],
+):
+    piece = first_piece + wp.tid()
+    centre = pieces.centres[piece]
+    normal = wp.cross(pieces.first_axes[piece], pieces.second_axes[piece])
+    island = pieces.islands[piece]
+    detour = pieces.detours[piece]
+    weight = pieces.weights[piece]
+    nearest = nearest_site(centre, normal, island, detour, sites, out_cells[piece])
+    out_cells[piece] = nearest
+
+    # A piece whose circle no border crosses is its nearest site's as a whole.
+    offset = sites.places[nearest] - centre
+    radius = pieces.radii[piece]
+    square = wp.length_sq(offset)
+    is_whole = detour_of(normal, island, detour, sites.normals[nearest], sites.islands[nearest]) == 0.0
+    reach = 2.0 * (wp.sqrt(square) + radius)
+    slot = int(0)
+    while is_whole and slot < candidate_count(sites.around, sites.places):
+        if slot < sites.around.shape[1]:
+            if sites.apart[nearest, slot] > reach:
+                break
+        other = candidate(sites.around, nearest, slot)
+        slot += 1
+        if other != nearest:
+            apart = 2.0 * radius * wp.length(sites.places[other] - sites.places[nearest])
+            is_whole = wp.length_sq(sites.places[other] - centre) - square > apart
+    if is_whole:
+        moment = -pieces.areas[piece] * weight * offset
+        wp.atomic_add(out_masses, nearest, fixed(weight * pieces.areas[piece]))
+        for axis in range(3):
+            wp.atomic_add(out_moments, nearest, axis, fixed(moment[axis]))
+        wp.atomic_add(out_energies, nearest, fixed(weight * (pieces.inertias[piece] + pieces.areas[piece] * square)))
+    else:
+        _add_cut(piece, nearest, pieces, sites, out_masses, out_moments, out_energies)

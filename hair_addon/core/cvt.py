@@ -4,38 +4,40 @@
 The cell V_i of a site s_i is the part of the surface that is nearer to it than to any other (voronoi.py). With a
 density rho, the energy is E = sum_i ∫_{V_i} rho(x) |x - s_i|² dA, and its gradient 2 m_i (s_i - c_i), c_i being the
 centroid of the cell and m_i its mass. Lloyd's step, to the surface point nearest to the centroid, never raises E.
-L-BFGS takes the same step as its first guess and learns better ones [Liu09]; where one raises E, it begins again.
+L-BFGS [Liu09] begins with steps that springs between neighbours would take (springs.py), and learns better ones; where
+one raises E, it takes Lloyd's and begins again.
 
-From a random start any descent ends in grains of honeycomb that do not match. So few sites are relaxed first, and then
-each pair of neighbours gets a site in its middle, which makes a finer honeycomb out of a coarse one, again and again: a
-multilevel method, as in [Du06].
+From a random start any descent ends in grains of honeycomb that do not match. So few sites that are far from each other
+(farthest.py) are relaxed first, and then each pair of neighbours gets a site in its middle, which makes a finer
+honeycomb out of a coarse one, again and again: a multilevel method, as in [Du06].
 
 Where E is least, areas of cells go with rho^(-1/2) [Gersho79]. Sites are to go with the density D that an artist
 painted, so rho = D².
 """
 
 from dataclasses import dataclass
-from itertools import product
-from operator import add
 
 import numpy as np
 
 from .cut_cells import CutCells
+from .farthest import farthest
 from .ground import Ground
 from .lbfgs import Memory
 from .mesh import SurfacePoints, positions
 from .sampled_cells import SampledCells
-from .voronoi import sites_on
+from .springs import Springs
+from .voronoi import EVERYWHERE, sites_on
 
 STEPS_KEPT = 7
 LONGEST_STEP = 0.5  # of the way to the next site
 FEWEST_SITES = 260  # from so many on, fewer are placed first
 LEAST_PAIR = 0.4  # of the part of the surface that two neighbours share in a honeycomb: others get no site between
 GAP_ROUNDS = 4  # gaps that share a corner are filled one after the other
-BESIDE = tuple(product((-1, 0, 1), repeat=3))  # steps from a cell of a grid to those around it, and itself
+START_SAMPLES = 16  # for each site of the start
 SAMPLES_PER_SITE = 64  # while they are few
 LEAST_SAMPLES = 2000
-FIRST_ITERATIONS, COARSE_ITERATIONS = 30, 10
+FIRST_ITERATIONS, COARSE_ITERATIONS = 6, 3
+RISE = 0.01  # of the energy: so much a step may raise it on the way to a better place, where that is allowed
 ENOUGH = 1e-4  # an iteration that lowers the energy by less than that part of it was the last
 
 # Second moment of a regular hexagon about its centre by its area squared: no tessellation of the plane has less.
@@ -115,12 +117,12 @@ def _place(ground, count, seed, iterations, device, progress):
     counts = [count]
     while counts[0] > FEWEST_SITES:
         counts.insert(0, _coarser(counts[0], 0.0))
-    sites, _ = ground.samples(counts[0], random)
+    sites = _start(ground, counts[0], random)
     # Where triangles are much smaller than cells, samples do for most of the way.
     is_fine = len(ground.amounts) > 2 * SAMPLES_PER_SITE * count
     for level in range(len(counts)):
         told = _share(progress, 0.3 * level / len(counts), 0.3 * (level + 1) / len(counts))
-        if level < len(counts) - 1 or level == 0 or is_fine:
+        if level < len(counts) - 1 or is_fine:
             points, part = ground.samples(max(SAMPLES_PER_SITE * len(sites), LEAST_SAMPLES))
             cells = SampledCells(ground, points, part, len(sites), device)
             rounds = COARSE_ITERATIONS if level else FIRST_ITERATIONS
@@ -132,8 +134,17 @@ def _place(ground, count, seed, iterations, device, progress):
                 for finer in range(len(counts) - 2, 0, -1):
                     counts[finer] = _coarser(counts[finer + 1], missing * 2.0**finer)
             sites = _refined(ground, cells, points, sites, counts[level + 1], device)
+    # Sites that come from fewer, evened out before, need half of the rounds.
+    rounds = iterations if len(counts) == 1 else (iterations + 1) // 2
     told = _share(progress, 0.3, 1.0)
-    return _descend(ground, CutCells(ground, count, device), sites, iterations, device, told).sites
+    return _descend(ground, CutCells(ground, count, device), sites, rounds, device, told, is_strict=False).sites
+
+
+def _start(ground, count, random):
+    """`count` sites that are far from each other."""
+    points, _ = ground.samples(START_SAMPLES * count, random)
+    squares = EVERYWHERE**2 * (1.0 + random.random(len(points)))
+    return points[farthest(ground, points, squares, _wanted(ground, points[:0], count))]
 
 
 def _coarser(count, missing):
@@ -147,17 +158,19 @@ def _share(progress, first, last):
 
 
 def _descend(ground, cells, sites, iterations, device, progress, steps_kept=STEPS_KEPT, is_strict=True):
-    """Sites after at most so many iterations, none of which raised the energy unless `is_strict` is false.
+    """The best sites of at most so many iterations, none of which raised the energy unless `is_strict` is false.
 
-    A site that comes to another side, by its normal, may raise it, and that may be the way to a better place.
+    A site that comes to another side, by its normal, may raise it a little: to try shorter steps instead costs as much
+    as going on does.
     """
     memory = Memory(steps_kept)
     state = best = _State(ground, cells, sites, device)
     energies = [state.energy]
     for iteration in range(iterations):
         progress(iteration / iterations)
-        moved = _State(ground, cells, state.stepped(memory.direction(state.gradient, state.inverse)), device)
-        if moved.energy > state.energy and len(memory):
+        moves = memory.direction(state.gradient, state.moves if steps_kept else state.lloyd_moves)
+        moved = _State(ground, cells, state.stepped(moves), device)
+        if moved.energy > (1.0 if is_strict else 1.0 + RISE) * state.energy and len(memory):
             memory.clear()
             moved = _State(ground, cells, state.stepped(state.to_centroids), device)
         if is_strict and moved.energy > state.energy:
@@ -180,13 +193,22 @@ class _State:
     def __init__(self, ground, cells, sites, device):
         self.sites, self._ground = sites, ground
         self.places = positions(ground.mesh, sites).astype(np.float64)
-        self.sums = cells.sums(sites_on(ground, sites, device))
+        self._device, self._on = device, sites_on(ground, sites, device)
+        self.sums = cells.sums(self._on)
         self.energy = self.sums.energy
         normals = ground.normals[sites.triangle]
         gradient = -2.0 * self.sums.moments
         self.gradient = gradient - np.einsum("ni,ni->n", gradient, normals)[:, None] * normals
         filled = self.sums.masses > 0.0
         self.inverse = np.where(filled, 0.5 / np.where(filled, self.sums.masses, 1.0), 0.0)[:, None]
+
+    def moves(self, gradient):
+        """(n, 3): nearly the moves that change the gradient by (n, 3)."""
+        return Springs(self._on, self.sums.masses, self._device).moves(gradient)
+
+    def lloyd_moves(self, gradient):
+        """(n, 3): the same, where no cell knew of its neighbours."""
+        return self.inverse * gradient
 
     @property
     def to_centroids(self):
@@ -237,9 +259,11 @@ def _refined(ground, cells, points, sites, count, device):
     # In a honeycomb of n sites each of 3n pairs has as large a part.
     is_wide = (known >= 0) & (sizes > LEAST_PAIR * len(points) / (3.0 * len(sites)))
     ranked = np.argsort(-sizes, kind="stable")
-    between = _firsts(which, squares)[ranked[is_wide[ranked]]]
+    is_wide = is_wide[ranked]
+    between = _firsts(which, squares)[ranked[is_wide]]
     islands = ground.islands[points.triangle]
-    sites = sites.joined(points[_within(between, islands, _wanted(ground, sites, count))])
+    chosen = _within(between, islands, _wanted(ground, sites, count))
+    sites = sites.joined(ground.moved(points[chosen], middles[which[chosen]]))
     for _ in range(GAP_ROUNDS):
         if len(sites) < count:
             sites = sites.joined(points[_widest_gaps(ground, cells, points, sites, count, device)])
@@ -248,27 +272,14 @@ def _refined(ground, cells, points, sites, count, device):
 
 
 def _widest_gaps(ground, cells, points, sites, count, device):
-    """Samples, indices of them, that are farthest from all sites: at most as many as are lacking, and not together."""
-    first, _ = cells.nearest_two(sites_on(ground, sites, device))
+    """Samples, indices of them, that are farthest from all sites and from each other: as many as are lacking, at most.
+
+    Each cell has one to offer.
+    """
+    first = cells.nearest(sites_on(ground, sites, device))
     squares = np.sum((cells.places - positions(ground.mesh, sites)[first]) ** 2, axis=1)
-    widths = squares * cells.densities  # by the spacing that sites should have there
-    gaps = _firsts(first, -widths)
-    gaps = gaps[np.argsort(-widths[gaps], kind="stable")]
-    islands, wanted = ground.islands[points.triangle], _wanted(ground, sites, count)
-    lone, taken = [], {}
-    # Only gaps in cells side by side can be too near to each other.
-    width = 1.001 * float(np.sqrt(max(squares[gaps].max(initial=0.0), 1e-12)))
-    for gap, cell in zip(gaps, np.floor(cells.places[gaps] / width).astype(int).tolist(), strict=True):
-        if len(lone) == count - len(sites):
-            break
-        near = [g for step in BESIDE for g in taken.get(tuple(map(add, cell, step)), ())]
-        apart = np.sum((cells.places[near] - cells.places[gap]) ** 2, axis=1)
-        # A gap is the farthest place of several cells.
-        if wanted[islands[gap]] > 0 and np.all(apart > squares[gap]):
-            lone.append(gap)
-            taken.setdefault(tuple(cell), []).append(gap)
-            wanted[islands[gap]] -= 1
-    return np.array(lone, int)
+    corners = _firsts(first, -squares * cells.densities)
+    return corners[farthest(ground, points[corners], squares[corners], _wanted(ground, sites, count))]
 
 
 def _wanted(ground, sites, count):
@@ -290,8 +301,10 @@ def _within(ranked, islands, wanted):
 
 
 def _firsts(groups, keys):
-    """Index of the smallest key of each group that there is, groups rising."""
-    order = np.argsort(-keys, kind="stable")
-    firsts = np.full(groups.max() + 1, -1)
-    firsts[groups[order]] = order  # the last one stays
+    """Index of the smallest key of each group that there is, groups rising; of equal ones the lowest."""
+    least = np.full(groups.max() + 1, np.inf)
+    np.minimum.at(least, groups, keys)
+    found = np.flatnonzero(keys == least[groups])[::-1]
+    firsts = np.full(len(least), -1)
+    firsts[groups[found]] = found  # the last one stays
     return firsts[firsts >= 0]

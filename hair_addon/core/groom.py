@@ -40,7 +40,7 @@ class GuideSettings(Settings):
         soft_high=4.0,
     )
     symmetric: bool = param(False, "Root guides alike on both sides of the object's X axis")
-    relax_iterations: int = param(16, "Rounds of relaxation that even out the guides", low=0, high=1000, soft_high=100)
+    relax_iterations: int = param(12, "Rounds of relaxation that even out the guides", low=0, high=1000, soft_high=100)
     length: float = param(
         0.15,
         "Length of the guides from root to tip",
@@ -163,19 +163,20 @@ def distribute_guides(
         curvature,
         cut_cells,
         cvt,
+        farthest,
         fingerprint,
         ground,
         guides,
-        hash_grid,
         islands,
         sampled_cells,
+        springs,
         surface_query,
         transform,
         voronoi,
     )
 
-    _load_kernels(device, bspline, cut_cells, guides, hash_grid, sampled_cells, surface_query, voronoi)
-    _load_kernels("cpu", fingerprint, islands, transform)
+    _load_kernels(device, bspline, cut_cells, guides, sampled_cells, springs, surface_query, voronoi)
+    _load_kernels("cpu", farthest, fingerprint, islands, transform)
     relaxing = part_of(progress, 0.1, 0.9)
     mirror = ground.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
     if roots is None:

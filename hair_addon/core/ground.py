@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The part of a surface where roots may be, in pieces small enough for sums over cells, and where its points are."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import warp as wp
@@ -13,7 +13,8 @@ from .sampling import check_density, corner_masses
 from .surface_query import SurfaceQuery
 
 GRID_SIZE = 32  # cells along each axis of the grid that sites are found by; farther ones wrap around
-LONGEST_EDGE = 1.5  # of a piece, by the spacing of sites: a piece is shared among few cells
+LONGEST_EDGE = 2.5  # of a piece, by the spacing of sites: a piece is shared among few cells
+LONGEST_GRADED_EDGE = 1.5  # where the density varies: it is one number in a piece
 LEAST_COSINE = -1.0 / 3.0  # between normals of one side of a surface
 LEAST_PIECES = 2000  # so many sites at least are cut for: density is one number in a piece
 PLASTIC = 0.7548776662466927, 0.5698402909980532  # steps of the evenest sequence in a square [Roberts18]
@@ -32,20 +33,26 @@ class Mirror:
 
 @dataclass(frozen=True)
 class Parts:
-    """Triangles cut out of a mesh's triangles: triangle (Q,), barycentric (Q, 3, 3) of their corners, areas (Q,)."""
+    """Triangles cut out of a mesh's triangles, of triangle (Q,).
+
+    barycentric (Q, 3, 3) and corners (Q, 3, 3) at unit size: where their corners are; areas (Q,).
+    """
 
     triangle: np.ndarray
     barycentric: np.ndarray
+    corners: np.ndarray
     areas: np.ndarray
 
     def chosen(self, selection):
         """The parts of a mask or an index array."""
-        return Parts(self.triangle[selection], self.barycentric[selection], self.areas[selection])
+        return Parts(*(getattr(self, field.name)[selection] for field in fields(self)))
 
     def joined(self, *others):
         """These parts and others, one after another."""
+        if not others:
+            return self
         every = (self, *others)
-        return Parts(*(np.concatenate([getattr(p, n) for p in every]) for n in ("triangle", "barycentric", "areas")))
+        return Parts(*(np.concatenate([getattr(part, field.name) for part in every]) for field in fields(self)))
 
     def centres(self):
         """`SurfacePoints`."""
@@ -79,26 +86,35 @@ class Ground:
         grown = np.flatnonzero(has_area & corner_masses(self.mesh, self._values).any(axis=1))
         self.query = SurfaceQuery(self.mesh, grown, device)
         self.grid = wp.HashGrid(GRID_SIZE, GRID_SIZE, GRID_SIZE, device=device)
-        whole = Parts(grown, np.broadcast_to(np.eye(3), (len(grown), 3, 3)), self.mesh.areas[grown])
+        corners = np.broadcast_to(np.eye(3), (len(grown), 3, 3))
+        whole = Parts(grown, corners, self.mesh.corners[grown], self.mesh.areas[grown])
         if mirror is not None:
             whole = self._heavier_side(whole)
         if texture is not None:  # whose details triangles know nothing of
-            whole = self._cut(whole, _spacing(whole.areas.sum(), LEAST_PIECES), lambda points: 1.0)
+            spacing = _spacing(whole.areas.sum(), LEAST_PIECES)
+            whole = _cut(whole, LONGEST_GRADED_EDGE * spacing, lambda parts: 1.0)
         # Where the density is high sites are close, and pieces small.
-        amount = whole.areas @ self.density_at(whole.centres())
+        amount = (whole.areas * self.density_at(whole.centres())).sum()
         if not amount > 0.0:
             raise HairError("The density is zero on every face: paint some weight where hair should grow.")
         spacing = _spacing(amount, max(site_count, LEAST_PIECES))
-        self.parts = self._cut(whole, spacing, lambda points: np.maximum(self.density_at(points), 1e-3))
+        if texture is None and np.ptp(self._values) == 0.0:
+            self.parts = _cut(whole, LONGEST_EDGE * spacing, lambda parts: 1.0)
+        else:
+            self.parts = _cut(whole, LONGEST_GRADED_EDGE * spacing, self._least_density)
         self.densities = self.density_at(self.parts.centres())
         self.parts, self.densities = self.parts.chosen(self.densities > 0.0), self.densities[self.densities > 0.0]
         self.amounts = self.parts.areas * self.densities
-        self.mass = float(self.amounts @ self.densities)
+        self.mass = float((self.amounts * self.densities).sum())
 
     def density_at(self, points):
         """(N,) float64: D at `SurfacePoints`, one where the given density is highest."""
         density = interpolate(self._values, self.mesh, points).astype(np.float64)
         return density if self._texture is None else density * self._texture.at(points)
+
+    def _least_density(self, parts):
+        """(Q,): D, and no less than a thousandth, where pieces are as large as may be."""
+        return np.maximum(self.density_at(parts.centres()), 1e-3)
 
     def moved(self, points, places):
         """`SurfacePoints` moved to the ground nearest to places (N, 3).
@@ -107,7 +123,9 @@ class Ground:
         """
         if self._mirror is not None:
             places = places - np.minimum(self._heights(places), 0.0)[:, None] * self._mirror.normal
-        found = self.query.nearest(places)
+        # Where they come from is no farther; a part more than that for rounding.
+        farthest = 1.01 * np.linalg.norm(places - positions(self.mesh, points), axis=1) + 1e-5
+        found = self.query.nearest(places, farthest)
         before, after = self.normals[points.triangle], self.normals[found.triangle]
         is_good = (np.einsum("ni,ni->n", before, after) > LEAST_COSINE) & (self.density_at(found) > 0.0)
         is_good &= self.islands[found.triangle] == self.islands[points.triangle]
@@ -162,22 +180,6 @@ class Ground:
         """(N,) heights of places above the mirror, at unit size."""
         return (places + self.origin / self.size) @ self._mirror.normal
 
-    def _corners(self, parts):
-        return np.einsum("qck,qkx->qcx", parts.barycentric, self.mesh.corners[parts.triangle])
-
-    def _cut(self, parts, spacing, density_at):
-        """Parts halved across their longest edges until these are short; spacing: of sites where the density is one."""
-        done = []
-        while len(parts.areas):
-            corners = self._corners(parts)
-            edges = corners - np.roll(corners, -1, axis=1)
-            squares = np.einsum("qcx,qcx->qc", edges, edges)
-            limit = (LONGEST_EDGE * spacing) ** 2 / density_at(parts.centres())
-            is_long = squares.max(axis=1) > limit
-            done.append(parts.chosen(~is_long))
-            parts = _halved(parts.chosen(is_long), squares[is_long].argmax(axis=1))
-        return done[0].joined(*done[1:])
-
     def _heavier_side(self, parts):
         """The parts above the mirror, cut along it; a mirror whose upper side has less is turned round."""
         above, below = (self._cut_at_mirror(parts, sign) for sign in (1.0, -1.0))
@@ -188,7 +190,7 @@ class Ground:
         return above
 
     def _cut_at_mirror(self, parts, sign):
-        heights = sign * self._heights(self._corners(parts).reshape(-1, 3)).reshape(-1, 3)
+        heights = sign * self._heights(parts.corners.reshape(-1, 3)).reshape(-1, 3)
         heights[np.abs(heights) < 1e-6] = 0.0
         lowest = heights.min(axis=1)
         pieces = [parts.chosen((lowest >= 0.0) & (heights.max(axis=1) > 0.0))]
@@ -212,7 +214,11 @@ class Ground:
                     (np.stack([cuts[0], b[:, 1], b[:, 2]], axis=1), near),
                     (np.stack([cuts[0], b[:, 2], cuts[1]], axis=1), area - tip - near),
                 ]
-            pieces += [Parts(parts.triangle[crossed], barycentric, areas) for barycentric, areas in corners]
+            triangle = parts.triangle[crossed]
+            pieces += [
+                Parts(triangle, barycentric, barycentric @ self.mesh.corners[triangle], areas)
+                for barycentric, areas in corners
+            ]
         return pieces[0].joined(*pieces[1:])
 
 
@@ -224,11 +230,26 @@ def _spacing(amount, count):
     return max(np.sqrt(amount / count), 8.0 / count)
 
 
+def _cut(parts, longest, density_of):
+    """Parts halved across their longest edges until none is longer than `longest`, where the density is one."""
+    done = []
+    while len(parts.areas):
+        edges = parts.corners - parts.corners[:, (1, 2, 0)]
+        squares = np.einsum("qcx,qcx->qc", edges, edges)
+        is_long = squares.max(axis=1) > longest**2 / density_of(parts)
+        done.append(parts.chosen(~is_long))
+        parts = _halved(parts.chosen(is_long), squares[is_long].argmax(axis=1))
+    return done[0].joined(*done[1:])
+
+
 def _halved(parts, edge):
     """Each part as two, cut from the middle of its edge that begins at corner `edge` (Q,)."""
     rows = np.arange(len(edge))
-    one, other, across = (parts.barycentric[rows, (edge + turn) % 3] for turn in range(3))
-    middle = 0.5 * (one + other)
-    halves = [np.stack([one, middle, across], axis=1), np.stack([middle, other, across], axis=1)]
-    first, second = (Parts(parts.triangle, half, 0.5 * parts.areas) for half in halves)
+    halves = [[], []]
+    for corners in (parts.barycentric, parts.corners):
+        one, other, across = (corners[rows, (edge + turn) % 3] for turn in range(3))
+        middle = 0.5 * (one + other)
+        halves[0].append(np.stack([one, middle, across], axis=1))
+        halves[1].append(np.stack([middle, other, across], axis=1))
+    first, second = (Parts(parts.triangle, *half, 0.5 * parts.areas) for half in halves)
     return first.joined(second)

@@ -22,17 +22,13 @@ class Memory:
         if self._limit and curvature > 1e-10 * (dot(step, step) * dot(change, change)) ** 0.5:
             self._pairs = [*self._pairs, (step, change, curvature)][-self._limit :]
 
-    def direction(self, gradient, inverse):
-        """Where to go from a gradient (n, 3); inverse (n, 1): diagonal of what the inverse Hessian is thought to be."""
+    def direction(self, gradient, solved):
+        """Where to go from a gradient (n, 3); solved: of moves, which are thought to change a gradient by so much."""
         direction, parts = gradient, []
         for step, change, curvature in reversed(self._pairs):
             parts.append(dot(step, direction) / curvature)
             direction = direction - parts[-1] * change
-        scale = 1.0
-        if self._pairs:
-            _, change, curvature = self._pairs[-1]
-            scale = curvature / dot(change, inverse * change)
-        direction = scale * inverse * direction
+        direction = solved(direction)
         for (step, change, curvature), part in zip(self._pairs, reversed(parts), strict=True):
             direction = direction + (part - dot(change, direction) / curvature) * step
         return -direction

@@ -5,7 +5,7 @@ import numpy as np
 import warp as wp
 
 from .mesh import positions
-from .voronoi import Sites, detour_of, detours, fixed, nearest_places, nearest_site, sum_cells
+from .voronoi import Sites, detour_of, detours, fixed, nearest_site, some_sites, sum_cells
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -26,7 +26,8 @@ class SampledCells:
     """The cells of sites on a `Ground`, of which they get points (`SurfacePoints` of equal amounts) as wholes."""
 
     def __init__(self, ground, points, part, site_count, device):
-        self.places, self._device = positions(ground.mesh, points), device
+        self._ground, self._device = ground, device
+        self.places = positions(ground.mesh, points)
         self.densities = densities = ground.densities[part]
         self._samples = Samples()
         self._samples.places = wp.array(self.places, dtype=wp.vec3, device=device)
@@ -39,9 +40,14 @@ class SampledCells:
     def sums(self, sites, with_seconds=False):
         """`Sums` for `Sites`."""
         if self._cells is None:
-            self._cells = nearest_places(sites, self._samples.places)
+            self._cells = some_sites(self._ground, sites, self._samples.places)
         inputs, outputs = [self._samples, sites, with_seconds], [self._cells, self._seconds]
         return sum_cells(_nearest_two, len(self.places), inputs, outputs, sites, self._device)
+
+    def nearest(self, sites):
+        """(Q,) the nearest of `Sites` to each point."""
+        self.sums(sites)
+        return self._cells.numpy().astype(np.int64)
 
     def nearest_two(self, sites):
         """(Q,) the nearest of `Sites` to each point, and (Q,) the next, -1 for none."""

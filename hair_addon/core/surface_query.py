@@ -5,6 +5,7 @@ import numpy as np
 import warp as wp
 
 from .mesh import SurfacePoints
+from .threads import LEAST_SHARE, in_threads, share_count
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -27,13 +28,20 @@ class SurfaceQuery:
             indices=wp.array(mesh.triangles[self._triangles].ravel(), dtype=int, device=device),
         )
 
-    def nearest(self, places):
-        """(N, 3) finite positions [m] → the nearest `SurfacePoints`."""
+    def nearest(self, places, farthest=None):
+        """(N, 3) finite positions [m] → the nearest `SurfacePoints`.
+
+        farthest (N,) [m]: distances within which there is some surface, if they are known: so it is found sooner.
+        """
         device = self.mesh.device
+        limits = wp.full(len(places), FARTHEST, dtype=float, device=device)
+        if farthest is not None:
+            limits = wp.array(farthest, dtype=float, device=device)
         places = wp.array(places.astype(np.float32), dtype=wp.vec3, device=device)
         faces = wp.empty(len(places), dtype=int, device=device)
         barycentric = wp.empty(len(places), dtype=wp.vec3, device=device)
-        wp.launch(_nearest, len(places), [self.mesh.id, places], outputs=[faces, barycentric], device=device)
+        outputs = [[faces, barycentric]] * share_count(len(places), LEAST_SHARE // 4, device)
+        in_threads(_nearest, len(places), [self.mesh.id, places, limits], outputs, device)
         return SurfacePoints(self._triangles[faces.numpy()], barycentric.numpy())
 
 
@@ -41,11 +49,13 @@ class SurfaceQuery:
 def _nearest(
     surface: wp.uint64,
     places: wp.array[wp.vec3],
+    farthest: wp.array[float],
+    first_place: int,
     # outputs
     out_faces: wp.array[int],
     out_barycentric: wp.array[wp.vec3],
 ):
-    place = wp.tid()
-    query = wp.mesh_query_point_no_sign(surface, places[place], FARTHEST)
+    place = first_place + wp.tid()
+    query = wp.mesh_query_point_no_sign(surface, places[place], farthest[place])
     out_faces[place] = query.face
     out_barycentric[place] = wp.vec3(query.u, query.v, 1.0 - query.u - query.v)

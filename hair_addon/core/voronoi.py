@@ -8,39 +8,39 @@ Sums are kept as whole numbers, in units far below single precision: they do not
 threads, so results are the same bit for bit, on every run.
 """
 
-import os
-import threading
 from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
 
-from . import hash_grid
 from .mesh import positions
+from .threads import LEAST_SHARE, in_threads, share_count
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 SITES_AROUND = 16  # how many neighbours of a site (itself among them) are looked at before all sites are
+FIRST_RING = 7  # a site and as many as stand around it in a honeycomb
 EVERYWHERE = 4.0  # a distance that reaches across a surface of unit size
 SEARCH_RADIUS = 2.6  # by the square root of a cell's area: more than SITES_AROUND of a honeycomb
 DETOUR = 2.0  # by which a site on the other side of a thin part counts as farther, in spacings of sites
 
-MOST_THREADS = 8
-LEAST_SHARE = 4096  # pieces for which another thread is worth its start
-
 UNIT = wp.constant(wp.float64(2.0**54))  # sums over a surface with a mass of one stay below 2^63
+
+near_list = wp.types.vector(length=SITES_AROUND, dtype=int)
+near_squares = wp.types.vector(length=SITES_AROUND, dtype=float)
 
 
 @wp.struct
 class Sites:
-    """Where sites are, which side they are on, and who is near them."""
+    """Where sites are, which side they are on, who is near them, and how far the first ring of these is, as a mean."""
 
     places: wp.array[wp.vec3]
     normals: wp.array[wp.vec3]
     islands: wp.array[int]
     around: wp.array2d[int]
     apart: wp.array2d[float]
+    spacings: wp.array[float]
 
 
 @wp.func
@@ -130,47 +130,27 @@ def sites_on(ground, points, device):
     shape = (len(points), min(SITES_AROUND, len(points)))
     sites.around = wp.empty(shape, dtype=int, device=device)
     sites.apart = wp.empty(shape, dtype=float, device=device)
+    sites.spacings = wp.empty(len(points), dtype=float, device=device)
     radius = SEARCH_RADIUS * float(np.sqrt(ground.parts.areas.sum() / len(points)))
     ground.grid.build(sites.places, radius)
-    inputs, outputs = [sites.places, ground.grid.id, radius], [sites.around, sites.apart]
+    inputs, outputs = [sites.places, ground.grid.id, radius], [sites.around, sites.apart, sites.spacings]
     shares = share_count(len(points), LEAST_SHARE // 8, device)
     in_threads(_find_around, len(points), inputs, [outputs] * shares, device)
     return sites
 
 
-def nearest_places(sites, points):
-    """(Q,) int Warp array: the site whose place is nearest to each point, for a search to begin with."""
-    nearest, _ = hash_grid.neighbours(sites.places, points, EVERYWHERE, 1)
-    return nearest.flatten()
+def some_sites(ground, sites, points):
+    """(Q,) int Warp array: a site that is not far from each point, for a search to begin with."""
+    found = wp.empty(len(points), dtype=int, device=points.device)
+    radius = float(np.sqrt(ground.parts.areas.sum() / len(sites.places)))
+    wp.launch(_some_site, len(points), [sites, points, ground.grid.id, radius], [found], device=points.device)
+    return found
 
 
 def detours(ground, densities, site_count):
     """(Q,) squared: how much farther a site on the other side counts, twice the spacing that sites have there."""
     areas = ground.amounts.sum() / (site_count * densities)
     return np.minimum(DETOUR**2 * areas, EVERYWHERE**2)
-
-
-def share_count(count, least_share, device):
-    """How many threads share so many pieces of work, at least so many each."""
-    return min(os.cpu_count() or 1, MOST_THREADS, 1 + count // least_share) if wp.get_device(device).is_cpu else 1
-
-
-def in_threads(kernel, count, inputs, outputs, device):
-    """Launch a kernel on as many shares as there are lists of outputs; its last input is where its share begins."""
-    bounds = [count * share // len(outputs) for share in range(len(outputs) + 1)]
-    if len(outputs) > 1:  # threads would compile it once each; on a processor a block is one thread
-        kernel.module.load(wp.get_device(device), 1)
-
-    def launch(share):
-        first, end = bounds[share : share + 2]
-        wp.launch(kernel, dim=end - first, inputs=[*inputs, first], outputs=outputs[share], device=device)
-
-    others = [threading.Thread(target=launch, args=(share,)) for share in range(1, len(outputs))]
-    for thread in others:
-        thread.start()
-    launch(0)
-    for thread in others:
-        thread.join()
 
 
 def sum_cells(kernel, count, inputs, outputs, sites, device):
@@ -188,6 +168,31 @@ def sum_cells(kernel, count, inputs, outputs, sites, device):
 
 
 @wp.kernel
+def _some_site(
+    sites: Sites,
+    points: wp.array[wp.vec3],
+    grid: wp.uint64,
+    first_radius: float,
+    # outputs
+    out_sites: wp.array[int],
+):
+    point = wp.tid()
+    place = points[point]
+    found = int(-1)
+    nearest = float(wp.inf)
+    radius = first_radius
+    while found < 0:
+        for site in wp.hash_grid_query(grid, place, radius):
+            apart = wp.length_sq(sites.places[site] - place)
+            # The order of a grid's points is not the same everywhere.
+            if apart < nearest or (apart == nearest and site < found):
+                nearest = apart
+                found = site
+        radius = 2.0 * radius
+    out_sites[point] = found
+
+
+@wp.kernel
 def _find_around(
     places: wp.array[wp.vec3],
     grid: wp.uint64,
@@ -196,28 +201,41 @@ def _find_around(
     # outputs
     out_around: wp.array2d[int],
     out_apart: wp.array2d[float],
+    out_spacings: wp.array[float],
 ):
     site = first_site + wp.tid()
     limit = out_around.shape[1]
     place = places[site]
+    around = near_list()
+    squares = near_squares()
     radius = first_radius
     count = int(0)
     while count < limit:
         count = int(0)
+        last = radius * radius
         for other in wp.hash_grid_query(grid, place, radius):
-            apart = wp.length(places[other] - place)
-            if apart < radius and (count < limit or apart <= out_apart[site, limit - 1]):
-                slot = wp.min(count, limit - 1)
-                if count == limit and apart == out_apart[site, slot] and other > out_around[site, slot]:
+            square = wp.length_sq(places[other] - place)
+            if square <= last:
+                if count == limit and square == last and other > around[limit - 1]:
                     continue
+                slot = wp.min(count, limit - 1)
                 while slot > 0 and (
-                    out_apart[site, slot - 1] > apart
-                    or (out_apart[site, slot - 1] == apart and out_around[site, slot - 1] > other)
+                    squares[slot - 1] > square or (squares[slot - 1] == square and around[slot - 1] > other)
                 ):
-                    out_apart[site, slot] = out_apart[site, slot - 1]
-                    out_around[site, slot] = out_around[site, slot - 1]
+                    squares[slot] = squares[slot - 1]
+                    around[slot] = around[slot - 1]
                     slot -= 1
-                out_apart[site, slot] = apart
-                out_around[site, slot] = other
+                squares[slot] = square
+                around[slot] = other
                 count = wp.min(count + 1, limit)
+                if count == limit:
+                    last = squares[limit - 1]
         radius = 1.5 * radius
+    for slot in range(limit):
+        out_around[site, slot] = around[slot]
+        out_apart[site, slot] = wp.sqrt(squares[slot])
+    ring = wp.min(FIRST_RING, limit)
+    total = float(0.0)
+    for slot in range(1, ring):
+        total += wp.sqrt(squares[slot])
+    out_spacings[site] = total / float(wp.max(ring - 1, 1))
