@@ -214,7 +214,7 @@ def test_a_strand_has_the_colour_of_its_random_number(lit, model):
         state.appearance.random_color = amount
         color = picture()[..., :3]
         ratios.append(color[:, :40].mean() / color[:, -40:].mean())
-    assert 0.8 < ratios[0] < 1.25
+    assert 0.7 < ratios[0] < 1.4  # other strands stand on the left than on the right
     assert ratios[1] > 2.0 * ratios[0]
 
 
