@@ -216,7 +216,7 @@ def _symmetric(controls, places, mirror):
     """Controls (G, n, 3) of which the second half are grown as images of the first, where their roots (G, 3) are."""
     count = len(places) // 2
     images = mirror.image(places[:count])
-    reach = 1e-3 * np.ptp(places, axis=0).max()
+    reach = 5e-3 * np.ptp(places, axis=0).max()
     is_image = np.linalg.norm(images - places[len(places) - count :], axis=1) <= reach
     arms = controls[:count] - controls[:count, :1]
     mirrored = mirror.image(arms.reshape(-1, 3)).reshape(arms.shape) + places[len(places) - count :, None]
