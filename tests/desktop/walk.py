@@ -258,6 +258,7 @@ def click():
             yield from wait(0.3)
             selected.append([o.name for o in (head_object, hair) if o.select_get()])
         facts["clicks"][tool] = selected
+    screen("selected")
 
 
 def write_files():
