@@ -17,20 +17,19 @@ _NO_SEGMENT = 0x7FFFFFFF  # beyond all that there can be
 class HairBuffer:
     """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
 
-    color: linear light, premultiplied; depths: of hair where color has any, the bits of floats from 0 to 1; segments:
-    which are nearest; ranges: (first, count) of those of each hair that was added last.
+    color: linear light, premultiplied; depths: of hair where color has any, the bits of floats from 0 to 1.
     """
 
     def __init__(self, width, height):
         self.size = (width, height)
         self.color = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
-        self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
+        self._segments = gpu.types.GPUTexture(self.size, format="R32UI")
         self._surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
-        self.ranges = []
+        self._ranges = []  # (first, count) of each hair's segments
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self._surface_depth)
         self._strips = gpu.types.GPUFrameBuffer(
-            color_slots=(self.segments, self.depths), depth_slot=self._surface_depth
+            color_slots=(self._segments, self.depths), depth_slot=self._surface_depth
         )
 
     def surfaces(self, background=(0.0, 0.0, 0.0, 0.0)):
@@ -44,10 +43,10 @@ class HairBuffer:
         lights, view: records of `uniforms`; in_compute: whether a compute program finds the nearest strands, None:
         where it can.
         """
-        self.segments.clear(format="UINT", value=(_NO_SEGMENT,))
+        self._segments.clear(format="UINT", value=(_NO_SEGMENT,))
         draw = self._find if (shaders.has_image_atomics() if in_compute is None else in_compute) else self._draw_strips
         placed, first = [], 0
-        self.ranges = []
+        self._ranges = []
         for strands, shading, to_world, surface_color, samplers, steps in hair:
             record = drawing.strand_record(strands, view, to_world, steps)
             record["seen_points"] = seen_points(strands.point_count)
@@ -56,7 +55,7 @@ class HairBuffer:
             record["surface_color"][:3] = surface_color
             record["back_gain"] = dual_scattering.BACK_GAIN
             placed.append((strands, shading, record, samplers, first))
-            self.ranges.append((first, _segment_count(strands, record)))
+            self._ranges.append((first, _segment_count(strands, record)))
             first += _segment_count(strands, record)
         light_block = uniforms.uniform_buffer(lights)
         draw([(strands, record, first) for strands, _shading, record, _samplers, first in placed], light_block)
@@ -67,7 +66,7 @@ class HairBuffer:
         """Which of the hair that was added last is nearest in a sample, counted from 0; None where there is none."""
         with self._strips.bind():  # a framebuffer that was never bound has no size
             segment = int(self._strips.read_color(x, y, 1, 1, 1, 0, "UINT")[0][0][0])
-        found = [index for index, (first, count) in enumerate(self.ranges) if first <= segment < first + count]
+        found = [index for index, (first, count) in enumerate(self._ranges) if first <= segment < first + count]
         return found[0] if found else None
 
     def _find(self, placed, lights):
@@ -77,7 +76,7 @@ class HairBuffer:
             program.image("depths", self.depths)
             self._dispatch(program)
         program = shaders.segments_program()
-        images = {"depths": self.depths, "segments": self.segments}
+        images = {"depths": self.depths, "segments": self._segments}
         for is_depth in (1, 0):
             for strands, record, first in placed:
                 constants = {"first_segment": first, "is_depth": is_depth}
@@ -95,7 +94,7 @@ class HairBuffer:
     def _shade(self, strands, shading, record, lights, samplers, first):
         """Fill the samples in which a strand of this hair is nearest with its light."""
         program = shading.program
-        textures = {"segments": self.segments, "strands": strands.texture, **shading.samplers, **samplers}
+        textures = {"segments": self._segments, "strands": strands.texture, **shading.samplers, **samplers}
         if shading.is_varied:
             textures["strand_randoms"] = strands.randoms
         blocks = {"view": uniforms.uniform_buffer(record), "lights": lights, **shading.blocks}

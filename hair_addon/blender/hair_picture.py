@@ -98,24 +98,6 @@ class HairPicture:
         with drawing.gpu_state(depth_test, depth_writes=True, blend="ALPHA_PREMULT"):
             drawing.cover(program)
 
-    def show_outline(self, index, color, depth_test="LESS_EQUAL"):
-        """Draw a line around one of the hair, counted from 0, over the viewport that is bound; color: linear RGB."""
-        first, count = self._pass.ranges[index]
-        program = shaders.outline_program()
-        x, y, _width, _height = gpu.state.viewport_get()
-        program.bind()
-        program.uniform_float("origin", (x, y))
-        program.uniform_float("outline_color", color)
-        for name, value in (("first_segment", first), ("segment_count", count)):
-            program.uniform_int(name, value)
-        program.uniform_int("pass_count", self.pass_count)
-        program.uniform_int("samples_per_side", self._per_side)
-        program.uniform_sampler("passes", self._color)
-        program.uniform_sampler("depths", self._depth)
-        program.uniform_sampler("segments", self._pass.segments)
-        with drawing.gpu_state(depth_test, depth_writes=False):
-            drawing.cover(program)
-
     def hair_at(self, x, y):
         """Which of the hair is seen at a pixel, counted from 0; None where there is none within the pixel."""
         places = [(self._per_side * x + i, self._per_side * y + j) for j in self._sides for i in self._sides]

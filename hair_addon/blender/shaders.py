@@ -289,21 +289,6 @@ def display_program():
     return _compile(info, "cover.vert", "display.frag")
 
 
-@cache
-def outline_program():
-    """The program that draws a line around selected hair: see outline.frag."""
-    info = gpu.types.GPUShaderCreateInfo()
-    info.push_constant("VEC2", "origin")
-    info.push_constant("VEC3", "outline_color")
-    for name in ("pass_count", "samples_per_side", "first_segment", "segment_count"):
-        info.push_constant("INT", name)
-    info.sampler(0, "FLOAT_2D", "passes")
-    info.sampler(1, "FLOAT_2D", "depths")
-    info.sampler(2, "UINT_2D", "segments")
-    info.depth_write("ANY")
-    return _compile(info, "cover.vert", "outline.frag")
-
-
 _complaints = {}  # files of a program → what was wrong with them
 
 

@@ -100,22 +100,8 @@ def _draw_hair(context):
         1.0 if xray is None else xray,
         "LESS_EQUAL" if viewport.overlay.show_overlays and xray is None else "ALWAYS",
     )
-    if viewport.overlay.show_overlays and viewport.overlay.show_outline_selected:
-        _draw_outlines(context, drawn, picture, "ALWAYS" if xray is not None else "LESS_EQUAL")
     if not picture.is_fine:
         region.tag_redraw()
-
-
-def _draw_outlines(context, drawn, picture, depth_test):
-    """Lines around the hair that is selected, as Blender draws them around what it draws itself."""
-    theme = context.preferences.themes[0].view_3d
-    owners = {uid: index for index, uid in enumerate(drawn.owners)}
-    for hair_object in context.selected_objects:
-        index = owners.get(hair_object.session_uid)
-        if index is not None:
-            is_active = hair_object == context.view_layer.objects.active
-            color = theme.object_active if is_active else theme.object_selected
-            picture.show_outline(index, tuple(np.power(color[:], 2.2)), depth_test)
 
 
 def hair_at(context, x, y):
