@@ -102,13 +102,26 @@ def keep_rest(surface_object):
 
 
 def draw_natively(curves, is_shown):
-    """Let Blender draw Curves in viewports as they are, or not at all. Renders show them either way.
-
-    As wire, for which Curves have no lines: nothing is drawn, evaluated or uploaded for it, unlike a bounding box.
-    """
+    """Let Blender draw Curves in viewports as they are, or not at all. Renders show them either way."""
     for user in bpy.data.objects:
         if user.data == curves:
-            user.display_type = "TEXTURED" if is_shown else "WIRE"
+            user.display_type = "TEXTURED" if is_shown else _hidden_as(user)
+
+
+def show_selection(curves_object):
+    """Draw a box around an object that Blender does not draw otherwise while it is selected, and none when it isn't."""
+    hidden_as = _hidden_as(curves_object)
+    if curves_object.display_type in {"WIRE", "BOUNDS"} and curves_object.display_type != hidden_as:
+        curves_object.display_type = hidden_as
+
+
+def _hidden_as(curves_object):
+    """The display for which Blender evaluates, uploads and draws no strand.
+
+    Of Curves as wire it draws nothing, until they are selected: then it draws the outline of every strand. Of those
+    that are displayed as a box it draws that box instead.
+    """
+    return "BOUNDS" if curves_object.select_get() else "WIRE"
 
 
 def write_strands(curves, surface, points, roots, radii, leaders=None, normals=None):

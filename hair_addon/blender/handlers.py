@@ -29,6 +29,8 @@ def after_depsgraph_update(_scene, depsgraph):
         return
     global _is_opening, _is_undone
     viewport.forget(is_hair_only=_is_hair_only(depsgraph))
+    if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
+        looks.follow_selection(depsgraph.view_layer)
     if _is_opening:
         _is_opening = False
         return

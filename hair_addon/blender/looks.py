@@ -33,3 +33,11 @@ def show_shaded(hair, is_drawn):
     for target in hair:
         target.vellus.is_drawn = is_drawn
         evaluate_shading(target)
+
+
+def follow_selection(view_layer):
+    """Show which hair is selected of what Blender does not draw."""
+    for shown in view_layer.objects:
+        state = shown.data.vellus if shown is not None and shown.type == "CURVES" else None
+        if state is not None and state.kind == "HAIR" and state.is_drawn:
+            curves.show_selection(shown)

@@ -312,6 +312,24 @@ def test_blender_draws_hair_itself_only_where_this_does_not(hair):
     assert hair.display_type == "WIRE" and not hair.hide_render and not hair.hide_select
 
 
+def test_selected_hair_is_shown_by_a_box_without_its_strands(hair):
+    """Outlines of selected Curves would cost their native evaluation: Blender draws none of what it shows as a box."""
+
+    def display(is_selected):
+        hair.select_set(is_selected)
+        bpy.context.view_layer.update()
+        return hair.display_type
+
+    assert [display(True), display(False)] == ["BOUNDS", "WIRE"]
+    display(True)
+    for is_drawn, expected in ((False, "TEXTURED"), (True, "BOUNDS")):
+        hair.data.vellus.is_drawn = is_drawn
+        bpy.context.view_layer.update()
+        assert hair.display_type == expected
+    hair.data.vellus.is_drawn = False
+    assert display(False) == "TEXTURED"
+
+
 def test_meshes_that_are_no_surface_in_the_viewport_hide_nothing(sphere):
     space = next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
 

@@ -145,7 +145,7 @@ def test_pictures_and_tables_are_written_while_the_window_lives_on(walk):
     assert exr.read_tables(folder).settings == exr.read_dual_tables(folder).settings
 
 
-def test_selected_hair_has_an_outline(walk):
+def test_selected_hair_is_shown_by_a_box(walk):
     """In the theme's orange, which Blender draws by itself: the picture of before the clicks has none."""
     view = walk.facts["steps"]["grown"]["view"]
     before, after = (part(walk.picture(name), view) for name in ("clicks", "selected"))
