@@ -28,6 +28,7 @@ class BoundHair:
     guide_uid: int  # session_uid of their Curves
     surface: Surface
     points: np.ndarray  # (S, P, 3) float32 at rest, in the surface's local coordinates
+    shares: np.ndarray  # (S, k) float32, the weights of each strand's guides as they are combed now
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether what is not written is where points are, and perhaps the guide map
     is_map_written: bool = False  # whether the datablock holds this guide map
@@ -38,20 +39,15 @@ class BoundHair:
         """(P,) float32 along every strand, in the surface's local units."""
         return groom.strand_radii(self.settings, self.points.shape[1]) / np.float32(self.surface.scale)
 
-    @cached_property
-    def _weights(self):
-        return groom.weights_now(self.binding, self.guides).weights.numpy().copy()
-
     @property
     def guide_map(self):
         """(S, k) int32 and float32: each strand's guides, -1 for none, and their weights, as they are combed now."""
-        return np.where(self._weights > 0.0, self.binding.guide_weights.indices.numpy(), -1), self._weights
+        return np.where(self.shares > 0.0, self.binding.guide_weights.indices.numpy(), -1), self.shares
 
-    def weigh_again(self, moved):
-        """Bring the guide map up to guides that were combed; moved: (M,) indices of the strands that follow them."""
-        weights = groom.weights_now(self.binding, self.guides, moved).weights.numpy()
-        self.is_map_written = self.is_map_written and np.array_equal(weights, self._weights[moved])
-        self._weights[moved] = weights
+    def take_shares(self, shares, moved=slice(None)):
+        """Bring the guide map up to guides that were combed: the weights of strands, or of (M,) indices of them."""
+        self.is_map_written = self.is_map_written and np.array_equal(shares, self.shares[moved])
+        self.shares[moved] = shares
 
     @cached_property
     def reach(self):

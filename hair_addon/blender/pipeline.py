@@ -73,11 +73,33 @@ def _binding_hair(guide_curves, settings, depsgraph, target):
     surface, density = _read_surface(guide_curves.surface, settings, depsgraph)
     guides = read_guides(guide_curves, surface)
     key = root_key(settings, density)
-    roots = _kept_roots(target, surface, key)
     parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
+    found = _found_guides(target, settings, key, parting.key, guides, surface)
+    roots = _kept_roots(target, surface, key) if found is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
-    binding, points = yield lambda progress: _bind(surface, guides, settings, density, parting, roots, device, progress)
-    return BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, points)
+
+    def compute(progress):
+        if found is None:
+            binding = _bind(surface, guides, settings, density, parting, roots, device, progress)
+        else:
+            binding = groom.weigh_again(found, settings)
+        return binding, *_strands(surface, binding, guides, progress)
+
+    binding, *made = yield compute
+    return BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, *made)
+
+
+def _found_guides(target, settings, key, parting_key, guides, surface):
+    """The `HairBinding` of hair whose strands would find the guides that they follow already; else None.
+
+    So sliders of weights, limits and widths search nothing.
+    """
+    bound = None if target is None else bindings.of(target)
+    if bound is None or (bound.root_key, bound.parting_key) != (key, parting_key):
+        return None
+    most = bound.binding.candidates.indices.shape[1] - 1
+    is_same = bound.surface.is_at_rest_as(surface) and _are_same(bound.guides.roots, guides.roots)
+    return bound.binding if is_same and settings.neighbour_limit <= most else None
 
 
 def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
@@ -101,21 +123,21 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
             device=device,
             progress=part_of(progress, 0.0, 0.5),
         )
-        binding = _bind(surface, guides, hair_settings, density, parting, None, device, part_of(progress, 0.5, 1.0))
-        return guides, *binding
+        progress = part_of(progress, 0.5, 1.0)
+        binding = _bind(surface, guides, hair_settings, density, parting, None, device, progress)
+        return guides, binding, *_strands(surface, binding, guides, progress)
 
-    guides, binding, points = yield compute
+    guides, binding, *made = yield compute
     key = root_key(guide_settings, density, texture and texture.values)
     guide_curves = _write_guides(None, place.find(), surface, guides, guide_settings, key)
     key = root_key(hair_settings, density)
     guide_uid = guide_curves.session_uid
-    bound = BoundHair(binding, hair_settings, key, parting.key, guides, guide_uid, surface, points)
+    bound = BoundHair(binding, hair_settings, key, parting.key, guides, guide_uid, surface, *made)
     return guide_curves, _write_bound(None, place.find(), guide_curves, bound)
 
 
 def _bind(surface, guides, settings, density, parting, roots, device, progress):
-    """`HairBinding`, and strands (S, P, 3) float32 in the surface's local coordinates."""
-    binding = groom.bind_hair(
+    return groom.bind_hair(
         surface.mesh,
         guides,
         settings,
@@ -128,8 +150,14 @@ def _bind(surface, guides, settings, density, parting, roots, device, progress):
         device=device,
         progress=part_of(progress, 0.0, 0.8),
     )
+
+
+def _strands(surface, binding, guides, progress):
+    """Strands (S, P, 3) float32 in the surface's local coordinates, and the weights of their guides (S, k) float32."""
     progress("Growing strands", 0.8)
-    return binding, surface.to_local(groom.follow_guides(binding, guides).numpy())
+    weights = groom.weights_now(binding, guides)
+    points = surface.to_local(groom.strand_points(binding, guides, weights), in_place=True)
+    return points, weights.weights.numpy()
 
 
 def _write_guides(target, surface_object, surface, guides, settings, key):
@@ -205,7 +233,9 @@ def guides_digest(guide_curves):
     """What says whether hair was written for guides as they are: undo may bring back one and not the other."""
     if guide_curves is None:
         return ""
-    return hashlib.blake2b(curves.read_points(guide_curves).tobytes(), digest_size=16).hexdigest()
+    from ..core.fingerprint import fingerprint  # Warp takes longer to import than the add-on may take to start
+
+    return fingerprint(curves.read_points(guide_curves))
 
 
 def read_guides(guide_curves, surface):
@@ -241,15 +271,23 @@ def follow_guides(target):
     bound.guides = guides
     moved = bound.reach.of(combed)
     if len(moved):
-        if len(moved) > len(bound.points) // 2:  # to sort out those that stay would take longer
-            bound.points[:] = bound.surface.to_local(groom.follow_guides(bound.binding, guides).numpy())
-        else:
-            bound.points[moved] = bound.surface.to_local(groom.follow_some(bound.binding, guides, moved))
-        if bound.settings.guide_map:
-            bound.weigh_again(moved)
+        # Beyond a half, to sort out those that stay would take longer.
+        _follow(bound, moved if len(moved) <= len(bound.points) // 2 else None)
         bound.has_moved_only = bound.is_written or bound.has_moved_only
         bound.is_written = False
     return moved
+
+
+def _follow(bound, moved):
+    """Bring strands of bound hair up to its guides; moved: (M,) indices of those to compute, None: all."""
+    binding, guides, surface = bound.binding, bound.guides, bound.surface
+    weights = groom.weights_now(binding, guides, moved)
+    if moved is None:
+        surface.to_local(groom.strand_points(binding, guides, weights, bound.points), in_place=True)
+        bound.take_shares(weights.weights.numpy())
+    else:
+        bound.points[moved] = surface.to_local(groom.follow_some(binding, guides, moved, weights), in_place=True)
+        bound.take_shares(weights.weights.numpy(), moved)
 
 
 def _are_same(roots, others):

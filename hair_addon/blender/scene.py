@@ -32,11 +32,11 @@ class Surface:
     to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → these
     is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
 
-    def to_local(self, points):
-        """(S, P, 3) points of strands → the object's local coordinates, float32."""
+    def to_local(self, points, in_place=False):
+        """(S, P, 3) points of strands → the object's local coordinates, float32; in their own memory if that is free."""
         from ..core.transform import transformed  # Warp takes longer to import than the add-on may take to start
 
-        return transformed(points, np.linalg.inv(self.to_world_axes))
+        return transformed(points, np.linalg.inv(self.to_world_axes), points if in_place else None)
 
     def from_local(self, positions):
         """(..., 3) local coordinates → positions here, float32."""
@@ -46,6 +46,11 @@ class Surface:
     def is_deformed(self):
         """Whether anything moves its vertices away from where they rest."""
         return not np.array_equal(self.rest, self.posed)
+
+    def is_at_rest_as(self, other):
+        """Whether strands made on one are in place on the other."""
+        mine, its = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
+        return all(map(np.array_equal, mine, its))
 
     @property
     def mirror_normal(self):

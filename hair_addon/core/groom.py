@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import leaders
 from .errors import HairError
 from .long_work import part_of, unheard
 from .mesh import SurfacePoints, check_mesh, check_points, positions
@@ -130,6 +129,7 @@ class HairBinding:
     positions: "wp.array[wp.vec3]"  # noqa: F821 (S,) [m]
     normals: "wp.array[wp.vec3]"  # noqa: F821 (S,) unit
     guide_normals: "wp.array[wp.vec3]"  # noqa: F821 (G,) unit, at the guides' roots
+    candidates: "guide_weights.Candidates"  # noqa: F821 (S, k + 1)
     guide_weights: "guide_weights.GuideWeights"  # noqa: F821 (S, k), before guides that differ are left out
     limits: "guide_weights.Limits"  # noqa: F821
     keep_length: float
@@ -250,19 +250,20 @@ def bind_hair(
         fingerprint,
         guide_weights,
         hash_grid,
-        interpolation,
         lane_interpolation,
+        leaders,
         part_lines,
         rooting,
         sampling,
         surface_query,
         transform,
+        vector_interpolation,
     )
     from .regions import kept_apart
 
-    sums = interpolation if device == "cpu" else lane_interpolation
+    sums = vector_interpolation if device == "cpu" else lane_interpolation
     _load_kernels(device, guide_weights, hash_grid, sums, rooting)
-    _load_kernels("cpu", fingerprint, transform)
+    _load_kernels("cpu", fingerprint, leaders, transform)
     if lines is not None:
         _load_kernels(device, part_lines, surface_query)
         lines = part_lines.lay(mesh, lines, device, drawn_on)
@@ -274,18 +275,44 @@ def bind_hair(
     guide_positions, guide_normals = rooting.rooted(mesh, guides.roots, device)
     root_positions, root_normals = rooting.rooted(mesh, roots, device)
     progress("Finding guides", 0.4)
-    weights = guide_weights.find_guides(
+    candidates = guide_weights.find_candidates(
         root_positions,
         root_normals,
         guide_positions,
         guide_normals,
-        None if settings.automatic_influence else settings.influence_distance,
         settings.neighbour_limit,
         regions=kept_apart(regions, roots, guides.roots),
         lines=lines,
     )
-    limits = guide_weights.Limits(settings.angle_limit, settings.length_limit)
-    return HairBinding(roots, root_positions, root_normals, guide_normals, weights, limits, settings.keep_length)
+    return _weighed(roots, root_positions, root_normals, guide_normals, candidates, settings)
+
+
+def _weighed(roots, root_positions, root_normals, guide_normals, candidates, settings):
+    """The `HairBinding` of strands that have found their guides."""
+    from . import guide_weights
+
+    return HairBinding(
+        roots,
+        root_positions,
+        root_normals,
+        guide_normals,
+        candidates,
+        guide_weights.weigh(
+            candidates,
+            root_normals,
+            guide_normals,
+            None if settings.automatic_influence else settings.influence_distance,
+            settings.neighbour_limit,
+        ),
+        guide_weights.Limits(settings.angle_limit, settings.length_limit),
+        settings.keep_length,
+    )
+
+
+def weigh_again(binding, settings):
+    """A `HairBinding` with other weights, limits or lengths: no search. For at most as many guides as were found."""
+    places = binding.roots, binding.positions, binding.normals, binding.guide_normals
+    return _weighed(*places, binding.candidates, settings)
 
 
 def _load_kernels(device, *modules):
@@ -296,21 +323,40 @@ def _load_kernels(device, *modules):
 
 
 def follow_guides(binding, guides) -> Strands:
-    """Strands of a binding for the guides as they are combed now: no search, this is what live editing repeats."""
+    """Strands of a binding for the guides as they are combed now: no search."""
     weights = weights_now(binding, guides)
     return Strands(_follow(binding, guides, binding.positions, binding.normals, weights), binding.roots)
 
 
-def follow_some(binding, guides, chosen):
-    """(M, P, 3) float32 [m]: the points that `follow_guides` gives some strands, and no others are computed.
+def strand_points(binding, guides, weights, out=None):
+    """(S, P, 3) float32 [m]: the points of `follow_guides` in the processor's memory; what live editing repeats.
 
-    chosen: (M,) indices of strands, such as `guide_weights.Reach` finds for the guides that moved.
+    weights: what `weights_now` gives; out: such an array to fill and return, or None for a new one.
+    """
+    import warp as wp
+
+    from . import cores
+
+    roots, normals, device = binding.positions, binding.normals, binding.positions.device
+    shape = len(roots), guides.point_count
+    there = cores.empty_for_results(shape, device) if out is None else wp.array(out, dtype=wp.vec3, copy=False)
+    if device.is_cpu:
+        return _follow(binding, guides, roots, normals, weights, there).numpy()
+    wp.copy(there, _follow(binding, guides, roots, normals, weights))
+    wp.synchronize_device(device)
+    return there.numpy()
+
+
+def follow_some(binding, guides, chosen, weights):
+    """(M, P, 3) float32 [m]: the points that `strand_points` gives some strands, and no others are computed.
+
+    chosen: (M,) indices of strands, such as `guide_weights.Reach` finds for the guides that moved; weights: theirs, as
+    `weights_now` gives them.
     """
     import warp as wp
 
     from .guide_weights import rows
 
-    weights = weights_now(binding, guides, chosen)
     chosen = wp.array(chosen, dtype=int, device=binding.positions.device)
     return _follow(binding, guides, rows(binding.positions, chosen), rows(binding.normals, chosen), weights).numpy()
 
@@ -336,15 +382,17 @@ def _guide_points(binding, guides):
     return guides.points.to(binding.positions.device)
 
 
-def _follow(binding, guides, roots, root_normals, weights):
+def _follow(binding, guides, roots, root_normals, weights, out=None):
     from . import interpolation
 
-    points = _guide_points(binding, guides)
-    return interpolation.interpolate(roots, root_normals, points, binding.guide_normals, weights, binding.keep_length)
+    points, guide_normals = _guide_points(binding, guides), binding.guide_normals
+    return interpolation.interpolate(roots, root_normals, points, guide_normals, weights, binding.keep_length, out)
 
 
 def leading_strands(mesh, guides, binding):
     """(S,) int32: the strand of a `HairBinding` that stands for the guide that each follows first."""
+    from . import leaders
+
     first = binding.guide_weights.indices.numpy()[:, 0]
     return leaders.leaders(first, binding.positions.numpy(), positions(mesh, guides.roots))
 

@@ -35,35 +35,44 @@ FADE = math.radians(30.0)  # of the angle limit, over which a guide's share fade
 
 
 @dataclass(frozen=True)
+class Candidates:
+    """The guides nearest to each strand, nearest first, and those that are left out: (S, k + 1) arrays on one device.
+
+    indices int32, -1 where there are no more; ways float32 [m] to them along the surface or through space, inf then.
+    """
+
+    indices: "wp.array2d[int]"
+    ways: "wp.array2d[float]"
+
+
+@dataclass(frozen=True)
 class GuideWeights:
     """The guides that each strand follows, nearest first: (S, k) arrays on one device.
 
     indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
-    cosine and sine of the angle about the normal from the guide's frame to the strand's. On a GPU also order: (S,)
-    int32, the strands in the order of the guides that they follow first.
+    cosine and sine of the angle about the normal from the guide's frame to the strand's; order: (S,) int32, the
+    strands by the guides that they follow first.
     """
 
     indices: "wp.array2d[int]"
     weights: "wp.array2d[float]"
     turns: "wp.array2d[wp.vec2]"
-    order: "wp.array[int] | None" = None
+    order: "wp.array[int]"
 
     def of(self, chosen):
         """The same of some strands; chosen: int32 Warp array on the device."""
-        parts = (rows(array, chosen) for array in (self.indices, self.weights, self.turns))
-        return GuideWeights(*parts, _order_on(self.indices.device, len(chosen)))
+        indices, weights, turns = (rows(array, chosen) for array in (self.indices, self.weights, self.turns))
+        return GuideWeights(indices, weights, turns, _order_by(indices))
 
 
-def _order_on(device, count, first=None):
-    """The order of `GuideWeights` by the first guides (S,) int32, or any if they are not told; None on a processor."""
-    if device.is_cpu:
-        return None
+def _order_by(indices):
+    """The order of `GuideWeights` of these indices (S, k)."""
+    count, device = len(indices), indices.device
     # Radix sort wants room for as many again.
     order = wp.array(np.arange(2 * count, dtype=np.int32), device=device)
-    if first is not None:
-        keys = wp.empty(2 * count, dtype=int, device=device)
-        wp.copy(keys, first, count=count)
-        wp.utils.radix_sort_pairs(keys, order, count)
+    keys = wp.empty(2 * count, dtype=int, device=device)
+    wp.copy(keys, indices[:, 0].contiguous(), count=count)
+    wp.utils.radix_sort_pairs(keys, order, count)
     return order[:count]
 
 
@@ -87,7 +96,10 @@ class Reach:
 
     def of(self, guides):
         """Indices, rising, of the strands that follow any of some guides."""
-        is_reached = np.zeros(int(self.strands.max(initial=-1)) + 1, bool)
+        strand_count = int(self.strands.max(initial=-1)) + 1
+        if len(guides) == len(self.starts) - 1:  # every strand follows some
+            return np.arange(strand_count)
+        is_reached = np.zeros(strand_count, bool)
         for guide in guides:
             is_reached[self.strands[self.starts[guide] : self.starts[guide + 1]]] = True
         return np.flatnonzero(is_reached)
@@ -108,29 +120,41 @@ def rows(array, chosen):
     return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()
 
 
-def find_guides(
-    roots, normals, guide_roots, guide_normals, influence_distance, neighbour_limit, *, regions=None, lines=None
-):
-    """`GuideWeights` of strands at roots (S,) [m] with unit normals (S,), for guides (G,) likewise; all vec3 arrays.
+def find_candidates(roots, normals, guide_roots, guide_normals, neighbour_limit, *, regions=None, lines=None):
+    """`Candidates` of strands at roots (S,) [m] with unit normals (S,), for guides (G,) likewise; all vec3 arrays.
 
-    influence_distance: d [m], None for automatic; neighbour_limit: k; regions: (S,) and (G,) int32, no strand follows
-    guides of two, nor of another than its own if that has any; lines: `PartLines` that no way to a guide crosses.
+    neighbour_limit: k; regions: (S,) and (G,) int32, no strand follows guides of two, nor of another than its own if
+    that has any; lines: `PartLines` that no way to a guide crosses.
     """
     candidates, ways = _nearest_guides(guide_roots, roots, neighbour_limit + 1, regions)
     if lines is not None:
         candidates, ways = _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions)
-    device = roots.device
-    indices = wp.empty((len(roots), neighbour_limit), dtype=int, device=device)
+    return Candidates(candidates, ways)
+
+
+def weigh(candidates, normals, guide_normals, influence_distance, neighbour_limit):
+    """`GuideWeights` (S, k) of `Candidates`, k + 1 of whom or more were looked for; normals (S,), guide_normals (G,).
+
+    influence_distance: d [m], None for automatic; neighbour_limit: k.
+    """
+    device, strand_count = normals.device, len(normals)
+    indices = wp.empty((strand_count, neighbour_limit), dtype=int, device=device)
     weights = wp.empty(indices.shape, dtype=float, device=device)
     turns = wp.empty(indices.shape, dtype=wp.vec2, device=device)
     cores.launch(
         _weigh,
-        len(roots),
-        inputs=[Rows(candidates), Rows(ways), Rows(normals), guide_normals, influence_distance or 0.0],
+        strand_count,
+        inputs=[
+            Rows(candidates.indices),
+            Rows(candidates.ways),
+            Rows(normals),
+            guide_normals,
+            influence_distance or 0.0,
+        ],
         outputs=[indices, weights, turns],
         device=device,
     )
-    return GuideWeights(indices, weights, turns, _order_on(device, len(roots), indices[:, 0].contiguous()))
+    return GuideWeights(indices, weights, turns, _order_by(indices))
 
 
 def _nearest_guides(guide_roots, roots, count, regions):

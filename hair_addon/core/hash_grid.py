@@ -26,6 +26,9 @@ candidate_values = wp.types.vector(length=CANDIDATE_LIMIT, dtype=float)
 LIMIT = 64  # points that a query finds, at most
 key_list = wp.types.vector(length=LIMIT, dtype=wp.uint64)
 NO_KEY = wp.constant(wp.uint64(2**64 - 1))
+QUERIES_AT_ONCE = 8  # of a cell, in vector registers
+SLOTS_AT_ONCE = 9
+SHORT = -2  # in place of the nearest point's index: nearer points were too few, and it takes a wider search
 WIDENINGS = 3  # doublings of the search radius before all points are read instead
 
 
@@ -109,6 +112,90 @@ def _cells(
     out_cells[query] = cell
 
 
+_RANKING = f"""
+#if !defined(__CUDA_ARCH__)
+  typedef float floats __attribute__((ext_vector_type({QUERIES_AT_ONCE})));
+  typedef double keys __attribute__((ext_vector_type({QUERIES_AT_ONCE})));
+  typedef long long bits __attribute__((ext_vector_type({QUERIES_AT_ONCE})));
+  const float infinite = __builtin_inff();
+  const int limit = out_indices.shape[1];
+  const float reach = first_radius * first_radius;
+  for (int begin = first; begin < end; begin += {QUERIES_AT_ONCE}) {{
+    const int count = end - begin < {QUERIES_AT_ONCE} ? end - begin : {QUERIES_AT_ONCE};
+    floats x, y, z;
+    for (int lane = 0; lane < {QUERIES_AT_ONCE}; ++lane) {{
+      const auto& query = queries.data[order.data[begin + (lane < count ? lane : 0)]];
+      x[lane] = query[0];
+      y[lane] = query[1];
+      z[lane] = query[2];
+    }}
+    keys nearest[{LIMIT}];
+    // Some slots at a time, in registers: what falls out of the last of them is handed on to the next.
+    keys handed[{CANDIDATE_LIMIT}];
+    for (int candidate = 0; candidate < candidate_count; ++candidate) {{
+      const floats away_x = candidates_x[candidate] - x;
+      const floats away_y = candidates_y[candidate] - y;
+      const floats away_z = candidates_z[candidate] - z;
+      const floats apart = away_x * away_x + away_y * away_y + away_z * away_z;
+      // A float leaves 29 bits of a double free: room for which it is, and so for who comes first of two as far.
+      const bits key = __builtin_bit_cast(bits, __builtin_convertvector(apart, keys)) | candidate;
+      handed[candidate] = __builtin_bit_cast(keys, key);
+    }}
+    for (int slot = 0; slot < limit; slot += {SLOTS_AT_ONCE}) {{
+      keys kept[{SLOTS_AT_ONCE}];
+      for (int i = 0; i < {SLOTS_AT_ONCE}; ++i) kept[i] = keys(__builtin_inf());
+      for (int candidate = 0; candidate < candidate_count; ++candidate) {{
+        keys key = handed[candidate];
+        #pragma unroll
+        for (int i = 0; i < {SLOTS_AT_ONCE}; ++i) {{
+          const keys other = kept[i];
+          kept[i] = key < other ? key : other;
+          key = key < other ? other : key;
+        }}
+        handed[candidate] = key;
+      }}
+      for (int i = 0; i < {SLOTS_AT_ONCE} && slot + i < limit; ++i) nearest[slot + i] = kept[i];
+    }}
+    for (int lane = 0; lane < count; ++lane) {{
+      const size_t row = size_t(order.data[begin + lane]) * limit;
+      int found_count = 0;
+      for (int slot = 0; slot < limit; ++slot) {{
+        const double key = nearest[slot][lane];
+        const float squared = key;
+        const float apart = __builtin_sqrtf(squared);
+        const bool is_near = squared < reach;
+        found_count += is_near;
+        // What is out of reach does not count, except for the very nearest.
+        const bool is_found = is_near && (slot == 0 || apart < distance);
+        const int candidate = __builtin_bit_cast(long long, key) & {CANDIDATE_LIMIT - 1};
+        out_indices.data[row + slot] = is_found ? candidates[candidate] : -1;
+        out_distances.data[row + slot] = is_found ? apart : infinite;
+      }}
+      if (found_count < limit && (first_radius < distance || found_count == 0)) out_indices.data[row] = {SHORT};
+    }}
+  }}
+#endif
+"""
+
+
+@wp.func_native(_RANKING)
+def _rank(
+    queries: wp.array[wp.vec3],
+    order: wp.array[int],
+    first: int,
+    end: int,
+    candidate_count: int,
+    candidates: candidate_indices,
+    candidates_x: candidate_values,
+    candidates_y: candidate_values,
+    candidates_z: candidate_values,
+    distance: float,
+    first_radius: float,
+    out_indices: wp.array2d[int],
+    out_distances: wp.array2d[float],
+): ...
+
+
 @wp.kernel
 def _by_cells(
     points: wp.array[wp.vec3],
@@ -124,53 +211,57 @@ def _by_cells(
     out_distances: wp.array2d[float],
 ):
     cell = wp.tid()
-    low = queries[order[firsts[cell]]]
+    first = firsts[cell]
+    end = ends[cell]
+    low = queries[order[first]]
     high = low
-    for place in range(firsts[cell] + 1, ends[cell]):
+    for place in range(first + 1, end):
         low = wp.min(low, queries[order[place]])
         high = wp.max(high, queries[order[place]])
-    # All points in reach of any query of the cell: found once, compared with each.
+    # All points in reach of any query of the cell, by rising index: found once, compared with each.
     candidates = candidate_indices()
-    x = candidate_values()
-    y = candidate_values()
-    z = candidate_values()
-    candidate_count = int(0)
+    count = int(0)
     for point in wp.hash_grid_query(grid, 0.5 * (low + high), first_radius + 0.5 * wp.length(high - low)):
         position = points[point]
         if _squared_distance(position, wp.min(wp.max(position, low), high)) < first_radius * first_radius:
-            if candidate_count < CANDIDATE_LIMIT:
-                candidates[candidate_count] = point
-                x[candidate_count] = position[0]
-                y[candidate_count] = position[1]
-                z[candidate_count] = position[2]
-            candidate_count += 1
+            if count < CANDIDATE_LIMIT:
+                slot = count
+                while slot > 0 and candidates[slot - 1] > point:
+                    candidates[slot] = candidates[slot - 1]
+                    slot -= 1
+                candidates[slot] = point
+            count += 1
+    are_all = count <= CANDIDATE_LIMIT
+    if are_all:
+        x = candidate_values()
+        y = candidate_values()
+        z = candidate_values()
+        for slot in range(count):
+            position = points[candidates[slot]]
+            x[slot] = position[0]
+            y[slot] = position[1]
+            z[slot] = position[2]
+        _rank(
+            queries,
+            order,
+            first,
+            end,
+            count,
+            candidates,
+            x,
+            y,
+            z,
+            distance,
+            first_radius,
+            out_indices,
+            out_distances,
+        )
     limit = out_indices.shape[1]
-    listed = candidate_indices()
-    squared = candidate_values()
-    for place in range(firsts[cell], ends[cell]):
+    for place in range(first, end):
         query = order[place]
-        position = queries[query]
-        nearest = key_list(NO_KEY)
-        if candidate_count <= CANDIDATE_LIMIT:
-            # Which of them are in reach is listed without a branch.
-            count = int(0)
-            for candidate in range(candidate_count):
-                away = wp.vec3(x[candidate], y[candidate], z[candidate]) - position
-                apart = wp.length_sq(away)
-                listed[count] = candidates[candidate]
-                squared[count] = apart
-                count += wp.where(apart < first_radius * first_radius, 1, 0)
-            for listing in range(count):
-                key = _key(squared[listing], listed[listing])
-                for slot in range(wp.min(listing + 1, limit)):
-                    other = nearest[slot]
-                    nearest[slot] = wp.min(other, key)
-                    key = wp.max(other, key)
-            if nearest[limit - 1] == NO_KEY and (first_radius < distance or nearest[0] == NO_KEY):
-                nearest = _widened(points, position, grid, distance, first_radius, 1, limit)
-        else:
-            nearest = _widened(points, position, grid, distance, first_radius, 0, limit)
-        _write(nearest, distance, out_indices[query], out_distances[query])
+        if not are_all or out_indices[query, 0] == SHORT:
+            nearest = _widened(points, queries[query], grid, distance, first_radius, wp.where(are_all, 1, 0), limit)
+            _write(nearest, distance, out_indices[query], out_distances[query])
 
 
 @wp.kernel

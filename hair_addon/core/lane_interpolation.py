@@ -178,7 +178,7 @@ def _framed_offsets(
     out_offsets[guide, point] = framed_offset(guide_points, guide, point, guide_normals[guide])
 
 
-def by_lanes(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0):
+def by_lanes(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0, out=None):
     """What `interpolation.interpolate` returns; all arrays on one GPU."""
     device = roots.device
     offsets = wp.empty(guide_points.shape, dtype=wp.vec4, device=device)
@@ -189,7 +189,7 @@ def by_lanes(roots, normals, guide_points, guide_normals, guide_weights, keep_le
         outputs=[offsets],
         device=device,
     )
-    points = wp.empty((len(roots), guide_points.shape[1]), dtype=wp.vec3, device=device)
+    points = wp.empty((len(roots), guide_points.shape[1]), dtype=wp.vec3, device=device) if out is None else out
     strands_in_a_warp = 32 // LANES
     wp.launch(
         _strands_on_lanes,

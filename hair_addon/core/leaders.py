@@ -2,6 +2,27 @@
 """Which strand stands for the guide that others follow: the middle of their clump in Blender's hair nodes."""
 
 import numpy as np
+import warp as wp
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+
+@wp.kernel
+def _nearest(
+    guide_index: wp.array[int],
+    roots: wp.array[wp.vec3],
+    guide_roots: wp.array[wp.vec3],
+    # outputs
+    out_squared: wp.array[float],
+    out_leader: wp.array[int],
+):
+    # One after the other, on one core: of several in one place the first stays.
+    for strand in range(guide_index.shape[0]):
+        guide = guide_index[strand]
+        squared = wp.length_sq(roots[strand] - guide_roots[guide])
+        if squared < out_squared[guide]:
+            out_squared[guide] = squared
+            out_leader[guide] = strand
 
 
 def leaders(guide_index, roots, guide_roots):
@@ -9,10 +30,15 @@ def leaders(guide_index, roots, guide_roots):
 
     guide_index: (S,) the guide that each strand follows first; roots (S, 3) and guide_roots (G, 3) [m].
     """
-    apart = np.linalg.norm(roots - guide_roots[guide_index], axis=1)
-    nearest = np.full(len(guide_roots), np.inf, apart.dtype)
-    np.minimum.at(nearest, guide_index, apart)
-    candidates = np.flatnonzero(apart == nearest[guide_index])
-    leader = np.zeros(len(guide_roots), np.int32)
-    leader[guide_index[candidates[::-1]]] = candidates[::-1]  # of several in one place the first
-    return leader[guide_index]
+    guide_index, roots, guide_roots = (
+        wp.array(np.ascontiguousarray(array, scalar), dtype=kind, device="cpu", copy=False)
+        for array, scalar, kind in (
+            (guide_index, np.int32, int),
+            (roots, np.float32, wp.vec3),
+            (guide_roots, np.float32, wp.vec3),
+        )
+    )
+    squared = wp.full(len(guide_roots), wp.inf, dtype=float, device="cpu")
+    leader = wp.zeros(len(guide_roots), dtype=int, device="cpu")
+    wp.launch(_nearest, 1, inputs=[guide_index, roots, guide_roots], outputs=[squared, leader], device="cpu")
+    return leader.numpy()[guide_index.numpy()]

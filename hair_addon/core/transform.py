@@ -23,13 +23,16 @@ def _transform(
         out_points[strand, point] = matrix * points[strand, point]
 
 
-def transformed(points, matrix):
-    """(S, P, 3) float32 points, each multiplied by a (3, 3) matrix; by the identity they are themselves."""
+def transformed(points, matrix, out=None):
+    """(S, P, 3) float32 points, each multiplied by a (3, 3) matrix; by the identity they are themselves.
+
+    out: array to put them in, which may be that of the points; None for a new one.
+    """
     points = np.ascontiguousarray(points, np.float32)
     if not len(points) or np.array_equal(matrix, np.eye(3)):
         return points
     there = wp.array(points, dtype=wp.vec3, device="cpu", copy=False)
-    moved = cores.empty_vectors(there.shape, "cpu")
+    moved = cores.empty_vectors(there.shape, "cpu") if out is None else wp.array(out, dtype=wp.vec3, copy=False)
     matrix = wp.mat33(*np.asarray(matrix, np.float32).ravel().tolist())
     cores.launch(_transform, len(points), inputs=[Rows(there), matrix], outputs=[moved], device="cpu")
     return moved.numpy()

@@ -139,24 +139,47 @@ def test_whoever_reads_the_hair_reads_it_as_it_is_drawn(hair, window, reader, tm
     np.testing.assert_allclose(points(bpy.data.objects["Hair"]), wanted, atol=1e-6)
 
 
-def test_sliders_that_keep_roots_write_when_they_are_let_go(hair, window, monkeypatch):
+_SLIDERS = {
+    "neighbour_limit": (7, 5, 3),
+    "influence_distance": (0.3, 0.5, 0.8),
+    "keep_length": (0.5, 0.2, 0.0),
+    "angle_limit": (0.5, 0.3, 0.1),
+    "length_limit": (1.3, 1.1, 1.01),
+}
+
+
+@pytest.mark.parametrize(("name", "values"), _SLIDERS.items())
+def test_sliders_that_keep_roots_search_nothing_and_write_when_they_are_let_go(hair, window, monkeypatch, name, values):
+    list(stroke(bpy.data.objects["Guides"], range(0, 60, 2), steps=2))  # guides that differ
+    settings = hair.data.vellus.hair
+    settings.automatic_influence = name != "influence_distance"
+    bpy.context.view_layer.update()
+    live_hair.write_all()
     drawn(hair)
     calls = counts_of(monkeypatch)
     before, roots = points(hair), attribute(hair, "root_triangle")
-    for limit in (7, 5, 3):
-        hair.data.vellus.hair.neighbour_limit = limit
+    for value in values:
+        setattr(settings, name, value)
         bpy.context.view_layer.update()
         assert not np.array_equal(drawn(hair), before)
-    assert (calls["uploads"], calls["writes"]) == (3, 0)
-    searches = calls["searches"]
     for _ in range(3):
         bpy.context.view_layer.update()
-    assert calls["searches"] == searches
+    assert (calls["searches"], calls["uploads"], calls["writes"]) == (0, 3, 0)
     live_hair.write_all()
     assert calls["writes"] == 1
     assert np.array_equal(points(hair), drawn(hair))
     assert np.array_equal(attribute(hair, "root_triangle"), roots)
     assert not hair.data.vellus.is_stale
+    assert np.array_equal(points(hair), grown_from_nothing(hair))
+
+
+def test_more_guides_for_a_strand_are_searched_for(hair, window, monkeypatch):
+    calls = counts_of(monkeypatch)
+    hair.data.vellus.hair.neighbour_limit = 12
+    bpy.context.view_layer.update()
+    assert calls["searches"] == 1
+    live_hair.write_all()
+    assert np.array_equal(points(hair), grown_from_nothing(hair))
 
 
 def test_a_guide_slider_that_keeps_roots_searches_nothing(hair, monkeypatch):
@@ -196,7 +219,7 @@ def test_what_was_just_written_is_not_read_again(hair, monkeypatch):
     calls = counts_of(monkeypatch)
     pipeline.interpolate_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get(), hair.data)
     bpy.context.view_layer.update()
-    assert compared == [] and (calls["writes"], calls["searches"]) == (1, 1)
+    assert compared == [] and (calls["writes"], calls["searches"]) == (1, 0)
     assert bindings.of(hair.data) is not None
     sculpted = points(hair)
     sculpted[7, -1] += 0.1

@@ -9,6 +9,7 @@ import warp as wp
 
 from hair_addon.core import guide_weights
 from hair_addon.core.guide_weights import Limits
+from tests.core.finding import find_guides
 from tests.devices import DEVICE
 
 
@@ -35,7 +36,7 @@ def dense(found, guide_count):
 
 def weights_at(roots, guide_roots, distance=None, limit=8, **kept_apart):
     """(S, G) on flat ground; roots (S, 2), guide_roots (G, 2)."""
-    found = guide_weights.find_guides(
+    found = find_guides(
         vectors(flat(roots)),
         up(len(roots)),
         vectors(flat(guide_roots)),
@@ -55,7 +56,7 @@ def steepest(weights, path):
 @pytest.mark.parametrize("limit", [1, 3, 8, 12])
 @pytest.mark.parametrize("distance", [None, 0.05, 0.2])
 def test_weights_are_shares(rng, distance, limit):
-    found = guide_weights.find_guides(
+    found = find_guides(
         vectors(flat(rng.random((300, 2)))), up(300), vectors(flat(rng.random((60, 2)))), up(60), distance, limit
     )
     indices, weights = found.indices.numpy(), found.weights.numpy()
@@ -180,9 +181,7 @@ def leaning(angles, lengths=1.0, point_count=9):
 def limited_weights(guides, limits, root=(9e-4, 0.0)):
     """(G,) for a strand nearest to the first guide."""
     count = len(guides)
-    found = guide_weights.find_guides(
-        vectors(flat([root])), up(1), vectors(guides[:, 0]), up(count), None, max(count, 1)
-    )
+    found = find_guides(vectors(flat([root])), up(1), vectors(guides[:, 0]), up(count), None, max(count, 1))
     return dense(guide_weights.limited(found, vectors(guides), up(count), limits), count)[0]
 
 
@@ -223,14 +222,14 @@ def test_shares_fade_while_a_guide_is_combed_away(limits):
 def test_limits_of_no_effect(rng):
     """What mixes all: no limits, or guides that are alike wherever they stand on a surface that bends."""
     guides = rng.normal(size=(7, 9, 3))
-    found = guide_weights.find_guides(vectors([(0, 0, 0)]), up(1), vectors(guides[:, 0]), up(7), None, 7)
+    found = find_guides(vectors([(0, 0, 0)]), up(1), vectors(guides[:, 0]), up(7), None, 7)
     free = guide_weights.limited(found, vectors(guides), up(7), Limits())
     np.testing.assert_allclose(free.weights.numpy(), found.weights.numpy(), rtol=1e-5)
     normals = rng.normal(size=(50, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     grown = normals[:, None] * np.linspace(1.0, 1.5, 9)[:, None]  # along the normals of a sphere
     roots = vectors(normals[:20] + 1e-3)
-    found = guide_weights.find_guides(roots, vectors(normals[:20]), vectors(normals), vectors(normals), None, 8)
+    found = find_guides(roots, vectors(normals[:20]), vectors(normals), vectors(normals), None, 8)
     alike = guide_weights.limited(found, vectors(grown), vectors(normals), Limits(math.radians(20.0), 1.5))
     np.testing.assert_allclose(alike.weights.numpy(), found.weights.numpy(), rtol=1e-4)
 

@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from hair_addon.core import guide_weights, interpolation
 from hair_addon.core.strands import offsets, segment_lengths
+from tests.core.finding import find_guides
 from tests.devices import DEVICE
 
 
@@ -22,7 +23,7 @@ def unit(array):
 def strands_between(roots, normals, guides, guide_normals, distance=None, limit=8, keep_length=1.0):
     """Points (S, P, 3) by both stages; guides (G, P, 3)."""
     roots, normals, guides, guide_normals = map(vectors, (roots, normals, guides, guide_normals))
-    weights = guide_weights.find_guides(roots, normals, guides[:, 0].contiguous(), guide_normals, distance, limit)
+    weights = find_guides(roots, normals, guides[:, 0].contiguous(), guide_normals, distance, limit)
     return interpolation.interpolate(roots, normals, guides, guide_normals, weights, keep_length).numpy()
 
 
@@ -194,15 +195,13 @@ def test_any_number_of_points(scene, point_count):
 @pytest.mark.parametrize("point_count", [1, 3, 15, 16, 17, 32, 33, 41, 100])
 @pytest.mark.parametrize("strand_count", [1, 2, 7, 40])
 def test_both_ways_are_one(scene, point_count, strand_count):
-    """The processor's way and the GPU's, both on the GPU: the same sums, added up in another order."""
+    """The processor's way and the GPU's: the same sums, added up in another order."""
     guides = np.concatenate([scene["guides"]] * 5, axis=1)[:, :point_count]
-    roots, normals, guides, guide_normals = map(
-        vectors, (scene["roots"][:strand_count], scene["normals"][:strand_count], guides, scene["guide_normals"])
-    )
-    guide_roots = guides[:, 0].contiguous()
-    weights = guide_weights.find_guides(roots, normals, guide_roots, guide_normals, None, 8)
-    one, other = (
-        way(roots, normals, guides, guide_normals, weights).numpy()
-        for way in (interpolation.by_strands, interpolation.by_lanes)
-    )
-    np.testing.assert_allclose(one, other, atol=1e-5)
+    arrays = scene["roots"][:strand_count], scene["normals"][:strand_count], guides, scene["guide_normals"]
+
+    def strands_on(device):
+        roots, normals, guides, guide_normals = (vectors(array).to(device) for array in arrays)
+        weights = find_guides(roots, normals, guides[:, 0].contiguous(), guide_normals, None, 8)
+        return interpolation.interpolate(roots, normals, guides, guide_normals, weights).numpy()
+
+    np.testing.assert_allclose(strands_on("cpu"), strands_on(DEVICE), atol=1e-5)

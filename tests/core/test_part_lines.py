@@ -11,6 +11,7 @@ import warp as wp
 from hair_addon.core import guide_weights, part_lines
 from hair_addon.core.errors import HairError
 from tests.core.conftest import flat_grid, subdivided_sphere
+from tests.core.finding import find_guides
 from tests.core.test_guide_weights import dense, flat, steepest, up, vectors
 from tests.devices import DEVICE
 
@@ -156,7 +157,7 @@ def test_there_is_no_way_through_where_lines_meet(ground, rng):
 
 
 def parted_weights(ground, lines, roots, guide_roots, distance=None, limit=8):
-    found = guide_weights.find_guides(
+    found = find_guides(
         vectors(flat(roots)),
         up(len(roots)),
         vectors(flat(guide_roots)),
@@ -184,7 +185,7 @@ def test_a_line_that_ends_separates_no_farther_than_the_way_round_is_longer(grou
     guide_roots = rng.random((300, 2))
     roots = np.array([0.65, 0.4]) + (0.3, 0.2) * rng.random((200, 2))
     line = segments((0.1, 0.5), (0.5, 0.5))
-    free = guide_weights.find_guides(vectors(flat(roots)), up(200), vectors(flat(guide_roots)), up(300), None, 8)
+    free = find_guides(vectors(flat(roots)), up(200), vectors(flat(guide_roots)), up(300), None, 8)
     np.testing.assert_allclose(parted_weights(ground, line, roots, guide_roots), dense(free, 300), atol=1e-5)
 
 
@@ -199,8 +200,7 @@ def test_lines_lie_on_the_surface():
     places = np.stack([np.sqrt(1.0 - z * z) * np.cos(turn), np.sqrt(1.0 - z * z) * np.sin(turn), z], axis=1)
     guides, roots = vectors(places), vectors(places[::-1] * np.array([1.0, -1.0, 1.0]))
     parted, free = (
-        dense(guide_weights.find_guides(roots, roots, guides, guides, None, 8, lines=lines), 400)
-        for lines in (laid, None)
+        dense(find_guides(roots, roots, guides, guides, None, 8, lines=lines), 400) for lines in (laid, None)
     )
     places_of_roots = roots.numpy()
     below = places_of_roots[:, 2] < 0.5

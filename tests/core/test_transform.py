@@ -25,3 +25,10 @@ def test_nothing_is_copied_for_nothing(rng):
     points = rng.random((5, 7, 3), np.float32)
     assert transformed(points, np.eye(3)) is points
     assert transformed(points[:0], 2.0 * np.eye(3)).shape == (0, 7, 3)
+
+
+def test_points_may_be_replaced(rng):
+    points, matrix = rng.random((9000, 7, 3), np.float32), rng.random((3, 3))
+    expected = transformed(points, matrix)
+    assert np.shares_memory(transformed(points, matrix, out=points), points)
+    np.testing.assert_array_equal(points, expected)
