@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from ..core import groom
-from ..core.groom import HairBinding, HairSettings
+from ..core.groom import HairSettings
+from ..core.hair_binding import HairBinding
 from ..core.strands import Strands
 from .scene import Surface
 

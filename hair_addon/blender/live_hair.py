@@ -9,6 +9,7 @@ picture, and the Curves are written at once.
 import bpy
 import numpy as np
 
+from ..core import hair_binding
 from ..core.errors import HairError
 from . import bindings, curves, hair_cache, pipeline
 
@@ -35,7 +36,7 @@ def follow_guides(hair, depsgraph):
         make_again(hair, depsgraph)
         return
     try:
-        moved = pipeline.follow_guides(hair)
+        moved = _follow_combed(hair)
     except HairError as error:
         hair.vellus.status = str(error)
         return
@@ -44,6 +45,39 @@ def follow_guides(hair, depsgraph):
     elif len(moved):
         hair_cache.move(hair.session_uid, moved)
         _write_soon(hair)
+
+
+def _follow_combed(hair):
+    """Move the strands of bound hair whose guides were combed since; indices (M,) of those that moved.
+
+    None where that is not enough: guides came, went or slid over the surface, and the hair has to be bound again.
+    """
+    bound = bindings.of(hair)
+    guides, before = pipeline.read_guides(hair.vellus.guide_curves, bound.surface), bound.guides
+    if guides.points.shape != before.points.shape or not guides.roots.is_same(before.roots):
+        return None
+    combed = np.flatnonzero((guides.numpy() != before.numpy()).any(axis=(1, 2)))
+    bound.guides = guides
+    moved = bound.reach.of(combed)
+    if len(moved):
+        # Beyond a half, to sort out those that stay would take longer.
+        follow_bound(bound, moved if len(moved) <= len(bound.points) // 2 else None)
+        bound.has_moved_only = bound.is_written or bound.has_moved_only
+        bound.is_written = False
+    return moved
+
+
+def follow_bound(bound, moved):
+    """Bring strands of bound hair up to its guides; moved: (M,) indices of those to compute, None: all."""
+    binding, guides, surface = bound.binding, bound.guides, bound.surface
+    weights = hair_binding.weights_now(binding, guides, moved)
+    if moved is None:
+        surface.to_local(hair_binding.strand_points(binding, guides, weights, bound.points), in_place=True)
+        bound.take_shares(weights.weights.numpy())
+    else:
+        points = hair_binding.follow_some(binding, guides, moved, weights)
+        bound.points[moved] = surface.to_local(points, in_place=True)
+        bound.take_shares(weights.weights.numpy(), moved)
 
 
 def make_again(hair, depsgraph):

@@ -10,7 +10,7 @@ import hashlib
 import bpy
 import numpy as np
 
-from ..core import groom, strands
+from ..core import groom, hair_binding, strands
 from ..core.errors import HairError
 from ..core.long_work import part_of, run_now
 from ..core.mesh import require_finite
@@ -82,7 +82,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target):
         if found is None:
             binding = _bind(surface, guides, settings, density, parting, roots, device, progress)
         else:
-            binding = groom.weigh_again(found, settings)
+            binding = hair_binding.weigh_again(found, settings)
         return binding, *_strands(surface, binding, guides, progress)
 
     binding, *made = yield compute
@@ -98,7 +98,7 @@ def _found_guides(target, settings, key, parting_key, guides, surface):
     if bound is None or (bound.root_key, bound.parting_key) != (key, parting_key):
         return None
     most = bound.binding.candidates.indices.shape[1] - 1
-    is_same = bound.surface.is_at_rest_as(surface) and _are_same(bound.guides.roots, guides.roots)
+    is_same = bound.surface.is_at_rest_as(surface) and bound.guides.roots.is_same(guides.roots)
     return bound.binding if is_same and settings.neighbour_limit <= most else None
 
 
@@ -155,8 +155,8 @@ def _bind(surface, guides, settings, density, parting, roots, device, progress):
 def _strands(surface, binding, guides, progress):
     """Strands (S, P, 3) float32 in the surface's local coordinates, and the weights of their guides (S, k) float32."""
     progress("Growing strands", 0.8)
-    weights = groom.weights_now(binding, guides)
-    points = surface.to_local(groom.strand_points(binding, guides, weights), in_place=True)
+    weights = hair_binding.weights_now(binding, guides)
+    points = surface.to_local(hair_binding.strand_points(binding, guides, weights), in_place=True)
     return points, weights.weights.numpy()
 
 
@@ -190,7 +190,7 @@ def write_hair(target):
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
         radii = groom.strand_radii(bound.settings, bound.points.shape[1])
         binding = bound.binding
-        leaders = groom.leading_strands(bound.surface.mesh, bound.guides, binding)
+        leaders = hair_binding.leading_strands(bound.surface.mesh, bound.guides, binding)
         normals = binding.normals.numpy()
         curves.write_strands(target, bound.surface, bound.points, binding.roots, radii, leaders, normals)
     if not bound.is_map_written:
@@ -255,43 +255,6 @@ def read_guides(guide_curves, surface):
     else:
         points = strands.resample(points, offsets, groom.POINT_COUNT)
     return strands.from_numpy(points, roots, preferences.device())
-
-
-def follow_guides(target):
-    """Move the strands of bound hair whose guides were combed since; indices (M,) of those that moved.
-
-    None where that is not enough: guides came, went or slid over the surface, and the hair has to be bound again.
-    """
-    bound = bindings.of(target)
-    guides = read_guides(target.vellus.guide_curves, bound.surface)
-    before = bound.guides
-    if guides.points.shape != before.points.shape or not _are_same(guides.roots, before.roots):
-        return None
-    combed = np.flatnonzero((guides.numpy() != before.numpy()).any(axis=(1, 2)))
-    bound.guides = guides
-    moved = bound.reach.of(combed)
-    if len(moved):
-        # Beyond a half, to sort out those that stay would take longer.
-        _follow(bound, moved if len(moved) <= len(bound.points) // 2 else None)
-        bound.has_moved_only = bound.is_written or bound.has_moved_only
-        bound.is_written = False
-    return moved
-
-
-def _follow(bound, moved):
-    """Bring strands of bound hair up to its guides; moved: (M,) indices of those to compute, None: all."""
-    binding, guides, surface = bound.binding, bound.guides, bound.surface
-    weights = groom.weights_now(binding, guides, moved)
-    if moved is None:
-        surface.to_local(groom.strand_points(binding, guides, weights, bound.points), in_place=True)
-        bound.take_shares(weights.weights.numpy())
-    else:
-        bound.points[moved] = surface.to_local(groom.follow_some(binding, guides, moved, weights), in_place=True)
-        bound.take_shares(weights.weights.numpy(), moved)
-
-
-def _are_same(roots, others):
-    return np.array_equal(roots.triangle, others.triangle) and np.array_equal(roots.barycentric, others.barycentric)
 
 
 def follow_surface(guide_curves, depsgraph, axes_before=None):

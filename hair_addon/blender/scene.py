@@ -33,7 +33,7 @@ class Surface:
     is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
 
     def to_local(self, points, in_place=False):
-        """(S, P, 3) points of strands → the object's local coordinates, float32; in their own memory if that is free."""
+        """(S, P, 3) points of strands → the object's local coordinates, float32; in_place: in their own memory."""
         from ..core.transform import transformed  # Warp takes longer to import than the add-on may take to start
 
         return transformed(points, np.linalg.inv(self.to_world_axes), points if in_place else None)

@@ -55,7 +55,7 @@ def empty_vectors(shape, device):
 
 
 def empty_for_results(shape, device):
-    """An array of vec3 in the processor's memory for what a device computes; a GPU fills pinned memory 30 times faster."""
+    """An array of vec3 in the processor's memory for a device's results: pinned, which a GPU fills faster."""
     if wp.get_device(device).is_cpu:
         return empty_vectors(shape, "cpu")
     return wp.empty(shape, dtype=wp.vec3, device="cpu", pinned=True)

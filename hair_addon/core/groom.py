@@ -2,7 +2,8 @@
 """Section 2 of [Report12] as two functions: `distribute_guides` and `generate_hair`, with their settings.
 
 `generate_hair` is `bind_hair` (roots, neighbours, weights: all that depends on where guides are rooted) followed by
-`follow_guides` (what combing repeats). The stages need Warp, which takes long to import, so they are imported late.
+`hair_binding.follow_guides` (what combing repeats). The stages need Warp, which takes long to import, so they are
+imported late.
 """
 
 import math
@@ -10,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .errors import HairError
+from . import hair_binding
+from .hair_binding import HairBinding
 from .long_work import part_of, unheard
-from .mesh import SurfacePoints, check_mesh, check_points, positions
+from .mesh import check_mesh, check_points, positions
 from .params import Settings, param
 from .strands import Strands
 
@@ -119,20 +121,6 @@ class HairSettings(Settings):
     tip_taper: float = param(
         0.2, "Radius at the tip as a part of the radius at the root", low=0.0, high=1.0, subtype="FACTOR"
     )
-
-
-@dataclass(frozen=True)
-class HairBinding:
-    """What ties hair to a surface and its guides, and does not change while guides are combed."""
-
-    roots: SurfacePoints
-    positions: "wp.array[wp.vec3]"  # noqa: F821 (S,) [m]
-    normals: "wp.array[wp.vec3]"  # noqa: F821 (S,) unit
-    guide_normals: "wp.array[wp.vec3]"  # noqa: F821 (G,) unit, at the guides' roots
-    candidates: "guide_weights.Candidates"  # noqa: F821 (S, k + 1)
-    guide_weights: "guide_weights.GuideWeights"  # noqa: F821 (S, k), before guides that differ are left out
-    limits: "guide_weights.Limits"  # noqa: F821
-    keep_length: float
 
 
 def distribute_guides(
@@ -284,35 +272,7 @@ def bind_hair(
         regions=kept_apart(regions, roots, guides.roots),
         lines=lines,
     )
-    return _weighed(roots, root_positions, root_normals, guide_normals, candidates, settings)
-
-
-def _weighed(roots, root_positions, root_normals, guide_normals, candidates, settings):
-    """The `HairBinding` of strands that have found their guides."""
-    from . import guide_weights
-
-    return HairBinding(
-        roots,
-        root_positions,
-        root_normals,
-        guide_normals,
-        candidates,
-        guide_weights.weigh(
-            candidates,
-            root_normals,
-            guide_normals,
-            None if settings.automatic_influence else settings.influence_distance,
-            settings.neighbour_limit,
-        ),
-        guide_weights.Limits(settings.angle_limit, settings.length_limit),
-        settings.keep_length,
-    )
-
-
-def weigh_again(binding, settings):
-    """A `HairBinding` with other weights, limits or lengths: no search. For at most as many guides as were found."""
-    places = binding.roots, binding.positions, binding.normals, binding.guide_normals
-    return _weighed(*places, binding.candidates, settings)
+    return hair_binding.weighed(roots, root_positions, root_normals, guide_normals, candidates, settings)
 
 
 def _load_kernels(device, *modules):
@@ -320,81 +280,6 @@ def _load_kernels(device, *modules):
     import warp as wp
 
     wp.force_load(device, [wp.get_module(module.__name__) for module in modules])
-
-
-def follow_guides(binding, guides) -> Strands:
-    """Strands of a binding for the guides as they are combed now: no search."""
-    weights = weights_now(binding, guides)
-    return Strands(_follow(binding, guides, binding.positions, binding.normals, weights), binding.roots)
-
-
-def strand_points(binding, guides, weights, out=None):
-    """(S, P, 3) float32 [m]: the points of `follow_guides` in the processor's memory; what live editing repeats.
-
-    weights: what `weights_now` gives; out: such an array to fill and return, or None for a new one.
-    """
-    import warp as wp
-
-    from . import cores
-
-    roots, normals, device = binding.positions, binding.normals, binding.positions.device
-    shape = len(roots), guides.point_count
-    there = cores.empty_for_results(shape, device) if out is None else wp.array(out, dtype=wp.vec3, copy=False)
-    if device.is_cpu:
-        return _follow(binding, guides, roots, normals, weights, there).numpy()
-    wp.copy(there, _follow(binding, guides, roots, normals, weights))
-    wp.synchronize_device(device)
-    return there.numpy()
-
-
-def follow_some(binding, guides, chosen, weights):
-    """(M, P, 3) float32 [m]: the points that `strand_points` gives some strands, and no others are computed.
-
-    chosen: (M,) indices of strands, such as `guide_weights.Reach` finds for the guides that moved; weights: theirs, as
-    `weights_now` gives them.
-    """
-    import warp as wp
-
-    from .guide_weights import rows
-
-    chosen = wp.array(chosen, dtype=int, device=binding.positions.device)
-    return _follow(binding, guides, rows(binding.positions, chosen), rows(binding.normals, chosen), weights).numpy()
-
-
-def weights_now(binding, guides, chosen=None):
-    """The `GuideWeights` by which strands follow the guides as combed now; chosen: (M,) indices of some, None: all."""
-    import warp as wp
-
-    from . import guide_weights
-
-    if len(guides) != len(binding.guide_normals):
-        raise HairError(
-            f"The hair was bound to {len(binding.guide_normals)} guides and there are {len(guides)} now: bind it again."
-        )
-    weights = binding.guide_weights
-    if chosen is not None:
-        weights = weights.of(wp.array(chosen, dtype=int, device=binding.positions.device))
-    return guide_weights.limited(weights, _guide_points(binding, guides), binding.guide_normals, binding.limits)
-
-
-def _guide_points(binding, guides):
-    # A kernel that is handed memory of another device reads rubbish, or ends all work on its own.
-    return guides.points.to(binding.positions.device)
-
-
-def _follow(binding, guides, roots, root_normals, weights, out=None):
-    from . import interpolation
-
-    points, guide_normals = _guide_points(binding, guides), binding.guide_normals
-    return interpolation.interpolate(roots, root_normals, points, guide_normals, weights, binding.keep_length, out)
-
-
-def leading_strands(mesh, guides, binding):
-    """(S,) int32: the strand of a `HairBinding` that stands for the guide that each follows first."""
-    from . import leaders
-
-    first = binding.guide_weights.indices.numpy()[:, 0]
-    return leaders.leaders(first, binding.positions.numpy(), positions(mesh, guides.roots))
 
 
 def generate_hair(mesh, guides, settings, *, density=None, regions=(), lines=None, device="cpu") -> Strands:
@@ -405,7 +290,7 @@ def generate_hair(mesh, guides, settings, *, density=None, regions=(), lines=Non
     strand mixes guides across, one that begins where the last ended going on, or None.
     """
     binding = bind_hair(mesh, guides, settings, density=density, regions=regions, lines=lines, device=device)
-    return follow_guides(binding, guides)
+    return hair_binding.follow_guides(binding, guides)
 
 
 def strand_radii(settings, point_count=POINT_COUNT):

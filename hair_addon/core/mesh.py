@@ -23,6 +23,10 @@ class SurfacePoints:
         """The points of a slice, a mask or an index array."""
         return SurfacePoints(self.triangle[selection], self.barycentric[selection])
 
+    def is_same(self, others):
+        """Whether these are the same points, to the last bit."""
+        return np.array_equal(self.triangle, others.triangle) and np.array_equal(self.barycentric, others.barycentric)
+
     def joined(self, others):
         """These points, and then the others."""
         return SurfacePoints(

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core import groom
+from hair_addon.core import groom, hair_binding
 from tests.core.conftest import HEAD, read_obj
 
 
@@ -37,11 +37,13 @@ def test_follow_guides(strand_count, device):
     guides = groom.distribute_guides(head, groom.GuideSettings(), density=density, device=device)
     settings = groom.HairSettings(strand_count=strand_count)
     binding = groom.bind_hair(head, guides, settings, density=density, device=device)
+    weights = hair_binding.weights_now(binding, guides)
+    on_host = hair_binding.strand_points(binding, guides, weights)
     points = wp.empty((strand_count, groom.POINT_COUNT), dtype=wp.vec3, device=device)
     ways = {
         "bind": lambda: groom.bind_hair(head, guides, settings, density=density, device=device),
-        "follow": lambda: groom.follow_guides(binding, guides),
-        "follow, to the host": lambda: groom.follow_guides(binding, guides).numpy(),
+        "follow": lambda: hair_binding.follow_guides(binding, guides),
+        "follow, to the host": lambda: hair_binding.strand_points(binding, guides, weights, on_host),
         "fill as much": lambda: points.fill_(wp.vec3(1.0, 2.0, 3.0)),
     }
     times = {name: median_time(way, device) for name, way in ways.items()}

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender import bindings, hair_cache, handlers, live_hair, pipeline, strand_textures
-from hair_addon.core import groom
+from hair_addon.core import hair_binding
 from hair_addon.core.guide_weights import reach
 from tests.blender.counting import counts_of
 from tests.blender.reading import attribute, points, write_points
@@ -67,7 +67,7 @@ def test_a_stroke_searches_nothing_and_writes_once(hair, window, monkeypatch):
 def grown(hair):
     """(S, P, 3) that the whole hair follows its binding to, for the guides as they are now."""
     bound = bindings.of(hair.data)
-    return groom.follow_guides(
+    return hair_binding.follow_guides(
         bound.binding, pipeline.read_guides(hair.data.vellus.guide_curves, bound.surface)
     ).numpy()
 

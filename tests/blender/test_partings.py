@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender import bindings, curves, pipeline
-from hair_addon.core import groom
+from hair_addon.core import groom, hair_binding
 from tests.blender.reading import attribute, points, write_points
 
 LEAN = math.radians(60.0)
@@ -284,7 +284,7 @@ def test_the_guide_map_is_what_strands_follow(guides):
 
     def assert_stored():
         bound = bindings.of(hair.data)
-        expected = groom.weights_now(bound.binding, bound.guides)
+        expected = hair_binding.weights_now(bound.binding, bound.guides)
         indices, weights = curves.read_guide_map(hair.data)
         np.testing.assert_array_equal(weights, expected.weights.numpy())
         np.testing.assert_array_equal(indices, np.where(weights > 0.0, expected.indices.numpy(), -1))

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core import cvt, groom, hash_grid, strands
+from hair_addon.core import cvt, groom, hair_binding, hash_grid, strands
 from hair_addon.core import mesh as mesh_math
 from hair_addon.core.errors import HairError
 from hair_addon.core.groom import GuideSettings, HairSettings
@@ -97,10 +97,10 @@ def test_combing_searches_nothing(head, scalp, guides, hair, hair_settings, monk
     """Moved guides move the strands that follow them; the binding stays."""
     binding = bind_hair(head, guides, hair_settings, density=scalp)
     monkeypatch.setattr(hash_grid, "neighbours", None)
-    np.testing.assert_array_equal(groom.follow_guides(binding, guides).numpy(), hair.numpy())
+    np.testing.assert_array_equal(hair_binding.follow_guides(binding, guides).numpy(), hair.numpy())
     points = guides.numpy().copy()
     points[:, 1:] *= 1.01
-    combed = groom.follow_guides(binding, from_numpy(points, guides.roots)).numpy()
+    combed = hair_binding.follow_guides(binding, from_numpy(points, guides.roots)).numpy()
     np.testing.assert_array_equal(combed[:, 0], hair.numpy()[:, 0])
     assert np.linalg.norm(combed - hair.numpy(), axis=-1)[:, 1:].min() > 0.0
 
@@ -192,7 +192,7 @@ def test_refused_guides(head, guides, hair_settings):
         generate_hair(head, none, hair_settings)
     binding = bind_hair(head, guides, hair_settings)
     with pytest.raises(HairError, match="bound to 200 guides and there are 10"):
-        groom.follow_guides(binding, from_numpy(guides.numpy()[:10], guides.roots[:10]))
+        hair_binding.follow_guides(binding, from_numpy(guides.numpy()[:10], guides.roots[:10]))
 
 
 def test_settings_do_not_import_warp():

@@ -6,7 +6,7 @@ import pytest
 import warp as wp
 from scipy.spatial.transform import Rotation
 
-from hair_addon.core import guide_weights, interpolation
+from hair_addon.core import interpolation
 from hair_addon.core.strands import offsets, segment_lengths
 from tests.core.finding import find_guides
 from tests.devices import DEVICE

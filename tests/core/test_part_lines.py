@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core import guide_weights, part_lines
+from hair_addon.core import part_lines
 from hair_addon.core.errors import HairError
 from tests.core.conftest import flat_grid, subdivided_sphere
 from tests.core.finding import find_guides
