@@ -141,6 +141,8 @@ def weigh(candidates, normals, guide_normals, influence_distance, neighbour_limi
     indices = wp.empty((strand_count, neighbour_limit), dtype=int, device=device)
     weights = wp.empty(indices.shape, dtype=float, device=device)
     turns = wp.empty(indices.shape, dtype=wp.vec2, device=device)
+    tangents = wp.empty_like(guide_normals)
+    wp.launch(_tangents, len(tangents), inputs=[guide_normals], outputs=[tangents], device=device)
     cores.launch(
         _weigh,
         strand_count,
@@ -148,6 +150,7 @@ def weigh(candidates, normals, guide_normals, influence_distance, neighbour_limi
             Rows(candidates.indices),
             Rows(candidates.ways),
             Rows(normals),
+            tangents,
             guide_normals,
             influence_distance or 0.0,
         ],
@@ -253,10 +256,8 @@ def frame(normal: wp.vec3):
 
 
 @wp.func
-def _turn(guide_normal: wp.vec3, normal: wp.vec3):
+def _turn(guide_tangent: wp.vec3, guide_normal: wp.vec3, tangent: wp.vec3, bitangent: wp.vec3, normal: wp.vec3):
     """Cosine and sine of Z: where the least rotation from one normal to the other leaves the guide's tangent."""
-    guide_tangent, _guide_bitangent = frame(guide_normal)
-    tangent, bitangent = frame(normal)
     # For t across a: R t = t - (t·b) (a + b) / (1 + a·b). Opposite normals have no least rotation: any will do.
     lean = wp.dot(guide_tangent, normal) / wp.max(1.0 + wp.dot(guide_normal, normal), 1.0e-6)
     turned = guide_tangent - lean * (guide_normal + normal)
@@ -264,10 +265,22 @@ def _turn(guide_normal: wp.vec3, normal: wp.vec3):
 
 
 @wp.kernel
+def _tangents(
+    normals: wp.array[wp.vec3],
+    # outputs
+    out_tangents: wp.array[wp.vec3],
+):
+    guide = wp.tid()
+    tangent, _bitangent = frame(normals[guide])
+    out_tangents[guide] = tangent
+
+
+@wp.kernel
 def _weigh(
     candidates: wp.array2d[int],
     ways: wp.array2d[float],
     normals: wp.array[wp.vec3],
+    guide_tangents: wp.array[wp.vec3],
     guide_normals: wp.array[wp.vec3],
     influence_distance: float,
     # outputs
@@ -289,6 +302,9 @@ def _weigh(
     distance = wp.max(distance, STRETCH * nearest)
     reach = wp.min(distance, left_out)
     sigma = wp.max(0.5 * distance, 1.0e-30)  # Eq. 9
+    fall_off = 1.0 / (2.0 * sigma * sigma)
+    normal = normals[strand]
+    tangent, bitangent = frame(normal)
     total = float(0.0)
     for slot in range(limit):
         weight = float(0.0)
@@ -299,11 +315,11 @@ def _weigh(
             part = way / reach
             fall = 1.0 - part * part
             # Relative to the nearest guide's, which cancels in Eq. 10: no weight of a far root is lost to rounding.
-            weight = wp.exp((nearest - way) * (nearest + way) / (2.0 * sigma * sigma)) * fall * fall
+            weight = wp.exp((nearest - way) * (nearest + way) * fall_off) * fall * fall
         if slot == 0 and weight == 0.0:
             weight = 1.0  # all are as far as the one that is left out
         if weight > 0.0:
-            turn = _turn(guide_normals[guide], normals[strand])
+            turn = _turn(guide_tangents[guide], guide_normals[guide], tangent, bitangent, normal)
         else:
             guide = -1
         out_indices[strand, slot] = guide
