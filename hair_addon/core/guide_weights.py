@@ -27,6 +27,7 @@ from .cores import Rows
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 STRETCH = 1.25
+TOGETHER = 65_536  # strands that a processor makes by their guides' order: more rows than its caches see as near
 EVERYWHERE = 1e18  # [m]: a distance to search that leaves nothing out
 SURPLUS = 3  # times the guides wanted are looked at where a part line may be in the way of some
 
@@ -51,7 +52,7 @@ class GuideWeights:
 
     indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
     cosine and sine of the angle about the normal from the guide's frame to the strand's; order: (S,) int32, the
-    strands by the guides that they follow first.
+    strands by the guides that they follow first, some ten thousand neighbours in memory after the others.
     """
 
     indices: "wp.array2d[int]"
@@ -59,21 +60,35 @@ class GuideWeights:
     turns: "wp.array2d[wp.vec2]"
     order: "wp.array[int]"
 
-    def of(self, chosen):
+    def of(self, chosen, guide_count):
         """The same of some strands; chosen: int32 Warp array on the device."""
         indices, weights, turns = (rows(array, chosen) for array in (self.indices, self.weights, self.turns))
-        return GuideWeights(indices, weights, turns, _order_by(indices))
+        return GuideWeights(indices, weights, turns, _order_by(indices, guide_count))
 
 
-def _order_by(indices):
+def _order_by(indices, guide_count):
     """The order of `GuideWeights` of these indices (S, k)."""
     count, device = len(indices), indices.device
     # Radix sort wants room for as many again.
-    order = wp.array(np.arange(2 * count, dtype=np.int32), device=device)
-    keys = wp.empty(2 * count, dtype=int, device=device)
-    wp.copy(keys, indices[:, 0].contiguous(), count=count)
+    order, keys = (wp.empty(2 * count, dtype=int, device=device) for _ in range(2))
+    together = TOGETHER if device.is_cpu else count
+    wp.launch(_keys, count, inputs=[indices, guide_count, together], outputs=[keys, order], device=device)
     wp.utils.radix_sort_pairs(keys, order, count)
     return order[:count]
+
+
+@wp.kernel
+def _keys(
+    indices: wp.array2d[int],
+    guide_count: int,
+    together: int,
+    # outputs
+    out_keys: wp.array[int],
+    out_strands: wp.array[int],
+):
+    strand = wp.tid()
+    out_keys[strand] = strand / together * guide_count + indices[strand, 0]
+    out_strands[strand] = strand
 
 
 @dataclass(frozen=True)
@@ -157,7 +172,7 @@ def weigh(candidates, normals, guide_normals, influence_distance, neighbour_limi
         outputs=[indices, weights, turns],
         device=device,
     )
-    return GuideWeights(indices, weights, turns, _order_by(indices))
+    return GuideWeights(indices, weights, turns, _order_by(indices, len(guide_normals)))
 
 
 def _nearest_guides(guide_roots, roots, count, regions):
