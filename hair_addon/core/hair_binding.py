@@ -70,7 +70,10 @@ def strand_points(binding, guides, weights, out=None):
 
     roots, normals, device = binding.positions, binding.normals, binding.positions.device
     shape = len(roots), guides.point_count
-    there = cores.empty_for_results(shape, device) if out is None else wp.array(out, dtype=wp.vec3, copy=False)
+    if out is None:
+        there = cores.empty_for_results(shape, device)
+    else:
+        there = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
     if device.is_cpu:
         return _follow(binding, guides, roots, normals, weights, there).numpy()
     wp.copy(there, _follow(binding, guides, roots, normals, weights))

@@ -32,7 +32,10 @@ def transformed(points, matrix, out=None):
     if not len(points) or np.array_equal(matrix, np.eye(3)):
         return points
     there = wp.array(points, dtype=wp.vec3, device="cpu", copy=False)
-    moved = cores.empty_vectors(there.shape, "cpu") if out is None else wp.array(out, dtype=wp.vec3, copy=False)
+    if out is None:
+        moved = cores.empty_vectors(there.shape, "cpu")
+    else:
+        moved = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
     matrix = wp.mat33(*np.asarray(matrix, np.float32).ravel().tolist())
     cores.launch(_transform, len(points), inputs=[Rows(there), matrix], outputs=[moved], device="cpu")
     return moved.numpy()

@@ -105,6 +105,20 @@ def test_combing_searches_nothing(head, scalp, guides, hair, hair_settings, monk
     assert np.linalg.norm(combed - hair.numpy(), axis=-1)[:, 1:].min() > 0.0
 
 
+def test_strands_in_the_processors_memory(head, scalp, guides, hair, hair_settings):
+    """Wherever they were computed: in new memory, in what is given, and some of them alone."""
+    binding = bind_hair(head, guides, hair_settings, density=scalp)
+    weights = hair_binding.weights_now(binding, guides)
+    made, given = hair_binding.strand_points(binding, guides, weights), np.full_like(hair.numpy(), np.nan)
+    filled = hair_binding.strand_points(binding, guides, weights, given)
+    assert np.shares_memory(filled, given) and not np.shares_memory(made, given)
+    for points in (made, given):
+        np.testing.assert_array_equal(points, hair.numpy())
+    chosen = np.arange(3, 2000, 7)
+    some = hair_binding.follow_some(binding, guides, chosen, hair_binding.weights_now(binding, guides, chosen))
+    np.testing.assert_array_equal(some, made[chosen])
+
+
 def test_strands_have_as_many_points_as_the_guides(head, scalp, guides, hair_settings):
     coarse = from_numpy(guides.numpy()[:, ::8], guides.roots)
     assert generate_hair(head, coarse, hair_settings, density=scalp).numpy().shape == (2000, 6, 3)
