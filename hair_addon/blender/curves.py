@@ -52,10 +52,17 @@ def _write_positions(curves, points):
 
 def _write_radii(curves, radii):
     """The same radii (P,) along every strand, unless they are there already."""
-    radii = np.asarray(radii, np.float32)
-    if "radius" in curves.attributes and (read_radii(curves).reshape(-1, len(radii)) == radii).all():
+    radii, present = np.asarray(radii, np.float32), _read_attribute(curves, "radius", 1)
+    if present is not None and _repeats(present.ravel(), radii):
         return
     _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
+
+
+def _repeats(values, row):
+    """Whether values (N,) are a row over and over again; looked at in parts that the processor's caches hold."""
+    some = np.tile(row, 4096)
+    parts = (values[first : first + len(some)] for first in range(0, len(values), len(some)))
+    return all(np.array_equal(part, some[: len(part)]) for part in parts)
 
 
 def _read_attribute(curves, name, width):

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from . import cores, hash_grid, part_lines
+from . import cores, hash_grid, part_lines, vector_weights
 from .cores import Rows
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
@@ -156,8 +156,8 @@ def weigh(candidates, normals, guide_normals, influence_distance, neighbour_limi
     indices = wp.empty((strand_count, neighbour_limit), dtype=int, device=device)
     weights = wp.empty(indices.shape, dtype=float, device=device)
     turns = wp.empty(indices.shape, dtype=wp.vec2, device=device)
-    tangents = wp.empty_like(guide_normals)
-    wp.launch(_tangents, len(tangents), inputs=[guide_normals], outputs=[tangents], device=device)
+    frames = wp.empty((len(guide_normals), vector_weights.NUMBERS), dtype=float, device=device)
+    wp.launch(_frames, len(guide_normals), inputs=[guide_normals], outputs=[frames], device=device)
     cores.launch(
         _weigh,
         strand_count,
@@ -165,8 +165,7 @@ def weigh(candidates, normals, guide_normals, influence_distance, neighbour_limi
             Rows(candidates.indices),
             Rows(candidates.ways),
             Rows(normals),
-            tangents,
-            guide_normals,
+            frames,
             influence_distance or 0.0,
         ],
         outputs=[indices, weights, turns],
@@ -230,10 +229,10 @@ def limited(guide_weights, guide_points, guide_normals, limits):
     A guide's share fades over the last `FADE` of the angle limit, and from the square root of the length limit on.
     """
     device = guide_points.device
-    guide_count = len(guide_points)
-    leans = wp.empty((guide_count, 2), dtype=wp.vec3, device=device)
-    lengths = wp.empty(guide_count, dtype=float, device=device)
-    wp.launch(_shapes, guide_count, [guide_points, guide_normals], outputs=[leans, lengths], device=device)
+    shapes = wp.empty((len(guide_points), vector_weights.NUMBERS), dtype=float, device=device)
+    wp.launch(_shapes, len(guide_points), inputs=[guide_points, guide_normals], outputs=[shapes], device=device)
+    cosine_none, cosine_all = _fade_of_cosine(limits.angle)
+    length_limit = min(math.log(limits.length), UNLIMITED)
     weights = wp.empty_like(guide_weights.weights)
     cores.launch(
         _limit,
@@ -242,10 +241,11 @@ def limited(guide_weights, guide_points, guide_normals, limits):
             Rows(guide_weights.indices),
             Rows(guide_weights.weights),
             Rows(guide_weights.turns),
-            leans,
-            lengths,
-            *_fade_of_cosine(limits.angle),
-            min(math.log(limits.length), UNLIMITED),
+            shapes,
+            cosine_none,
+            1.0 / max(cosine_all - cosine_none, 1e-6),
+            length_limit,
+            1.0 / max(0.5 * length_limit, 1e-6),
         ],
         outputs=[weights],
         device=device,
@@ -270,24 +270,20 @@ def frame(normal: wp.vec3):
     return tangent, wp.vec3(b, sign + normal[1] * normal[1] * a, -normal[1])
 
 
-@wp.func
-def _turn(guide_tangent: wp.vec3, guide_normal: wp.vec3, tangent: wp.vec3, bitangent: wp.vec3, normal: wp.vec3):
-    """Cosine and sine of Z: where the least rotation from one normal to the other leaves the guide's tangent."""
-    # For t across a: R t = t - (t·b) (a + b) / (1 + a·b). Opposite normals have no least rotation: any will do.
-    lean = wp.dot(guide_tangent, normal) / wp.max(1.0 + wp.dot(guide_normal, normal), 1.0e-6)
-    turned = guide_tangent - lean * (guide_normal + normal)
-    return wp.normalize(wp.vec2(wp.dot(tangent, turned), wp.dot(bitangent, turned)))
-
-
 @wp.kernel
-def _tangents(
+def _frames(
     normals: wp.array[wp.vec3],
     # outputs
-    out_tangents: wp.array[wp.vec3],
+    out_frames: wp.array2d[float],
 ):
     guide = wp.tid()
-    tangent, _bitangent = frame(normals[guide])
-    out_tangents[guide] = tangent
+    normal = normals[guide]
+    tangent, _bitangent = frame(normal)
+    for axis in range(3):
+        out_frames[guide, axis] = tangent[axis]
+        out_frames[guide, 3 + axis] = normal[axis]
+    out_frames[guide, 6] = 0.0
+    out_frames[guide, 7] = 0.0
 
 
 @wp.kernel
@@ -295,8 +291,7 @@ def _weigh(
     candidates: wp.array2d[int],
     ways: wp.array2d[float],
     normals: wp.array[wp.vec3],
-    guide_tangents: wp.array[wp.vec3],
-    guide_normals: wp.array[wp.vec3],
+    frames: wp.array2d[float],
     influence_distance: float,
     # outputs
     out_indices: wp.array2d[int],
@@ -316,33 +311,25 @@ def _weigh(
                 distance = STRETCH * ways[strand, slot]
     distance = wp.max(distance, STRETCH * nearest)
     reach = wp.min(distance, left_out)
-    sigma = wp.max(0.5 * distance, 1.0e-30)  # Eq. 9
+    sigma = wp.max(0.5 * distance, 1.0e-15)  # Eq. 9
     fall_off = 1.0 / (2.0 * sigma * sigma)
     normal = normals[strand]
     tangent, bitangent = frame(normal)
-    total = float(0.0)
-    for slot in range(limit):
-        weight = float(0.0)
-        turn = wp.vec2(1.0, 0.0)
-        guide = candidates[strand, slot]
-        way = ways[strand, slot]
-        if guide >= 0 and way < reach:
-            part = way / reach
-            fall = 1.0 - part * part
-            # Relative to the nearest guide's, which cancels in Eq. 10: no weight of a far root is lost to rounding.
-            weight = wp.exp((nearest - way) * (nearest + way) * fall_off) * fall * fall
-        if slot == 0 and weight == 0.0:
-            weight = 1.0  # all are as far as the one that is left out
-        if weight > 0.0:
-            turn = _turn(guide_tangents[guide], guide_normals[guide], tangent, bitangent, normal)
-        else:
-            guide = -1
-        out_indices[strand, slot] = guide
-        out_weights[strand, slot] = weight
-        out_turns[strand, slot] = turn
-        total += weight
-    for slot in range(limit):
-        out_weights[strand, slot] = out_weights[strand, slot] / total
+    vector_weights.weigh(
+        strand,
+        nearest,
+        reach,
+        fall_off,
+        tangent,
+        bitangent,
+        normal,
+        candidates,
+        ways,
+        frames,
+        out_indices,
+        out_weights,
+        out_turns,
+    )
 
 
 @wp.kernel
@@ -350,8 +337,7 @@ def _shapes(
     guide_points: wp.array2d[wp.vec3],
     guide_normals: wp.array[wp.vec3],
     # outputs
-    out_leans: wp.array2d[wp.vec3],
-    out_lengths: wp.array[float],
+    out_shapes: wp.array2d[float],
 ):
     """Unit directions in the guide's frame, of its lower half and from root to tip, and the logarithm of its length."""
     guide = wp.tid()
@@ -367,23 +353,13 @@ def _shapes(
         if point <= half:
             lower += wp.normalize(guide_points[guide, point] - root)
     tip = guide_points[guide, last] - root
-    lower = wp.vec3(wp.dot(tangent, lower), wp.dot(bitangent, lower), wp.dot(normal, lower))
-    tip = wp.vec3(wp.dot(tangent, tip), wp.dot(bitangent, tip), wp.dot(normal, tip))
-    out_leans[guide, 0] = wp.normalize(lower)
-    out_leans[guide, 1] = wp.normalize(tip)
-    out_lengths[guide] = wp.log(wp.clamp(length, 1.0e-30, 1.0e30))
-
-
-@wp.func
-def _turned(turn: wp.vec2, vector: wp.vec3):
-    return wp.vec3(turn[0] * vector[0] - turn[1] * vector[1], turn[1] * vector[0] + turn[0] * vector[1], vector[2])
-
-
-@wp.func
-def _fade(none: float, all: float, value: float):
-    """0 at `none`, 1 at `all`, smooth between."""
-    part = wp.clamp((value - none) / wp.max(all - none, 1.0e-6), 0.0, 1.0)
-    return part * part * (3.0 - 2.0 * part)
+    lower = wp.normalize(wp.vec3(wp.dot(tangent, lower), wp.dot(bitangent, lower), wp.dot(normal, lower)))
+    tip = wp.normalize(wp.vec3(wp.dot(tangent, tip), wp.dot(bitangent, tip), wp.dot(normal, tip)))
+    for axis in range(3):
+        out_shapes[guide, axis] = lower[axis]
+        out_shapes[guide, 3 + axis] = tip[axis]
+    out_shapes[guide, 6] = wp.log(wp.clamp(length, 1.0e-30, 1.0e30))
+    out_shapes[guide, 7] = 0.0
 
 
 @wp.kernel
@@ -391,32 +367,14 @@ def _limit(
     indices: wp.array2d[int],
     weights: wp.array2d[float],
     turns: wp.array2d[wp.vec2],
-    leans: wp.array2d[wp.vec3],
-    lengths: wp.array[float],
+    shapes: wp.array2d[float],
     cosine_none: float,
-    cosine_all: float,
+    per_cosine: float,
     length_limit: float,
+    per_length: float,
     # outputs
     out_weights: wp.array2d[float],
 ):
-    strand = wp.tid()
-    nearest = indices[strand, 0]
-    turn = turns[strand, 0]
-    lower = _turned(turn, leans[nearest, 0])
-    tip = _turned(turn, leans[nearest, 1])
-    length = lengths[nearest]
-    total = weights[strand, 0]
-    out_weights[strand, 0] = total
-    for slot in range(1, indices.shape[1]):
-        weight = float(0.0)
-        guide = indices[strand, slot]
-        if guide >= 0:
-            turn = turns[strand, slot]
-            cosine = wp.min(wp.dot(lower, _turned(turn, leans[guide, 0])), wp.dot(tip, _turned(turn, leans[guide, 1])))
-            apart = wp.abs(lengths[guide] - length)
-            weight = weights[strand, slot] * _fade(cosine_none, cosine_all, cosine)
-            weight = weight * (1.0 - _fade(0.5 * length_limit, length_limit, apart))
-            total += weight
-        out_weights[strand, slot] = weight
-    for slot in range(indices.shape[1]):
-        out_weights[strand, slot] = out_weights[strand, slot] / total
+    vector_weights.limit(
+        wp.tid(), indices, weights, turns, shapes, cosine_none, per_cosine, length_limit, per_length, out_weights
+    )
