@@ -13,33 +13,12 @@ from ..core import mesh as mesh_math
 from ..core import strands
 from ..core.errors import HairError
 from ..core.mesh import SurfacePoints
-from . import follow_nodes
-
-# How an attribute's values are called by its data type.
-_VALUE_NAMES = {"FLOAT": "value", "INT": "value", "FLOAT2": "vector", "FLOAT_VECTOR": "vector"}
+from . import attributes, follow_nodes
 
 _GUIDE_MAP = ("guide_index", "guide_weight")
 
 # A stored root further than this part of the surface's size from the curve's first point is out of date.
 _ROOT_TOLERANCE = 1e-4
-
-
-def _write_attribute(curves, name, data_type, domain, values):
-    """Give every point or curve a value, unless each has it already: what is written is copied, and read by others."""
-    attribute = curves.attributes.get(name)
-    if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, domain):
-        curves.attributes.remove(attribute)
-        attribute = None
-    scalar, value_name = np.int32 if data_type == "INT" else np.float32, _VALUE_NAMES[data_type]
-    values = np.ascontiguousarray(values, scalar).ravel()
-    if attribute is None:
-        attribute = curves.attributes.new(name, data_type, domain)
-    else:
-        present = np.empty_like(values)
-        attribute.data.foreach_get(value_name, present)
-        if np.array_equal(present, values):
-            return
-    attribute.data.foreach_set(value_name, values)
 
 
 def _write_positions(curves, points):
@@ -52,10 +31,10 @@ def _write_positions(curves, points):
 
 def _write_radii(curves, radii):
     """The same radii (P,) along every strand, unless they are there already."""
-    radii, present = np.asarray(radii, np.float32), _read_attribute(curves, "radius", 1)
+    radii, present = np.asarray(radii, np.float32), attributes.read(curves, "radius", 1)
     if present is not None and _repeats(present.ravel(), radii):
         return
-    _write_attribute(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
+    attributes.write(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
 
 
 def _repeats(values, row):
@@ -63,16 +42,6 @@ def _repeats(values, row):
     some = np.tile(row, 4096)
     parts = (values[first : first + len(some)] for first in range(0, len(values), len(some)))
     return all(np.array_equal(part, some[: len(part)]) for part in parts)
-
-
-def _read_attribute(curves, name, width):
-    """(N, width) float32, or None where the attribute is missing."""
-    attribute = curves.attributes.get(name)
-    if attribute is None:
-        return None
-    values = np.empty((len(attribute.data), width), np.float32)
-    attribute.data.foreach_get("vector" if width > 1 else "value", values.ravel())
-    return values
 
 
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
@@ -146,9 +115,9 @@ def write_strands(curves, surface, points, roots, radii, leaders=None, normals=N
     _write_radii(curves, radii / surface.scale)
     if leaders is not None:
         # Blender's hair nodes look for this curve among the strands themselves: around it they clump, curl and braid.
-        _write_attribute(curves, "guide_curve_index", "INT", "CURVE", leaders)
-    _write_attribute(curves, "id", "INT", "CURVE", np.arange(strand_count))
-    _write_attribute(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
+        attributes.write(curves, "guide_curve_index", "INT", "CURVE", leaders)
+    attributes.write(curves, "id", "INT", "CURVE", np.arange(strand_count))
+    attributes.write(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
     write_roots(curves, surface, roots, normals)
 
 
@@ -164,7 +133,7 @@ def write_guide_map(curves, guide_map):
             curves.attributes.remove(attribute)
     for slot in range(slot_count):
         for name, data_type, values in zip(_GUIDE_MAP, ("INT", "FLOAT"), guide_map, strict=True):
-            _write_attribute(curves, f"{name}_{slot}", data_type, "CURVE", values[:, slot])
+            attributes.write(curves, f"{name}_{slot}", data_type, "CURVE", values[:, slot])
 
 
 def read_guide_map(curves):
@@ -184,12 +153,12 @@ def write_roots(curves, surface, roots, normals=None):
     """Store where strands are rooted: for ourselves, for the nodes that carry them, and for Blender's own tools."""
     stored = surface.swap_winding(roots)
     normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots) if normals is None else normals)
-    _write_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
-    _write_attribute(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
-    _write_attribute(curves, "root_triangle", "INT", "CURVE", stored.triangle)
-    _write_attribute(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", stored.barycentric)
+    attributes.write(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
+    attributes.write(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
+    attributes.write(curves, "root_triangle", "INT", "CURVE", stored.triangle)
+    attributes.write(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", stored.barycentric)
     for name, vertices in zip(follow_nodes.ROOT_VERTICES, surface.root_vertices(roots).T, strict=True):
-        _write_attribute(curves, name, "INT", "CURVE", vertices)
+        attributes.write(curves, name, "INT", "CURVE", vertices)
     curves.surface_uv_map = surface.uv_map
     curves.vellus.topology = surface.topology
     for user in bpy.data.objects:
@@ -206,7 +175,7 @@ def write_uvs(curves, surface):
         return
     firsts = np.concatenate([[0], np.cumsum(counts)])[:-1]
     roots = read_roots(curves, surface, surface.from_local(read_points(curves)[firsts]))
-    _write_attribute(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
+    attributes.write(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
     curves.surface_uv_map = surface.uv_map
     curves.update_tag()
 
@@ -272,13 +241,13 @@ def transform(curves, matrix):
 
 def read_root_places(curves):
     """Stored (S, 3) int32 root vertices and (S, 3) float32 barycentric coordinates in Blender's order; or None."""
-    barycentric = _read_attribute(curves, "root_barycentric", 3)
-    attributes = [curves.attributes.get(name) for name in follow_nodes.ROOT_VERTICES]
-    if barycentric is None or None in attributes:
+    barycentric = attributes.read(curves, "root_barycentric", 3)
+    corners = [curves.attributes.get(name) for name in follow_nodes.ROOT_VERTICES]
+    if barycentric is None or None in corners:
         return None
     vertices = np.empty((3, len(barycentric)), np.int32)
-    for row, attribute in zip(vertices, attributes, strict=True):
-        attribute.data.foreach_get("value", row)
+    for row, corner in zip(vertices, corners, strict=True):
+        corner.data.foreach_get("value", row)
     return np.ascontiguousarray(vertices.T), barycentric
 
 
@@ -312,7 +281,7 @@ def read_points(curves):
 
 def read_radii(curves):
     """(all points,) float32 in local units; Blender's own default where curves carry no radius."""
-    radii = _read_attribute(curves, "radius", 1)
+    radii = attributes.read(curves, "radius", 1)
     return np.full(len(curves.points), 0.005, np.float32) if radii is None else radii[:, 0]
 
 
@@ -320,14 +289,14 @@ def read_randoms(curves):
     """(S,) float32 in [0, 1]: by which strands differ; numbers follow from the order of curves that carry none."""
     if not _has_randoms(curves):
         return strands.random_numbers(len(curves.curves))
-    randoms = _read_attribute(curves, "strand_random", 1)[:, 0]
+    randoms = attributes.read(curves, "strand_random", 1)[:, 0]
     return np.where((randoms >= 0.0) & (randoms <= 1.0), randoms, np.float32(0.5))
 
 
 def write_randoms(curves):
     """Give the strands that carry none their random numbers."""
     if len(curves.curves) and not _has_randoms(curves):
-        _write_attribute(curves, "strand_random", "FLOAT", "CURVE", read_randoms(curves))
+        attributes.write(curves, "strand_random", "FLOAT", "CURVE", read_randoms(curves))
 
 
 def _has_randoms(curves):
@@ -370,7 +339,7 @@ def _nearest_roots(surface, places):
 
 def stored_roots(curves, surface):
     """`SurfacePoints` from the curves' attributes; impossible ones become a corner of triangle 0. None if absent."""
-    barycentric = _read_attribute(curves, "root_barycentric", 3)
+    barycentric = attributes.read(curves, "root_barycentric", 3)
     triangle_attribute = curves.attributes.get("root_triangle")
     if barycentric is None or triangle_attribute is None:
         return None
