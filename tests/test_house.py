@@ -145,7 +145,7 @@ ROOMS = {
         lambda path: [*attribute_lines(syntax(path), "bpy.props"), *import_lines(path, "bpy.props")],
         r"blender/(properties|preferences)\.py",
     ),
-    "Blender's arrays": (array_lines, r"blender/(scene|partings|curves)\.py"),
+    "Blender's arrays": (array_lines, r"blender/(scene|partings|attributes|curves)\.py"),
     "layout": (
         lambda path: list(attribute_lines(syntax(path), *LAYOUT)),
         r"blender/(panels/.*|menus\.py|preferences\.py)",
