@@ -73,4 +73,4 @@ def _in_lines(values, indent=""):
                 yield f"{indent}{name}:"
                 yield from _in_lines(row, indent + "  ")
             else:
-                yield f"{indent}{name}: {row}"
+                yield f"{indent}{name}: {'none' if row in (None, [], '') else row}"
