@@ -235,18 +235,6 @@ def settings_of(hair):
     return groom_settings.settings_of(_curves(hair, "HAIR"))
 
 
-def apply_settings(hair, settings):
-    """Give hair Curves and their guides other `GroomSettings`; what was combed stays as it is.
-
-    >>> settings = api.load_settings("groom.json")
-    >>> api.apply_settings(bpy.data.objects["Hair"], settings)
-    >>> bpy.context.view_layer.update()  # the strands are made here
-    """
-    from .blender import groom_settings
-
-    groom_settings.apply_settings(_curves(hair, "HAIR"), settings)
-
-
 def save_settings(path, settings):
     """Write `GroomSettings` as JSON.
 
@@ -262,6 +250,18 @@ def load_settings(path):
     2000
     """
     return settings_file.read(path)
+
+
+def apply_settings(hair, settings):
+    """Give hair Curves and their guides other `GroomSettings`; what was combed stays as it is.
+
+    >>> settings = api.load_settings("groom.json")
+    >>> api.apply_settings(bpy.data.objects["Hair"], settings)
+    >>> bpy.context.view_layer.update()  # the strands are made here
+    """
+    from .blender import groom_settings
+
+    groom_settings.apply_settings(_curves(hair, "HAIR"), settings)
 
 
 def _changed(settings_class, settings, changes):
