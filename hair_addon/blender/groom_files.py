@@ -63,11 +63,11 @@ def _select(guides, hair):
 
 
 def _export(partial, ending, guides, hair):
+    scale = strand_arrays.metres_per_unit(bpy.context.scene)
     if ending == ".abc":
         # A disk that is full ends the process there: room for the file is asked for before.
         files.require_room(partial, _alembic_bytes(guides, hair))
         frame = bpy.context.scene.frame_current
-        scale = strand_arrays.metres_per_unit(bpy.context.scene)
         bpy.ops.wm.alembic_export(
             filepath=str(partial), selected=True, start=frame, end=frame, global_scale=scale, as_background_job=False
         )
@@ -75,6 +75,20 @@ def _export(partial, ending, guides, hair):
         bpy.ops.wm.usd_export(
             filepath=str(partial), selected_objects_only=True, export_hair=True, export_textures_mode="KEEP"
         )
+        if scale != 1.0:
+            _say_unit(partial, scale)
+
+
+def _say_unit(path, scale):
+    """Tell a USD file that its unit is so many metres: Blender takes any scene's for one metre."""
+    if path.suffix.lower() == ".usdz":
+        raise HairError("The unit of this scene is no metre, which a .usdz by Blender cannot say: write a .usdc.")
+    bpy.utils.expose_bundled_modules()
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, scale)
+    stage.Save()
 
 
 def _alembic_bytes(guides, hair):

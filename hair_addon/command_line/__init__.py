@@ -22,7 +22,7 @@ def main(arguments, program):
     except SystemExit as end:  # argparse ends by itself: 0 after --help, 2 for what it does not understand
         return end.code
     with console.own_streams(given.verbose) as (out, errors), interruption.Interruption() as interrupted:
-        return _run(given, console.Console(out, errors, interrupted, given.quiet, given.json))
+        return run(given, console.Console(out, errors, interrupted, given.quiet, given.json))
 
 
 def parser(program):
@@ -34,7 +34,8 @@ def parser(program):
     return made
 
 
-def _run(given, said):
+def run(given, said):
+    """Run a verb whose options were understood; returns the exit status. said: its `Console`."""
     try:
         given.run(given, said)
         return 0

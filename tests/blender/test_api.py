@@ -11,6 +11,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+import warp
 
 from hair_addon import api
 from tests.blender.following import update
@@ -44,6 +45,7 @@ def scalp(sphere):
 
 def test_examples_of_functions_run(scalp, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(warp.config, "log_level", warp.LOG_WARNING)
     documented, runner = examples()[1:], doctest.DocTestRunner()
     for example in documented:
         example.globs = {"api": api, "bpy": bpy}

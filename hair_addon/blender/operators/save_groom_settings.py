@@ -12,7 +12,7 @@ from .file_browser import BrowsedOperator
 
 
 class VELLUS_OT_save_groom_settings(BrowsedOperator, bpy.types.Operator):
-    """Save the settings of the active hair and its guides to a file, for other surfaces, scripts and the command line"""
+    """Save the settings of the active hair and its guides to a file, for other hair, scripts and the command line"""
 
     bl_idname = "vellus.save_groom_settings"
     bl_label = "Save Groom Settings"
