@@ -80,7 +80,7 @@ def _export(partial, ending, guides, hair):
 
 
 def _say_unit(path, scale):
-    """Tell a USD file that its unit is so many metres: Blender takes any scene's for one metre."""
+    """Tell a USD file that its unit is so many metres: Blender takes any scene's for one, as it does when it reads."""
     if path.suffix.lower() == ".usdz":
         raise HairError("The unit of this scene is no metre, which a .usdz by Blender cannot say: write a .usdc.")
     bpy.utils.expose_bundled_modules()

@@ -70,6 +70,12 @@ def write_obj(path, vertices, triangles, name="Tetrahedron"):
     return path
 
 
+def load(path):
+    """{name: array} of an .npz."""
+    with np.load(path) as arrays:
+        return dict(arrays)
+
+
 def distance_to(points, vertices, triangles):
     """(N,) from each point to the nearest place on any triangle, by trying all of them."""
     best = np.full(len(points), np.inf)

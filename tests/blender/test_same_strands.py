@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
+from tests.blender.commands import load
 from tests.blender.reading import points
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -77,7 +78,7 @@ def test_all_ways_make_the_same_strands(surface, tmp_path):
     for way, found in made.items():
         for kind, expected, came in zip(("guides", "hair"), first, found, strict=True):
             assert np.array_equal(expected, came), f"{kind}: {way}"
-    stored = np.load(files)
+    stored = load(files)
     for name, expected in zip(("guide_points", "strand_points"), arrays, strict=True):
         assert np.array_equal(stored[name], expected)
 
