@@ -45,7 +45,7 @@ def _axes(up):
 # Ending → (import, operator that does it, check for what the operator would not notice).
 _FORMATS = {
     ".obj": (_import_obj, "wm.obj_import", whole_meshes.require_obj),
-    ".ply": (_import_ply, "wm.ply_import", None),
+    ".ply": (_import_ply, "wm.ply_import", whole_meshes.require_ply),
     ".stl": (_import_stl, "wm.stl_import", whole_meshes.require_stl),
     ".glb": (_import_gltf, "import_scene.gltf", None),
     ".gltf": (_import_gltf, "import_scene.gltf", None),
