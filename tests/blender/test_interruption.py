@@ -11,6 +11,8 @@ import time
 import bpy
 import pytest
 
+from hair_addon import api
+from hair_addon.command_line.interruption import Interruption
 from hair_addon.core.long_work import Stopped
 from tests.blender.commands import HEAD, ROOT, command
 
@@ -99,9 +101,18 @@ def test_frames_that_were_done_are_whole(lit, tmp_path):
         assert tuple(image.size) == (64, 48)
 
 
+def test_a_second_ctrl_c_does_not_wait():
+    with Interruption() as interruption:
+        signal.raise_signal(signal.SIGINT)
+        assert interruption.is_asked
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert interruption.status == 130
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
 def test_whoever_hears_of_progress_may_stop_a_script(sphere):
     """The same for the functions that scripts call: nothing is left in the scene."""
-    from hair_addon import api
 
     def stop(_step, part):
         if part > 0.3:
