@@ -5,12 +5,23 @@
 def register():
     """Make the add-on known to Blender."""
     from . import blender
+    from .blender import cli_command
 
     blender.register()
+    cli_command.register(_command)
 
 
 def unregister():
     """Take the add-on out of Blender; hair that was made stays in the file."""
     from . import blender
+    from .blender import cli_command
 
+    cli_command.unregister()
     blender.unregister()
+
+
+def _command(arguments):
+    """blender --command vellus …; returns the exit status."""
+    from . import command_line
+
+    return command_line.main(arguments, "blender --command vellus")

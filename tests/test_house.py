@@ -139,7 +139,7 @@ ROOMS = {
     "gpu": (
         lambda path: import_lines(path, "gpu", "gpu_extras"),
         r"blender/(uniforms|shaders|strand_textures|hair_shading|drawing|hair_buffer|shadows|visibility|surroundings"
-        r"|hair_picture|viewport|render|batch)\.py",
+        r"|hair_picture|viewport|render)\.py",
     ),
     "bpy.props": (
         lambda path: [*attribute_lines(syntax(path), "bpy.props"), *import_lines(path, "bpy.props")],

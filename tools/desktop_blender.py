@@ -53,9 +53,8 @@ class DesktopBlender:
         have here; log: a file for all that Blender prints, the terminal without one.
         """
         width, height = WINDOW_SIZE
-        environment = {"HOME": str(profile), "BLENDER_USER_RESOURCES": str(profile), "LC_ALL": "C.UTF-8"}
         command = [
-            *("env", *(f"{name}={value}" for name, value in environment.items())),
+            *("env", *_environment(profile)),
             *("xvfb-run", "--auto-servernum", "--server-args", f"-screen 0 {width}x{height}x24 -nolisten tcp"),
             *("timeout", "--kill-after=10", str(limit)),
             *(self.executable, "--gpu-backend", backend, "--window-geometry", "0", "0", str(width), str(height)),
@@ -71,6 +70,19 @@ class DesktopBlender:
         finally:
             if output:
                 output.close()
+
+    def command(self, *arguments, profile, folders=(), limit=300):
+        """Blender without a window, as `blender ARGUMENT …`; returns the finished process. Others as for `run`."""
+        command = ["env", *_environment(profile), "timeout", str(limit), self.executable, *arguments]
+        if self.folder is not None:
+            command = _inside(self.folder, command, [ROOT, profile, *folders])
+        return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=limit + 60)
+
+
+def _environment(profile):
+    """NAME=VALUE for a Blender whose user files and home are a folder."""
+    values = {"HOME": profile, "BLENDER_USER_RESOURCES": profile, "LC_ALL": "C.UTF-8"}
+    return [f"{name}={value}" for name, value in values.items()]
 
 
 def find_or_install():

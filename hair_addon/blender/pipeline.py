@@ -113,7 +113,7 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
     device, place = preferences.device(), Remembered(surface_object)
 
     def compute(progress):
-        guides = groom.distribute_guides(
+        grown = groom.distribute_guides(
             surface.mesh,
             guide_settings,
             density=density,
@@ -123,17 +123,24 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
             device=device,
             progress=part_of(progress, 0.0, 0.5),
         )
+        guides = _as_written(grown, surface, device)
         progress = part_of(progress, 0.5, 1.0)
         binding = _bind(surface, guides, hair_settings, density, parting, None, device, progress)
-        return guides, binding, *_strands(surface, binding, guides, progress)
+        return grown, guides, binding, *_strands(surface, binding, guides, progress)
 
-    guides, binding, *made = yield compute
+    grown, guides, binding, *made = yield compute
     key = root_key(guide_settings, density, texture and texture.values)
-    guide_curves = _write_guides(None, place.find(), surface, guides, guide_settings, key)
+    guide_curves = _write_guides(None, place.find(), surface, grown, guide_settings, key)
     key = root_key(hair_settings, density)
     guide_uid = guide_curves.session_uid
     bound = BoundHair(binding, hair_settings, key, parting.key, guides, guide_uid, surface, *made)
     return guide_curves, _write_bound(None, place.find(), guide_curves, bound)
+
+
+def _as_written(guides, surface, device):
+    """Guides as Curves will give them back, rounded in local coordinates: hair is the same as if they were there."""
+    points = surface.to_local(guides.numpy())
+    return strands.from_numpy(surface.from_local(points), guides.roots, device)
 
 
 def _bind(surface, guides, settings, density, parting, roots, device, progress):

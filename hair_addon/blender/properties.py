@@ -276,6 +276,11 @@ def file(description):
     )
 
 
+def only_files(pattern):
+    """The `filter_glob` property by which a file browser shows some files alone."""
+    return bpy.props.StringProperty(default=pattern, options={"HIDDEN"})
+
+
 def text(name, description):
     """A line of text that is no setting."""
     return bpy.props.StringProperty(name=name, description=description, translation_context=CONTEXT)

@@ -4,18 +4,16 @@
 Blender's presets are Python scripts, which it runs; a look is numbers, so it is read as numbers.
 """
 
-import json
 from dataclasses import asdict
 from pathlib import Path
 
 import bpy
 
+from ..core import settings_file
 from ..core.errors import HairError
 from ..core.params import declared
 from ..core.shading.appearance import Appearance
 from . import preferences
-
-_LARGEST_FILE = 65_536  # bytes; a look takes some 700
 
 
 def names():
@@ -27,36 +25,18 @@ def names():
 
 def write(name, look):
     """Save an `Appearance` under a name, in place of what had it. Raises `HairError`."""
-    path = _path(name, create=True)
-    try:
-        path.write_text(json.dumps({"version": 1, **asdict(look)}, indent=1), encoding="utf-8")
-    except OSError as error:
-        raise HairError("The look cannot be written: {cause}.", cause=error) from error
+    settings_file.write_object(_path(name, create=True), {"version": 1, **asdict(look)})
 
 
 def read(name):
-    """The `Appearance` of a name; what the file does not say is at its default. Raises `HairError`."""
+    """The `Appearance` of a name; what the file does not say is at its default. Raises `HairError`.
+
+    Of what a newer Vellus saved, it takes what it knows.
+    """
     path = _path(name, create=False)
-    try:
-        if path.stat().st_size > _LARGEST_FILE:
-            raise HairError('"{name}" is no saved look: its file is too large.', name=name)
-        found = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError) as error:
-        raise HairError('"{name}" cannot be read: save the look again.', name=name) from error
-    if not isinstance(found, dict):
-        raise HairError('"{name}" cannot be read: save the look again.', name=name)
-    values = {key: _value(name, found[key], default) for key, default, _ in declared(Appearance) if key in found}
-    return Appearance(**values)
-
-
-def _value(name, value, default):
-    """What JSON gave, in the type of a setting; its range is checked by the `Appearance`."""
-    try:
-        if isinstance(default, tuple):
-            return tuple(float(component) for component in value)
-        return type(default)(value)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise HairError('"{name}" cannot be read: save the look again.', name=name) from error
+    found = settings_file.read_object(path)
+    known = {key: found[key] for key, _default, _details in declared(Appearance) if key in found}
+    return settings_file.to_settings(known, Appearance, path)
 
 
 def remove(name):

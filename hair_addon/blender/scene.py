@@ -151,6 +151,11 @@ def read_surface(surface_object, depsgraph):
     return Surface(surface_object.name, mesh, faces, rest, posed, corner_uvs, uv_map, to_world_axes, is_mirrored)
 
 
+def present_depsgraph():
+    """The dependency graph of the context's scene and view layer, evaluated."""
+    return bpy.context.evaluated_depsgraph_get()
+
+
 def triangle_count(surface_object, view_layer):
     """How many triangles a mesh object has as it is evaluated: by its counts, without reading it."""
     depsgraph = view_layer.depsgraph

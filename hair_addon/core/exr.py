@@ -19,7 +19,7 @@ import numpy as np
 import OpenEXR
 
 from .errors import HairError
-from .params import declared
+from .params import declared, like
 from .shading import table_axes
 from .shading.dual_scattering import DualTables
 from .shading.lookup_tables import MAX_SIZE, Settings, Tables, to_half
@@ -164,24 +164,13 @@ def _settings_from_header(image, name):
         values = json.loads(text)
         if values.keys() != defaults.keys():
             raise foreign
-        values = {key: _like(default, values[key]) for key, default in defaults.items()}
+        values = {key: like(default, values[key]) for key, default in defaults.items()}
     except (AttributeError, TypeError, ValueError, OverflowError, RecursionError) as error:
         raise foreign from error
     try:
         return Settings(**values)
     except (HairError, OverflowError) as error:
         raise HairError(f"{image.path} holds settings that cannot be: {error} Bake the tables again.") from error
-
-
-def _like(default, value):
-    """A JSON value as the type of a setting's default; raises TypeError or ValueError when it is of another kind."""
-    if isinstance(default, tuple) and isinstance(value, list):
-        return tuple(_like(example, component) for example, component in zip(default, value, strict=True))
-    if isinstance(default, float) and type(value) is int:
-        return float(value)
-    if type(value) is not type(default):
-        raise TypeError(f"{value!r} in place of {default!r}")
-    return value
 
 
 # Writing.

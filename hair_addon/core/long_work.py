@@ -34,12 +34,12 @@ def part_of(progress, first, last):
     return lambda step, part: progress(step, first + (last - first) * part)
 
 
-def run_now(work):
-    """Run a generator of the kind above to its end; returns what it returns."""
+def run_now(work, progress=unheard):
+    """Run a generator of the kind above to its end; returns what it returns. progress: told how far each part is."""
     try:
         compute = next(work)
         while True:
-            compute = work.send(compute(unheard))
+            compute = work.send(compute(progress))
     except StopIteration as end:
         return end.value
 

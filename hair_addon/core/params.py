@@ -41,6 +41,17 @@ def label_of(name, details):
     return details.label or name.replace("_", " ").capitalize()
 
 
+def like(default, value):
+    """A value that JSON gave, as the type of a setting's default; raises TypeError or ValueError for another kind."""
+    if isinstance(default, tuple) and isinstance(value, list):
+        return tuple(like(example, component) for example, component in zip(default, value, strict=True))
+    if isinstance(default, float) and type(value) is int:
+        return float(value)
+    if type(value) is not type(default):
+        raise TypeError(f"{value!r} in place of {default!r}")
+    return value
+
+
 @dataclass(frozen=True)
 class Settings:
     """Base of every stage's settings. Making one with a value outside its range raises `HairError`."""

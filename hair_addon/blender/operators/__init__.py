@@ -12,11 +12,13 @@ from .comb_guides import VELLUS_OT_comb_guides
 from .delete_hair import VELLUS_OT_delete_hair
 from .distribute_guides import VELLUS_OT_distribute_guides
 from .interpolate_hair import VELLUS_OT_interpolate_hair
+from .load_groom_settings import VELLUS_OT_load_groom_settings
 from .make_uv_map import VELLUS_OT_make_uv_map
 from .pick_hair import VELLUS_OT_pick_hair
 from .remove_look import VELLUS_OT_remove_look
 from .render_picture import VELLUS_OT_render_picture
 from .restore_guides import VELLUS_OT_restore_guides
+from .save_groom_settings import VELLUS_OT_save_groom_settings
 from .save_look import VELLUS_OT_save_look
 from .select_guides import VELLUS_OT_select_guides
 from .select_hair import VELLUS_OT_select_hair
@@ -45,4 +47,6 @@ CLASSES = (
     VELLUS_OT_remove_look,
     VELLUS_OT_bake_tables,
     VELLUS_OT_render_picture,
+    VELLUS_OT_save_groom_settings,
+    VELLUS_OT_load_groom_settings,
 )

@@ -3,9 +3,9 @@
 
 import bpy
 
-from ...core import estimate, exr
-from ...core.shading import dual_scattering, lookup_tables
-from .. import files, preferences, properties
+from ...core import estimate
+from ...core.shading import lookup_tables
+from .. import files, properties, table_files
 from ..datablocks import Remembered
 from ..selection import hair_of
 from .file_browser import BrowsedOperator
@@ -38,11 +38,8 @@ class VELLUS_OT_bake_tables(BrowsedOperator, bpy.types.Operator):
     def work(self, context):
         hair = Remembered(hair_of(context.object))
         settings = properties.to_settings(self, lookup_tables.Settings)
-        folder, named, device = files.resolve(self.directory), self.directory, preferences.device()
-        tables = yield lambda progress: lookup_tables.bake(settings, device, progress)
-        dual = yield lambda progress: dual_scattering.bake(tables)
-        exr.write_tables(folder, tables, files.addon_version())
-        exr.write_dual_tables(folder, dual, files.addon_version())
+        folder, named = files.resolve(self.directory), self.directory
+        yield from table_files.baking_tables(settings, folder)
         target = hair.find()
         if target is not None:
             target.vellus.table_folder = named

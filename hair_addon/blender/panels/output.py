@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Output: pictures of the hair."""
+"""Output: pictures of the hair, and its settings as a file."""
 
 import bpy
 
@@ -10,7 +10,7 @@ from .tab import HairTab, write
 
 
 class VELLUS_PT_output(HairTab, bpy.types.Panel):
-    """Pictures of the hair"""
+    """Pictures of the hair, and its settings as a file"""
 
     bl_label = "Output"
     bl_idname = "VELLUS_PT_output"
@@ -20,6 +20,9 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         layout = self.layout
         layout.operator("vellus.render_picture", icon="IMAGE_DATA")
         layout.operator("vellus.toggle_drawing", icon="SHADING_RENDERED")
+        row = layout.row(align=True)
+        row.operator("vellus.save_groom_settings", icon="EXPORT", text=interface_text("Save Settings…"))
+        row.operator("vellus.load_groom_settings", icon="IMPORT", text=interface_text("Load Settings…"))
         hair = hair_of(context.object)
         if hair is not None and keyed.are_keyed(hair) and not context.scene.render.use_lock_interface:
             write(layout, context, interface_text("Keyed settings are rendered with a locked interface only."), "ERROR")

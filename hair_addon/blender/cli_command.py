@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""blender --command vellus: the command that Blender knows while the add-on is on."""
+
+import bpy
+
+_command = None
+
+
+def register(run):
+    """Let Blender call run(arguments), which returns the exit status."""
+    global _command
+    _command = bpy.utils.register_cli_command("vellus", run)
+
+
+def unregister():
+    """Take the command away again."""
+    global _command
+    bpy.utils.unregister_cli_command(_command)
+    _command = None

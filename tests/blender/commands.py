@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Commands as users call them: in a process of their own, or in this one, which is quicker."""
+
+import io
+import json
+import os
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hair_addon import command_line
+from hair_addon.command_line.console import Console
+from hair_addon.command_line.interruption import Interruption
+
+ROOT = Path(__file__).resolve().parents[2]
+HEAD = ROOT / "blend_samples" / "head.obj"
+
+TETRAHEDRON = (
+    np.array([[0.1, 0.2, 0.3], [1.1, 0.2, 0.4], [0.2, 2.4, 0.5], [0.4, 0.6, 3.7]]),
+    np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]]),
+)
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended: its exit status and what it said."""
+
+    status: int
+    out: str
+    errors: str
+
+    @property
+    def results(self):
+        """Standard output as lines of JSON."""
+        return [json.loads(line) for line in self.out.splitlines()]
+
+
+def command(*arguments):
+    """The words of a command in a process of its own."""
+    return [sys.executable, "-m", "hair_addon", *map(str, arguments)]
+
+
+def run(*arguments, **details):
+    """Run a command in a process of its own."""
+    details = {"cwd": ROOT, "timeout": 300, "env": os.environ | {"PYTHONPATH": str(ROOT)}} | details
+    done = subprocess.run(command(*arguments), capture_output=True, text=True, check=False, **details)
+    return Ended(done.returncode, done.stdout, done.stderr)
+
+
+def run_here(*arguments):
+    """Run a command in this process, where Blender is there already."""
+    out, errors = io.StringIO(), io.StringIO()
+    try:
+        given = command_line.parser("vellus").parse_args(list(map(str, arguments)))
+    except SystemExit as end:
+        return Ended(end.code, "", "")
+    with Interruption() as interruption:
+        status = command_line.run(given, Console(out, errors, interruption, given.quiet, given.json))
+    return Ended(status, out.getvalue(), errors.getvalue())
+
+
+def write_obj(path, vertices, triangles, name="Tetrahedron"):
+    """A mesh as text."""
+    lines = [f"o {name}", *("v {} {} {}".format(*vertex) for vertex in vertices)]
+    lines += ["f {} {} {}".format(*(triangle + 1)) for triangle in np.asarray(triangles)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
+
+
+def load(path):
+    """{name: array} of an .npz."""
+    with np.load(path) as arrays:
+        return dict(arrays)
+
+
+def distance_to(points, vertices, triangles):
+    """(N,) from each point to the nearest place on any triangle, by trying all of them."""
+    best = np.full(len(points), np.inf)
+    for a, b, c in vertices[triangles]:
+        ab, ac, ap = b - a, c - a, points - a
+        u, v = np.linalg.solve(np.array([[ab @ ab, ab @ ac], [ab @ ac, ac @ ac]]), np.stack([ap @ ab, ap @ ac]))
+        inside = (u > -1e-4) & (v > -1e-4) & (u + v < 1.0 + 1e-4)
+        away = np.linalg.norm(ap - u[:, None] * ab - v[:, None] * ac, axis=1)
+        best = np.where(inside, np.minimum(best, away), best)
+    return best

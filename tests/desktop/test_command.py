@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""blender --command vellus: the installed extension's command line, in a Blender without a window."""
+
+import json
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.blender.commands import HEAD, load, run
+from tools import build_extension
+
+pytestmark = pytest.mark.desktop
+
+SMALL = ("--guides", 40, "--strands", 300, "--seed", 5)
+
+
+@pytest.fixture(scope="module")
+def vellus(desktop, tmp_path_factory):
+    """A function that calls blender --command vellus in a profile with the extension; `.folder` is seen by both."""
+    profile = tmp_path_factory.mktemp("profile")
+    installing = ("--command", "extension", "install-file", "--repo", "user_default", "--enable")
+    installed = desktop.command(*installing, build_extension.build(build_extension.this_platform()), profile=profile)
+    assert installed.returncode == 0, installed.stdout + installed.stderr
+
+    def call(*arguments):
+        return desktop.command("--command", "vellus", *arguments, profile=profile)
+
+    call.folder = profile
+    return call
+
+
+def results(done):
+    """Lines of JSON; before the command begins Blender may have told of itself."""
+    return [json.loads(line) for line in done.stdout.splitlines() if line.startswith("{")]
+
+
+def test_it_makes_the_arrays_that_python_does(vellus, tmp_path):
+    """The same code on another Python and another NumPy: equal to rounding."""
+    out = vellus.folder / "head.npz"
+    done = vellus("groom", HEAD, *SMALL, "--out", out, "--json")
+    assert done.returncode == 0, done.stderr
+    assert results(done)[0]["strands"] == 300
+    assert done.stdout.splitlines()[-1].startswith("{")
+    assert run("groom", HEAD, *SMALL, "--out", tmp_path / "head.npz").status == 0
+    expected, found = load(tmp_path / "head.npz"), load(out)
+    for name, array in expected.items():
+        np.testing.assert_allclose(found[name], array, atol=1e-5)
+
+
+def test_a_groom_is_made_told_of_and_drawn(vellus):
+    blend = vellus.folder / "head.blend"
+    assert vellus("groom", HEAD, *SMALL, "--preset", "BLOND", "--out", blend).returncode == 0
+    told = results(vellus("info", blend, "--json"))[0]
+    assert told["hair"][0]["strands"] == 300
+    bpy.ops.wm.open_mainfile(filepath=str(blend))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location = (0.0, 0.0, 3.0)
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    bpy.ops.wm.save_as_mainfile(filepath=str(vellus.folder / "shot.blend"))
+    render = ("render", vellus.folder / "shot.blend", "--frames", "1-2", "--width", 64, "--height", 48)
+    drawn = vellus(*render, "--out", vellus.folder / "f_#.png", "--json")
+    assert [result["frame"] for result in results(drawn)] == [1, 2], drawn.stderr
+    assert (vellus.folder / "f_1.png").exists() and (vellus.folder / "f_2.png").exists()
+
+
+def test_it_ends_as_it_should(vellus):
+    missing = vellus("groom", "missing.obj", "--out", "x.npz")
+    assert missing.returncode == 1 and missing.stderr == "vellus: missing.obj is not there: check the name.\n"
+    assert vellus("comb").returncode == 2
+    helped = vellus("groom", "--help")
+    assert helped.returncode == 0 and "usage: blender --command vellus groom" in helped.stdout
+    # Debian's Blender is built without USD.
+    refused = vellus("groom", HEAD, *SMALL, "--out", vellus.folder / "a.usdc")
+    assert (refused.returncode, len(refused.stderr.splitlines())) in ((1, 1), (0, 0))
