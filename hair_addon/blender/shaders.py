@@ -18,9 +18,12 @@ FOLDER = Path(__file__).resolve().parents[2] / "shaders"
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 
 
-def expand(name):
-    """(text, lines): the file with every #include put in its place once, and each line's (file, number)."""
-    text, lines, seen = [], [], set()
+def expand(name, skipped=()):
+    """(text, lines): the file with every #include but those of `skipped` put in its place once.
+
+    lines: each line's (file, number).
+    """
+    text, lines, seen = [], [], set(skipped)
 
     def add(file):
         if file in seen:
@@ -139,10 +142,11 @@ PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 
 
 @cache
-def shading_program(file, blocks=(), tables=()):
+def shading_program(file, blocks=(), tables=(), in_parts=False):
     """The compute program that shades strands: a model's .comp, its blocks and its samplers of tables.
 
-    blocks: (instance, class of settings), ...; tables: (sampler, type), ...
+    blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: whether just a part of the light
+    is drawn, by the constants of include/drawn_light.glsl.
     """
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
@@ -157,7 +161,11 @@ def shading_program(file, blocks=(), tables=()):
     info.image(0, PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
     for name in ("first_segment", "segment_count"):
         info.push_constant("INT", name)
-    return _compile_compute(info, file)
+    if not in_parts:
+        return _compile_compute(info, file)
+    info.push_constant("VEC4", "drawn_lobes")
+    info.push_constant("FLOAT", "drawn_world")
+    return _compile_compute(info, file, skipped=("include/drawn_light.glsl",))
 
 
 @cache
@@ -303,8 +311,8 @@ def _compile(info, vertex, fragment, targets=_COLOR):
     return _create(info, (vertex, fragment), vertex_lines, fragment_lines)
 
 
-def _compile_compute(info, file):
-    text, lines = expand(file)
+def _compile_compute(info, file, skipped=()):
+    text, lines = expand(file, skipped)
     info.compute_source(text)
     return _create(info, (file,), [], lines)
 

@@ -81,6 +81,8 @@ VIEW = Block(
         "back_gain": "float",  # of what comes back from behind a strand
         "light_index": "int",  # the light that a shadow pass looks from
         "coverage_turn": "float",  # by which a pass takes other samples of thin strands
+        "first_column": "int",  # of the picture's samples, where what is drawn is a tile of it
+        "first_row": "int",
     },
 )
 LIGHT = Block(
