@@ -3,11 +3,12 @@
 
 import bpy
 
-from . import handlers, keymap, menus, operators, panels, preferences, properties, running, translations, viewport
+from . import engine, handlers, keymap, menus, operators, panels, preferences, properties, running, translations, viewport
 
 CLASSES = (
     preferences.VellusPreferences,
     *properties.CLASSES,
+    engine.VellusRenderEngine,
     *operators.CLASSES,
     *panels.CLASSES,
     *menus.CLASSES,

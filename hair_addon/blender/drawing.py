@@ -4,6 +4,7 @@
 Strands are camera-facing strips without vertex attributes: the vertex shader pulls points from a texture.
 """
 
+import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -33,6 +34,9 @@ class Steps:
 
 
 _ALL = Steps()
+
+# A render runs beside the window, and both share programs and the values that these are given: who draws, draws alone.
+ALONE = threading.RLock()
 
 
 def view_record(world_to_view, view_to_clip, height, least_width=0.0):
@@ -136,6 +140,12 @@ def walk_strands(strands, program, record, lights, samplers, images, constants):
         for name, value in constants.items():
             program.uniform_int(name, value)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+
+
+def dispatch_over(program, size):
+    """Run a bound compute program once for every texel of a picture of this size."""
+    width, height = (-(-length // shaders.PICTURE_GROUP_SIZE) for length in size)
+    gpu.compute.dispatch(program, width, height, 1)
 
 
 def draw_surface(surface, color, view, lights, scene_samplers):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.errors import HairError
-from . import drawing, hair_cache, level_of_detail, scene, surroundings, uniforms, visibility
+from . import drawing, hair_cache, level_of_detail, scene, strand_textures, surroundings, uniforms, visibility
 from . import lights as light_door
 from .shadows import SUN, ShadowMaps
 
@@ -24,7 +24,7 @@ class DrawnScene:
     """Read once by `read`, drawn from any number of views until something moves."""
 
     hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on, part in viewports)
-    surfaces: list  # (SurfaceOnGPU, linear RGB)
+    surfaces: list  # (SurfaceOnGPU, linear RGB, None of a holdout)
     lights: np.ndarray  # uniforms.LIGHTS
     world: light_door.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
@@ -44,23 +44,63 @@ def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, befo
     if viewport is not None and not hair:
         # Blender draws the rest by itself: a scene without hair pays nothing for the add-on.
         return DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
-    placed = [(strands, to_world) for strands, _, to_world, *_ in hair]
     if before is None or before.shadow_maps is None:
-        meshes = scene.read_drawn_meshes(depsgraph, viewport)
-        surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
-        world = light_door.read_world(blender_scene)
-        lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, placed)
-        shadow_maps = ShadowMaps(_MAP_SIZE, max(1, min(int(lights["count"]), _SHADOWED_LIGHTS)))
+        surfaces, lights, world, shadow_maps = _read_surroundings(blender_scene, depsgraph, viewport, hair)
     else:
         surfaces, lights, world, shadow_maps = before.surfaces, before.lights, before.world, before.shadow_maps
-    batches = [surface.batch for surface, _ in surfaces]
+    placed, batches = _placed(hair), [surface.batch for surface, _ in surfaces]
     shadow_maps.draw(lights, placed, batches, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
     if is_draft and before is not None and _have_same_places(before.hair, hair):
         seen = before.hair_visibility, before.surface_visibility
     else:
-        opacities = [shading.opacity for _, shading, *_ in hair]
-        seen = visibility.measure(placed, [surface for surface, _ in surfaces], opacities)
+        seen = _visibility(hair, surfaces)
     return DrawnScene(hair, surfaces, lights, world, shadow_maps, *seen, owners)
+
+
+def read_render(depsgraph, known):
+    """The same for a render, whose depsgraph may be at another time than the file: hair as Blender has evaluated it.
+
+    known: {session_uid: (points, radii, random numbers, StrandsOnGPU)} of what was drawn a moment before, changed: what
+    stands still is not uploaded again.
+    """
+    hair = list(_read_rendered_hair(depsgraph, known))
+    surroundings_there = _read_surroundings(depsgraph.scene_eval, depsgraph, None, hair)
+    surfaces, lights, _world, shadow_maps = surroundings_there
+    shadow_maps.draw(lights, _placed(hair), [surface.batch for surface, _ in surfaces], _SHADOW_STEPS)
+    return DrawnScene(hair, *surroundings_there, *_visibility(hair, surfaces))
+
+
+def _read_surroundings(blender_scene, depsgraph, viewport, hair):
+    """(surfaces, lights, world, shadow maps that are to be drawn)."""
+    meshes = scene.read_drawn_meshes(depsgraph, viewport)
+    surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
+    world = light_door.read_world(blender_scene)
+    lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, _placed(hair))
+    return surfaces, lights, world, ShadowMaps(_MAP_SIZE, max(1, min(int(lights["count"]), _SHADOWED_LIGHTS)))
+
+
+def _placed(hair):
+    return [(strands, to_world) for strands, _, to_world, *_ in hair]
+
+
+def _visibility(hair, surfaces):
+    opacities = [shading.opacity for _, shading, *_ in hair]
+    return visibility.measure(_placed(hair), [surface for surface, _ in surfaces], opacities)
+
+
+def _read_rendered_hair(depsgraph, known):
+    for instance in depsgraph.object_instances:
+        hair_object = instance.object
+        original = hair_object.original.data
+        if hair_object.type != "CURVES" or original.vellus.kind != "HAIR" or not len(hair_object.data.curves):
+            continue
+        arrays = hair_cache.read_strands(hair_object.data)
+        uid = hair_object.original.session_uid
+        if uid not in known or not all(map(np.array_equal, arrays, known[uid])):
+            known[uid] = (*arrays, strand_textures.upload_strands(*arrays))
+        shading = hair_cache.shading_of(original.evaluated_get(depsgraph))  # its settings may be keyed
+        to_world = np.array(instance.matrix_world, np.float64)
+        yield known[uid][-1], shading, to_world, scene.surface_color(original.surface), 1.0
 
 
 def _read_hair(view_layer, viewport, refused):
@@ -134,6 +174,15 @@ def draw_hair(drawn, view, buffer, is_viewport=False):
     buffer.add_hair(hair, drawn.lights, view)
 
 
+def draw_behind_hair(drawn, view, buffer, is_transparent):
+    """Fill a `HairBuffer` with the background, unless it is to be left empty, and with all surfaces."""
+    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
+    with buffer.surfaces(background):
+        if drawn.world.image is not None and not is_transparent:
+            surroundings.draw_background(drawn.world, view, *buffer.size)
+        draw_surfaces(drawn, view)
+
+
 def draw_surfaces(drawn, view):
     """Draw all surfaces with depth test into the bound framebuffer."""
     # The hair's shadow on a surface takes the first hair's colour: one colour a draw call.
@@ -141,4 +190,7 @@ def draw_surfaces(drawn, view):
         view["hair_forward"][:3], view["seen_opacity"] = drawn.hair[0][1].forward, drawn.hair[0][1].opacity
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, color), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=True):
+            if color is None:
+                drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
+                continue
             drawing.draw_surface(surface, color, view, drawn.lights, drawn.shadow_maps.samplers | seen)

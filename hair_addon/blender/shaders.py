@@ -282,6 +282,33 @@ def accumulate_program():
     return _compile(info, "cover.vert", "accumulate.frag")
 
 
+FILM_FORMAT = "RGBA32F"  # of sums of samples
+
+
+@cache
+def film_program():
+    """The compute program that adds the samples of `picture` to a film: see film.comp."""
+    return _film("film.comp", (("picture", "FLOAT_2D"),))
+
+
+@cache
+def film_depth_program():
+    """The same of what is no light: see film_depth.comp."""
+    samplers = (("segments", "UINT_2D"), ("depths", "UINT_2D"), ("surface_depth", "FLOAT_2D"))
+    return _film("film_depth.comp", samplers, (("VEC4", "view_to_clip"),))
+
+
+def _film(file, samplers, constants=()):
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
+    for slot, (name, kind) in enumerate(samplers):
+        info.sampler(slot, kind, name)
+    for kind, name in (("INT", "samples_per_side"), *constants):
+        info.push_constant(kind, name)
+    info.image(0, FILM_FORMAT, "FLOAT_2D", "sums", qualifiers={"READ", "WRITE"})
+    return _compile_compute(info, file)
+
+
 @cache
 def display_program():
     """The program that shows hair over a viewport: see display.frag."""

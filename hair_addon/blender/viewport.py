@@ -76,6 +76,11 @@ def draw():
     Nothing that is wrong with hair may keep the viewport from being drawn: it is said once, and the hair is left out.
     """
     context = bpy.context
+    with drawing.ALONE:
+        _draw(context)
+
+
+def _draw(context):
     try:
         if context.space_data.shading.type != "RENDERED":  # there the render engine draws hair by itself
             _draw_hair(context)

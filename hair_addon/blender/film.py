@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sums of samples over a tile of a picture, for each of its passes."""
+
+import gpu
+import numpy as np
+
+from . import drawing, drawn_scene, shaders
+from .hair_buffer import HairBuffer
+
+_MOST_SAMPLES = 4096  # along a tile's side: its textures take up to 700 MB
+
+FAR = 1e10  # distance of what is nowhere, as Cycles has it
+
+# How much of R, TT, TRT and all else that comes from lights is in each of the passes of hair's light, and of the world's.
+LOBES = {
+    "Hair R": ((1.0, 0.0, 0.0, 0.0), 0.0),
+    "Hair TT": ((0.0, 1.0, 0.0, 0.0), 0.0),
+    "Hair TRT": ((0.0, 0.0, 1.0, 0.0), 0.0),
+    "Hair Scattered": ((0.0, 0.0, 0.0, 1.0), 0.0),
+    "Hair World": ((0.0, 0.0, 0.0, 0.0), 1.0),
+}
+
+
+class Film:
+    """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
+
+    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask" or of `LOBES`; is_transparent: whether the
+    background is left empty.
+    """
+
+    def __init__(self, size, per_side, passes, is_transparent):
+        self.size, self._per_side, self._is_transparent = size, per_side, is_transparent
+        self._samples = HairBuffer(size[0] * per_side, size[1] * per_side)
+        self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
+        self._depth = self._texture() if {"Depth", "Hair Mask"} & set(passes) else None
+        self._passes = passes
+        self.clear()
+
+    def _texture(self):
+        return gpu.types.GPUTexture(self.size, format=shaders.FILM_FORMAT)
+
+    def clear(self):
+        """What is drawn now is another tile, or another moment."""
+        self._sample_count = 0
+        for texture in self._sums.values():
+            texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+        if self._depth is not None:
+            self._depth.clear(format="FLOAT", value=(0.0, FAR, 0.0, 0.0))
+
+    def add_pass(self, drawn, view, view_to_clip):
+        """Draw a `DrawnScene` once.
+
+        view: a `drawing.pass_record` of this tile; view_to_clip: (4, 4), what depths are measured by.
+        """
+        drawn_scene.draw_behind_hair(drawn, view, self._samples, self._is_transparent)
+        drawn_scene.draw_hair(drawn, view, self._samples)
+        for name, texture in self._sums.items():
+            picture = self._samples.part_of_light(*LOBES[name]) if name in LOBES else self._samples.color
+            self._add(shaders.film_program(), {"picture": picture}, texture)
+        if self._depth is not None:
+            program = shaders.film_depth_program()
+            program.bind()
+            program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
+            names = ("segments", "depths", "surface_depth")
+            self._add(program, {name: getattr(self._samples, name) for name in names}, self._depth)
+        self._sample_count += self._per_side**2
+
+    def _add(self, program, samplers, sums):
+        with drawing.bound(program, {}, samplers):
+            program.uniform_int("samples_per_side", self._per_side)
+            program.image("sums", sums)
+            drawing.dispatch_over(program, self.size)
+
+    def read(self):
+        """{pass: (height, width, channels) float32}, first row at the bottom: means over the samples, least depths."""
+        found = {name: self._read(texture) / self._sample_count for name, texture in self._sums.items()}
+        for name in LOBES:
+            if name in found:
+                found[name] = found[name][..., :3]
+        if self._depth is not None:
+            data = self._read(self._depth)
+            planes = {"Hair Mask": data[..., :1] / self._sample_count, "Depth": data[..., 1:2]}
+            found |= {name: plane for name, plane in planes.items() if name in self._passes}
+        return found
+
+    def _read(self, texture):
+        return np.array(texture.read(), np.float32).reshape(self.size[1], self.size[0], 4)
+
+
+def largest_tile(per_side):
+    """Longest side [pixels] of a tile that the graphics driver takes with so many samples along a pixel's side."""
+    return min(gpu.capabilities.max_texture_size_get(), _MOST_SAMPLES) // per_side
