@@ -3,7 +3,20 @@
 
 import bpy
 
-from . import engine, handlers, keymap, menus, operators, panels, preferences, properties, running, translations, viewport
+from . import (
+    engine,
+    engine_panels,
+    handlers,
+    keymap,
+    menus,
+    operators,
+    panels,
+    preferences,
+    properties,
+    running,
+    translations,
+    viewport,
+)
 
 CLASSES = (
     preferences.VellusPreferences,
@@ -22,6 +35,7 @@ def register():
     translations.register()
     properties.register()
     menus.register()
+    engine_panels.register()
     keymap.register()
     handlers.register()
     viewport.register()
@@ -33,6 +47,7 @@ def unregister():
     viewport.unregister()
     handlers.unregister()
     keymap.unregister()
+    engine_panels.unregister()
     menus.unregister()
     properties.unregister()
     translations.unregister()

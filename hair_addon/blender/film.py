@@ -11,7 +11,8 @@ _MOST_SAMPLES = 4096  # along a tile's side: its textures take up to 700 MB
 
 FAR = 1e10  # distance of what is nowhere, as Cycles has it
 
-# How much of R, TT, TRT and all else that comes from lights is in each of the passes of hair's light, and of the world's.
+# How much of R, TT, TRT and all else that comes from lights is in each of the passes of hair's light, and how much of
+# the world's.
 LOBES = {
     "Hair R": ((1.0, 0.0, 0.0, 0.0), 0.0),
     "Hair TT": ((0.0, 1.0, 0.0, 0.0), 0.0),

@@ -10,7 +10,7 @@ from . import drawing, film
 class Frame:
     """Arrays {pass: (height, width, channels) float32} of a window of a picture, first row at the bottom.
 
-    size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of what is rendered of it;
+    size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of what is rendered;
     sample_count: of a pixel in each moment; passes, is_transparent: of `film.Film`; tile_side: the longest side of a
     tile [pixels], None: what the graphics driver takes.
     """

@@ -53,9 +53,7 @@ class HairBuffer:
         self._lights = None
         self._part = None
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
-        self._strips = gpu.types.GPUFrameBuffer(
-            color_slots=(self.segments, self.depths), depth_slot=self.surface_depth
-        )
+        self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
     def surfaces(self, background=_NOTHING):
         """The framebuffer that surfaces are drawn into, bound and cleared: a context manager."""

@@ -35,7 +35,7 @@ class PassSettings(Settings):
         False,
         "The light of hair in parts that add up to it: reflected (R), through the fibre (TT), reflected inside (TRT), "
         "scattered further, and the world's",
-        label="Lobes of Hair",
+        label="Hair Lobes",
     )
 
 
