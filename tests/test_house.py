@@ -138,7 +138,7 @@ ROOMS = {
     "bpy": (lambda path: import_lines(path, "bpy", "mathutils", "bmesh", "bl_ui", "bpy_extras"), r"blender/.*"),
     "gpu": (
         lambda path: import_lines(path, "gpu", "gpu_extras"),
-        r"blender/(uniforms|shaders|strand_textures|hair_shading|drawing|hair_buffer|shadows|visibility|surroundings"
+        r"blender/(uniforms|shaders|render_programs|strand_textures|hair_shading|drawing|hair_buffer|shadows|visibility|surroundings"
         r"|hair_picture|viewport|render|film|batch)\.py",
     ),
     "bpy.props": (

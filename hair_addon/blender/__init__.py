@@ -13,6 +13,7 @@ from . import (
     panels,
     preferences,
     properties,
+    rendered_view,
     running,
     translations,
     viewport,
@@ -44,6 +45,7 @@ def register():
 def unregister():
     """Undo `register` in reverse."""
     running.end(bpy.context)
+    rendered_view.clear()
     viewport.unregister()
     handlers.unregister()
     keymap.unregister()

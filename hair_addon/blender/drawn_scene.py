@@ -33,16 +33,26 @@ class DrawnScene:
     owners: tuple = ()  # session_uid of the object of each hair
 
 
-def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, before=None, is_draft=False):
+def read(
+    blender_scene,
+    view_layer,
+    depsgraph,
+    viewport=None,
+    refused=None,
+    before=None,
+    is_draft=False,
+    is_hair_only=True,
+):
     """Bring a scene to the GPU and draw its shadow maps.
 
     viewport: the 3-D viewport whose visibility counts, None for a render; refused: called with the datablock and the
     `HairError` of hair that cannot be drawn, which otherwise is raised; before: the `DrawnScene` from before hair
-    changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse.
+    changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse; is_hair_only: whether
+    Blender draws the rest of a viewport.
     """
     hair, owners = _read_hair(view_layer, viewport, refused)
-    if viewport is not None and not hair:
-        # Blender draws the rest by itself: a scene without hair pays nothing for the add-on.
+    if viewport is not None and is_hair_only and not hair:
+        # A scene without hair pays nothing for the add-on.
         return DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
     if before is None or before.shadow_maps is None:
         surfaces, lights, world, shadow_maps = _read_surroundings(blender_scene, depsgraph, viewport, hair)

@@ -8,11 +8,11 @@ import numpy as np
 
 from ..core import picture
 from ..core.errors import HairError
-from . import drawing, drawn_scene, film, properties, scene
+from . import drawing, drawn_scene, film, properties, rendered_view, scene, viewport
 from .frame import Frame
 from .translations import error_text, interface_text
 
-NAME = "VELLUS"
+NAME = viewport.ENGINE
 
 
 class VellusRenderEngine(bpy.types.RenderEngine):
@@ -29,6 +29,17 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         for name in _passes(renderlayer):
             channels, kind = _CHANNELS.get(name, ("RGB", "COLOR"))
             self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+
+    def view_update(self, context, depsgraph):
+        """Something moved: what that is, handlers know."""
+
+    def view_draw(self, context, depsgraph):
+        """Draw a viewport with Rendered shading."""
+        try:
+            if rendered_view.draw(context):
+                self.tag_redraw()
+        except HairError as error:
+            self.error_set(error_text(error))
 
     def render(self, depsgraph):
         """Render a view layer in the depsgraph's frame."""

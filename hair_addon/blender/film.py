@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from . import drawing, drawn_scene, shaders
+from . import drawing, drawn_scene, render_programs
 from .hair_buffer import HairBuffer
 
 _MOST_SAMPLES = 4096  # along a tile's side: its textures take up to 700 MB
@@ -30,7 +30,7 @@ class Film:
     """
 
     def __init__(self, size, per_side, passes, is_transparent):
-        self.size, self._per_side, self._is_transparent = size, per_side, is_transparent
+        self.size, self._per_side, self.is_transparent = size, per_side, is_transparent
         self._samples = HairBuffer(size[0] * per_side, size[1] * per_side)
         self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
         self._depth = self._texture() if {"Depth", "Hair Mask"} & set(passes) else None
@@ -38,11 +38,11 @@ class Film:
         self.clear()
 
     def _texture(self):
-        return gpu.types.GPUTexture(self.size, format=shaders.FILM_FORMAT)
+        return gpu.types.GPUTexture(self.size, format=render_programs.FILM_FORMAT)
 
     def clear(self):
         """What is drawn now is another tile, or another moment."""
-        self._sample_count = 0
+        self.sample_count = 0
         for texture in self._sums.values():
             texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
         if self._depth is not None:
@@ -53,18 +53,18 @@ class Film:
 
         view: a `drawing.pass_record` of this tile; view_to_clip: (4, 4), what depths are measured by.
         """
-        drawn_scene.draw_behind_hair(drawn, view, self._samples, self._is_transparent)
+        drawn_scene.draw_behind_hair(drawn, view, self._samples, self.is_transparent)
         drawn_scene.draw_hair(drawn, view, self._samples)
         for name, texture in self._sums.items():
             picture = self._samples.part_of_light(*LOBES[name]) if name in LOBES else self._samples.color
-            self._add(shaders.film_program(), {"picture": picture}, texture)
+            self._add(render_programs.film_program(), {"picture": picture}, texture)
         if self._depth is not None:
-            program = shaders.film_depth_program()
+            program = render_programs.film_depth_program()
             program.bind()
             program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
             names = ("segments", "depths", "surface_depth")
             self._add(program, {name: getattr(self._samples, name) for name in names}, self._depth)
-        self._sample_count += self._per_side**2
+        self.sample_count += self._per_side**2
 
     def _add(self, program, samplers, sums):
         with drawing.bound(program, {}, samplers):
@@ -72,15 +72,27 @@ class Film:
             program.image("sums", sums)
             drawing.dispatch_over(program, self.size)
 
+    def show(self):
+        """Lay the mean of the samples over the viewport that is bound."""
+        program = render_programs.film_view_program()
+        x, y, _width, _height = gpu.state.viewport_get()
+        with (
+            drawing.bound(program, {}, {"sums": self._sums["Combined"]}),
+            drawing.gpu_state("NONE", False, "ALPHA_PREMULT"),
+        ):
+            program.uniform_float("origin", (x, y))
+            program.uniform_float("sample_count", self.sample_count)
+            drawing.cover(program)
+
     def read(self):
         """{pass: (height, width, channels) float32}, first row at the bottom: means over the samples, least depths."""
-        found = {name: self._read(texture) / self._sample_count for name, texture in self._sums.items()}
+        found = {name: self._read(texture) / self.sample_count for name, texture in self._sums.items()}
         for name in LOBES:
             if name in found:
                 found[name] = found[name][..., :3]
         if self._depth is not None:
             data = self._read(self._depth)
-            planes = {"Hair Mask": data[..., :1] / self._sample_count, "Depth": data[..., 1:2]}
+            planes = {"Hair Mask": data[..., :1] / self.sample_count, "Depth": data[..., 1:2]}
             found |= {name: plane for name, plane in planes.items() if name in self._passes}
         return found
 
