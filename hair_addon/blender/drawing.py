@@ -163,6 +163,11 @@ def draw_surface_depth(surface, view, lights, fragment="shadow_surface.frag"):
     _draw(surface, shaders.surface_depth_program(fragment), view, uniforms.uniform_buffer(lights), {})
 
 
+def draw_triangles(surface, program, view, lights, samplers):
+    """Draw a surface's batch by a program of its own."""
+    _draw(surface, program, view, uniforms.uniform_buffer(lights), samplers)
+
+
 def _draw(batch, program, view, lights, samplers, count=0):
     with bound(program, {"view": uniforms.uniform_buffer(view), "lights": lights}, samplers):
         batch.draw_range(program, elem_count=count)  # zero: all there are

@@ -6,7 +6,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..core.errors import HairError
-from . import drawing, hair_cache, level_of_detail, scene, strand_textures, surroundings, uniforms, visibility
+from . import (
+    drawing,
+    hair_cache,
+    level_of_detail,
+    render_programs,
+    scene,
+    strand_textures,
+    surroundings,
+    uniforms,
+    visibility,
+)
 from . import lights as light_door
 from .shadows import SUN, ShadowMaps
 
@@ -193,11 +203,28 @@ def draw_behind_hair(drawn, view, buffer, is_transparent):
         draw_surfaces(drawn, view)
 
 
-def draw_surfaces(drawn, view):
-    """Draw all surfaces with depth test into the bound framebuffer."""
-    # The hair's shadow on a surface takes the first hair's colour: one colour a draw call.
+def draw_arrival(drawn, view, buffer):
+    """A texture of how much of the lights arrives at what a `HairBuffer` shows; hair was added to it last."""
+    _see_through_hair(drawn, view)
+    with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        for surface, color in drawn.surfaces:
+            if color is None:
+                drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
+                continue
+            program = render_programs.surface_arrival_program()
+            drawing.draw_triangles(surface.batch, program, view, drawn.lights, drawn.shadow_maps.samplers)
+    return buffer.part_by(render_programs.strand_arrival_program())
+
+
+def _see_through_hair(drawn, view):
+    """The hair's shadow on a surface takes the first hair's colour: one colour a draw call."""
     if drawn.hair:
         view["hair_forward"][:3], view["seen_opacity"] = drawn.hair[0][1].forward, drawn.hair[0][1].opacity
+
+
+def draw_surfaces(drawn, view):
+    """Draw all surfaces with depth test into the bound framebuffer."""
+    _see_through_hair(drawn, view)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, color), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=True):
             if color is None:

@@ -2,6 +2,7 @@
 """The render engine: surfaces and hair by the viewport's drawing code, of any size, without a window too."""
 
 import math
+import time
 
 import bpy
 import numpy as np
@@ -13,6 +14,8 @@ from .frame import Frame
 from .translations import error_text, interface_text
 
 NAME = viewport.ENGINE
+
+_TURN = 0.002  # [s] between passes, in which a window that waits to be drawn gets its turn
 
 
 class VellusRenderEngine(bpy.types.RenderEngine):
@@ -68,6 +71,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                 camera = scene.read_camera(blender_scene, depsgraph, *size, self.camera_override)
             for _pass in frame.expose(drawn, *camera):
                 done += 1
+                if not bpy.app.background:
+                    time.sleep(_TURN)
                 self.update_progress(done / in_all)
                 if self.test_break():
                     return
@@ -108,6 +113,8 @@ def _passes(view_layer):
     names = ["Combined"]
     if view_layer.use_pass_z:
         names.append("Depth")
+    if view_layer.use_pass_shadow:
+        names.append("Shadow")
     if wanted.has_hair_mask:
         names.append("Hair Mask")
     if wanted.has_lobes:

@@ -25,8 +25,8 @@ LOBES = {
 class Film:
     """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
 
-    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask" or of `LOBES`; is_transparent: whether the
-    background is left empty.
+    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Shadow" or of `LOBES`; is_transparent:
+    whether the background is left empty.
     """
 
     def __init__(self, size, per_side, passes, is_transparent):
@@ -56,8 +56,7 @@ class Film:
         drawn_scene.draw_behind_hair(drawn, view, self._samples, self.is_transparent)
         drawn_scene.draw_hair(drawn, view, self._samples)
         for name, texture in self._sums.items():
-            picture = self._samples.part_of_light(*LOBES[name]) if name in LOBES else self._samples.color
-            self._add(render_programs.film_program(), {"picture": picture}, texture)
+            self._add(render_programs.film_program(), {"picture": self._picture(name, drawn, view)}, texture)
         if self._depth is not None:
             program = render_programs.film_depth_program()
             program.bind()
@@ -65,6 +64,14 @@ class Film:
             names = ("segments", "depths", "surface_depth")
             self._add(program, {name: getattr(self._samples, name) for name in names}, self._depth)
         self.sample_count += self._per_side**2
+
+    def _picture(self, name, drawn, view):
+        """The samples of a pass, as a texture."""
+        if name == "Combined":
+            return self._samples.color
+        if name == "Shadow":
+            return drawn_scene.draw_arrival(drawn, view, self._samples)
+        return self._samples.part_of_light(*LOBES[name])
 
     def _add(self, program, samplers, sums):
         with drawing.bound(program, {}, samplers):
@@ -87,8 +94,8 @@ class Film:
     def read(self):
         """{pass: (height, width, channels) float32}, first row at the bottom: means over the samples, least depths."""
         found = {name: self._read(texture) / self.sample_count for name, texture in self._sums.items()}
-        for name in LOBES:
-            if name in found:
+        for name in found:
+            if name != "Combined":
                 found[name] = found[name][..., :3]
         if self._depth is not None:
             data = self._read(self._depth)

@@ -51,7 +51,7 @@ class HairBuffer:
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
         self._lights = None
-        self._part = None
+        self._part, self._part_depth, self._part_surfaces = None, None, None
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
@@ -83,13 +83,28 @@ class HairBuffer:
         for placed in self._hair:
             self._shade(placed, placed.shading.program, self.color)
 
+    def surfaces_of_part(self):
+        """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`."""
+        if self._part is None:
+            # A framebuffer does not hold its textures.
+            self._part = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
+            self._part_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+            self._part_surfaces = gpu.types.GPUFrameBuffer(color_slots=self._part, depth_slot=self._part_depth)
+        return drawing.cleared(self._part_surfaces, _NOTHING)
+
+    def part_by(self, program):
+        """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest."""
+        for placed in self._hair:
+            self._fill(placed, program, self._part, {}, {})
+        return self._part
+
     def part_of_light(self, lobes, world):
         """A texture of a part of the light of the hair that was added last, premultiplied.
 
         lobes: (4,) how much of R, TT, TRT and all else that comes from lights; world: how much of the world's.
         """
-        self._part = self._part or gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
-        self._part.clear(format="FLOAT", value=_NOTHING)
+        with self.surfaces_of_part():
+            pass
         for placed in self._hair:
             program = placed.shading.parts_program()
             program.bind()
@@ -129,11 +144,16 @@ class HairBuffer:
 
     def _shade(self, placed, program, picture):
         """Fill the samples in which a strand of a hair is nearest with its light."""
-        shading, strands = placed.shading, placed.strands
-        textures = {"segments": self.segments, "strands": strands.texture, **shading.samplers, **placed.samplers}
-        if shading.is_varied:
-            textures["strand_randoms"] = strands.randoms
-        blocks = {"view": uniforms.uniform_buffer(placed.record), "lights": self._lights, **shading.blocks}
+        shading = placed.shading
+        textures = (
+            {**shading.samplers, "strand_randoms": placed.strands.randoms} if shading.is_varied else shading.samplers
+        )
+        self._fill(placed, program, picture, shading.blocks, textures)
+
+    def _fill(self, placed, program, picture, blocks, textures):
+        """Run a program on the samples in which a strand of a hair is nearest."""
+        blocks = {"view": uniforms.uniform_buffer(placed.record), "lights": self._lights, **blocks}
+        textures = {"segments": self.segments, "strands": placed.strands.texture, **placed.samplers, **textures}
         with drawing.bound(program, blocks, textures):
             program.image("picture", picture)
             program.uniform_int("first_segment", placed.first)

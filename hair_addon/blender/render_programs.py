@@ -35,6 +35,21 @@ def _film(file, samplers, constants=()):
 
 
 @cache
+def strand_arrival_program():
+    """The compute program that says how much light arrives at strands: see strand_arrival.comp."""
+    return shaders.compile_compute(shaders.strand_samples_info(), "strand_arrival.comp")
+
+
+@cache
+def surface_arrival_program():
+    """The same of a surface: see surface_arrival.frag."""
+    info, varying = shaders.surface_info()
+    shaders.declare_scene(info, is_lit=False)
+    info.vertex_out(varying)
+    return shaders.compile_drawing(info, "surface.vert", "surface_arrival.frag")
+
+
+@cache
 def film_view_program():
     """The program that shows the mean of a film: see film_view.frag."""
     info = gpu.types.GPUShaderCreateInfo()

@@ -148,19 +148,10 @@ def shading_program(file, blocks=(), tables=(), in_parts=False):
     blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: whether just a part of the light
     is drawn, by the constants of include/drawn_light.glsl.
     """
-    info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
-    declare_scene(info, "".join(block.source for block in structs))
+    info = strand_samples_info("".join(block.source for block in structs), tables)
     for slot, ((instance, _class), block) in enumerate(zip(blocks, structs, strict=True), start=2):
         info.uniform_buf(slot, block.type_name, instance)
-    first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
-    samplers = (("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *tables)
-    for slot, (name, kind) in enumerate(samplers, start=first):
-        info.sampler(slot, kind, name)
-    info.image(0, PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
-    for name in ("first_segment", "segment_count"):
-        info.push_constant("INT", name)
     if not in_parts:
         return compile_compute(info, file)
     info.push_constant("VEC4", "drawn_lobes")
@@ -168,10 +159,24 @@ def shading_program(file, blocks=(), tables=(), in_parts=False):
     return compile_compute(info, file, skipped=("include/drawn_light.glsl",))
 
 
+def strand_samples_info(structs="", samplers=()):
+    """Info of a program that includes strand_samples.glsl; samplers: (name, type), ... beside the scene's."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
+    declare_scene(info, structs)
+    first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
+    for slot, (name, kind) in enumerate((("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *samplers), start=first):
+        info.sampler(slot, kind, name)
+    info.image(0, PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    for name in ("first_segment", "segment_count"):
+        info.push_constant("INT", name)
+    return info
+
+
 @cache
 def surface_program():
     """The program that draws a matt surface: attributes position, normal; uniform surface_color."""
-    info, varying = _surface()
+    info, varying = surface_info()
     declare_scene(info)
     info.push_constant("VEC3", "surface_color")
     varying.smooth("VEC4", "corner_seen_x_y")
@@ -183,13 +188,14 @@ def surface_program():
 @cache
 def surface_depth_program(fragment="shadow_surface.frag"):
     """The program that draws a surface into a shadow map, or one that only hides."""
-    info, varying = _surface()
+    info, varying = surface_info()
     declare_scene(info, shadow_samplers=(), is_lit=False)
     info.vertex_out(varying)
     return compile_drawing(info, "surface.vert", fragment)
 
 
-def _surface():
+def surface_info():
+    """(info, varying) of a program that draws triangles with the attributes position and normal."""
     info = gpu.types.GPUShaderCreateInfo()
     info.vertex_in(0, "VEC3", "position")
     info.vertex_in(1, "VEC3", "normal")

@@ -160,6 +160,24 @@ def test_a_holdout_leaves_a_hole_in_the_shape_of_the_surface(lit, tmp_path):
     assert seen["Combined"][..., 3].mean() > 2.0 * held_out["Combined"][..., 3].mean()
 
 
+def test_shadow_is_the_part_of_light_that_arrives(lit, tmp_path):
+    """Of a matt surface under one sun and no world, sample by sample: what is left of it is the pass."""
+    sun = next(o for o in bpy.data.objects if o.type == "LIGHT")
+    bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 2.0, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
+    bpy.context.view_layer.use_pass_shadow = bpy.context.view_layer.vellus.has_hair_mask = True
+    shaded = rendered(tmp_path, film_transparent=True, sample_count=1)
+    sun.data.use_shadow = False
+    open_to_light = rendered(tmp_path, sample_count=1)
+    is_surface = shaded["Hair Mask"] == 0.0
+    faces_light = is_surface & (open_to_light["Shadow"].min(axis=-1) > 0.99)
+    arriving = shaded["Combined"][..., :3] / np.maximum(open_to_light["Combined"][..., :3], 1e-6)
+    np.testing.assert_allclose(shaded["Shadow"][faces_light], arriving[faces_light], atol=5e-3)
+    assert shaded["Shadow"][faces_light].min() < 0.1 and shaded["Shadow"][faces_light].max() == 1.0
+    is_hair = shaded["Hair Mask"] > 0.9
+    assert is_hair.any() and shaded["Shadow"][is_hair].min() < 0.5
+    assert (open_to_light["Shadow"][is_hair] > 0.89).all()
+
+
 def test_depth_is_the_distance_along_the_view(scene, tmp_path):
     """Of Cycles' convention: a plane across the view has one depth, a slanted one that of its points; nothing, 1e10."""
     bpy.ops.object.camera_add(location=(0.0, 0.0, 5.0))
