@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The same of what is no light: in how many samples hair is nearest, and the least distance along the view's axis.
+// The same of what is no light: in how many samples hair is nearest, the least distance along the view's axis, and in how
+// many samples there is anything.
 
 const uint NO_SEGMENT = 0x7FFFFFFFu;
 
@@ -27,6 +28,7 @@ void main()
       }
       if (depth < 1.0) {
         found.y = min(found.y, distance_at(depth, view_to_clip));
+        found.z += 1.0;
       }
     }
   }

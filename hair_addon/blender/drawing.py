@@ -22,6 +22,7 @@ class SurfaceOnGPU:
     batch: gpu.types.GPUBatch
     places: gpu.types.GPUTexture
     row_corners: int
+    corner_count: int
 
 
 @dataclass(frozen=True)
@@ -200,7 +201,7 @@ def upload_surface(positions, normals):
     vertices.attr_fill("normal", np.ascontiguousarray(normals, np.float32))
     row_corners = min(len(positions), TEXTURE_WIDTH)
     places = places_texture(positions[:, None], np.zeros((len(positions), 1), np.float32), row_corners)
-    return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners)
+    return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners, len(positions))
 
 
 def draw_cover(program, blocks, samplers):

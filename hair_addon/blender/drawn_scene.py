@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All that a picture is drawn of, on the GPU: hair, the surfaces around it, lights and their shadow maps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,7 +40,11 @@ class DrawnScene:
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
     hair_visibility: list  # {sampler: texture} of the world's light on each of the hair
     surface_visibility: list
-    owners: tuple = ()  # session_uid of the object of each hair
+    owners: tuple = ()  # session_uid of the object of each hair; in a render `scene.owner_of` it
+    surface_owners: tuple = ()  # `scene.owner_of` each surface
+
+
+_EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
 
 
 def read(
@@ -63,9 +67,12 @@ def read(
     hair, owners = _read_hair(view_layer, viewport, refused)
     if viewport is not None and is_hair_only and not hair:
         # A scene without hair pays nothing for the add-on.
-        return DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
+        return _EMPTY
     if before is None or before.shadow_maps is None:
-        surfaces, lights, world, shadow_maps = _read_surroundings(blender_scene, depsgraph, viewport, hair)
+        surfaces = _upload(scene.read_drawn_meshes(depsgraph, viewport))
+        world = light_door.read_world(blender_scene)
+        lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, _placed(hair))
+        shadow_maps = _new_shadow_maps(lights)
     else:
         surfaces, lights, world, shadow_maps = before.surfaces, before.lights, before.world, before.shadow_maps
     placed, batches = _placed(hair), [surface.batch for surface, _ in surfaces]
@@ -83,20 +90,37 @@ def read_render(depsgraph, known):
     known: {session_uid: (points, radii, random numbers, StrandsOnGPU)} of what was drawn a moment before, changed: what
     stands still is not uploaded again.
     """
-    hair = list(_read_rendered_hair(depsgraph, known))
-    surroundings_there = _read_surroundings(depsgraph.scene_eval, depsgraph, None, hair)
-    surfaces, lights, _world, shadow_maps = surroundings_there
-    shadow_maps.draw(lights, _placed(hair), [surface.batch for surface, _ in surfaces], _SHADOW_STEPS)
-    return DrawnScene(hair, *surroundings_there, *_visibility(hair, surfaces))
+    unlit = read_unlit(depsgraph, known)
+    world = light_door.read_world(depsgraph.scene_eval)
+    lights = _lights(light_door.read_lights(depsgraph, for_render=True), world, _placed(unlit.hair))
+    shadow_maps = _new_shadow_maps(lights)
+    shadow_maps.draw(lights, _placed(unlit.hair), [surface.batch for surface, _ in unlit.surfaces], _SHADOW_STEPS)
+    hair_seen, surfaces_seen = _visibility(unlit.hair, unlit.surfaces)
+    return replace(
+        unlit,
+        lights=lights,
+        world=world,
+        shadow_maps=shadow_maps,
+        hair_visibility=hair_seen,
+        surface_visibility=surfaces_seen,
+    )
 
 
-def _read_surroundings(blender_scene, depsgraph, viewport, hair):
-    """(surfaces, lights, world, shadow maps that are to be drawn)."""
-    meshes = scene.read_drawn_meshes(depsgraph, viewport)
-    surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
-    world = light_door.read_world(blender_scene)
-    lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, _placed(hair))
-    return surfaces, lights, world, ShadowMaps(_MAP_SIZE, max(1, min(int(lights["count"]), _SHADOWED_LIGHTS)))
+def read_unlit(depsgraph, known):
+    """The same without anything that has to do with light: where things are."""
+    found = list(_read_rendered_hair(depsgraph, known))
+    meshes = scene.read_drawn_meshes(depsgraph)
+    hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)
+    surface_owners = tuple(mesh.owner for mesh in meshes)
+    return replace(_EMPTY, hair=hair, surfaces=_upload(meshes), owners=owners, surface_owners=surface_owners)
+
+
+def _upload(meshes):
+    return [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
+
+
+def _new_shadow_maps(lights):
+    return ShadowMaps(_MAP_SIZE, max(1, min(int(lights["count"]), _SHADOWED_LIGHTS)))
 
 
 def _placed(hair):
@@ -120,7 +144,8 @@ def _read_rendered_hair(depsgraph, known):
             known[uid] = (*arrays, strand_textures.upload_strands(*arrays))
         shading = hair_cache.shading_of(original.evaluated_get(depsgraph))  # its settings may be keyed
         to_world = np.array(instance.matrix_world, np.float64)
-        yield known[uid][-1], shading, to_world, scene.surface_color(original.surface), 1.0
+        color = scene.surface_color(original.surface)
+        yield (known[uid][-1], shading, to_world, color, 1.0), scene.owner_of(instance)
 
 
 def _read_hair(view_layer, viewport, refused):

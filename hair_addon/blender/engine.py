@@ -9,7 +9,7 @@ import numpy as np
 
 from ..core import picture
 from ..core.errors import HairError
-from . import drawing, drawn_scene, film, properties, rendered_view, scene, viewport
+from . import drawing, drawn_scene, film, motion, properties, rendered_view, scene, viewport
 from .frame import Frame
 from .translations import error_text, interface_text
 
@@ -29,8 +29,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
 
     def update_render_passes(self, scene=None, renderlayer=None):
         """Tell Blender which passes there will be: sockets of the compositor, layers of a multilayer file."""
-        for name in _passes(renderlayer):
-            channels, kind = _CHANNELS.get(name, ("RGB", "COLOR"))
+        for name in _passes(renderlayer, scene.render.use_motion_blur):
+            channels, kind = _KINDS.get(name, ("RGB", "COLOR"))
             self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
 
     def view_update(self, context, depsgraph):
@@ -61,7 +61,9 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         moments = _moments(blender_scene.render, blender_scene.vellus.motion_steps)
         sample_count = view_layer.samples or blender_scene.vellus.sample_count
         is_transparent = blender_scene.render.film_transparent
-        frame = Frame(size, window, -(-sample_count // len(moments)), _passes(view_layer), is_transparent)
+        passes = _passes(view_layer, blender_scene.render.use_motion_blur)
+        frame = Frame(size, window, -(-sample_count // len(moments)), passes, is_transparent)
+        others = self._others(depsgraph, size) if "Vector" in passes else []
         known, done, in_all = {}, 0, frame.pass_count * len(moments)
         for index in self._at(blender_scene, moments):
             said = interface_text("Moment {number} of {count}", number=index + 1, count=len(moments))
@@ -69,7 +71,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             with drawing.ALONE:
                 drawn = drawn_scene.read_render(depsgraph, known)
                 camera = scene.read_camera(blender_scene, depsgraph, *size, self.camera_override)
-            for _pass in frame.expose(drawn, *camera):
+                moving = motion.Motion(others[0], motion.places(drawn, *camera), others[1], size) if others else None
+            for _pass in frame.expose(drawn, *camera, moving):
                 done += 1
                 if not bpy.app.background:
                     time.sleep(_TURN)
@@ -77,6 +80,16 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                 if self.test_break():
                     return
             self._show(view_layer, window, frame.arrays())
+
+    def _others(self, depsgraph, size):
+        """Where everything is a frame before and a frame after: [`motion.Places`]."""
+        found = []
+        for _index in self._at(depsgraph.scene, [-1.0, 1.0]):
+            with drawing.ALONE:
+                there = drawn_scene.read_unlit(depsgraph, {})
+                camera = scene.read_camera(depsgraph.scene, depsgraph, *size, self.camera_override)
+                found.append(motion.places(there, *camera))
+        return found
 
     def _at(self, blender_scene, moments):
         """Bring the scene to each moment, from its frame, and back: a generator of their indices."""
@@ -104,15 +117,22 @@ class VellusRenderEngine(bpy.types.RenderEngine):
 
 
 # (channels, kind) of passes that are not the colours of light.
-_CHANNELS = {"Combined": ("RGBA", "COLOR"), "Depth": ("Z", "VALUE"), "Hair Mask": ("X", "VALUE")}
+_KINDS = {
+    "Combined": ("RGBA", "COLOR"),
+    "Depth": ("Z", "VALUE"),
+    "Hair Mask": ("X", "VALUE"),
+    "Vector": ("XYZW", "VECTOR"),
+}
 
 
-def _passes(view_layer):
-    """Names of the passes that are switched on."""
+def _passes(view_layer, is_blurred):
+    """Names of the passes that are switched on. What is blurred already has no motion that could blur it."""
     wanted = properties.to_settings(view_layer.vellus, picture.PassSettings)
     names = ["Combined"]
     if view_layer.use_pass_z:
         names.append("Depth")
+    if view_layer.use_pass_vector and not is_blurred:
+        names.append("Vector")
     if view_layer.use_pass_shadow:
         names.append("Shadow")
     if wanted.has_hair_mask:

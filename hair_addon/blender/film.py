@@ -4,12 +4,15 @@
 import gpu
 import numpy as np
 
-from . import drawing, drawn_scene, render_programs
+from . import drawing, drawn_scene, motion, render_programs
 from .hair_buffer import HairBuffer
 
 _MOST_SAMPLES = 4096  # along a tile's side: its textures take up to 700 MB
 
 FAR = 1e10  # distance of what is nowhere, as Cycles has it
+
+# Channels of passes that are not the colours of light.
+CHANNELS = {"Combined": 4, "Depth": 1, "Hair Mask": 1, "Vector": 4}
 
 # How much of R, TT, TRT and all else that comes from lights is in each of the passes of hair's light, and how much of
 # the world's.
@@ -25,16 +28,16 @@ LOBES = {
 class Film:
     """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
 
-    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Shadow" or of `LOBES`; is_transparent:
-    whether the background is left empty.
+    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Shadow", "Vector" or of `LOBES`;
+    is_transparent: whether the background is left empty. motion: `motion.Motion` of a film with the pass "Vector".
     """
 
     def __init__(self, size, per_side, passes, is_transparent):
         self.size, self._per_side, self.is_transparent = size, per_side, is_transparent
         self._samples = HairBuffer(size[0] * per_side, size[1] * per_side)
         self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
-        self._depth = self._texture() if {"Depth", "Hair Mask"} & set(passes) else None
-        self._passes = passes
+        self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
+        self._passes, self.motion = passes, None
         self.clear()
 
     def _texture(self):
@@ -69,6 +72,8 @@ class Film:
         """The samples of a pass, as a texture."""
         if name == "Combined":
             return self._samples.color
+        if name == "Vector":
+            return motion.draw(drawn, self.motion, view, self._samples)
         if name == "Shadow":
             return drawn_scene.draw_arrival(drawn, view, self._samples)
         return self._samples.part_of_light(*LOBES[name])
@@ -94,14 +99,12 @@ class Film:
     def read(self):
         """{pass: (height, width, channels) float32}, first row at the bottom: means over the samples, least depths."""
         found = {name: self._read(texture) / self.sample_count for name, texture in self._sums.items()}
-        for name in found:
-            if name != "Combined":
-                found[name] = found[name][..., :3]
         if self._depth is not None:
-            data = self._read(self._depth)
-            planes = {"Hair Mask": data[..., :1] / self.sample_count, "Depth": data[..., 1:2]}
-            found |= {name: plane for name, plane in planes.items() if name in self._passes}
-        return found
+            mask, depth, covered, _none = np.split(self._read(self._depth), 4, axis=-1)
+            found |= {"Hair Mask": mask / self.sample_count, "Depth": depth}
+            if "Vector" in found:  # of what is there, not of the background
+                found["Vector"] *= self.sample_count / np.maximum(covered, 1.0)
+        return {name: found[name][..., : CHANNELS.get(name, 3)] for name in self._passes}
 
     def _read(self, texture):
         return np.array(texture.read(), np.float32).reshape(self.size[1], self.size[0], 4)

@@ -28,16 +28,17 @@ class Frame:
         """How many passes a moment takes."""
         return len(self._tiles) * self._turns
 
-    def expose(self, drawn, world_to_view, view_to_clip):
+    def expose(self, drawn, world_to_view, view_to_clip, motion=None):
         """Draw a moment: a generator that yields after each pass, so that whoever draws may stop.
 
-        drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4).
+        drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector".
         """
         samples = tuple(length * self._per_side for length in self._size)
         for tile in self._tiles:
             if self._film is None or self._film.size != tile[2:]:
                 self._film = self._new_film(tile)
             self._film.clear()
+            self._film.motion = motion
             within = tuple(length * self._per_side for length in tile)
             for turn in range(self._turns):
                 with drawing.ALONE:

@@ -51,7 +51,7 @@ class HairBuffer:
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
         self._lights = None
-        self._part, self._part_depth, self._part_surfaces = None, None, None
+        self._parts = {}  # format → (framebuffer, texture, depth) of what is drawn beside the picture
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
@@ -83,20 +83,26 @@ class HairBuffer:
         for placed in self._hair:
             self._shade(placed, placed.shading.program, self.color)
 
-    def surfaces_of_part(self):
+    def surfaces_of_part(self, texture_format=shaders.PICTURE_FORMAT):
         """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`."""
-        if self._part is None:
+        if texture_format not in self._parts:
             # A framebuffer does not hold its textures.
-            self._part = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
-            self._part_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
-            self._part_surfaces = gpu.types.GPUFrameBuffer(color_slots=self._part, depth_slot=self._part_depth)
-        return drawing.cleared(self._part_surfaces, _NOTHING)
+            texture = gpu.types.GPUTexture(self.size, format=texture_format)
+            depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+            framebuffer = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
+            self._parts[texture_format] = framebuffer, texture, depth
+        return drawing.cleared(self._parts[texture_format][0], _NOTHING)
 
-    def part_by(self, program):
-        """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest."""
-        for placed in self._hair:
-            self._fill(placed, program, self._part, {}, {})
-        return self._part
+    def part_by(self, program, texture_format=shaders.PICTURE_FORMAT, inputs=None):
+        """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.
+
+        inputs: of each hair ({instance: record}, {sampler: texture}) that the program reads beside the scene.
+        """
+        texture = self._parts[texture_format][1]
+        for placed, (records, textures) in zip(self._hair, inputs or [({}, {})] * len(self._hair), strict=True):
+            blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
+            self._fill(placed, program, texture, blocks, textures)
+        return texture
 
     def part_of_light(self, lobes, world):
         """A texture of a part of the light of the hair that was added last, premultiplied.
@@ -105,13 +111,14 @@ class HairBuffer:
         """
         with self.surfaces_of_part():
             pass
+        texture = self._parts[shaders.PICTURE_FORMAT][1]
         for placed in self._hair:
             program = placed.shading.parts_program()
             program.bind()
             program.uniform_float("drawn_lobes", lobes)
             program.uniform_float("drawn_world", world)
-            self._shade(placed, program, self._part)
-        return self._part
+            self._shade(placed, program, texture)
+        return texture
 
     def hair_at(self, x, y):
         """Which of the hair that was added last is nearest in a sample, counted from 0; None where there is none."""

@@ -5,7 +5,7 @@ from functools import cache
 
 import gpu
 
-from . import shaders
+from . import shaders, uniforms
 
 FILM_FORMAT = "RGBA32F"  # of sums of samples
 
@@ -47,6 +47,35 @@ def surface_arrival_program():
     shaders.declare_scene(info, is_lit=False)
     info.vertex_out(varying)
     return shaders.compile_drawing(info, "surface.vert", "surface_arrival.frag")
+
+
+MOTION_FORMAT = "RGBA32F"  # of how far things move
+
+
+@cache
+def strand_motion_program():
+    """The compute program that says how far strands move: see strand_motion.comp."""
+    samplers = (("strands_before", "FLOAT_2D"), ("strands_after", "FLOAT_2D"))
+    info = shaders.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT)
+    info.uniform_buf(2, "Motion", "motion")
+    return shaders.compile_compute(info, "strand_motion.comp")
+
+
+@cache
+def surface_motion_program():
+    """The same of a surface: see surface_motion.vert."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.vertex_in(0, "VEC3", "position")
+    info.typedef_source(uniforms.VIEW.source + uniforms.MOTION.source)
+    info.uniform_buf(0, "View", "view")
+    info.uniform_buf(1, "Motion", "motion")
+    for slot, name in enumerate(("places_before", "places_after")):
+        info.sampler(slot, "FLOAT_2D", name)
+    varying = gpu.types.GPUStageInterfaceInfo("motion_varying")
+    for name in ("place_now", "place_before", "place_after"):
+        varying.smooth("VEC4", name)
+    info.vertex_out(varying)
+    return shaders.compile_drawing(info, "surface_motion.vert", "surface_motion.frag")
 
 
 @cache

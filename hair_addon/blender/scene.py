@@ -2,7 +2,7 @@
 """The door for surfaces and cameras: Blender's data → arrays."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import bpy
@@ -283,12 +283,13 @@ def picture_size(render):
 class DrawnMesh:
     """Triangles as they are drawn: (3 F, 3) float32 corner positions [m] and unit normals in world space, colour.
 
-    A holdout has none: where it is nearest the picture is empty.
+    A holdout has none: where it is nearest the picture is empty. owner: `owner_of` it.
     """
 
     positions: np.ndarray
     normals: np.ndarray
     color: tuple | None
+    owner: tuple = ()
 
 
 def read_drawn_meshes(depsgraph, viewport=None):
@@ -298,8 +299,14 @@ def read_drawn_meshes(depsgraph, viewport=None):
         if instance.object.type == "MESH" and instance.show_self and _is_surface_seen(instance, viewport):
             is_holdout = viewport is None and instance.object.original.holdout_get(view_layer=depsgraph.view_layer)
             matrix = np.array(instance.matrix_world, np.float64)
-            meshes.append(_read_drawn_mesh(instance.object, matrix, is_holdout))
+            meshes.append(replace(_read_drawn_mesh(instance.object, matrix, is_holdout), owner=owner_of(instance)))
     return [mesh for mesh in meshes if len(mesh.positions)]
+
+
+def owner_of(instance):
+    """What tells an instance of a depsgraph from all others, in every frame."""
+    parent = instance.parent.original.session_uid if instance.is_instance else 0
+    return instance.object.original.session_uid, parent, tuple(instance.persistent_id)
 
 
 def _is_surface_seen(instance, viewport):

@@ -159,15 +159,18 @@ def shading_program(file, blocks=(), tables=(), in_parts=False):
     return compile_compute(info, file, skipped=("include/drawn_light.glsl",))
 
 
-def strand_samples_info(structs="", samplers=()):
-    """Info of a program that includes strand_samples.glsl; samplers: (name, type), ... beside the scene's."""
+def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT):
+    """Info of a program that includes strand_samples.glsl.
+
+    samplers: (name, type), ... beside the scene's; texture_format: of what it fills.
+    """
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     declare_scene(info, structs)
     first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
     for slot, (name, kind) in enumerate((("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *samplers), start=first):
         info.sampler(slot, kind, name)
-    info.image(0, PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"WRITE"})
     for name in ("first_segment", "segment_count"):
         info.push_constant("INT", name)
     return info

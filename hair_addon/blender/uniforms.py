@@ -111,6 +111,16 @@ LIGHTS = Block(
     },
 )
 
+MOTION = Block(
+    "Motion",
+    {
+        "before_to_clip": "mat4",  # of what strands or surfaces have their places in, a frame before
+        "now_to_clip": "mat4",
+        "after_to_clip": "mat4",
+        "size": "vec4",  # width and height of the whole picture [pixels]
+    },
+)
+
 ENVIRONMENT = Block(
     "Environment",
     {

@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 
 from hair_addon.blender import drawing, film, render
+from hair_addon.blender.scene import read_camera
+from tests.blender.reading import evaluated_points
 from tests.blender.rendering import configure, layers_of, read_layers, rendered
 
 MODELS = [("KAJIYA_KAY", "energy"), ("MARSCHNER", "energy"), ("MARSCHNER", "classic")]
@@ -217,6 +219,78 @@ def test_motion_blur_is_the_mean_of_still_pictures(lit, tmp_path, monkeypatch):
         stills.append(rendered(tmp_path, use_motion_blur=False, sample_count=16)["Combined"])
     np.testing.assert_allclose(blurred, np.mean(stills, axis=0), atol=1e-5)
     assert np.abs(blurred - stills[1]).mean() > 5e-3
+
+
+def moving(surface):
+    """Camera and surface on their way through frames 1 to 3, of which 2 is the scene's."""
+    scene = bpy.context.scene
+    surface.rotation_mode = "XYZ"
+    for frame, place, turn, seen_from in (
+        (1, (0.0, 0.0, 0.0), 0.0, (0.0, -8.0, 0.0)),
+        (2, (0.2, 0.0, 0.1), 0.2, (0.1, -8.0, 0.0)),
+        (3, (0.5, 0.5, 0.1), 0.5, (0.1, -7.0, 0.3)),
+    ):
+        surface.location, surface.rotation_euler.z, scene.camera.location = place, turn, seen_from
+        for thing, path in ((surface, "location"), (surface, "rotation_euler"), (scene.camera, "location")):
+            thing.keyframe_insert(path, frame=frame)
+    scene.frame_set(2)
+
+
+def seen_points(curves_object, frame, size):
+    """(N, 3) places on strands in a frame's picture [pixels], and their distance along the view's axis."""
+    scene = bpy.context.scene
+    scene.frame_set(frame)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    to_view, to_clip = read_camera(scene, depsgraph, *size)
+    strands = evaluated_points(curves_object)
+    part = np.linspace(0.0, 1.0, 12, endpoint=False)[:, None]
+    dense = (strands[:, :-1, None] * (1.0 - part) + strands[:, 1:, None] * part).reshape(-1, 3)
+    viewed = np.c_[dense, np.ones(len(dense))] @ (to_view @ np.array(curves_object.matrix_world)).T
+    clip = viewed @ to_clip.T
+    return np.c_[(0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * size, -viewed[:, 2]]
+
+
+def test_vectors_of_hair_lead_to_the_frame_before_and_from_the_frame_after(lit, tmp_path):
+    """In each sample, by the point of a strand that it shows: hair that a surface carries, camera moving too."""
+    moving(bpy.data.objects["Sphere"])
+    view_layer = bpy.context.view_layer
+    view_layer.use_pass_vector = view_layer.use_pass_z = view_layer.vellus.has_hair_mask = True
+    passes = rendered(tmp_path, sample_count=1, film_transparent=True)
+    size = passes["Combined"].shape[1::-1]
+    assert bpy.context.scene.frame_current == 2
+    before, now, after = (seen_points(lit, frame, size) for frame in (1, 2, 3))
+    rows, columns = np.nonzero(passes["Hair Mask"])
+    depths = passes["Depth"][rows, columns]
+    shown = [
+        np.argmin(np.sum((now - (x + 0.5, y + 0.5, depth)) ** 2 * (1.0, 1.0, 1e4), axis=1))
+        for x, y, depth in zip(columns, rows, depths, strict=True)
+    ]
+    expected = np.c_[before[shown, :2] - now[shown, :2], now[shown, :2] - after[shown, :2]]
+    error = np.abs(passes["Vector"][rows, columns] - expected).max(axis=1)
+    # Which point of a strand a sample shows is known to a quarter of its segment.
+    assert np.median(error) < 0.05 and np.quantile(error, 0.95) < 0.25
+    assert np.abs(expected).max() > 5.0
+
+
+def test_vectors_are_those_of_cycles(lit, tmp_path):
+    moving(bpy.data.objects["Sphere"])
+    lit.hide_render = True
+    bpy.context.view_layer.use_pass_vector = True
+    ours = rendered(tmp_path, film_transparent=True, sample_count=16)["Vector"]
+    scene = bpy.context.scene
+    scene.cycles.samples, scene.cycles.device = 16, "CPU"
+    theirs = rendered(tmp_path, engine="CYCLES")["Vector"]
+    is_there = np.abs(theirs).max(axis=-1) > 0.0
+    assert is_there.sum() > 300
+    error = np.abs(ours - theirs)[is_there]
+    assert np.median(error) < 0.03 and error.mean() < 0.3
+    assert (ours[~is_there] == 0.0).mean() > 0.97
+
+
+def test_what_is_blurred_already_has_no_vectors(lit, tmp_path):
+    bpy.context.view_layer.use_pass_vector = True
+    assert "Vector" not in rendered(tmp_path, use_motion_blur=True, motion_steps=2)
+    bpy.context.scene.render.use_motion_blur = False
 
 
 def test_view_layers_are_rendered_apart(lit, tmp_path):
