@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The Kajiya-Kay model [Kajiya89], [Report12] Eq. 13.
 
+#include "include/drawn_light.glsl"
 #include "include/kajiya_kay.glsl"
 
 vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
@@ -9,7 +10,8 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   vec3 diffuse = settings.diffuse_color * kajiya_kay_diffuse(T, L) / (PI * PI);
   float exponent = blurred_exponent(settings.exponent, blur);
   float peak = kajiya_kay_specular_albedo(settings.exponent) / kajiya_kay_specular_albedo(exponent);
-  return diffuse + settings.specular_color * (peak * kajiya_kay_specular(T, L, V, exponent));
+  vec3 specular = settings.specular_color * (peak * kajiya_kay_specular(T, L, V, exponent));
+  return drawn_lobes.w * diffuse + drawn_lobes.x * specular;
 }
 
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)

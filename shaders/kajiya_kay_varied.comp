@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The Kajiya-Kay model [Kajiya89] for strands that differ: colour and highlight follow from absorption and roughness.
 
+#include "include/drawn_light.glsl"
 #include "include/kajiya_kay.glsl"
 #include "include/this_strand.glsl"
 
@@ -14,7 +15,8 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   float exponent = blurred_exponent(this_exponent(), blur);
   float specular = highlight_peak(settings.reflectance, exponent) * kajiya_kay_specular(T, L, V, exponent);
   // The integral of sin(T, L) over the sphere is pi², so this diffuse part has the albedo of the colour.
-  return color_from_falloff(this_sigma_a(), settings.falloff) * kajiya_kay_diffuse(T, L) / (PI * PI) + vec3(specular);
+  vec3 diffuse = color_from_falloff(this_sigma_a(), settings.falloff) * kajiya_kay_diffuse(T, L) / (PI * PI);
+  return drawn_lobes.w * diffuse + drawn_lobes.x * vec3(specular);
 }
 
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The Marschner model [Marschner03] from baked tables, [Report12] Eq. 14.
 
+#include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
 #include "include/marschner.glsl"
 
@@ -15,7 +16,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   vec3 m = textureLod(m_table, m_coordinates(sin_theta_i, sin_theta_o, settings.axes), 0.0).rgb;
   vec4 n = textureLod(n_table, n_at, 0.0);
   vec3 n_trt = textureLod(n_trt_table, n_at, 0.0).rgb;
-  return marschner_scattering(m, n, n_trt, cosine) * sin_from_cos(sin_theta_i);
+  return marschner_scattering(drawn_lobes.xyz * m, n, n_trt, cosine) * sin_from_cos(sin_theta_i);
 }
 
 #include "include/hair_return.glsl"

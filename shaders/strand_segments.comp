@@ -17,7 +17,7 @@ void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
 
 void meet(ivec2 place, float along, float coverage)
 {
-  if (!is_covered(dash_offset, place, coverage)) {
+  if (!is_covered(dash_offset, place + ivec2(view.first_column, view.first_row), coverage)) {
     return;
   }
   // Of floats that are not negative the bits have the same order.

@@ -5,7 +5,8 @@
 
 void main()
 {
-  if (!is_covered(strand_offset(strand_index) + view.coverage_turn, ivec2(gl_FragCoord.xy), strand_coverage)) {
+  ivec2 place = ivec2(gl_FragCoord.xy) + ivec2(view.first_column, view.first_row);
+  if (!is_covered(strand_offset(strand_index) + view.coverage_turn, place, strand_coverage)) {
     discard;
   }
   int pieces = view.drawn_points - 1;

@@ -128,7 +128,7 @@ def import_lines(path, *names):
 def array_lines(path):
     """Where arrays of geometry pass between Blender and NumPy; a picture's pixels are not geometry."""
     tree = syntax(path)
-    pixels = attribute_lines(tree, ".pixels.foreach_get", ".pixels.foreach_set")
+    pixels = attribute_lines(tree, ".pixels.foreach_get", ".pixels.foreach_set", ".rect.foreach_set")
     return sorted({*attribute_lines(tree, ".foreach_get", ".foreach_set", ".attributes.new")} - {*pixels})
 
 
@@ -138,8 +138,8 @@ ROOMS = {
     "bpy": (lambda path: import_lines(path, "bpy", "mathutils", "bmesh", "bl_ui", "bpy_extras"), r"blender/.*"),
     "gpu": (
         lambda path: import_lines(path, "gpu", "gpu_extras"),
-        r"blender/(uniforms|shaders|strand_textures|hair_shading|drawing|hair_buffer|shadows|visibility|surroundings"
-        r"|hair_picture|viewport|render)\.py",
+        r"blender/(uniforms|shaders|render_programs|strand_textures|hair_shading|drawing|hair_buffer|shadows|visibility"
+        r"|surroundings|hair_picture|viewport|render|film)\.py",
     ),
     "bpy.props": (
         lambda path: [*attribute_lines(syntax(path), "bpy.props"), *import_lines(path, "bpy.props")],
@@ -150,7 +150,10 @@ ROOMS = {
         lambda path: list(attribute_lines(syntax(path), *LAYOUT)),
         r"blender/(panels/.*|menus\.py|preferences\.py)",
     ),
-    "self.report": (lambda path: list(attribute_lines(syntax(path), "self.report")), r"blender/operators/.*"),
+    "self.report": (
+        lambda path: list(attribute_lines(syntax(path), "self.report")),
+        r"blender/(operators/.*|engine\.py)",
+    ),
     "wp.kernel": (lambda path: list(attribute_lines(syntax(path), "wp.kernel", "wp.func")), r"core/.*"),
     "OpenEXR": (lambda path: import_lines(path, "OpenEXR"), r"core/exr\.py"),
 }

@@ -3,11 +3,26 @@
 
 import bpy
 
-from . import handlers, keymap, menus, operators, panels, preferences, properties, running, translations, viewport
+from . import (
+    engine,
+    engine_panels,
+    handlers,
+    keymap,
+    menus,
+    operators,
+    panels,
+    preferences,
+    properties,
+    rendered_view,
+    running,
+    translations,
+    viewport,
+)
 
 CLASSES = (
     preferences.VellusPreferences,
     *properties.CLASSES,
+    engine.VellusRenderEngine,
     *operators.CLASSES,
     *panels.CLASSES,
     *menus.CLASSES,
@@ -21,6 +36,7 @@ def register():
     translations.register()
     properties.register()
     menus.register()
+    engine_panels.register()
     keymap.register()
     handlers.register()
     viewport.register()
@@ -29,9 +45,11 @@ def register():
 def unregister():
     """Undo `register` in reverse."""
     running.end(bpy.context)
+    rendered_view.clear()
     viewport.unregister()
     handlers.unregister()
     keymap.unregister()
+    engine_panels.unregister()
     menus.unregister()
     properties.unregister()
     translations.unregister()

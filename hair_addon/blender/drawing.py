@@ -4,6 +4,7 @@
 Strands are camera-facing strips without vertex attributes: the vertex shader pulls points from a texture.
 """
 
+import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
 
@@ -21,6 +22,7 @@ class SurfaceOnGPU:
     batch: gpu.types.GPUBatch
     places: gpu.types.GPUTexture
     row_corners: int
+    corner_count: int
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,9 @@ class Steps:
 
 
 _ALL = Steps()
+
+# A render runs beside the window, and both share programs and the values that these are given: who draws, draws alone.
+ALONE = threading.RLock()
 
 
 def view_record(world_to_view, view_to_clip, height, least_width=0.0):
@@ -48,6 +53,25 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     record["eye"][:3] = view_to_world[:3, 3] if record["is_perspective"] else view_to_world[:3, 2]
     record["pixels_per_unit"] = 0.5 * height * view_to_clip[1, 1]
     record["least_half_width"] = 0.5 * least_width / record["pixels_per_unit"]
+    return record
+
+
+def pass_record(world_to_view, view_to_clip, size, turn=0, tile=None):
+    """The `view_record` of a pass over a picture, each of which takes other places of its samples.
+
+    size: (width, height) of the picture [samples]; turn: which pass, the first one as it is and the others a part of a
+    sample to the side, by an even sequence [Roberts18]; tile: (left, bottom, width, height) [samples] of what is drawn.
+    """
+    left, bottom, width, height = tile or (0, 0, *size)
+    shift, window = np.eye(4), np.eye(4)
+    shift[:2, 3] = (np.modf(turn * np.array([0.75487767, 0.56984029]) + 0.5)[0] - 0.5) * 2.0 / size
+    window[0, 0], window[1, 1] = size[0] / width, size[1] / height
+    window[0, 3] = (size[0] - 2.0 * left) / width - 1.0
+    window[1, 3] = (size[1] - 2.0 * bottom) / height - 1.0
+    # No strand is thinner than a sample: it would break into dots.
+    record = view_record(world_to_view, window @ shift @ view_to_clip, height, least_width=1.0)
+    record["coverage_turn"] = turn * 0.61803399 % 1.0
+    record["first_column"], record["first_row"] = left, bottom
     return record
 
 
@@ -119,6 +143,12 @@ def walk_strands(strands, program, record, lights, samplers, images, constants):
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
 
 
+def dispatch_over(program, size):
+    """Run a bound compute program once for every texel of a picture of this size."""
+    width, height = (-(-length // shaders.PICTURE_GROUP_SIZE) for length in size)
+    gpu.compute.dispatch(program, width, height, 1)
+
+
 def draw_surface(surface, color, view, lights, scene_samplers):
     """Draw a matt `SurfaceOnGPU`; color: linear RGB."""
     program = shaders.surface_program()
@@ -132,6 +162,11 @@ def draw_surface(surface, color, view, lights, scene_samplers):
 def draw_surface_depth(surface, view, lights, fragment="shadow_surface.frag"):
     """Draw a surface into a shadow map's first pass, or where it only hides: surface_hides.frag."""
     _draw(surface, shaders.surface_depth_program(fragment), view, uniforms.uniform_buffer(lights), {})
+
+
+def draw_triangles(surface, program, view, lights, samplers):
+    """Draw a surface's batch by a program of its own."""
+    _draw(surface, program, view, uniforms.uniform_buffer(lights), samplers)
 
 
 def _draw(batch, program, view, lights, samplers, count=0):
@@ -166,7 +201,7 @@ def upload_surface(positions, normals):
     vertices.attr_fill("normal", np.ascontiguousarray(normals, np.float32))
     row_corners = min(len(positions), TEXTURE_WIDTH)
     places = places_texture(positions[:, None], np.zeros((len(positions), 1), np.float32), row_corners)
-    return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners)
+    return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners, len(positions))
 
 
 def draw_cover(program, blocks, samplers):

@@ -1,12 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """All that a picture is drawn of, on the GPU: hair, the surfaces around it, lights and their shadow maps."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..core.errors import HairError
-from . import drawing, hair_cache, level_of_detail, scene, surroundings, uniforms, visibility
+from . import (
+    drawing,
+    hair_cache,
+    level_of_detail,
+    render_programs,
+    scene,
+    strand_textures,
+    surroundings,
+    uniforms,
+    visibility,
+)
 from . import lights as light_door
 from .shadows import SUN, ShadowMaps
 
@@ -24,43 +34,118 @@ class DrawnScene:
     """Read once by `read`, drawn from any number of views until something moves."""
 
     hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on, part in viewports)
-    surfaces: list  # (SurfaceOnGPU, linear RGB)
+    surfaces: list  # (SurfaceOnGPU, linear RGB, None of a holdout)
     lights: np.ndarray  # uniforms.LIGHTS
     world: light_door.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
     hair_visibility: list  # {sampler: texture} of the world's light on each of the hair
     surface_visibility: list
-    owners: tuple = ()  # session_uid of the object of each hair
+    owners: tuple = ()  # session_uid of the object of each hair; in a render `scene.owner_of` it
+    surface_owners: tuple = ()  # `scene.owner_of` each surface
 
 
-def read(blender_scene, view_layer, depsgraph, viewport=None, refused=None, before=None, is_draft=False):
+_EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
+
+
+def read(
+    blender_scene,
+    view_layer,
+    depsgraph,
+    viewport=None,
+    refused=None,
+    before=None,
+    is_draft=False,
+    is_hair_only=True,
+):
     """Bring a scene to the GPU and draw its shadow maps.
 
     viewport: the 3-D viewport whose visibility counts, None for a render; refused: called with the datablock and the
     `HairError` of hair that cannot be drawn, which otherwise is raised; before: the `DrawnScene` from before hair
-    changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse.
+    changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse; is_hair_only: whether
+    Blender draws the rest of a viewport.
     """
     hair, owners = _read_hair(view_layer, viewport, refused)
-    if viewport is not None and not hair:
-        # Blender draws the rest by itself: a scene without hair pays nothing for the add-on.
-        return DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
-    placed = [(strands, to_world) for strands, _, to_world, *_ in hair]
+    if viewport is not None and is_hair_only and not hair:
+        # A scene without hair pays nothing for the add-on.
+        return _EMPTY
     if before is None or before.shadow_maps is None:
-        meshes = scene.read_drawn_meshes(depsgraph, viewport)
-        surfaces = [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
+        surfaces = _upload(scene.read_drawn_meshes(depsgraph, viewport))
         world = light_door.read_world(blender_scene)
-        lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, placed)
-        shadow_maps = ShadowMaps(_MAP_SIZE, max(1, min(int(lights["count"]), _SHADOWED_LIGHTS)))
+        lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, _placed(hair))
+        shadow_maps = _new_shadow_maps(lights)
     else:
         surfaces, lights, world, shadow_maps = before.surfaces, before.lights, before.world, before.shadow_maps
-    batches = [surface.batch for surface, _ in surfaces]
+    placed, batches = _placed(hair), [surface.batch for surface, _ in surfaces]
     shadow_maps.draw(lights, placed, batches, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
     if is_draft and before is not None and _have_same_places(before.hair, hair):
         seen = before.hair_visibility, before.surface_visibility
     else:
-        opacities = [shading.opacity for _, shading, *_ in hair]
-        seen = visibility.measure(placed, [surface for surface, _ in surfaces], opacities)
+        seen = _visibility(hair, surfaces)
     return DrawnScene(hair, surfaces, lights, world, shadow_maps, *seen, owners)
+
+
+def read_render(depsgraph, known):
+    """The same for a render, whose depsgraph may be at another time than the file: hair as Blender has evaluated it.
+
+    known: {session_uid: (points, radii, random numbers, StrandsOnGPU)} of what was drawn a moment before, changed: what
+    stands still is not uploaded again.
+    """
+    unlit = read_unlit(depsgraph, known)
+    world = light_door.read_world(depsgraph.scene_eval)
+    lights = _lights(light_door.read_lights(depsgraph, for_render=True), world, _placed(unlit.hair))
+    shadow_maps = _new_shadow_maps(lights)
+    shadow_maps.draw(lights, _placed(unlit.hair), [surface.batch for surface, _ in unlit.surfaces], _SHADOW_STEPS)
+    hair_seen, surfaces_seen = _visibility(unlit.hair, unlit.surfaces)
+    return replace(
+        unlit,
+        lights=lights,
+        world=world,
+        shadow_maps=shadow_maps,
+        hair_visibility=hair_seen,
+        surface_visibility=surfaces_seen,
+    )
+
+
+def read_unlit(depsgraph, known):
+    """The same without anything that has to do with light: where things are."""
+    found = list(_read_rendered_hair(depsgraph, known))
+    meshes = scene.read_drawn_meshes(depsgraph)
+    hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)
+    surface_owners = tuple(mesh.owner for mesh in meshes)
+    return replace(_EMPTY, hair=hair, surfaces=_upload(meshes), owners=owners, surface_owners=surface_owners)
+
+
+def _upload(meshes):
+    return [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
+
+
+def _new_shadow_maps(lights):
+    return ShadowMaps(_MAP_SIZE, max(1, min(int(lights["count"]), _SHADOWED_LIGHTS)))
+
+
+def _placed(hair):
+    return [(strands, to_world) for strands, _, to_world, *_ in hair]
+
+
+def _visibility(hair, surfaces):
+    opacities = [shading.opacity for _, shading, *_ in hair]
+    return visibility.measure(_placed(hair), [surface for surface, _ in surfaces], opacities)
+
+
+def _read_rendered_hair(depsgraph, known):
+    for instance in depsgraph.object_instances:
+        hair_object = instance.object
+        original = hair_object.original.data
+        if hair_object.type != "CURVES" or original.vellus.kind != "HAIR" or not len(hair_object.data.curves):
+            continue
+        arrays = hair_cache.read_strands(hair_object.data)
+        uid = hair_object.original.session_uid
+        if uid not in known or not all(map(np.array_equal, arrays, known[uid])):
+            known[uid] = (*arrays, strand_textures.upload_strands(*arrays))
+        shading = hair_cache.shading_of(original.evaluated_get(depsgraph))  # its settings may be keyed
+        to_world = np.array(instance.matrix_world, np.float64)
+        color = scene.surface_color(original.surface)
+        yield (known[uid][-1], shading, to_world, color, 1.0), scene.owner_of(instance)
 
 
 def _read_hair(view_layer, viewport, refused):
@@ -134,11 +219,40 @@ def draw_hair(drawn, view, buffer, is_viewport=False):
     buffer.add_hair(hair, drawn.lights, view)
 
 
-def draw_surfaces(drawn, view):
-    """Draw all surfaces with depth test into the bound framebuffer."""
-    # The hair's shadow on a surface takes the first hair's colour: one colour a draw call.
+def draw_behind_hair(drawn, view, buffer, is_transparent):
+    """Fill a `HairBuffer` with the background, unless it is to be left empty, and with all surfaces."""
+    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
+    with buffer.surfaces(background):
+        if drawn.world.image is not None and not is_transparent:
+            surroundings.draw_background(drawn.world, view, *buffer.size)
+        draw_surfaces(drawn, view)
+
+
+def draw_arrival(drawn, view, buffer):
+    """A texture of how much of the lights arrives at what a `HairBuffer` shows; hair was added to it last."""
+    _see_through_hair(drawn, view)
+    with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        for surface, color in drawn.surfaces:
+            if color is None:
+                drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
+                continue
+            program = render_programs.surface_arrival_program()
+            drawing.draw_triangles(surface.batch, program, view, drawn.lights, drawn.shadow_maps.samplers)
+    return buffer.part_by(render_programs.strand_arrival_program())
+
+
+def _see_through_hair(drawn, view):
+    """The hair's shadow on a surface takes the first hair's colour: one colour a draw call."""
     if drawn.hair:
         view["hair_forward"][:3], view["seen_opacity"] = drawn.hair[0][1].forward, drawn.hair[0][1].opacity
+
+
+def draw_surfaces(drawn, view):
+    """Draw all surfaces with depth test into the bound framebuffer."""
+    _see_through_hair(drawn, view)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, color), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=True):
+            if color is None:
+                drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
+                continue
             drawing.draw_surface(surface, color, view, drawn.lights, drawn.shadow_maps.samplers | seen)

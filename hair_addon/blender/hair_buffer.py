@@ -5,34 +5,57 @@ Strands overlap many times over, and only what is seen is shaded: once a sample,
 compute program [Burns13]. Where the graphics driver can, one finds the nearest strands too.
 """
 
+from dataclasses import dataclass
+
 import gpu
+import numpy as np
 
 from ..core.shading import dual_scattering
 from . import drawing, shaders, uniforms
-from .strand_textures import seen_points
+from .hair_shading import Shading
+from .strand_textures import StrandsOnGPU, seen_points
 
 _NO_SEGMENT = 0x7FFFFFFF  # beyond all that there can be
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A hair in a picture, and which of all segments are its own."""
+
+    strands: StrandsOnGPU
+    shading: Shading
+    record: np.ndarray  # uniforms.VIEW
+    samplers: dict
+    first: int
+
+    @property
+    def segment_count(self):
+        return self.strands.strand_count * (int(self.record["drawn_points"]) - 1)
+
+
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 class HairBuffer:
     """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
 
-    color: linear light, premultiplied; depths: of hair where color has any, the bits of floats from 0 to 1.
+    color: linear light, premultiplied; segments: of strands, what is nearest; surface_depth: of surfaces, from 0 to 1;
+    depths: of hair where there is any, the bits of floats from 0 to 1.
     """
 
     def __init__(self, width, height):
         self.size = (width, height)
         self.color = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
-        self._segments = gpu.types.GPUTexture(self.size, format="R32UI")
-        self._surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
-        self._ranges = []  # (first, count) of each hair's segments
-        self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self._surface_depth)
-        self._strips = gpu.types.GPUFrameBuffer(
-            color_slots=(self._segments, self.depths), depth_slot=self._surface_depth
-        )
+        self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
+        self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+        self._hair = []  # _Placed
+        self._lights = None
+        self._parts = {}  # format → (framebuffer, texture, depth) of what is drawn beside the picture
+        self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
+        self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
-    def surfaces(self, background=(0.0, 0.0, 0.0, 0.0)):
+    def surfaces(self, background=_NOTHING):
         """The framebuffer that surfaces are drawn into, bound and cleared: a context manager."""
         return drawing.cleared(self._surfaces, background)
 
@@ -43,10 +66,9 @@ class HairBuffer:
         lights, view: records of `uniforms`; in_compute: whether a compute program finds the nearest strands, None:
         where it can.
         """
-        self._segments.clear(format="UINT", value=(_NO_SEGMENT,))
+        self.segments.clear(format="UINT", value=(_NO_SEGMENT,))
         draw = self._find if (shaders.has_image_atomics() if in_compute is None else in_compute) else self._draw_strips
-        placed, first = [], 0
-        self._ranges = []
+        self._hair, first = [], 0
         for strands, shading, to_world, surface_color, samplers, steps in hair:
             record = drawing.strand_record(strands, view, to_world, steps)
             record["seen_points"] = seen_points(strands.point_count)
@@ -54,60 +76,93 @@ class HairBuffer:
             record["hair_forward"][:3] = shading.forward
             record["surface_color"][:3] = surface_color
             record["back_gain"] = dual_scattering.BACK_GAIN
-            placed.append((strands, shading, record, samplers, first))
-            self._ranges.append((first, _segment_count(strands, record)))
-            first += _segment_count(strands, record)
-        light_block = uniforms.uniform_buffer(lights)
-        draw([(strands, record, first) for strands, _shading, record, _samplers, first in placed], light_block)
-        for strands, shading, record, samplers, first in placed:
-            self._shade(strands, shading, record, light_block, samplers, first)
+            self._hair.append(_Placed(strands, shading, record, samplers, first))
+            first += self._hair[-1].segment_count
+        self._lights = uniforms.uniform_buffer(lights)
+        draw()
+        for placed in self._hair:
+            self._shade(placed, placed.shading.program, self.color)
+
+    def surfaces_of_part(self, texture_format=shaders.PICTURE_FORMAT):
+        """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`."""
+        if texture_format not in self._parts:
+            # A framebuffer does not hold its textures.
+            texture = gpu.types.GPUTexture(self.size, format=texture_format)
+            depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+            framebuffer = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
+            self._parts[texture_format] = framebuffer, texture, depth
+        return drawing.cleared(self._parts[texture_format][0], _NOTHING)
+
+    def part_by(self, program, texture_format=shaders.PICTURE_FORMAT, inputs=None):
+        """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.
+
+        inputs: of each hair ({instance: record}, {sampler: texture}) that the program reads beside the scene.
+        """
+        texture = self._parts[texture_format][1]
+        for placed, (records, textures) in zip(self._hair, inputs or [({}, {})] * len(self._hair), strict=True):
+            blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
+            self._fill(placed, program, texture, blocks, textures)
+        return texture
+
+    def part_of_light(self, lobes, world):
+        """A texture of a part of the light of the hair that was added last, premultiplied.
+
+        lobes: (4,) how much of R, TT, TRT and all else that comes from lights; world: how much of the world's.
+        """
+        with self.surfaces_of_part():
+            pass
+        texture = self._parts[shaders.PICTURE_FORMAT][1]
+        for placed in self._hair:
+            program = placed.shading.parts_program()
+            program.bind()
+            program.uniform_float("drawn_lobes", lobes)
+            program.uniform_float("drawn_world", world)
+            self._shade(placed, program, texture)
+        return texture
 
     def hair_at(self, x, y):
         """Which of the hair that was added last is nearest in a sample, counted from 0; None where there is none."""
         with self._strips.bind():  # a framebuffer that was never bound has no size
             segment = int(self._strips.read_color(x, y, 1, 1, 1, 0, "UINT")[0][0][0])
-        found = [index for index, (first, count) in enumerate(self._ranges) if first <= segment < first + count]
-        return found[0] if found else None
+        within = [placed.first <= segment < placed.first + placed.segment_count for placed in self._hair]
+        return within.index(True) if any(within) else None
 
-    def _find(self, placed, lights):
+    def _find(self):
         """The nearest segments, by a compute program: all depths first, then whose they are."""
         program = shaders.surface_depths_program()
-        with drawing.bound(program, {}, {"surface_depth": self._surface_depth}):
+        with drawing.bound(program, {}, {"surface_depth": self.surface_depth}):
             program.image("depths", self.depths)
-            self._dispatch(program)
+            drawing.dispatch_over(program, self.size)
         program = shaders.segments_program()
-        images = {"depths": self.depths, "segments": self._segments}
+        images = {"depths": self.depths, "segments": self.segments}
         for is_depth in (1, 0):
-            for strands, record, first in placed:
-                constants = {"first_segment": first, "is_depth": is_depth}
-                drawing.walk_strands(strands, program, record, lights, {}, images, constants)
+            for placed in self._hair:
+                constants = {"first_segment": placed.first, "is_depth": is_depth}
+                drawing.walk_strands(placed.strands, program, placed.record, self._lights, {}, images, constants)
 
-    def _draw_strips(self, placed, lights):
+    def _draw_strips(self):
         """The nearest segments, as strips of triangles that the graphics driver draws."""
         program = shaders.strip_segments_program()
         with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-            for strands, record, first in placed:
+            for placed in self._hair:
                 program.bind()
-                program.uniform_int("first_segment", first)
-                drawing.draw_strip(strands, program, record, lights)
+                program.uniform_int("first_segment", placed.first)
+                drawing.draw_strip(placed.strands, program, placed.record, self._lights)
 
-    def _shade(self, strands, shading, record, lights, samplers, first):
-        """Fill the samples in which a strand of this hair is nearest with its light."""
-        program = shading.program
-        textures = {"segments": self._segments, "strands": strands.texture, **shading.samplers, **samplers}
-        if shading.is_varied:
-            textures["strand_randoms"] = strands.randoms
-        blocks = {"view": uniforms.uniform_buffer(record), "lights": lights, **shading.blocks}
+    def _shade(self, placed, program, picture):
+        """Fill the samples in which a strand of a hair is nearest with its light."""
+        shading = placed.shading
+        textures = (
+            {**shading.samplers, "strand_randoms": placed.strands.randoms} if shading.is_varied else shading.samplers
+        )
+        self._fill(placed, program, picture, shading.blocks, textures)
+
+    def _fill(self, placed, program, picture, blocks, textures):
+        """Run a program on the samples in which a strand of a hair is nearest."""
+        blocks = {"view": uniforms.uniform_buffer(placed.record), "lights": self._lights, **blocks}
+        textures = {"segments": self.segments, "strands": placed.strands.texture, **placed.samplers, **textures}
         with drawing.bound(program, blocks, textures):
-            program.image("picture", self.color)
-            program.uniform_int("first_segment", first)
-            program.uniform_int("segment_count", _segment_count(strands, record))
-            self._dispatch(program)
-
-    def _dispatch(self, program):
-        width, height = (-(-length // shaders.PICTURE_GROUP_SIZE) for length in self.size)
-        gpu.compute.dispatch(program, width, height, 1)
-
-
-def _segment_count(strands, record):
-    return strands.strand_count * (int(record["drawn_points"]) - 1)
+            program.image("picture", picture)
+            program.uniform_int("first_segment", placed.first)
+            program.uniform_int("segment_count", placed.segment_count)
+            drawing.dispatch_over(program, self.size)

@@ -145,6 +145,11 @@ def _read(datablock):
         is_there = len(datablock.curves) == count
         randoms = curves.read_randoms(datablock) if is_there else strands.random_numbers(count)
         return bound.points, np.tile(bound.radii, (count, 1)), randoms
+    return read_strands(datablock)
+
+
+def read_strands(datablock):
+    """The same of any Curves as they are stored or evaluated. Raises `HairError`."""
     counts = curves.point_counts(datablock)
     if not len(counts):
         raise HairError(f'"{datablock.name}" has no strands to draw.')

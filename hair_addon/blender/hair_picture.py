@@ -46,7 +46,7 @@ class HairPicture:
 
         world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not hide hair.
         """
-        view = self._view(world_to_view, view_to_clip)
+        view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, self.pass_count)
         with self._pass.surfaces():
             if not is_see_through:
                 drawn_scene.draw_hiding(drawn, view)
@@ -56,16 +56,6 @@ class HairPicture:
                 self._sum.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
             self._accumulate()
         self.pass_count += 1
-
-    def _view(self, world_to_view, view_to_clip):
-        """The camera of the next pass: a part of a sample to the side, by an even sequence [Roberts18]."""
-        samples = np.array(self.size) * self._per_side
-        shift = np.eye(4)
-        shift[:2, 3] = (np.modf(self.pass_count * np.array([0.75487767, 0.56984029]) + 0.5)[0] - 0.5) * 2.0 / samples
-        # No strand is thinner than a sample: it would break into dots.
-        view = drawing.view_record(world_to_view, shift @ view_to_clip, samples[1], least_width=1.0)
-        view["coverage_turn"] = self.pass_count * 0.61803399
-        return view
 
     def _accumulate(self):
         program = shaders.accumulate_program()

@@ -1,7 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A model's settings and tables → the program that shades strands, with all that it reads beside the scene."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 
 import gpu
 import numpy as np
@@ -22,6 +24,7 @@ class Shading:
     """What a shader of strands needs on the GPU beside the scene."""
 
     program: gpu.types.GPUShader
+    parts_program: Callable[[], gpu.types.GPUShader]  # the same for a part of the light; compiled where it is asked for
     blocks: dict = field(default_factory=dict)  # {instance: GPUUniformBuf}
     samplers: dict = field(default_factory=dict)
     forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # passed on to strands behind
@@ -77,10 +80,12 @@ def _shading(file, blocks, arrays, forward, is_varied=False):
     if is_varied:
         kinds.append(("strand_randoms", "FLOAT_2D"))
     classes = tuple((instance, type(settings)) for instance, settings in blocks.items())
-    program = shaders.shading_program(file, classes, tuple(kinds))
+    wanted = file, classes, tuple(kinds)
+    program = shaders.shading_program(*wanted)
+    parts_program = partial(shaders.shading_program, *wanted, in_parts=True)
     buffers = {instance: uniforms.uniform_buffer(uniforms.fill(settings)) for instance, settings in blocks.items()}
     textures = {name: _table_texture(array) for name, array in arrays.items()}
-    return Shading(program, buffers, textures, forward, is_varied)
+    return Shading(program, parts_program, buffers, textures, forward, is_varied)
 
 
 def _table_texture(array):

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..core.groom import GuideSettings, HairSettings
 from ..core.params import declared, label_of
+from ..core.picture import PassSettings, RenderSettings
 from ..core.shading import appearance, lookup_tables
 from ..core.shading.appearance import Appearance
 from .translations import CONTEXT
@@ -129,6 +130,10 @@ def _mark_geometry(group, _context):
     group.id_data.update_tag()
 
 
+def _renew_passes(_group, context):
+    context.view_layer.update_render_passes()
+
+
 def _mark_shading(group, _context):
     group.id_data.vellus.is_shading_stale = True
     group.id_data.update_tag()
@@ -231,22 +236,40 @@ class VellusCurves(bpy.types.PropertyGroup):
     status: bpy.props.StringProperty(description="Why this could not be made again", options={"HIDDEN"})
 
 
+class VellusRenderSettings(bpy.types.PropertyGroup):
+    """How Vellus renders a scene"""
+
+    __annotations__ = annotations(RenderSettings)
+
+
+class VellusPassSettings(bpy.types.PropertyGroup):
+    """Which passes Vellus renders of a view layer"""
+
+    __annotations__ = annotations(PassSettings, _renew_passes)
+
+
 CLASSES = (
     VellusGuideSettings,
     VellusHairSettings,
     VellusAppearance,
     VellusMarschnerSettings,
     VellusCurves,
+    VellusRenderSettings,
+    VellusPassSettings,
 )
 
 
 def register():
-    """Attach the settings to every Curves datablock."""
+    """Attach the settings to every Curves datablock, scene and view layer."""
     bpy.types.Curves.vellus = bpy.props.PointerProperty(type=VellusCurves)
+    bpy.types.Scene.vellus = bpy.props.PointerProperty(type=VellusRenderSettings)
+    bpy.types.ViewLayer.vellus = bpy.props.PointerProperty(type=VellusPassSettings)
 
 
 def unregister():
     """Take them away again; what is stored in files stays there."""
+    del bpy.types.ViewLayer.vellus
+    del bpy.types.Scene.vellus
     del bpy.types.Curves.vellus
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ..core.errors import HairError
 from ..core.long_work import Stage, run_now
 from ..core.params import Settings, param
-from . import drawing, drawn_scene, hair_buffer, scene, surroundings
+from . import drawing, drawn_scene, hair_buffer, scene
 
 
 @dataclass(frozen=True)
@@ -48,23 +48,14 @@ def drawing_picture(settings):
     context = bpy.context
     depsgraph = context.evaluated_depsgraph_get()
     world_to_view, view_to_clip = scene.read_camera(context.scene, depsgraph, settings.width, settings.height)
-    # No strand is thinner than one of a pixel's samples: it would break into dots.
-    view = drawing.view_record(world_to_view, view_to_clip, height, least_width=1.0)
+    view = drawing.pass_record(world_to_view, view_to_clip, (width, height))
     drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
     buffer = hair_buffer.HairBuffer(width, height)
     yield Stage("Drawing surfaces", 0.4)
-    _draw_surfaces(drawn, view, buffer, settings.is_transparent)
+    drawn_scene.draw_behind_hair(drawn, view, buffer, settings.is_transparent)
     yield Stage("Drawing hair", 0.5)
     drawn_scene.draw_hair(drawn, view, buffer)
     return _resolved(buffer, settings)
-
-
-def _draw_surfaces(drawn, view, buffer, is_transparent):
-    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
-    with buffer.surfaces(background):
-        if drawn.world.image is not None and not is_transparent:
-            surroundings.draw_background(drawn.world, view, *buffer.size)
-        drawn_scene.draw_surfaces(drawn, view)
 
 
 def _resolved(buffer, settings):

@@ -2,7 +2,7 @@
 """The door for surfaces and cameras: Blender's data → arrays."""
 
 import hashlib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import bpy
@@ -257,11 +257,12 @@ def curves_objects(view_layer, kind, viewport=None):
     ]
 
 
-def read_camera(scene, depsgraph, width, height):
-    """(world to view, view to clip), each (4, 4) float64, of the scene's camera for a picture of this size."""
-    if scene.camera is None:
+def read_camera(scene, depsgraph, width, height, camera=None):
+    """(world to view, view to clip), each (4, 4) float64, of a camera, the scene's own, for a picture of this size."""
+    camera = camera or scene.camera
+    if camera is None:
         raise HairError("The scene has no camera to look through: add one.")
-    camera = scene.camera.evaluated_get(depsgraph)
+    camera = camera.evaluated_get(depsgraph)
     render = scene.render
     view_to_clip = camera.calc_matrix_camera(
         depsgraph, x=width, y=height, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y
@@ -273,13 +274,32 @@ def read_camera(scene, depsgraph, width, height):
     return np.array(view_to_world.inverted(), np.float64), np.array(view_to_clip, np.float64)
 
 
+def picture_size(render):
+    """((width, height), (left, bottom, width, height)) of a whole picture and of what is rendered of it [pixels].
+
+    render: a scene's `RenderSettings`, which may have a border.
+    """
+    part = 0.01 * render.resolution_percentage
+    width, height = max(int(render.resolution_x * part), 1), max(int(render.resolution_y * part), 1)
+    if not render.use_border:
+        return (width, height), (0, 0, width, height)
+    # As Blender rounds them.
+    left, right = int(render.border_min_x * width), int(render.border_max_x * width)
+    bottom, top = int(render.border_min_y * height), int(render.border_max_y * height)
+    return (width, height), (left, bottom, right - left, top - bottom)
+
+
 @dataclass(frozen=True)
 class DrawnMesh:
-    """Triangles as they are drawn: (3 F, 3) float32 corner positions [m] and unit normals in world space, colour."""
+    """Triangles as they are drawn: (3 F, 3) float32 corner positions [m] and unit normals in world space, colour.
+
+    A holdout has none: where it is nearest the picture is empty. owner: `owner_of` it.
+    """
 
     positions: np.ndarray
     normals: np.ndarray
-    color: tuple
+    color: tuple | None
+    owner: tuple = ()
 
 
 def read_drawn_meshes(depsgraph, viewport=None):
@@ -287,8 +307,16 @@ def read_drawn_meshes(depsgraph, viewport=None):
     meshes = []
     for instance in depsgraph.object_instances:
         if instance.object.type == "MESH" and instance.show_self and _is_surface_seen(instance, viewport):
-            meshes.append(_read_drawn_mesh(instance.object, np.array(instance.matrix_world, np.float64)))
+            is_holdout = viewport is None and instance.object.original.holdout_get(view_layer=depsgraph.view_layer)
+            matrix = np.array(instance.matrix_world, np.float64)
+            meshes.append(replace(_read_drawn_mesh(instance.object, matrix, is_holdout), owner=owner_of(instance)))
     return [mesh for mesh in meshes if len(mesh.positions)]
+
+
+def owner_of(instance):
+    """What tells an instance of a depsgraph from all others, in every frame."""
+    parent = instance.parent.original.session_uid if instance.is_instance else 0
+    return instance.object.original.session_uid, parent, tuple(instance.persistent_id)
 
 
 def _is_surface_seen(instance, viewport):
@@ -298,7 +326,7 @@ def _is_surface_seen(instance, viewport):
     return placed.original.visible_in_viewport_get(viewport) and instance.object.display_type in {"TEXTURED", "SOLID"}
 
 
-def _read_drawn_mesh(mesh_object, to_world):
+def _read_drawn_mesh(mesh_object, to_world, is_holdout):
     mesh = mesh_object.to_mesh()
     try:
         vertices = _vertex_positions(mesh)
@@ -311,7 +339,8 @@ def _read_drawn_mesh(mesh_object, to_world):
     positions = vertices[corners] @ to_world[:3, :3].T + to_world[:3, 3]
     normals = loop_normals[loops] @ np.linalg.pinv(to_world[:3, :3])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), surface_color(mesh_object))
+    color = None if is_holdout else surface_color(mesh_object)
+    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), color)
 
 
 def surface_color(mesh_object):

@@ -18,9 +18,12 @@ FOLDER = Path(__file__).resolve().parents[2] / "shaders"
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 
 
-def expand(name):
-    """(text, lines): the file with every #include put in its place once, and each line's (file, number)."""
-    text, lines, seen = [], [], set()
+def expand(name, skipped=()):
+    """(text, lines): the file with every #include but those of `skipped` put in its place once.
+
+    lines: each line's (file, number).
+    """
+    text, lines, seen = [], [], set(skipped)
 
     def add(file):
         if file in seen:
@@ -46,7 +49,7 @@ VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z")  # see shaders/world_vi
 VISIBILITY_TARGETS = ("seen_x_y", "seen_z")
 
 
-def _scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
+def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
     """What every shader of the scene sees: camera and lights, the shadow maps drawn so far, what the world lights."""
     info.typedef_source(uniforms.VIEW.source + uniforms.LIGHT.source + uniforms.LIGHTS.source + structs)
     info.uniform_buf(0, "View", "view")
@@ -71,7 +74,7 @@ def strip_program(fragment, shadow_samplers=(), targets=_COLOR):
     """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it."""
     info = gpu.types.GPUShaderCreateInfo()
     _strip(info, shadow_samplers)
-    return _compile(info, "strand.vert", fragment, targets)
+    return compile_drawing(info, "strand.vert", fragment, targets)
 
 
 @cache
@@ -80,11 +83,11 @@ def strip_segments_program():
     info = gpu.types.GPUShaderCreateInfo()
     _strip(info, ())
     info.push_constant("INT", "first_segment")
-    return _compile(info, "strand.vert", "strand_segments.frag", (("segment", "UINT"), ("depth", "UINT")))
+    return compile_drawing(info, "strand.vert", "strand_segments.frag", (("segment", "UINT"), ("depth", "UINT")))
 
 
 def _strip(info, shadow_samplers):
-    _scene(info, shadow_samplers=shadow_samplers, is_lit=False)
+    declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
     info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "strands")
     varying = gpu.types.GPUStageInterfaceInfo("strand_varying")
     varying.smooth("VEC3", "drawn_position")
@@ -112,14 +115,14 @@ def strand_shadow_program():
 
 def _walk(file, images, constants, shadow_samplers=()):
     info = gpu.types.GPUShaderCreateInfo()
-    _scene(info, shadow_samplers=shadow_samplers, is_lit=False)
+    declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
     info.local_group_size(RUN_GROUP_SIZE)
     info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "strands")
     for slot, name in enumerate(images):
         info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
     for name in constants:
         info.push_constant("INT", name)
-    return _compile_compute(info, file)
+    return compile_compute(info, file)
 
 
 PICTURE_GROUP_SIZE = 8  # samples along each side of what one work group of a picture's programs fills
@@ -132,56 +135,70 @@ def surface_depths_program():
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     info.sampler(0, "FLOAT_2D", "surface_depth")
     info.image(0, "R32UI", "UINT_2D", "depths", qualifiers={"WRITE"})
-    return _compile_compute(info, "surface_depths.comp")
+    return compile_compute(info, "surface_depths.comp")
 
 
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 
 
 @cache
-def shading_program(file, blocks=(), tables=()):
+def shading_program(file, blocks=(), tables=(), in_parts=False):
     """The compute program that shades strands: a model's .comp, its blocks and its samplers of tables.
 
-    blocks: (instance, class of settings), ...; tables: (sampler, type), ...
+    blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: whether just a part of the light
+    is drawn, by the constants of include/drawn_light.glsl.
+    """
+    structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
+    info = strand_samples_info("".join(block.source for block in structs), tables)
+    for slot, ((instance, _class), block) in enumerate(zip(blocks, structs, strict=True), start=2):
+        info.uniform_buf(slot, block.type_name, instance)
+    if not in_parts:
+        return compile_compute(info, file)
+    info.push_constant("VEC4", "drawn_lobes")
+    info.push_constant("FLOAT", "drawn_world")
+    return compile_compute(info, file, skipped=("include/drawn_light.glsl",))
+
+
+def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT):
+    """Info of a program that includes strand_samples.glsl.
+
+    samplers: (name, type), ... beside the scene's; texture_format: of what it fills.
     """
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
-    structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
-    _scene(info, "".join(block.source for block in structs))
-    for slot, ((instance, _class), block) in enumerate(zip(blocks, structs, strict=True), start=2):
-        info.uniform_buf(slot, block.type_name, instance)
+    declare_scene(info, structs)
     first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
-    samplers = (("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *tables)
-    for slot, (name, kind) in enumerate(samplers, start=first):
+    for slot, (name, kind) in enumerate((("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *samplers), start=first):
         info.sampler(slot, kind, name)
-    info.image(0, PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"WRITE"})
     for name in ("first_segment", "segment_count"):
         info.push_constant("INT", name)
-    return _compile_compute(info, file)
+    return info
 
 
 @cache
 def surface_program():
     """The program that draws a matt surface: attributes position, normal; uniform surface_color."""
-    info, varying = _surface()
-    _scene(info)
+    info, varying = surface_info()
+    declare_scene(info)
     info.push_constant("VEC3", "surface_color")
     varying.smooth("VEC4", "corner_seen_x_y")
     varying.smooth("VEC2", "corner_seen_z")
     info.vertex_out(varying)
-    return _compile(info, "lit_surface.vert", "surface.frag")
+    return compile_drawing(info, "lit_surface.vert", "surface.frag")
 
 
 @cache
 def surface_depth_program(fragment="shadow_surface.frag"):
     """The program that draws a surface into a shadow map, or one that only hides."""
-    info, varying = _surface()
-    _scene(info, shadow_samplers=(), is_lit=False)
+    info, varying = surface_info()
+    declare_scene(info, shadow_samplers=(), is_lit=False)
     info.vertex_out(varying)
-    return _compile(info, "surface.vert", fragment)
+    return compile_drawing(info, "surface.vert", fragment)
 
 
-def _surface():
+def surface_info():
+    """(info, varying) of a program that draws triangles with the attributes position and normal."""
     info = gpu.types.GPUShaderCreateInfo()
     info.vertex_in(0, "VEC3", "position")
     info.vertex_in(1, "VEC3", "normal")
@@ -195,9 +212,9 @@ def _surface():
 def visibility_program():
     """The program that adds up how much of the world the texels of `places` see, in two targets."""
     info = gpu.types.GPUShaderCreateInfo()
-    _scene(info, is_lit=False)
+    declare_scene(info, is_lit=False)
     info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "places")
-    return _compile(info, "cover.vert", "world_visibility.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
+    return compile_drawing(info, "cover.vert", "world_visibility.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
 
 
 @cache
@@ -225,7 +242,7 @@ def _shadow_filter(fragment, kind, sampler, constants=()):
     for constant in constants:
         info.push_constant(*constant)
     info.sampler(0, kind, sampler)
-    return _compile(info, "cover.vert", fragment)
+    return compile_drawing(info, "cover.vert", fragment)
 
 
 @cache
@@ -235,7 +252,7 @@ def environment_program(fragment):
     info.typedef_source(uniforms.ENVIRONMENT.source)
     info.uniform_buf(0, "Environment", "environment")
     info.sampler(0, "FLOAT_2D", "surroundings")
-    return _compile(info, "cover.vert", fragment)
+    return compile_drawing(info, "cover.vert", fragment)
 
 
 @cache
@@ -244,7 +261,7 @@ def resolve_program():
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("INT", "samples_per_side")
     info.sampler(0, "FLOAT_2D", "picture")
-    return _compile(info, "cover.vert", "resolve.frag")
+    return compile_drawing(info, "cover.vert", "resolve.frag")
 
 
 MOVE_GROUP_SIZE = 64  # points that one work group of `move_program` brings to their places
@@ -259,7 +276,7 @@ def move_program():
     info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
     for name in ("moved_count", "point_count", "row_strands", "moved_row_strands"):
         info.push_constant("INT", name)
-    return _compile_compute(info, "move_strands.comp")
+    return compile_compute(info, "move_strands.comp")
 
 
 @cache
@@ -271,7 +288,7 @@ def accumulate_program():
     info.sampler(0, "FLOAT_2D", "picture")
     info.sampler(1, "UINT_2D", "depths")
     info.depth_write("ANY")
-    return _compile(info, "cover.vert", "accumulate.frag")
+    return compile_drawing(info, "cover.vert", "accumulate.frag")
 
 
 @cache
@@ -286,14 +303,14 @@ def display_program():
     info.sampler(1, "FLOAT_2D", "depths")
     info.sampler(2, "FLOAT_3D", "display_table")
     info.depth_write("ANY")
-    return _compile(info, "cover.vert", "display.frag")
+    return compile_drawing(info, "cover.vert", "display.frag")
 
 
 _complaints = {}  # files of a program → what was wrong with them
 
 
-def _compile(info, vertex, fragment, targets=_COLOR):
-    """targets: (output, type), ... of the fragment shader."""
+def compile_drawing(info, vertex, fragment, targets=_COLOR):
+    """The program of a vertex and a fragment shader; targets: (output, type), ... of the latter. Raises `HairError`."""
     vertex_text, vertex_lines = expand(vertex)
     fragment_text, fragment_lines = expand(fragment)
     info.vertex_source(vertex_text)
@@ -303,8 +320,9 @@ def _compile(info, vertex, fragment, targets=_COLOR):
     return _create(info, (vertex, fragment), vertex_lines, fragment_lines)
 
 
-def _compile_compute(info, file):
-    text, lines = expand(file)
+def compile_compute(info, file, skipped=()):
+    """The compute program of a file, without the includes of `skipped`. Raises `HairError`."""
+    text, lines = expand(file, skipped)
     info.compute_source(text)
     return _create(info, (file,), [], lines)
 

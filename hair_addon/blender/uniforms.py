@@ -81,6 +81,8 @@ VIEW = Block(
         "back_gain": "float",  # of what comes back from behind a strand
         "light_index": "int",  # the light that a shadow pass looks from
         "coverage_turn": "float",  # by which a pass takes other samples of thin strands
+        "first_column": "int",  # of the picture's samples, where what is drawn is a tile of it
+        "first_row": "int",
     },
 )
 LIGHT = Block(
@@ -106,6 +108,16 @@ LIGHTS = Block(
         "light": (LIGHT, LIGHT_CAPACITY),
         "world": ("vec4", 6),  # mean radiance of the world's sides, in the order of `sphere.SIDES`
         "count": "int",
+    },
+)
+
+MOTION = Block(
+    "Motion",
+    {
+        "before_to_clip": "mat4",  # of what strands or surfaces have their places in, a frame before
+        "now_to_clip": "mat4",
+        "after_to_clip": "mat4",
+        "size": "vec4",  # width and height of the whole picture [pixels]
     },
 )
 

@@ -20,6 +20,8 @@ from .display_transform import DisplayTransform
 # Pixels: guides are lines that can be picked out at any distance.
 _GUIDE_WIDTH = 2.0
 
+ENGINE = "VELLUS"  # name of our render engine
+
 _handles = []
 _drawn = {}  # viewport → DrawnScene, until something moves
 _outdated = {}  # viewport → DrawnScene from before its hair changed, and nothing else
@@ -76,6 +78,11 @@ def draw():
     Nothing that is wrong with hair may keep the viewport from being drawn: it is said once, and the hair is left out.
     """
     context = bpy.context
+    with drawing.ALONE:
+        _draw(context)
+
+
+def _draw(context):
     try:
         if context.space_data.shading.type != "RENDERED":  # there the render engine draws hair by itself
             _draw_hair(context)
@@ -89,7 +96,7 @@ def draw():
 
 def _draw_hair(context):
     viewport, region = context.space_data, context.region
-    drawn = _drawn_scene(context)
+    drawn = drawn_scene_of(context)
     if not drawn.hair:
         return
     xray = _xray(viewport.shading)
@@ -102,6 +109,11 @@ def _draw_hair(context):
     )
     if not picture.is_fine:
         region.tag_redraw()
+
+
+def is_ours(context):
+    """Whether all of a viewport is drawn by our render engine."""
+    return context.space_data.shading.type == "RENDERED" and context.scene.render.engine == ENGINE
 
 
 def hair_at(context, x, y):
@@ -117,9 +129,10 @@ def hair_at(context, x, y):
     return next((o for o in context.view_layer.objects if o.session_uid == uid), None)
 
 
-def _drawn_scene(context):
+def drawn_scene_of(context):
+    """The `DrawnScene` of the context's viewport, read if something has moved."""
     viewport = context.space_data
-    key, shows = viewport.as_pointer(), _what_shows(viewport)
+    key, shows = viewport.as_pointer(), (is_ours(context), *_what_shows(viewport))
     if _shown.get(key) != shows:
         # What one viewport leaves out is no change of the scene.
         _drawn.pop(key, None), _outdated.pop(key, None)
@@ -133,6 +146,7 @@ def _drawn_scene(context):
             hair_cache.refuse,
             before=_outdated.pop(key, None),
             is_draft=bindings.has_unwritten(),
+            is_hair_only=not is_ours(context),
         )
     return _drawn[key]
 
@@ -168,11 +182,11 @@ def _picture(drawn, view, region, is_see_through):
         kept.picture.restart()
         kept.drawn, kept.seen = drawn, seen
     if not kept.picture.is_fine:
-        kept.picture.add_pass(drawn, *_matrices(view), is_see_through)
+        kept.picture.add_pass(drawn, *matrices_of(view), is_see_through)
     return kept.picture
 
 
-def _matrices(view):
+def matrices_of(view):
     """(world to view, view to clip) of a `RegionView3D`, each (4, 4) float64."""
     return np.array(view.view_matrix, np.float64), np.array(view.window_matrix, np.float64)
 
@@ -186,8 +200,8 @@ def _draw_guides(context):
     viewport = context.space_data
     guide_objects = scene.curves_objects(context.view_layer, "GUIDES", viewport)
     if guide_objects:
-        lights = _drawn_scene(context).lights
-        view = drawing.view_record(*_matrices(context.region_data), context.region.height, _GUIDE_WIDTH)
+        lights = drawn_scene_of(context).lights
+        view = drawing.view_record(*matrices_of(context.region_data), context.region.height, _GUIDE_WIDTH)
         for guide_object in guide_objects:
             _draw_guide_object(guide_object, view, lights)
 

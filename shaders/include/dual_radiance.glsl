@@ -6,6 +6,7 @@
 // FibreLobes half_circle_lobes(vec2 at) N, for light from a half circle
 // vec3 dual(int row, float theta_i)     what the strands around do, rows as in `dual_scattering.QUANTITIES`
 
+#include "include/drawn_light.glsl"
 #include "include/dual_scattering.glsl"
 #include "include/marschner.glsl"
 
@@ -24,7 +25,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
 {
   float sin_o = dot(T, V);
   vec2 at = n_coordinates(relative_azimuth(T, L, V), sin_from_cos(sin_o), settings.axes);
-  return lobe_sum(fibre_m(dot(T, L), sin_o, blur), fibre_lobes(at));
+  return lobe_sum(drawn_lobes * fibre_m(dot(T, L), sin_o, blur), fibre_lobes(at));
 }
 
 // `dual_scattering.radiance`. Shifts and widths are the mean over the channels, which differ little in them.
@@ -38,7 +39,7 @@ vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
   float phi = relative_azimuth(T, L, V);
 
   float beta_f = mean(dual(4, theta_i));
-  vec3 back = dual(6, theta_i) * (view.back_gain / PI);
+  vec3 back = drawn_lobes.w * dual(6, theta_i) * (view.back_gain / PI);
   float back_shift = 2.0 * mean(dual(7, theta_i));
   float back_width = mean(dual(8, theta_i));
   // Variances of theta_h are quarters of those of theta_i + theta_o.
@@ -48,7 +49,7 @@ vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
                 back * back_azimuth(phi) * shifted_lobe(sin_i, cos_i, sin_o, cos_o, back_shift, back_v);
 
   vec2 at = n_coordinates(phi, cos_o, settings.axes);
-  vec3 through = lobe_sum(fibre_m(sin_i, sin_o, spread + blur), half_circle_lobes(at));
+  vec3 through = drawn_lobes.w * lobe_sum(fibre_m(sin_i, sin_o, spread + blur), half_circle_lobes(at));
   vec3 back_spread = back * spread_back_azimuth(phi) *
                      shifted_lobe(sin_i, cos_i, sin_o, cos_o, back_shift, back_v + spread);
   return direct_part(count) * direct + scattered_part(count, dual(0, theta_i)) * (through + back_spread);

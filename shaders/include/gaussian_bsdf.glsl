@@ -3,6 +3,7 @@
 //
 // vec3 inner_reflection(vec2 at, FibreLobes lobes, vec3 T, vec3 L, vec3 V)   N_TRT
 
+#include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
 #include "include/marschner.glsl"
 #include "include/this_fibre.glsl"
@@ -18,7 +19,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   float theta_h = 0.5 * (atan(sin_theta_i, cos_theta_i) + atan(sin_theta_o, sin_from_cos(sin_theta_o)));
   float tilt_trt = settings.shifts == 0 ? 2.0 : 1.5;
   vec3 m = gaussian_lobes(theta_h, settings.tilt, tilt_trt, beta_r_of(this_roughness()), blur);
-  return marschner_scattering(m, lobes.n, inner_reflection(at, lobes, T, L, V), cosine) * cos_theta_i;
+  return marschner_scattering(drawn_lobes.xyz * m, lobes.n, inner_reflection(at, lobes, T, L, V), cosine) * cos_theta_i;
 }
 
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)

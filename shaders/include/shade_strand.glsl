@@ -8,9 +8,10 @@
 // void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
 //     what it sends back of light from everywhere: the integral over phi, and the same weighted with the cosine of phi
 
+#include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
 #include "include/shadow.glsl"
-#include "include/this_place.glsl"
+#include "include/strand_samples.glsl"
 #include "include/world.glsl"
 
 const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not seen beside any light
@@ -33,7 +34,7 @@ vec3 strand_light()
               view.hair_forward.rgb,
               plus,
               minus);
-  vec3 radiance = strand_radiance(plus, minus, T, V, returned, towards);
+  vec3 radiance = drawn_world * strand_radiance(plus, minus, T, V, returned, towards);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
@@ -50,7 +51,7 @@ vec3 strand_light()
     if (shadow_place(light, drawn_position, at, depth)) {
       irradiance *= lit_part(at, depth);
       count = crossed_strands(at, depth);
-      radiance += irradiance * surface_bounce(at, depth, count) * returned;
+      radiance += drawn_lobes.w * irradiance * surface_bounce(at, depth, count) * returned;
     }
     // Most of a head of hair lies in the shadow of the rest, where nothing is left to scatter.
     vec3 arriving = irradiance * transmitted(count, view.hair_forward.rgb);
@@ -62,17 +63,7 @@ vec3 strand_light()
   return radiance;
 }
 
-void main()
+vec4 sample_value()
 {
-  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
-  ivec2 size = textureSize(segments, 0);
-  if (any(greaterThanEqual(place, size))) {
-    return;
-  }
-  // Segments of other hair, and no segment at all, are beyond this hair's count either way.
-  uint found = texelFetch(segments, place, 0).r - uint(first_segment);
-  if (found < uint(segment_count)) {
-    find_place(int(found), vec2(place) + 0.5, vec2(size));
-    imageStore(picture, place, vec4(strand_light(), 1.0));
-  }
+  return vec4(strand_light(), 1.0);
 }

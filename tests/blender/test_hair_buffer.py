@@ -44,7 +44,7 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
     ]
     buffer.add_hair(hair, lights, view, in_compute)
     counts = [len(points) * ((steps.point_count or points.shape[1]) - 1) for points, _radii, _place in placed]
-    segments = np.array(buffer._segments.read(), np.int64).reshape(SIZE[::-1])
+    segments = np.array(buffer.segments.read(), np.int64).reshape(SIZE[::-1])
     depths = np.array(buffer.depths.read()).astype(np.uint32).reshape(SIZE[::-1]).view(np.float32)
     covered = np.array(buffer.color.read(), np.float32).reshape(*SIZE[::-1], 4)[..., 3] == 1.0
     np.testing.assert_array_equal(covered, segments != hair_buffer._NO_SEGMENT)  # what is found is shaded

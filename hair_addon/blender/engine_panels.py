@@ -1,0 +1,40 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's own panels that make sense for our render engine: output, colour management, lights, materials."""
+
+import bpy
+
+from .engine import NAME
+
+# Blender lists in a panel the engines that it is for. Those that are for engines in general are for ours too, but for
+# what it does not draw; and a few of EEVEE's are, which have no general twin.
+_GENERAL = "BLENDER_RENDER"
+_NOT_OURS = (
+    *("RENDER_PT_freestyle", "VIEWLAYER_PT_freestyle", "MATERIAL_PT_freestyle", "RENDER_PT_stereoscopy"),
+    *("RENDER_PT_gpencil", "RENDER_PT_grease_pencil", "RENDER_PT_simplify_greasepencil"),
+    *("PARTICLE_PT", "DATA_PT_lightprobe", "DATA_PT_volume", "EEVEE_MATERIAL_PT_viewport_settings"),
+    "DATA_PT_light",  # without power
+)
+_OURS = ("DATA_PT_EEVEE_light", "EEVEE_WORLD_PT_surface", "EEVEE_MATERIAL_PT_context_material")
+_OURS += ("EEVEE_MATERIAL_PT_surface", "DATA_PT_light_animation")
+
+
+def _panels():
+    pending = [bpy.types.Panel]
+    while pending:
+        for panel in pending.pop().__subclasses__():
+            pending.append(panel)
+            engines, name = getattr(panel, "COMPAT_ENGINES", ()), panel.__name__
+            if name in _OURS or (_GENERAL in engines and not name.startswith(_NOT_OURS)):
+                yield panel
+
+
+def register():
+    """Show Blender's panels where Vellus is the render engine."""
+    for panel in _panels():
+        panel.COMPAT_ENGINES.add(NAME)
+
+
+def unregister():
+    """Hide them again."""
+    for panel in _panels():
+        panel.COMPAT_ENGINES.discard(NAME)

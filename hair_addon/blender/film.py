@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sums of samples over a tile of a picture, for each of its passes."""
+
+import gpu
+import numpy as np
+
+from . import drawing, drawn_scene, motion, render_programs
+from .hair_buffer import HairBuffer
+
+_MOST_SAMPLES = 4096  # along a tile's side: its textures take up to 700 MB
+
+FAR = 1e10  # distance of what is nowhere, as Cycles has it
+
+# Channels of passes that are not the colours of light.
+CHANNELS = {"Combined": 4, "Depth": 1, "Hair Mask": 1, "Vector": 4}
+
+# How much of R, TT, TRT and all else that comes from lights is in each of the passes of hair's light, and how much of
+# the world's.
+LOBES = {
+    "Hair R": ((1.0, 0.0, 0.0, 0.0), 0.0),
+    "Hair TT": ((0.0, 1.0, 0.0, 0.0), 0.0),
+    "Hair TRT": ((0.0, 0.0, 1.0, 0.0), 0.0),
+    "Hair Scattered": ((0.0, 0.0, 0.0, 1.0), 0.0),
+    "Hair World": ((0.0, 0.0, 0.0, 0.0), 1.0),
+}
+
+
+class Film:
+    """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
+
+    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Shadow", "Vector" or of `LOBES`;
+    is_transparent: whether the background is left empty. motion: `motion.Motion` of a film with the pass "Vector".
+    """
+
+    def __init__(self, size, per_side, passes, is_transparent):
+        self.size, self._per_side, self.is_transparent = size, per_side, is_transparent
+        self._samples = HairBuffer(size[0] * per_side, size[1] * per_side)
+        self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
+        self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
+        self._passes, self.motion = passes, None
+        self.clear()
+
+    def _texture(self):
+        return gpu.types.GPUTexture(self.size, format=render_programs.FILM_FORMAT)
+
+    def clear(self):
+        """What is drawn now is another tile, or another moment."""
+        self.sample_count = 0
+        for texture in self._sums.values():
+            texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+        if self._depth is not None:
+            self._depth.clear(format="FLOAT", value=(0.0, FAR, 0.0, 0.0))
+
+    def add_pass(self, drawn, view, view_to_clip):
+        """Draw a `DrawnScene` once.
+
+        view: a `drawing.pass_record` of this tile; view_to_clip: (4, 4), what depths are measured by.
+        """
+        drawn_scene.draw_behind_hair(drawn, view, self._samples, self.is_transparent)
+        drawn_scene.draw_hair(drawn, view, self._samples)
+        for name, texture in self._sums.items():
+            self._add(render_programs.film_program(), {"picture": self._picture(name, drawn, view)}, texture)
+        if self._depth is not None:
+            program = render_programs.film_depth_program()
+            program.bind()
+            program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
+            names = ("segments", "depths", "surface_depth")
+            self._add(program, {name: getattr(self._samples, name) for name in names}, self._depth)
+        self.sample_count += self._per_side**2
+
+    def _picture(self, name, drawn, view):
+        """The samples of a pass, as a texture."""
+        if name == "Combined":
+            return self._samples.color
+        if name == "Vector":
+            return motion.draw(drawn, self.motion, view, self._samples)
+        if name == "Shadow":
+            return drawn_scene.draw_arrival(drawn, view, self._samples)
+        return self._samples.part_of_light(*LOBES[name])
+
+    def _add(self, program, samplers, sums):
+        with drawing.bound(program, {}, samplers):
+            program.uniform_int("samples_per_side", self._per_side)
+            program.image("sums", sums)
+            drawing.dispatch_over(program, self.size)
+
+    def show(self):
+        """Lay the mean of the samples over the viewport that is bound."""
+        program = render_programs.film_view_program()
+        x, y, _width, _height = gpu.state.viewport_get()
+        with (
+            drawing.bound(program, {}, {"sums": self._sums["Combined"]}),
+            drawing.gpu_state("NONE", False, "ALPHA_PREMULT"),
+        ):
+            program.uniform_float("origin", (x, y))
+            program.uniform_float("sample_count", self.sample_count)
+            drawing.cover(program)
+
+    def read(self):
+        """{pass: (height, width, channels) float32}, first row at the bottom: means over the samples, least depths."""
+        found = {name: self._read(texture) / self.sample_count for name, texture in self._sums.items()}
+        if self._depth is not None:
+            mask, depth, covered, _none = np.split(self._read(self._depth), 4, axis=-1)
+            found |= {"Hair Mask": mask / self.sample_count, "Depth": depth}
+            if "Vector" in found:  # of what is there, not of the background
+                found["Vector"] *= self.sample_count / np.maximum(covered, 1.0)
+        return {name: found[name][..., : CHANNELS.get(name, 3)] for name in self._passes}
+
+    def _read(self, texture):
+        return np.array(texture.read(), np.float32).reshape(self.size[1], self.size[0], 4)
+
+
+def largest_tile(per_side):
+    """Longest side [pixels] of a tile that the graphics driver takes with so many samples along a pixel's side."""
+    return min(gpu.capabilities.max_texture_size_get(), _MOST_SAMPLES) // per_side

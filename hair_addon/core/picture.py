@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a picture is made of: samples of its pixels, moments of its exposure, tiles."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .params import Settings, param
+
+_MOST_PER_SIDE = 4
+
+
+@dataclass(frozen=True)
+class RenderSettings(Settings):
+    """How a scene is rendered."""
+
+    sample_count: int = param(
+        64, "Samples of each pixel: the more, the less noise", label="Samples", low=1, high=65536, soft_high=1024
+    )
+    motion_steps: int = param(
+        16,
+        "Moments of the exposure that motion blur is the mean of; each is drawn with its part of the samples",
+        low=1,
+        high=1024,
+        soft_high=64,
+    )
+
+
+@dataclass(frozen=True)
+class PassSettings(Settings):
+    """Passes of a view layer beside those that Blender has switches for."""
+
+    has_hair_mask: bool = param(False, "How much of each pixel hair covers", label="Hair Mask")
+    has_lobes: bool = param(
+        False,
+        "The light of hair in parts that add up to it: reflected (R), through the fibre (TT), reflected inside (TRT), "
+        "scattered further, and the world's",
+        label="Hair Lobes",
+    )
+
+
+def samples_per_side(sample_count):
+    """Along each side of a pixel in each pass over a picture: as many as make up the samples in whole passes."""
+    return next(side for side in range(_MOST_PER_SIDE, 0, -1) if sample_count % side**2 == 0)
+
+
+def moments(shutter, position, count):
+    """(count,) times [frames] from a frame, in the middles of equal parts of its exposure.
+
+    shutter: how long it is open [frames]; position: START, CENTER or END: which moment of the exposure the frame is.
+    """
+    before = {"START": 0.0, "CENTER": 0.5, "END": 1.0}[position]
+    return shutter * ((np.arange(count) + 0.5) / count - before)
+
+
+def tiles(window, side):
+    """[(left, bottom, width, height)] that a window of such numbers [pixels] falls into, `side` long at most."""
+    left, bottom, width, height = window
+    return [
+        (left + x, bottom + y, min(side, width - x), min(side, height - y))
+        for y in range(0, height, side)
+        for x in range(0, width, side)
+    ]

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The same of what is no light: in how many samples hair is nearest, the least distance along the view's axis, and in how
+// many samples there is anything.
+
+const uint NO_SEGMENT = 0x7FFFFFFFu;
+
+// clip: what brings a place on the axis to clip space, its last two rows and columns, row by row.
+float distance_at(float depth, vec4 clip)
+{
+  float ndc = 2.0 * depth - 1.0;
+  return (clip.w * ndc - clip.y) / (clip.z * ndc - clip.x);
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(pixel, imageSize(sums)))) {
+    return;
+  }
+  vec4 found = imageLoad(sums, pixel);
+  for (int y = 0; y < samples_per_side; y++) {
+    for (int x = 0; x < samples_per_side; x++) {
+      ivec2 place = pixel * samples_per_side + ivec2(x, y);
+      float depth = texelFetch(surface_depth, place, 0).r;
+      if (texelFetch(segments, place, 0).r < NO_SEGMENT) {
+        depth = min(depth, uintBitsToFloat(texelFetch(depths, place, 0).r));
+        found.x += 1.0;
+      }
+      if (depth < 1.0) {
+        found.y = min(found.y, distance_at(depth, view_to_clip));
+        found.z += 1.0;
+      }
+    }
+  }
+  imageStore(sums, pixel, found);
+}

@@ -1,0 +1,7 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A film in a viewport: scene-linear light, which Blender brings through the view transform.
+
+void main()
+{
+  color = texelFetch(sums, ivec2(gl_FragCoord.xy - origin), 0) / sample_count;
+}

@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How far what is seen moves in a picture, as Cycles has it: to where it was a frame before, and from where it will be a frame
+// after [pixels].
+
+vec2 picture_place(vec4 clip, vec2 size)
+{
+  return (0.5 * clip.xy / clip.w + 0.5) * size;
+}
+
+vec4 moved(vec4 now, vec4 before, vec4 after, vec2 size)
+{
+  vec2 place = picture_place(now, size);
+  return vec4(picture_place(before, size) - place, place - picture_place(after, size));
+}

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The main of programs that fill the samples of a picture in which a strand of this hair is nearest: needs the sampler
+// segments and the image picture.
+
+#include "include/this_place.glsl"
+
+// At the place that `find_place` found.
+vec4 sample_value();
+
+void main()
+{
+  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
+  ivec2 size = textureSize(segments, 0);
+  if (any(greaterThanEqual(place, size))) {
+    return;
+  }
+  // Segments of other hair, and no segment at all, are beyond this hair's count either way.
+  uint found = texelFetch(segments, place, 0).r - uint(first_segment);
+  if (found < uint(segment_count)) {
+    find_place(int(found), vec2(place) + 0.5, vec2(size));
+    imageStore(picture, place, sample_value());
+  }
+}

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// How much of the lights arrives at strands: one where nothing is in their way, zero in the dark.
+
+#include "include/arrival.glsl"
+#include "include/strand_samples.glsl"
+
+vec4 sample_value()
+{
+  vec3 sent = vec3(0.0);
+  vec3 arriving = vec3(0.0);
+  for (int index = 0; index < lights.count; index++) {
+    Light light = lights.light[index];
+    vec3 irradiance = irradiance_of(light, drawn_position);
+    vec3 at;
+    float depth;
+    vec3 part = vec3(1.0);
+    if (shadow_place(light, drawn_position, at, depth)) {
+      part = lit_part(at, depth) * transmitted(crossed_strands(at, depth), view.hair_forward.rgb);
+    }
+    sent += irradiance;
+    arriving += irradiance * part;
+  }
+  return vec4(part_of(arriving, sent), 1.0);
+}

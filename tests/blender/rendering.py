@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenes rendered to files, and what is in these."""
+
+import bpy
+import numpy as np
+import OpenEXR
+
+
+def rendered(folder, **settings):
+    """{pass: (height, width) or (height, width, channels) float32}, first row at the bottom, of the active view layer.
+
+    The scene is rendered by our engine to an EXR with all its passes; settings: of the scene's `render`, or of its own
+    settings of ours.
+    """
+    return layers_of(folder, **settings)[bpy.context.view_layer.name]
+
+
+def layers_of(folder, **settings):
+    """The same of every view layer: {view layer: {pass: array}}."""
+    configure(**settings)
+    render, path = bpy.context.scene.render, folder / "rendered.exr"
+    render.image_settings.media_type = "MULTI_LAYER_IMAGE"
+    render.image_settings.color_depth = "32"
+    render.filepath = str(path)
+    assert bpy.ops.render.render(write_still=True) == {"FINISHED"}
+    return read_layers(path)
+
+
+def configure(**settings):
+    """A small picture by our engine, and what else is asked for."""
+    scene = bpy.context.scene
+    settings = {"engine": "VELLUS", "resolution_x": 96, "resolution_y": 72, "sample_count": 4} | settings
+    for name, value in settings.items():
+        setattr(scene.vellus if hasattr(scene.vellus, name) else scene.render, name, value)
+
+
+def read_layers(path):
+    """{view layer: {pass: array}} of a multilayer EXR."""
+    found = {}
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        for part in file.parts:
+            for name, channel in part.channels.items():
+                layer, render_pass, letter = name.split(".")
+                channels = found.setdefault(layer, {}).setdefault(render_pass, {})
+                channels[letter] = np.array(channel.pixels, np.float32)[::-1]
+    return {layer: {name: _stacked(channels) for name, channels in passes.items()} for layer, passes in found.items()}
+
+
+def _stacked(channels):
+    order = sorted(channels, key="RGBAXYZW".index)
+    return channels[order[0]] if len(order) == 1 else np.stack([channels[letter] for letter in order], axis=-1)

@@ -1,0 +1,374 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine: its picture is the offscreen picture, of any size, in tiles, in parts, over any backdrop."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender import drawing, film, render
+from hair_addon.blender.scene import read_camera
+from tests.blender.reading import evaluated_points
+from tests.blender.rendering import configure, layers_of, read_layers, rendered
+
+MODELS = [("KAJIYA_KAY", "energy"), ("MARSCHNER", "energy"), ("MARSCHNER", "classic")]
+
+
+def light_up(color=(0.2, 0.3, 0.4)):
+    """A world of this colour."""
+    world = bpy.context.scene.world or bpy.data.worlds.new("World")
+    bpy.context.scene.world = world
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
+
+
+def offscreen(width=96, height=72, samples_per_side=2):
+    return render.draw_picture(render.PictureSettings(width, height, samples_per_side, is_transparent=True))
+
+
+@pytest.mark.parametrize("kind", ["PERSP", "ORTHO"])
+def test_it_renders_the_offscreen_picture(lit, tmp_path, kind):
+    light_up()
+    camera = bpy.context.scene.camera.data
+    camera.type, camera.ortho_scale, camera.shift_x, camera.shift_y = kind, 4.0, 0.1, -0.05
+    combined = rendered(tmp_path, film_transparent=True, pixel_aspect_x=1.5)["Combined"]
+    np.testing.assert_allclose(combined, offscreen(), atol=1e-6)
+    assert (combined[..., 3] > 0.5).mean() > 0.05
+
+
+def test_more_samples_come_closer_to_many(lit, tmp_path):
+    """By any number of them, alpha too: the error falls at least as fast as chance would have it."""
+    many = rendered(tmp_path, film_transparent=True, sample_count=400)["Combined"]
+    errors = [
+        np.sqrt(np.mean((rendered(tmp_path, sample_count=count)["Combined"] - many) ** 2, axis=(0, 1)))
+        for count in (4, 17, 64)
+    ]
+    assert (errors[1] < 0.6 * errors[0]).all()
+    assert (errors[2] < 0.6 * errors[1]).all()
+
+
+def test_tiles_join_without_a_seam(lit, tmp_path, monkeypatch):
+    bpy.context.view_layer.use_pass_z = True
+    bpy.context.view_layer.vellus.has_hair_mask = True
+    whole = rendered(tmp_path, film_transparent=True, sample_count=8)
+    monkeypatch.setattr(film, "largest_tile", lambda _per_side: 37)
+    for name, tiled in rendered(tmp_path, sample_count=8).items():
+        # A rounding error moves a sample across an edge here and there.
+        differs = np.abs(tiled - whole[name]) > 1e-4 * np.maximum(np.abs(whole[name]), 1.0)
+        assert differs.mean() < 0.003, name
+        assert differs[:, 34:40].mean() < 0.01 and differs[34:40].mean() < 0.01, name
+        mean = [np.mean(pixels[pixels < 1e9]) for pixels in (tiled, whole[name])]
+        assert mean[0] == pytest.approx(mean[1], rel=1e-4)
+
+
+def test_a_picture_larger_than_any_texture_is_rendered(lit, tmp_path, monkeypatch):
+    largest = 64
+    monkeypatch.setattr(film, "_MOST_SAMPLES", largest)
+    made = []
+    real = film.HairBuffer
+    monkeypatch.setattr(film, "HairBuffer", lambda *size: (made.append(size), real(*size))[1])
+    combined = rendered(tmp_path, film_transparent=True, sample_count=4)["Combined"]
+    assert made and max(map(max, made)) <= largest
+    np.testing.assert_allclose(combined.mean(), offscreen().mean(), rtol=1e-3)
+
+
+@pytest.mark.parametrize("is_cropped", [False, True])
+def test_a_border_is_rendered_as_in_the_whole_picture(lit, tmp_path, is_cropped):
+    whole = rendered(tmp_path, film_transparent=True)["Combined"]
+    border = {"border_min_x": 0.3, "border_max_x": 0.71, "border_min_y": 0.2, "border_max_y": 0.66}
+    part = rendered(tmp_path, use_border=True, use_crop_to_border=is_cropped, **border)["Combined"]
+    rows, columns = slice(14, 47), slice(28, 68)
+    if not is_cropped:
+        outside = np.ones(part.shape[:2], bool)
+        outside[rows, columns] = False
+        assert (part[outside] == 0.0).all()
+        part = part[rows, columns]
+    assert part.shape == (33, 40, 4)
+    differs = np.abs(part - whole[rows, columns]).max(axis=-1) > 1e-4
+    assert differs.mean() < 0.005
+
+
+@pytest.mark.parametrize("light", [0.0, 1.0])
+def test_over_black_and_over_white_it_is_what_is_rendered_there(lit, tmp_path, light):
+    """The straight composite of an empty background, within 1/255, where hair has edges too."""
+    light_up((light,) * 3)
+    empty = rendered(tmp_path, film_transparent=True, sample_count=16)["Combined"]
+    filled = rendered(tmp_path, film_transparent=False, sample_count=16)["Combined"]
+    partly = (empty[..., 3] > 0.05) & (empty[..., 3] < 0.95)
+    assert partly.sum() > 200
+    np.testing.assert_allclose(empty[..., :3] + (1.0 - empty[..., 3:]) * light, filled[..., :3], atol=1e-4)
+    assert (filled[..., 3] == 1.0).all()
+
+
+@pytest.mark.parametrize("backdrop", [0.0, 1.0])
+def test_a_png_composites_as_the_exr_does(lit, tmp_path, backdrop):
+    """PNG holds straight colours of 8 bits: over a backdrop within 1/255 of the picture it was written of."""
+    scene = bpy.context.scene
+    light_up()
+    exr = rendered(tmp_path, film_transparent=True, sample_count=16)["Combined"]
+    scene.view_settings.view_transform = "Raw"
+    scene.render.image_settings.media_type = "IMAGE"
+    scene.render.image_settings.file_format, scene.render.image_settings.color_mode = "PNG", "RGBA"
+    scene.render.dither_intensity = 0.0
+    scene.render.filepath = str(tmp_path / "straight.png")
+    bpy.ops.render.render(write_still=True)
+    straight = pixels_of(tmp_path / "straight.png")
+    over = straight[..., :3] * straight[..., 3:] + (1.0 - straight[..., 3:]) * backdrop
+    color = exr[..., :3] / np.maximum(exr[..., 3:], 1e-6)
+    wanted = np.clip(color, 0.0, 1.0) * exr[..., 3:] + (1.0 - exr[..., 3:]) * backdrop
+    np.testing.assert_allclose(over, wanted, atol=1.0 / 255.0 + 1e-5)
+
+
+def pixels_of(path):
+    """(height, width, 4) of a picture file as it is stored."""
+    image = bpy.data.images.load(str(path))
+    image.colorspace_settings.name, image.alpha_mode = "Non-Color", "CHANNEL_PACKED"
+    pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    width, height = image.size
+    bpy.data.images.remove(image)
+    return pixels.reshape(height, width, 4)
+
+
+@pytest.mark.parametrize("is_varied", [False, True])
+@pytest.mark.parametrize(("model", "mode"), MODELS)
+def test_the_lobes_add_up_to_the_light_of_hair(lit, tmp_path, model, mode, is_varied):
+    """Under a sun, a world and on a surface that throws light back: of each model, and where strands differ."""
+    light_up()
+    state = lit.data.vellus
+    state.model, state.appearance.mode, state.marschner.size = model, mode, 64
+    if is_varied:
+        state.appearance.random_color = state.appearance.random_roughness = 0.4
+    bpy.data.objects["Sphere"].is_holdout = True
+    bpy.context.view_layer.vellus.has_lobes = True
+    passes = rendered(tmp_path, film_transparent=True)
+    lobes = {name: passes[name] for name in film.LOBES}
+    total = sum(lobes.values())
+    light = passes["Combined"][..., :3]
+    np.testing.assert_allclose(total, light, atol=2e-3 * light.max())
+    assert total.mean() == pytest.approx(light.mean(), rel=1e-3)
+    is_there = {name: lobe.mean() > 1e-3 * light.mean() for name, lobe in lobes.items()}
+    assert is_there["Hair R"] and is_there["Hair World"] and is_there["Hair Scattered"]
+    assert is_there["Hair TRT"] == (model == "MARSCHNER")
+
+
+def test_a_holdout_leaves_a_hole_in_the_shape_of_the_surface(lit, tmp_path):
+    bpy.context.view_layer.vellus.has_hair_mask = True
+    seen = rendered(tmp_path, film_transparent=True)
+    bpy.data.objects["Sphere"].is_holdout = True
+    held_out = rendered(tmp_path)
+    np.testing.assert_allclose(held_out["Hair Mask"], seen["Hair Mask"], atol=1e-6)
+    np.testing.assert_allclose(held_out["Combined"][..., 3], seen["Hair Mask"], atol=1e-6)
+    assert seen["Combined"][..., 3].mean() > 2.0 * held_out["Combined"][..., 3].mean()
+
+
+def test_shadow_is_the_part_of_light_that_arrives(lit, tmp_path):
+    """Of a matt surface under one sun and no world, sample by sample: what is left of it is the pass."""
+    sun = next(o for o in bpy.data.objects if o.type == "LIGHT")
+    bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, 2.0, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
+    bpy.context.view_layer.use_pass_shadow = bpy.context.view_layer.vellus.has_hair_mask = True
+    shaded = rendered(tmp_path, film_transparent=True, sample_count=1)
+    sun.data.use_shadow = False
+    open_to_light = rendered(tmp_path, sample_count=1)
+    is_surface = shaded["Hair Mask"] == 0.0
+    faces_light = is_surface & (open_to_light["Shadow"].min(axis=-1) > 0.99)
+    arriving = shaded["Combined"][..., :3] / np.maximum(open_to_light["Combined"][..., :3], 1e-6)
+    np.testing.assert_allclose(shaded["Shadow"][faces_light], arriving[faces_light], atol=5e-3)
+    assert shaded["Shadow"][faces_light].min() < 0.1 and shaded["Shadow"][faces_light].max() == 1.0
+    is_hair = shaded["Hair Mask"] > 0.9
+    assert is_hair.any() and shaded["Shadow"][is_hair].min() < 0.5
+    assert (open_to_light["Shadow"][is_hair] > 0.89).all()
+
+
+def test_depth_is_the_distance_along_the_view(scene, tmp_path):
+    """Of Cycles' convention: a plane across the view has one depth, a slanted one that of its points; nothing, 1e10."""
+    bpy.ops.object.camera_add(location=(0.0, 0.0, 5.0))
+    scene.camera = bpy.context.object
+    bpy.ops.mesh.primitive_plane_add(size=2.0, rotation=(0.0, math.pi / 4, 0.0))
+    bpy.context.view_layer.use_pass_z = True
+    ours = rendered(tmp_path)["Depth"]
+    scene.cycles.samples, scene.cycles.device = 1, "CPU"
+    theirs = rendered(tmp_path, engine="CYCLES")["Depth"]
+    is_there = (ours < 1e9) & (theirs < 1e9)
+    assert is_there.sum() > 300 and (is_there != (theirs < 1e9)).mean() < 0.02
+    step = 10.0 / scene.render.resolution_x  # of a slanted plane, in a pixel; the nearest of its samples counts
+    np.testing.assert_allclose(ours[is_there], theirs[is_there], atol=step)
+    assert np.ptp(ours[is_there]) > 1.0
+    assert (ours[~is_there & (theirs > 1e9)] == np.float32(1e10)).mean() > 0.98
+
+
+def test_motion_blur_is_the_mean_of_still_pictures(lit, tmp_path, monkeypatch):
+    """Of hair, surface and camera that move, at each moment of the exposure; all by the same places of the samples."""
+    real = drawing.pass_record
+    monkeypatch.setattr(drawing, "pass_record", lambda *args: real(*args[:3], 0, *args[4:]))
+    scene = bpy.context.scene
+    for thing, path, end in (
+        (bpy.data.objects["Sphere"], "location", (0.8, 0.0, 0.3)),
+        (scene.camera, "location", None),
+    ):
+        thing.keyframe_insert(path, frame=1)
+        thing.location = end or (0.3, -7.5, 0.2)
+        thing.keyframe_insert(path, frame=3)
+    scene.frame_set(2)
+    blur = {"use_motion_blur": True, "motion_blur_shutter": 0.8, "motion_steps": 4, "sample_count": 64}
+    blurred = rendered(tmp_path, film_transparent=True, **blur)["Combined"]
+    assert (scene.frame_current, scene.frame_subframe) == (2, 0.0)
+    stills = []
+    for moment in (-0.3, -0.1, 0.1, 0.3):
+        scene.frame_set(math.floor(2 + moment), subframe=moment % 1.0)
+        stills.append(rendered(tmp_path, use_motion_blur=False, sample_count=16)["Combined"])
+    np.testing.assert_allclose(blurred, np.mean(stills, axis=0), atol=1e-5)
+    assert np.abs(blurred - stills[1]).mean() > 5e-3
+
+
+def moving(surface):
+    """Camera and surface on their way through frames 1 to 3, of which 2 is the scene's."""
+    scene = bpy.context.scene
+    surface.rotation_mode = "XYZ"
+    for frame, place, turn, seen_from in (
+        (1, (0.0, 0.0, 0.0), 0.0, (0.0, -8.0, 0.0)),
+        (2, (0.2, 0.0, 0.1), 0.2, (0.1, -8.0, 0.0)),
+        (3, (0.5, 0.5, 0.1), 0.5, (0.1, -7.0, 0.3)),
+    ):
+        surface.location, surface.rotation_euler.z, scene.camera.location = place, turn, seen_from
+        for thing, path in ((surface, "location"), (surface, "rotation_euler"), (scene.camera, "location")):
+            thing.keyframe_insert(path, frame=frame)
+    scene.frame_set(2)
+
+
+def seen_points(curves_object, frame, size):
+    """(N, 3) places on strands in a frame's picture [pixels], and their distance along the view's axis."""
+    scene = bpy.context.scene
+    scene.frame_set(frame)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    to_view, to_clip = read_camera(scene, depsgraph, *size)
+    strands = evaluated_points(curves_object)
+    part = np.linspace(0.0, 1.0, 12, endpoint=False)[:, None]
+    dense = (strands[:, :-1, None] * (1.0 - part) + strands[:, 1:, None] * part).reshape(-1, 3)
+    viewed = np.c_[dense, np.ones(len(dense))] @ (to_view @ np.array(curves_object.matrix_world)).T
+    clip = viewed @ to_clip.T
+    return np.c_[(0.5 * clip[:, :2] / clip[:, 3:] + 0.5) * size, -viewed[:, 2]]
+
+
+def test_vectors_of_hair_lead_to_the_frame_before_and_from_the_frame_after(lit, tmp_path):
+    """In each sample, by the point of a strand that it shows: hair that a surface carries, camera moving too."""
+    moving(bpy.data.objects["Sphere"])
+    view_layer = bpy.context.view_layer
+    view_layer.use_pass_vector = view_layer.use_pass_z = view_layer.vellus.has_hair_mask = True
+    passes = rendered(tmp_path, sample_count=1, film_transparent=True)
+    size = passes["Combined"].shape[1::-1]
+    assert bpy.context.scene.frame_current == 2
+    before, now, after = (seen_points(lit, frame, size) for frame in (1, 2, 3))
+    rows, columns = np.nonzero(passes["Hair Mask"])
+    depths = passes["Depth"][rows, columns]
+    shown = [
+        np.argmin(np.sum((now - (x + 0.5, y + 0.5, depth)) ** 2 * (1.0, 1.0, 1e4), axis=1))
+        for x, y, depth in zip(columns, rows, depths, strict=True)
+    ]
+    expected = np.c_[before[shown, :2] - now[shown, :2], now[shown, :2] - after[shown, :2]]
+    error = np.abs(passes["Vector"][rows, columns] - expected).max(axis=1)
+    # Which point of a strand a sample shows is known to a quarter of its segment.
+    assert np.median(error) < 0.05 and np.quantile(error, 0.95) < 0.25
+    assert np.abs(expected).max() > 5.0
+
+
+def test_vectors_are_those_of_cycles(lit, tmp_path):
+    moving(bpy.data.objects["Sphere"])
+    lit.hide_render = True
+    bpy.context.view_layer.use_pass_vector = True
+    ours = rendered(tmp_path, film_transparent=True, sample_count=16)["Vector"]
+    scene = bpy.context.scene
+    scene.cycles.samples, scene.cycles.device = 16, "CPU"
+    theirs = rendered(tmp_path, engine="CYCLES")["Vector"]
+    is_there = np.abs(theirs).max(axis=-1) > 0.0
+    assert is_there.sum() > 300
+    error = np.abs(ours - theirs)[is_there]
+    assert np.median(error) < 0.03 and error.mean() < 0.3
+    assert (ours[~is_there] == 0.0).mean() > 0.97
+
+
+def test_what_is_blurred_already_has_no_vectors(lit, tmp_path):
+    bpy.context.view_layer.use_pass_vector = True
+    assert "Vector" not in rendered(tmp_path, use_motion_blur=True, motion_steps=2)
+    bpy.context.scene.render.use_motion_blur = False
+
+
+def test_view_layers_are_rendered_apart(lit, tmp_path):
+    scene = bpy.context.scene
+    other = scene.view_layers.new("Without hair")
+    alone = bpy.data.collections.new("Hair alone")
+    scene.collection.children.link(alone)
+    alone.objects.link(lit)
+    scene.collection.objects.unlink(lit)
+    other.layer_collection.children["Hair alone"].exclude = True
+    other.vellus.has_hair_mask = True
+    layers = layers_of(tmp_path, film_transparent=True)
+    assert set(layers) == {"ViewLayer", "Without hair"}
+    assert "Hair Mask" not in layers["ViewLayer"]
+    assert (layers["Without hair"]["Hair Mask"] == 0.0).all()
+    assert layers["Without hair"]["Combined"][..., 3].sum() < layers["ViewLayer"]["Combined"][..., 3].sum()
+
+
+def test_each_frame_follows_the_deformed_surface(arm, tmp_path):
+    scene = bpy.context.scene
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.vellus.add_hair(guide_count=60, strand_count=600, length=0.3, radius=0.01)
+    bpy.ops.object.camera_add(location=(0.0, 0.0, 9.0))
+    scene.camera = bpy.context.object
+    bpy.ops.object.light_add(type="SUN")
+    scene.frame_start, scene.frame_end, scene.frame_step = 1, 11, 10
+    configure(film_transparent=True)
+    scene.render.image_settings.media_type = "MULTI_LAYER_IMAGE"
+    scene.render.filepath = str(tmp_path / "frame_")
+    scene.frame_set(1)
+    bpy.ops.render.render(animation=True)
+    pictures = {frame: read_layers(tmp_path / f"frame_{frame:04}.exr")["ViewLayer"]["Combined"] for frame in (1, 11)}
+    for frame, pixels in pictures.items():
+        scene.frame_set(frame)
+        assert np.abs(pixels - offscreen()).mean() < 2e-3
+    assert np.abs(pictures[1] - pictures[11]).mean() > 0.02
+
+
+def test_what_cannot_be_rendered_is_said_in_a_sentence(lit, tmp_path):
+    configure(filepath=str(tmp_path / "nothing.png"), use_multiview=True)
+    with pytest.raises(RuntimeError, match="one view: switch Stereoscopy off"):
+        bpy.ops.render.render(write_still=True)
+    bpy.context.scene.render.use_multiview = False
+    bpy.context.scene.camera.data.type = "PANO"
+    with pytest.raises(RuntimeError, match="perspective and orthographic"):
+        bpy.ops.render.render(write_still=True)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_defect_writes_no_picture(lit, tmp_path, monkeypatch, capfd):
+    def broken(*_args):
+        raise ZeroDivisionError("nothing to divide by")
+
+    monkeypatch.setattr(film.Film, "add_pass", broken)
+    configure(filepath=str(tmp_path / "nothing.png"))
+    with pytest.raises(RuntimeError, match="could not render this: nothing to divide by"):
+        bpy.ops.render.render(write_still=True)
+    assert not list(tmp_path.iterdir())
+    assert "ZeroDivisionError" in capfd.readouterr().err
+
+
+def test_blender_s_panels_are_shown_for_it_while_it_is_there(scene):
+    import hair_addon
+
+    names = (
+        "RENDER_PT_output",
+        "RENDER_PT_format",
+        "RENDER_PT_stamp",
+        "RENDER_PT_color_management",
+        "VIEWLAYER_PT_layer",
+    )
+    panels = [getattr(bpy.types, name) for name in (*names, "DATA_PT_EEVEE_light", "EEVEE_WORLD_PT_surface")]
+    assert all("VELLUS" in panel.COMPAT_ENGINES for panel in panels)
+    assert "VELLUS" not in bpy.types.RENDER_PT_eevee_raytracing.COMPAT_ENGINES
+    hair_addon.unregister()
+    try:
+        assert not any("VELLUS" in panel.COMPAT_ENGINES for panel in panels)
+        with pytest.raises(TypeError):
+            scene.render.engine = "VELLUS"
+    finally:
+        hair_addon.register()
