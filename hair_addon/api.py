@@ -206,18 +206,18 @@ def draw(*, progress=unheard, **settings):
 def render(path, *, frame=None, engine="vellus", **settings):
     """Make a frame of the scene, the present one for None, and write it as .png or .exr, whole or not at all.
 
-    engine: "vellus", "cycles" or "eevee"; settings as of `draw`, width and height the scene's unless given.
-    Returns the path. In that, ### becomes the number of the frame.
+    engine: "vellus", "cycles" or "eevee"; settings: fields of `core.picture.FrameSettings`, width and height the
+    scene's unless given. Returns the path. In that, ### becomes the number of the frame.
 
     >>> api.render("frame_####.png", frame=3, width=64, height=48).name
     'frame_0003.png'
     """
     from .blender import frames
-    from .blender.render import PictureSettings
+    from .core.picture import FrameSettings
 
     if engine not in frames.ENGINES:
         raise HairError(f'There is no engine "{engine}": there are {", ".join(frames.ENGINES)}.')
-    settings = _changed(PictureSettings, None, frames.scene_size() | settings)
+    settings = _changed(FrameSettings, None, frames.scene_size() | settings)
     frame = frames.present_frame() if frame is None else frame
     frames.require_pattern(path, 1)
     target = frames.path_of(path, frame)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Everything Blender: classes in the order they need each other."""
 
+import atexit
+
 import bpy
 
 from . import (
@@ -40,10 +42,15 @@ def register():
     keymap.register()
     handlers.register()
     viewport.register()
+    if bpy.app.module:
+        # A Blender program switches add-ons off before its graphics end; as a module it does not, and whatever is left
+        # on the GPU would be freed without them.
+        atexit.register(unregister)
 
 
 def unregister():
     """Undo `register` in reverse."""
+    atexit.unregister(unregister)
     running.end(bpy.context)
     rendered_view.clear()
     viewport.unregister()

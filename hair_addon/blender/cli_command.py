@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """blender --command vellus: the command that Blender knows while the add-on is on."""
 
+import sys
+
 import bpy
 
 _command = None
@@ -17,3 +19,10 @@ def unregister():
     global _command
     bpy.utils.unregister_cli_command(_command)
     _command = None
+
+
+def words():
+    """What starts a command in a process of its own, as this one was."""
+    if bpy.app.module:
+        return [sys.executable, "-m", "hair_addon"]
+    return [bpy.app.binary_path, "--command", "vellus"]

@@ -27,14 +27,16 @@ def resolve(path):
 
 
 @contextlib.contextmanager
-def whole_file(path):
+def whole_file(path, partial=None):
     """A path beside `path` to write to: what is written there takes that place in the end, or nothing does.
 
-    Raises `HairError` where the folder may not be written or its disk is full, of which not every exporter tells.
+    partial: that path, where nobody else may write it now; None for one of its own. Raises `HairError` where the folder
+    may not be written or its disk is full, of which not every exporter tells.
     """
     path = Path(path)
-    # In the same folder, or paths relative to the file would be wrong.
-    partial = path.with_name(f".vellus_{secrets.token_hex(4)}{path.suffix}")
+    if partial is None:
+        # In the same folder, or paths relative to the file would be wrong.
+        partial = path.with_name(f".vellus_{secrets.token_hex(4)}{path.suffix}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         yield partial
@@ -45,6 +47,11 @@ def whole_file(path):
     finally:
         with contextlib.suppress(OSError):  # it has moved to its place, or was never made
             partial.unlink()
+
+
+def partial_of(path):
+    """Where a file is written that is claimed: what a process left that was killed is found there, and replaced."""
+    return path.with_name(f".vellus_{path.name}")
 
 
 def require_room(path, byte_count):

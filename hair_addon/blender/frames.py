@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames of the open scene → picture files, each of them whole: drawn by Vellus, or rendered by Cycles or EEVEE."""
+"""Frames of the open scene → picture files, each of them whole: rendered by Vellus, Cycles or EEVEE."""
 
 import contextlib
 from pathlib import Path
@@ -7,10 +7,12 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import HairError
-from . import files, render
+from ..core.params import declared
+from ..core.picture import PassSettings
+from . import files, viewport
 
-# As a user names them → Blender's name of the engine; we draw ourselves.
-ENGINES = {"vellus": "", "cycles": "CYCLES", "eevee": "BLENDER_EEVEE"}
+# As a user names them → as Blender does.
+ENGINES = {"vellus": viewport.ENGINE, "cycles": "CYCLES", "eevee": "BLENDER_EEVEE"}
 
 # Ending → (Blender's format, bits of a colour).
 _FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32")}
@@ -43,6 +45,11 @@ def path_of(pattern, frame):
     return pattern.with_name(f"{before}{frame:0{width + (frame < 0)}d}{after}")
 
 
+def is_sequence(pattern):
+    """Whether a pattern names a file for each frame."""
+    return _number_width(Path(pattern)) > 0
+
+
 def require_pattern(pattern, frame_count):
     """Raise `HairError` unless so many frames can be written by a pattern."""
     pattern = Path(pattern)
@@ -60,47 +67,67 @@ def _number_width(pattern):
     return len(name) - len(name.rstrip("#"))
 
 
-def write_frame(path, frame, engine, settings):
-    """Make a frame of the open scene and write it; the file appears whole or not at all. Raises `HairError`.
+def write_frame(path, frame, engine, settings, partial=None):
+    """Render a frame of the open scene and write it; the file appears whole or not at all. Raises `HairError`.
 
-    engine: of `ENGINES`; settings: `render.PictureSettings`, of which other engines than ours take size and background.
+    engine: of `ENGINES`; settings: `FrameSettings`; partial: of `files.whole_file`.
     """
     blender_scene = bpy.context.scene
-    blender_scene.frame_set(frame)
-    if engine == "vellus":
-        pixels = render.draw_picture(settings)
-        with files.whole_file(path) as partial:
-            render.write_picture(pixels, partial, blender_scene)
-    else:
-        with files.whole_file(path) as partial, _rendering(blender_scene, partial, ENGINES[engine], settings):
-            if bpy.ops.render.render(write_still=True, scene=blender_scene.name) != {"FINISHED"}:
-                raise HairError(f"Frame {frame} was not rendered: {engine} stopped before its end.")
+    if settings.has_passes and path.suffix.lower() != ".exr":
+        raise HairError(f"Passes are layers of an .exr, which {path} is not: name it so.")
+    with files.whole_file(path, partial) as partial, _rendering(blender_scene, partial, engine, settings):
+        blender_scene.frame_set(frame)
+        try:
+            ended = bpy.ops.render.render(write_still=True, scene=blender_scene.name)
+        except RuntimeError as error:
+            raise HairError(f"Frame {frame} was not rendered: {files.cause_of(error)}.") from error
+        if ended != {"FINISHED"}:
+            raise HairError(f"Frame {frame} was not rendered: {engine} stopped before its end.")
 
 
 @contextlib.contextmanager
 def _rendering(blender_scene, path, engine, settings):
     """The scene's own settings of renders are others for the time that it takes."""
-    file_format, color_depth = _FORMATS[path.suffix.lower()]
-    owner, image = blender_scene.render, blender_scene.render.image_settings
-    wanted = [
-        (owner, "engine", engine),
-        (owner, "filepath", str(path)),
-        (owner, "use_file_extension", False),
-        (owner, "resolution_x", settings.width),
-        (owner, "resolution_y", settings.height),
-        (owner, "resolution_percentage", 100),
-        (owner, "film_transparent", settings.is_transparent or owner.film_transparent),
-        (image, "media_type", "IMAGE"),
-        (image, "file_format", file_format),
-        (image, "color_mode", "RGBA"),
-        (image, "color_depth", color_depth),
-    ]
+    wanted = [*_of_scene(blender_scene, path, engine, settings)]
+    if settings.has_passes:
+        wanted += [change for layer in blender_scene.view_layers for change in _of_layer(layer)]
     before = [(owner, name, getattr(owner, name)) for owner, name, _value in wanted]
     try:
         _set(wanted)
         yield
     finally:
         _set(before)
+
+
+def _of_scene(blender_scene, path, engine, settings):
+    render, image = blender_scene.render, blender_scene.render.image_settings
+    file_format, color_depth = _FORMATS[path.suffix.lower()]
+    yield render, "engine", ENGINES[engine]
+    yield render, "filepath", str(path)
+    yield render, "use_file_extension", False
+    yield render, "resolution_x", settings.width
+    yield render, "resolution_y", settings.height
+    yield render, "resolution_percentage", 100
+    yield render, "film_transparent", settings.is_transparent or render.film_transparent
+    yield image, "media_type", "MULTI_LAYER_IMAGE" if settings.has_passes else "IMAGE"
+    yield image, "file_format", "OPEN_EXR_MULTILAYER" if settings.has_passes else file_format
+    if not settings.has_passes:
+        yield image, "color_mode", "RGBA"
+    yield image, "color_depth", color_depth
+    if settings.sample_count:
+        owner, name = {
+            "vellus": (blender_scene.vellus, "sample_count"),
+            "cycles": (blender_scene.cycles, "samples"),
+            "eevee": (blender_scene.eevee, "taa_render_samples"),
+        }[engine]
+        yield owner, name, settings.sample_count
+
+
+def _of_layer(view_layer):
+    for name in ("use_pass_z", "use_pass_vector", "use_pass_shadow"):
+        yield view_layer, name, True
+    for name, _default, _details in declared(PassSettings):
+        yield view_layer.vellus, name, True
 
 
 def _set(values):

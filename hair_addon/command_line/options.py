@@ -95,3 +95,10 @@ def frame_range(text):
     if last < first:
         raise argparse.ArgumentTypeError(f"{text} holds no frame: the first is after the last")
     return range(first, last + 1)
+
+
+def count(text):
+    """A whole number from 1 to 256."""
+    if re.fullmatch(r"\d{1,3}", text) is None or not 1 <= int(text) <= 256:
+        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 to 256")
+    return int(text)

@@ -27,6 +27,17 @@ class RenderSettings(Settings):
 
 
 @dataclass(frozen=True)
+class FrameSettings(Settings):
+    """Of a frame that is rendered into a file."""
+
+    width: int = param(1920, "Width of the picture in pixels", low=1, high=65536)
+    height: int = param(1080, "Height of the picture in pixels", low=1, high=65536)
+    sample_count: int = param(0, "Samples of each pixel; 0: as many as the scene asks for", low=0, high=65536)
+    is_transparent: bool = param(False, "Leave the background empty, whatever the scene says")
+    has_passes: bool = param(False, "All passes that there are, as layers of a multilayer EXR")
+
+
+@dataclass(frozen=True)
 class PassSettings(Settings):
     """Passes of a view layer beside those that Blender has switches for."""
 

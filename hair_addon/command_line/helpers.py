@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Several processes of one command on this machine."""
+
+import json
+import queue
+import signal
+import subprocess
+import threading
+
+from ..core.errors import HairError
+from .console import PROGRAM
+
+_LOOK = 0.2  # [s] between looks at whether somebody has asked to stop
+_PATIENCE = 30.0  # [s] for a process to end that was asked to
+
+
+def run(commands, console, said_as):
+    """Run commands side by side until all have ended; raises `HairError` where one fails, when the others are done.
+
+    commands: lists of words, each of which gives lines of JSON; said_as(values): the sentence of a line.
+    """
+    heard = queue.Queue()
+    helpers = []
+    try:
+        helpers += [_Helper(words, heard) for words in commands]
+        while any(helper.is_talking for helper in helpers) or not heard.empty():
+            console.progress(f"{len(helpers)} processes", 0.0)
+            try:
+                values = heard.get(timeout=_LOOK)
+            except queue.Empty:
+                continue
+            console.result(values, said_as(values))
+    finally:
+        for helper in helpers:
+            helper.stop()
+    failed = next((helper for helper in helpers if helper.status != 0), None)
+    if failed is not None:
+        raise HairError(failed.complaint)
+
+
+class _Helper:
+    """A process, and threads that listen to it."""
+
+    def __init__(self, words, heard):
+        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
+        self._process = subprocess.Popen(words, text=True, encoding="utf-8", errors="replace", **pipes)
+        self._heard, self._complaints = heard, []
+        self._threads = [threading.Thread(target=target, daemon=True) for target in (self._hear, self._hear_errors)]
+        for thread in self._threads:
+            thread.start()
+
+    def _hear(self):
+        for line in self._process.stdout:
+            if line.startswith("{"):  # Blender tells of itself before the command begins
+                self._heard.put(json.loads(line))
+
+    def _hear_errors(self):
+        for line in self._process.stderr:
+            if line.startswith(f"{PROGRAM}: "):
+                self._complaints.append(line.removeprefix(f"{PROGRAM}: ").strip())
+
+    @property
+    def is_talking(self):
+        """Whether more may be heard."""
+        return any(thread.is_alive() for thread in self._threads)
+
+    @property
+    def status(self):
+        """The exit status, once it is silent."""
+        return self._process.wait()
+
+    @property
+    def complaint(self):
+        """Why it failed."""
+        if self._complaints:
+            return self._complaints[-1]
+        return f"A process that was to help ended with status {self.status}, and did not say why."
+
+    def stop(self):
+        """End it, if it has not ended: at its next step, or at once where that takes too long."""
+        if self._process.poll() is None:
+            self._process.send_signal(signal.SIGTERM)
+            try:
+                self._process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:
+                self._process.kill()
+        for thread in self._threads:
+            thread.join()

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sequences of frames, stopped and gone on with, and shared by processes: no frame is made twice, none is broken."""
+
+import contextlib
+import json
+import os
+import resource
+import signal
+import subprocess
+import time
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender import frames, sequence
+from hair_addon.core.claims import claim
+from hair_addon.core.errors import HairError
+from tests.blender.commands import ROOT, command, run, run_here
+
+COUNT = 6
+
+HOLD = """
+import sys, time
+from hair_addon.core.claims import claim
+with claim(sys.argv[1]):
+    print(flush=True)
+    time.sleep(2)
+"""
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+
+
+@pytest.fixture(scope="module")
+def turning(tmp_path_factory):
+    """A .blend of a ball with hair that turns before a camera."""
+    path = tmp_path_factory.mktemp("turning") / "ball.blend"
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    ball = bpy.context.object
+    for frame, angle in ((1, 0.0), (COUNT, 2.0)):
+        ball.rotation_euler.z = angle
+        ball.keyframe_insert("rotation_euler", frame=frame)
+    bpy.ops.vellus.add_hair(guide_count=30, strand_count=200, length=0.08, gravity=1.0, radius=0.002)
+    bpy.ops.object.light_add(type="SUN")
+    bpy.ops.object.camera_add(location=(0.0, -0.6, 0.0), rotation=(np.pi / 2.0, 0.0, 0.0))
+    scene = bpy.context.scene
+    scene.camera = bpy.context.object
+    scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = COUNT, 64, 48
+    scene.vellus.sample_count = 4
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def words(turning, folder, *more, ending="png"):
+    return ("render", turning, "--frames", f"1-{COUNT}", "--out", folder / f"f_###.{ending}", "--json", *more)
+
+
+def start(turning, folder):
+    """The command in a process of its own, whose standard output may be read."""
+    line = list(map(str, command(*words(turning, folder))))
+    return subprocess.Popen(line, stdout=subprocess.PIPE, env=ENVIRONMENT, cwd=ROOT)
+
+
+def pixels(path):
+    """(N,) float32 of a picture."""
+    image = bpy.data.images.load(str(path))
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    bpy.data.images.remove(image)
+    return values
+
+
+def frame_numbers(ended):
+    return [result["frame"] for result in ended.results]
+
+
+def pictures(folder):
+    return sorted(path.name for path in folder.glob("*.png"))
+
+
+ALL = [f"f_{number:03}.png" for number in range(1, COUNT + 1)]
+
+
+@pytest.fixture(scope="module")
+def whole(turning, tmp_path_factory):
+    """A folder with the sequence, made in one go."""
+    folder = tmp_path_factory.mktemp("whole")
+    ended = run(*words(turning, folder))
+    assert ended.status == 0, ended.errors
+    assert frame_numbers(ended) == list(range(1, COUNT + 1))
+    assert pictures(folder) == ALL
+    return folder
+
+
+def test_hair_turns_with_its_surface(whole):
+    first, second, last = (pixels(whole / name) for name in (ALL[0], ALL[1], ALL[-1]))
+    assert np.abs(first - second).max() > 0.05
+    assert np.abs(first - last).mean() > np.abs(first - second).mean()
+
+
+def test_a_frame_does_not_depend_on_those_before(turning, whole, tmp_path):
+    ended = run("render", turning, "--frames", "4-4", "--out", tmp_path / "f_###.png", "--json")
+    assert frame_numbers(ended) == [4]
+    np.testing.assert_array_equal(pixels(tmp_path / ALL[3]), pixels(whole / ALL[3]))
+
+
+@pytest.mark.parametrize("asked", [signal.SIGKILL, signal.SIGINT], ids=["killed", "Ctrl-C"])
+def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
+    with start(turning, tmp_path) as process:
+        first = [json.loads(process.stdout.readline())["frame"] for _ in range(2)]
+        process.send_signal(asked)
+        first += [json.loads(line)["frame"] for line in process.stdout]
+    there = {name: (tmp_path / name).stat().st_mtime_ns for name in pictures(tmp_path)}
+    assert 2 <= len(there) < COUNT
+    ended = run(*words(turning, tmp_path))
+    assert ended.status == 0, ended.errors
+    assert set(frame_numbers(ended)).isdisjoint(first)
+    assert pictures(tmp_path) == ALL
+    assert {name: (tmp_path / name).stat().st_mtime_ns for name in there} == there
+    assert not list(tmp_path.glob(".*"))
+    for name in ALL:
+        np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))
+    assert frame_numbers(run(*words(turning, tmp_path))) == []
+
+
+def test_processes_share_the_frames(turning, whole, tmp_path):
+    """Those of one command, and another command that runs at the same time."""
+    other = start(turning, tmp_path)
+    ended = run(*words(turning, tmp_path, "--jobs", 2))
+    out, _errors = other.communicate(timeout=120)
+    assert (ended.status, other.returncode) == (0, 0), ended.errors
+    made = frame_numbers(ended) + [json.loads(line)["frame"] for line in out.splitlines()]
+    assert sorted(made) == list(range(1, COUNT + 1))
+    for name in ALL:
+        np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))
+    assert not list(tmp_path.glob(".*"))
+
+
+def test_frames_of_something_else_are_kept(turning, whole, tmp_path):
+    with contextlib.chdir(tmp_path):
+        assert run_here(*words(turning, tmp_path)).status == 0
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    ended = run_here(*words(turning, tmp_path, "--width", 32))
+    assert ended.status == 1 and "f_###.png.json is of another sequence (settings)" in ended.errors
+    (tmp_path / "f_###.png.json").unlink()
+    ended = run_here(*words(turning, tmp_path))
+    assert ended.status == 1 and "f_001.png is of no sequence that is known" in ended.errors
+    (tmp_path / "f_###.png.json").write_text("half of")
+    ended = run_here(*words(turning, tmp_path))
+    assert ended.status == 1 and "cannot be read" in ended.errors
+    assert all(path.read_bytes() == held for path, held in before.items() if path.suffix == ".png")
+    ended = run_here(*words(turning, tmp_path, "--width", 32, "--overwrite"))
+    assert ended.status == 0 and frame_numbers(ended) == list(range(1, COUNT + 1))
+    assert frame_numbers(run_here(*words(turning, tmp_path, "--width", 32))) == []
+
+
+def test_a_full_disk_leaves_what_was_whole(turning, tmp_path):
+    """As the system says it of a file that may not grow further."""
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+
+    ended = run(*words(turning, tmp_path, ending="exr"), preexec_fn=limit)
+    assert ended.status == 1 and len(ended.errors.splitlines()) == 1
+    assert not [path for path in tmp_path.iterdir() if path.suffix == ".exr"]
+    assert run(*words(turning, tmp_path, ending="exr")).status == 0
+    assert len(list(tmp_path.glob("f_*.exr"))) == COUNT
+
+
+def test_who_fails_among_several_says_why_once(turning, tmp_path):
+    bpy.ops.wm.open_mainfile(filepath=str(turning))
+    bpy.data.objects.remove(bpy.context.scene.camera)
+    blind = tmp_path / "blind.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blind))
+    ended = run("render", blind, "--frames", "1-4", "--out", tmp_path / "f_##.png", "--jobs", 2)
+    assert ended.status == 1 and len(ended.errors.splitlines()) == 1
+    assert "was not rendered" in ended.errors and "camera" in ended.errors
+    assert not list(tmp_path.glob("f_*.png")) and not list(tmp_path.glob(".*"))
+
+
+def test_it_waits_for_what_others_make(tmp_path):
+    """A frame that another process has claimed is made here if that ends without it."""
+    pattern = tmp_path / "f_#.png"
+    line = [*command()[:1], "-c", HOLD, str(frames.path_of(pattern, 1))]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, env=ENVIRONMENT) as holder:
+        holder.stdout.readline()
+        started = time.monotonic()
+        made = [n for n, _ in sequence.make(pattern, [1, 2], lambda path, number: path.write_text(str(number)))]
+        assert made == [2, 1] and time.monotonic() - started > 1.0
+
+
+def test_a_sequence_begins_when_nobody_else_begins_it(tmp_path):
+    pattern = tmp_path / "f_#.png"
+    sequence.begin(pattern, [1], {"of": "this"})
+    sequence.begin(pattern, [1], {"of": "this"})
+    with pytest.raises(HairError, match="another sequence"):
+        sequence.begin(pattern, [1], {"of": "that"})
+    with claim(sequence.record_of(pattern)) as is_ours:
+        assert is_ours
