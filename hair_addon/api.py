@@ -164,13 +164,15 @@ def shade(hair, look=None, *, model=None, **changes):
     groom_settings.assign_look(target, wanted)
 
 
-def table_settings(look, **changes):
-    """`lookup_tables.Settings` of the tables that an `Appearance` is drawn with.
+def table_settings(settings, **changes):
+    """`lookup_tables.Settings` of the tables that hair of some `GroomSettings` is drawn with.
 
-    >>> api.table_settings(api.Appearance(roughness=0.2), size=64).roughness
+    >>> settings = api.GroomSettings(appearance=api.Appearance(roughness=0.2))
+    >>> api.table_settings(settings, size=64).roughness
     0.2
     """
-    return _changed(lookup_tables.Settings, appearance.table_settings(look), changes)
+    found = appearance.table_settings(settings.appearance, settings.tables)
+    return _changed(lookup_tables.Settings, found, changes)
 
 
 def bake_tables(folder, settings=None, *, has_plots=False, progress=unheard, **changes):

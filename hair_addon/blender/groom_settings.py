@@ -3,6 +3,7 @@
 
 from ..core.groom import GuideSettings
 from ..core.settings_file import GroomSettings
+from ..core.shading.appearance import TABLE_FIELDS
 from . import curves, looks, pipeline, properties
 
 
@@ -10,7 +11,8 @@ def settings_of(hair):
     """The `GroomSettings` of a hair Curves datablock and its guides. Raises `HairError`."""
     guides, hair_settings = pipeline.inputs_of(hair)
     guide_settings = properties.to_settings(guides.vellus.guides, GuideSettings)
-    return GroomSettings(guide_settings, hair_settings, properties.look_of(hair.vellus))
+    look, tables = properties.look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
+    return GroomSettings(guide_settings, hair_settings, look, tables)
 
 
 def apply_settings(hair, settings):
@@ -25,7 +27,7 @@ def apply_settings(hair, settings):
     for group, wanted in ((guides.vellus.guides, settings.guides), (hair.vellus.hair, settings.hair)):
         if properties.to_settings(group, type(wanted)) != wanted:  # or everything would be made again for nothing
             properties.assign(group, wanted)
-    assign_look(hair, settings.appearance)
+    _assign_shading(hair, settings)
 
 
 def assign_look(hair, look):
@@ -38,5 +40,10 @@ def assign_look(hair, look):
 def adding_hair(surface_object, settings, depsgraph):
     """Guides and hair of some `GroomSettings` on a mesh object, as work in steps; returns the Curves of both."""
     guides, hair = yield from pipeline.adding_hair(surface_object, settings.guides, settings.hair, depsgraph)
-    assign_look(hair, settings.appearance)
+    _assign_shading(hair, settings)
     return guides, hair
+
+
+def _assign_shading(hair, settings):
+    properties.assign(hair.vellus.marschner, settings.tables, skip=TABLE_FIELDS)
+    assign_look(hair, settings.appearance)

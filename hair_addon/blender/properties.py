@@ -105,10 +105,14 @@ def look_of(state):
     return to_settings(state.appearance, Appearance)
 
 
+def own_table_settings_of(state):
+    """The `lookup_tables.Settings` of a hair, those at their defaults that follow from its look. Raises `HairError`."""
+    return to_settings(state.marschner, lookup_tables.Settings, skip=appearance.TABLE_FIELDS)
+
+
 def table_settings_of(state):
     """The `lookup_tables.Settings` that the Marschner model shades a hair with. Raises `HairError`."""
-    base = to_settings(state.marschner, lookup_tables.Settings, skip=appearance.TABLE_FIELDS)
-    settings = appearance.table_settings(look_of(state), base)
+    settings = appearance.table_settings(look_of(state), own_table_settings_of(state))
     # As an operator's properties hold them, so that tables it baked of these settings have the same ones.
     return replace(
         settings,
@@ -119,10 +123,11 @@ def table_settings_of(state):
     )
 
 
-def assign(owner, settings):
-    """Write `Settings` into an operator's or group's properties."""
+def assign(owner, settings, skip=()):
+    """Write `Settings` into an operator's or group's properties, but for those of `skip`."""
     for name, _default, _details in declared(type(settings)):
-        setattr(owner, name, getattr(settings, name))
+        if name not in skip:
+            setattr(owner, name, getattr(settings, name))
 
 
 def _mark_geometry(group, _context):

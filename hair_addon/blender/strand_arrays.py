@@ -9,6 +9,9 @@ from ..core.errors import HairError
 from . import curves, live_hair, scene, selection
 
 
+_AT_ONCE = 16_384  # strands, in double precision: all of them would take four times their memory
+
+
 def metres_per_unit(blender_scene):
     """How many metres a unit of a scene is."""
     units = blender_scene.unit_settings
@@ -25,9 +28,12 @@ def world_points(datablock):
     if shown is None:
         raise HairError('No object of the view layer shows "{name}".', name=datablock.name)
     local = _carried(datablock, _at_rest(datablock))
-    to_world = np.array(shown.matrix_world, np.float64)
-    points = local.astype(np.float64) @ to_world[:3, :3].T + to_world[:3, 3]
-    return (points * metres_per_unit(bpy.context.scene)).astype(np.float32)
+    to_world = np.array(shown.matrix_world, np.float64) * metres_per_unit(bpy.context.scene)
+    world = np.empty_like(local)
+    for start in range(0, len(local), _AT_ONCE):
+        some = slice(start, start + _AT_ONCE)
+        world[some] = local[some].astype(np.float64) @ to_world[:3, :3].T + to_world[:3, 3]
+    return world
 
 
 def _at_rest(datablock):

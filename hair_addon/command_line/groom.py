@@ -6,7 +6,6 @@ from dataclasses import replace
 from pathlib import Path
 
 from .. import api
-from ..core.settings_file import SECTIONS
 from ..core.shading.presets import PRESETS
 from . import opening, options
 
@@ -19,9 +18,8 @@ def add(verbs):
     parser.add_argument("--surface", default="", metavar="NAME", help="the mesh object; not needed where there is one")
     parser.add_argument("--up", choices=("Y", "Z"), default="Z", help="axis that points up in an .obj, .ply, .stl [Z]")
     parser.add_argument("--preset", choices=PRESETS, metavar="NAME", help=f"a look: {', '.join(PRESETS)}")
-    options.add_settings_file(parser)
     options.add_scripts(parser)
-    options.add_settings(parser, *SECTIONS.values())
+    options.add_groom_settings(parser)
     options.add_common(parser)
     parser.set_defaults(run=run)
 
@@ -31,7 +29,7 @@ def run(given, console):
     settings = options.groom_settings(given)
     if given.preset:
         look = replace(PRESETS[given.preset][1], mode=settings.appearance.mode)
-        settings = replace(settings, appearance=options.changed(look, given))
+        settings = options.changed_groom(replace(settings, appearance=look), given)
     from ..blender import groom_files, mesh_files
 
     mesh_files.require_readable(given.input)

@@ -37,7 +37,7 @@ def run(given, console):
 
 
 def _settings(path):
-    return {"settings": asdict(settings_file.read(path))}
+    return {"settings": settings_file.sections_of(settings_file.read(path))}
 
 
 def _tables(path):

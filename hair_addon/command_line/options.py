@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..core import settings_file
-from ..core.params import declared, label_of
+from ..core.params import label_of
 from .console import PROGRAM
 
 # Settings that a shorter word names better on a command line.
@@ -42,14 +42,18 @@ def add_settings_file(parser):
     parser.add_argument("--settings", type=Path, metavar="FILE", help="groom settings (JSON); options come before it")
 
 
-def add_settings(parser, *settings_classes):
-    """An option for each setting of some classes; an option that is not given leaves no trace."""
-    names = set()
-    for settings_class in settings_classes:
-        for name, default, details in declared(settings_class):
-            if name not in names:
-                names.add(name)
-                _add_setting(parser, name, default, details)
+def add_settings(parser, declarations):
+    """An option for each declared setting, each name once; one that is not given leaves no trace."""
+    for name, default, details in {setting[0]: setting for setting in declarations}.values():
+        _add_setting(parser, name, default, details)
+
+
+def add_groom_settings(parser):
+    """--settings, and an option for each setting that such a file may hold."""
+    add_settings_file(parser)
+    add_settings(
+        parser, [setting for section in settings_file.SECTIONS for setting in settings_file.declared_in(section)]
+    )
 
 
 def _add_setting(parser, name, default, details):
@@ -72,16 +76,25 @@ def _in_words(default):
     return f"{default:g}" if isinstance(default, float) else str(default)
 
 
-def changed(settings, options):
-    """`Settings` with those fields changed that options name. Raises `HairError`."""
-    given = {name: getattr(options, name) for name, *_ in declared(type(settings)) if hasattr(options, name)}
+def changed(settings, options, declarations):
+    """`Settings` with those of the declared fields changed that options name. Raises `HairError`."""
+    given = {name: getattr(options, name) for name, *_ in declarations if hasattr(options, name)}
     return replace(settings, **{name: tuple(v) if isinstance(v, list) else v for name, v in given.items()})
 
 
 def groom_settings(options):
     """The `GroomSettings` of --settings, or the defaults, with what single options change. Raises `HairError`."""
     settings = settings_file.read(options.settings) if options.settings else settings_file.GroomSettings()
-    return replace(settings, **{name: changed(getattr(settings, name), options) for name in settings_file.SECTIONS})
+    return changed_groom(settings, options)
+
+
+def changed_groom(settings, options):
+    """`GroomSettings` with what single options change. Raises `HairError`."""
+    sections = {
+        name: changed(getattr(settings, name), options, settings_file.declared_in(name))
+        for name in settings_file.SECTIONS
+    }
+    return replace(settings, **sections)
 
 
 def frame_range(text):

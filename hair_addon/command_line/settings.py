@@ -12,8 +12,7 @@ def add(verbs):
     parser = verbs.add_parser("settings", help="write groom settings: the defaults, with what options change")
     parser.add_argument("--out", type=Path, metavar="FILE", help=".json; without it they are printed")
     parser.add_argument("--schema", action="store_true", help="the JSON Schema of such files instead")
-    options.add_settings_file(parser)
-    options.add_settings(parser, *settings_file.SECTIONS.values())
+    options.add_groom_settings(parser)
     options.add_common(parser)
     parser.set_defaults(run=run)
 

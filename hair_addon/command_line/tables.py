@@ -6,6 +6,7 @@ from pathlib import Path
 
 from .. import api
 from ..core import settings_file
+from ..core.params import declared
 from ..core.shading import lookup_tables
 from . import options
 
@@ -16,7 +17,7 @@ def add(verbs):
     parser.add_argument("--out", type=Path, required=True, help="folder for the tables: m.exr, n.exr, n_trt.exr, …")
     parser.add_argument("--plot", action="store_true", help="write a picture of each table too, with labelled axes")
     options.add_settings_file(parser)
-    options.add_settings(parser, lookup_tables.Settings)
+    options.add_settings(parser, declared(lookup_tables.Settings))
     options.add_common(parser)
     parser.set_defaults(run=run)
 
@@ -25,8 +26,8 @@ def run(given, console):
     """Bake and write."""
     settings = lookup_tables.Settings()
     if given.settings:
-        settings = api.table_settings(settings_file.read(given.settings).appearance)
-    settings = options.changed(settings, given)
+        settings = api.table_settings(settings_file.read(given.settings))
+    settings = options.changed(settings, given, declared(lookup_tables.Settings))
     started = time.perf_counter()
     paths = api.bake_tables(given.out, settings, has_plots=given.plot, progress=console.progress)
     seconds = time.perf_counter() - started

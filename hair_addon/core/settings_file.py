@@ -16,7 +16,8 @@ from pathlib import Path
 from .errors import HairError
 from .groom import GuideSettings, HairSettings
 from .params import declared, label_of, like
-from .shading.appearance import Appearance
+from .shading import lookup_tables
+from .shading.appearance import TABLE_FIELDS, Appearance
 
 FORMAT = "Vellus groom settings"
 VERSION = 2
@@ -31,9 +32,16 @@ class GroomSettings:
     guides: GuideSettings = field(default_factory=GuideSettings)
     hair: HairSettings = field(default_factory=HairSettings)
     appearance: Appearance = field(default_factory=Appearance)
+    tables: lookup_tables.Settings = field(default_factory=lookup_tables.Settings)  # but for what the appearance says
 
 
 SECTIONS = {section.name: section.default_factory for section in fields(GroomSettings)}
+
+
+def declared_in(section):
+    """[(name, default, Param)] of the settings that a section holds."""
+    left_out = TABLE_FIELDS if section == "tables" else ()
+    return [setting for setting in declared(SECTIONS[section]) if setting[0] not in left_out]
 
 
 def write(path, settings):
@@ -43,7 +51,13 @@ def write(path, settings):
 
 def to_object(settings):
     """What `write` writes."""
-    return {"format": FORMAT, "version": VERSION, **asdict(settings)}
+    return {"format": FORMAT, "version": VERSION, **sections_of(settings)}
+
+
+def sections_of(settings):
+    """{section: {name: value}} of `GroomSettings`."""
+    values = asdict(settings)
+    return {section: {name: values[section][name] for name, *_ in declared_in(section)} for section in SECTIONS}
 
 
 def read(path):
@@ -62,13 +76,16 @@ def from_object(found, path):
         values = sections.get(name, {})
         if not isinstance(values, dict):
             raise HairError('{path}: "{key}" holds no settings.', path=path, key=name)
-        made[name] = to_settings(values, settings_class, path, f"{name}.")
+        made[name] = to_settings(values, settings_class, path, f"{name}.", declared_in(name))
     return GroomSettings(**made)
 
 
-def to_settings(values, settings_class, path, place=""):
-    """{name: value} as JSON gave it → `Settings`. Raises `HairError` that names file and key; place: what is before."""
-    declarations = {name: default for name, default, _details in declared(settings_class)}
+def to_settings(values, settings_class, path, place="", allowed=None):
+    """{name: value} as JSON gave it → `Settings`. Raises `HairError` that names file and key; place: what is before.
+
+    allowed: those of the class' declarations that may be named, None for all.
+    """
+    declarations = {name: default for name, default, _details in allowed or declared(settings_class)}
     checked = {}
     for name, value in values.items():
         key = f"{place}{name}"
@@ -180,9 +197,9 @@ def schema():
         name: {
             "type": "object",
             "additionalProperties": False,
-            "properties": {setting[0]: _property(*setting) for setting in declared(settings_class)},
+            "properties": {setting[0]: _property(*setting) for setting in declared_in(name)},
         }
-        for name, settings_class in SECTIONS.items()
+        for name in SECTIONS
     }
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",

@@ -99,12 +99,13 @@ def test_options_come_before_the_file_of_settings(scene, mesh, tmp_path):
     groom = ("groom", mesh, "--settings", tmp_path / "groom.json", "--out", out)
     assert run_here(*groom).status == 0
     assert grown(out)[0] == wanted
-    options = ("--strands", 40, "--no-guide-map", "--melanin", 0.7, "--tint", 1, 0.5, 0.2)
+    options = ("--strands", 40, "--no-guide-map", "--melanin", 0.7, "--tint", 1, 0.5, 0.2, "--tilt", 0.1, "--size", 32)
     assert run_here(*groom, *options).status == 0
     assert grown(out)[0] == GroomSettings(
-        wanted.guides,
+        replace(wanted.guides, tilt=0.1),
         HairSettings(strand_count=40, seed=6, guide_map=False),
         Appearance(melanin=0.7, coat=0.5, tint=(1.0, 0.5, 0.2)),
+        lookup_tables.Settings(size=32),
     )
     assert run_here(*groom, "--preset", "BLOND", "--coat", 0.1).status == 0
     assert grown(out)[0].appearance == replace(PRESETS["BLOND"][1], coat=0.1)
@@ -152,10 +153,11 @@ def test_tables_of_the_energy_conserving_mode_are_baked_and_plotted(tmp_path):
 
 def test_tables_of_a_file_of_settings(tmp_path):
     look = Appearance(roughness=0.4, melanin=0.2)
-    settings_file.write(tmp_path / "groom.json", GroomSettings(appearance=look))
+    tables = lookup_tables.Settings(size=64, glint_gain=0.5)
+    settings_file.write(tmp_path / "groom.json", GroomSettings(appearance=look, tables=tables))
     bake = ("bake-tables", "--settings", tmp_path / "groom.json", "--size", 32, "--out", tmp_path / "t")
     assert run_here(*bake).status == 0
-    expected = appearance.table_settings(look, lookup_tables.Settings(size=32))
+    expected = appearance.table_settings(look, replace(tables, size=32))
     assert exr.read_tables(tmp_path / "t").settings == expected
 
 

@@ -219,7 +219,7 @@ def run_mounted(mounting, words, folder):
 
 
 @needs_mounts
-@pytest.mark.parametrize("kind", [kind for kind in OUTPUTS if kind != ".json"])
+@pytest.mark.parametrize("kind", [".blend", ".npz", ".usdc", ".abc", ".png", "tables"])
 def test_a_disk_that_is_really_full(words, tmp_path, kind):
     folder = tmp_path / "disk"
     folder.mkdir()
@@ -230,7 +230,7 @@ def test_a_disk_that_is_really_full(words, tmp_path, kind):
 
 
 @needs_mounts
-@pytest.mark.parametrize("kind", OUTPUTS)
+@pytest.mark.parametrize("kind", [".npz", ".exr", "tables", ".json"])
 def test_a_folder_that_may_only_be_read(words, tmp_path, kind):
     folder = tmp_path / "folder"
     folder.mkdir()

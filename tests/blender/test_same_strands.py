@@ -1,19 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Panel, scripts and command line: the same settings make the same strands, to the last bit."""
 
-import subprocess
-import sys
-from pathlib import Path
-
 import bpy
 import numpy as np
 import pytest
 
 from hair_addon import api
-from tests.blender.commands import load
+from tests.blender.commands import load, run, run_here
 from tests.blender.reading import points
 
-ROOT = Path(__file__).resolve().parents[2]
 GUIDES = {"guide_count": 40, "seed": 7, "length": 0.3, "gravity": 0.4}
 HAIR = {"strand_count": 600, "neighbour_limit": 5, "radius": 0.001}
 SEED = 7
@@ -67,9 +62,9 @@ def test_all_ways_make_the_same_strands(surface, tmp_path):
 
     out, files = tmp_path / "groom.blend", tmp_path / "groom.npz"
     api.save_settings(tmp_path / "groom.json", settings)
-    groom = [sys.executable, "-m", "hair_addon", "groom", blend, "--settings", tmp_path / "groom.json", "--quiet"]
-    for target in (out, files):
-        subprocess.run([*groom, "--out", target], cwd=ROOT, check=True, timeout=120)
+    for target, call in ((out, run_here), (files, run)):  # in this process, and in one of its own
+        groom = ("groom", blend, "--settings", tmp_path / "groom.json", "--out", target)
+        assert call(*groom).status == 0
     _open(out)
     keep("command line", bpy.data.objects["Guides"], bpy.data.objects["Hair"])
 

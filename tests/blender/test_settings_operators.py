@@ -11,11 +11,15 @@ from hair_addon.blender import groom_settings
 from hair_addon.core import settings_file
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.settings_file import GroomSettings
+from hair_addon.core.shading import lookup_tables
 from hair_addon.core.shading.appearance import Appearance
 from tests.blender.reading import points, snapshot
 
 WANTED = GroomSettings(
-    GuideSettings(guide_count=33, seed=5, length=0.2), HairSettings(strand_count=70), Appearance(melanin=0.3)
+    GuideSettings(guide_count=33, seed=5, length=0.2),
+    HairSettings(strand_count=70),
+    Appearance(melanin=0.3, mode="classic"),
+    lookup_tables.Settings(size=64, eccentricity=0.9),
 )
 
 
@@ -39,6 +43,7 @@ def test_settings_are_saved_as_they_are(hair, tmp_path, active):
     assert saved.guides == GuideSettings(guide_count=60, length=0.5)
     assert saved.hair == HairSettings(strand_count=500, radius=0.004)
     assert saved.appearance == Appearance(mode="classic")
+    assert saved.tables == lookup_tables.Settings()
 
 
 @pytest.mark.parametrize("active", ["Sphere", "Guides", "Hair"])

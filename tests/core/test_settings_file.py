@@ -14,7 +14,7 @@ from hair_addon.core import settings_file
 from hair_addon.core.errors import HairError
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.params import declared
-from hair_addon.core.settings_file import SECTIONS, GroomSettings
+from hair_addon.core.settings_file import SECTIONS, GroomSettings, declared_in
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.presets import PRESETS
 
@@ -33,11 +33,11 @@ def values_of(default, details):
     return st.tuples(*[numbers] * len(default)) if isinstance(default, tuple) else numbers
 
 
-def any_settings(settings_class):
-    return st.builds(settings_class, **{name: values_of(*rest) for name, *rest in declared(settings_class)})
+def any_settings(section):
+    return st.builds(SECTIONS[section], **{name: values_of(*rest) for name, *rest in declared_in(section)})
 
 
-GROOMS = st.builds(GroomSettings, **{name: any_settings(section) for name, section in SECTIONS.items()})
+GROOMS = st.builds(GroomSettings, **{name: any_settings(name) for name in SECTIONS})
 
 
 def write(path, values):
@@ -88,8 +88,12 @@ def check(value, schema):
 
 def test_the_schema_knows_every_setting():
     sections = settings_file.schema()["properties"]
-    for name, section in SECTIONS.items():
-        assert list(sections[name]["properties"]) == [setting for setting, *_ in declared(section)]
+    for name in SECTIONS:
+        assert list(sections[name]["properties"]) == [setting for setting, *_ in declared_in(name)]
+    named = [setting for name in SECTIONS for setting in sections[name]["properties"]]
+    everything = {setting for section in SECTIONS.values() for setting, *_ in declared(section)}
+    # What tables take from the appearance stands there, under the names that it has there.
+    assert everything - {*named} == {"eta", "sigma_a", "beta_r"}
 
 
 def test_what_a_file_leaves_out_is_at_its_default(tmp_path):
@@ -111,6 +115,7 @@ def test_a_look_as_it_was_saved_alone_is_read(tmp_path):
         (head(hair={"strand_cuont": 5}), 'there is no setting "hair.strand_cuont"'),
         (head(styling={}), 'there is no section "styling"'),
         (head(hair=[1]), '"hair" holds no settings'),
+        (head(tables={"roughness": 0.3}), 'there is no setting "tables.roughness"'),
         (head(hair={"strand_count": "many"}), '"hair.strand_count" must be a whole number'),
         (head(hair={"strand_count": 5.5}), '"hair.strand_count" must be a whole number'),
         (head(hair={"strand_count": True}), '"hair.strand_count" must be a whole number'),
