@@ -24,7 +24,7 @@ from pathlib import Path
 
 import numpy as np
 
-from .core import groom, settings_file
+from .core import groom, hair_binding, settings_file
 from .core.errors import HairError
 from .core.groom import GuideSettings, HairSettings
 from .core.long_work import run_now, unheard
@@ -99,7 +99,7 @@ def interpolate_hair(guides, settings=None, *, mesh=None, progress=unheard, **ch
             raise HairError("Guides of arrays need the mesh that they grow on: give its arrays as mesh=.")
         _require_no_names(settings)
         binding = groom.bind_hair(_mesh(mesh), guides, settings, progress=progress)
-        return groom.follow_guides(binding, guides)
+        return hair_binding.follow_guides(binding, guides)
     from .blender import pipeline
 
     return run_now(pipeline.interpolating_hair(_curves(guides, "GUIDES"), settings, _depsgraph()), progress)

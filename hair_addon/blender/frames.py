@@ -75,6 +75,8 @@ def write_frame(path, frame, engine, settings, partial=None):
     blender_scene = bpy.context.scene
     if settings.has_passes and path.suffix.lower() != ".exr":
         raise HairError(f"Passes are layers of an .exr, which {path} is not: name it so.")
+    if blender_scene.camera is None:
+        raise HairError("The scene has no camera to look through: add one.")
     with files.whole_file(path, partial) as partial, _rendering(blender_scene, partial, engine, settings):
         blender_scene.frame_set(frame)
         try:
@@ -103,7 +105,7 @@ def _of_scene(blender_scene, path, engine, settings):
     render, image = blender_scene.render, blender_scene.render.image_settings
     file_format, color_depth = _FORMATS[path.suffix.lower()]
     yield render, "engine", ENGINES[engine]
-    yield render, "filepath", str(path)
+    yield render, "filepath", str(path.absolute())
     yield render, "use_file_extension", False
     yield render, "resolution_x", settings.width
     yield render, "resolution_y", settings.height

@@ -46,9 +46,9 @@ def begin(pattern, numbers, described, replaces=False):
 
 
 def record_of(pattern):
-    """The file beside a sequence that says what it is of."""
+    """The file beside a sequence that says what it is of; hidden, so that its folder holds frames alone."""
     pattern = Path(pattern)
-    return pattern.with_name(f"{pattern.name}.json")
+    return pattern.with_name(f".{pattern.name}.json")
 
 
 def _begin(pattern, numbers, record, described, replaces):

@@ -23,7 +23,7 @@ def run(commands, console, said_as):
     helpers = []
     try:
         helpers += [_Helper(words, heard) for words in commands]
-        while any(helper.is_talking for helper in helpers) or not heard.empty():
+        while any(helper.is_at_work for helper in helpers) or not heard.empty():
             console.progress(f"{len(helpers)} processes", 0.0)
             try:
                 values = heard.get(timeout=_LOOK)
@@ -60,14 +60,14 @@ class _Helper:
                 self._complaints.append(line.removeprefix(f"{PROGRAM}: ").strip())
 
     @property
-    def is_talking(self):
-        """Whether more may be heard."""
-        return any(thread.is_alive() for thread in self._threads)
+    def is_at_work(self):
+        """Whether it runs, or more may be heard of it."""
+        return self._process.poll() is None or any(thread.is_alive() for thread in self._threads)
 
     @property
     def status(self):
-        """The exit status, once it is silent."""
-        return self._process.wait()
+        """The exit status of what is no longer at work."""
+        return self._process.returncode
 
     @property
     def complaint(self):

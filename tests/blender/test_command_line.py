@@ -216,7 +216,7 @@ def test_frames_are_drawn_each_to_its_file(shot, tmp_path):
         (2, "f_002.exr"),
         (3, "f_003.exr"),
     ]
-    assert sorted(path.name for path in (tmp_path / "f").iterdir()) == ["f_001.exr", "f_002.exr", "f_003.exr"]
+    assert sorted(path.name for path in (tmp_path / "f").glob("[!.]*")) == ["f_001.exr", "f_002.exr", "f_003.exr"]
     frames = [picture(tmp_path / "f" / f"f_00{number}.exr") for number in (1, 2, 3)]
     assert all(frame.shape == (30, 40, 4) for frame in frames)
     assert all(np.abs(first - second).max() > 0.01 for first, second in itertools.pairwise(frames))
@@ -361,4 +361,4 @@ def test_readme_shows_commands_that_work(lit, tmp_path, monkeypatch):
     for command in commands:
         ended = run_here(*shlex.split(command))
         assert ended.status == 0, f"{command}: {ended.errors}"
-    assert len(list((tmp_path / "frames").iterdir())) == 24
+    assert len(list((tmp_path / "frames").glob("[!.]*"))) == 24

@@ -78,6 +78,10 @@ def pictures(folder):
     return sorted(path.name for path in folder.glob("*.png"))
 
 
+def hidden(folder):
+    return sorted(path.name for path in folder.glob(".*"))
+
+
 ALL = [f"f_{number:03}.png" for number in range(1, COUNT + 1)]
 
 
@@ -117,7 +121,7 @@ def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
     assert set(frame_numbers(ended)).isdisjoint(first)
     assert pictures(tmp_path) == ALL
     assert {name: (tmp_path / name).stat().st_mtime_ns for name in there} == there
-    assert not list(tmp_path.glob(".*"))
+    assert hidden(tmp_path) == [".f_###.png.json"]
     for name in ALL:
         np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))
     assert frame_numbers(run(*words(turning, tmp_path))) == []
@@ -133,7 +137,7 @@ def test_processes_share_the_frames(turning, whole, tmp_path):
     assert sorted(made) == list(range(1, COUNT + 1))
     for name in ALL:
         np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))
-    assert not list(tmp_path.glob(".*"))
+    assert hidden(tmp_path) == [".f_###.png.json"]
 
 
 def test_frames_of_something_else_are_kept(turning, whole, tmp_path):
@@ -141,11 +145,11 @@ def test_frames_of_something_else_are_kept(turning, whole, tmp_path):
         assert run_here(*words(turning, tmp_path)).status == 0
     before = {path: path.read_bytes() for path in tmp_path.iterdir()}
     ended = run_here(*words(turning, tmp_path, "--width", 32))
-    assert ended.status == 1 and "f_###.png.json is of another sequence (settings)" in ended.errors
-    (tmp_path / "f_###.png.json").unlink()
+    assert ended.status == 1 and ".f_###.png.json is of another sequence (settings)" in ended.errors
+    (tmp_path / ".f_###.png.json").unlink()
     ended = run_here(*words(turning, tmp_path))
     assert ended.status == 1 and "f_001.png is of no sequence that is known" in ended.errors
-    (tmp_path / "f_###.png.json").write_text("half of")
+    (tmp_path / ".f_###.png.json").write_text("half of")
     ended = run_here(*words(turning, tmp_path))
     assert ended.status == 1 and "cannot be read" in ended.errors
     assert all(path.read_bytes() == held for path, held in before.items() if path.suffix == ".png")
@@ -175,8 +179,8 @@ def test_who_fails_among_several_says_why_once(turning, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(blind))
     ended = run("render", blind, "--frames", "1-4", "--out", tmp_path / "f_##.png", "--jobs", 2)
     assert ended.status == 1 and len(ended.errors.splitlines()) == 1
-    assert "was not rendered" in ended.errors and "camera" in ended.errors
-    assert not list(tmp_path.glob("f_*.png")) and not list(tmp_path.glob(".*"))
+    assert ended.errors == "vellus: The scene has no camera to look through: add one.\n"
+    assert not list(tmp_path.glob("f_*.png")) and hidden(tmp_path) == [".f_##.png.json"]
 
 
 def test_it_waits_for_what_others_make(tmp_path):
