@@ -1,7 +1,7 @@
 # make demo, make test: from a bare clone, everything that they need is installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
-.PHONY: help demo compare test desktop bench build lint lock samples clean
+.PHONY: help demo compare turntable test desktop bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
 # uv trusts the certificates that the machine trusts, as pip does: some networks have their own.
@@ -12,7 +12,7 @@ installed = .venv/installed
 peers = .venv/peers
 
 help: ## this list
-	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-8s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
 demo: $(installed) ## the head, 200 guides, 30,000 strands: pictures and tables in out/demo
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
@@ -28,6 +28,9 @@ bench: $(installed) $(peers) ## the benchmarks, with their figures
 
 compare: $(installed) ## the head by Cycles and by Vellus: mean colours, and both pictures, in out/compare
 	$(python) blend_samples/compare.py --out out/compare $(ARGS)
+
+turntable: $(installed) ## the head turning, 24 frames by the command line, in out/turntable; goes on where it was stopped
+	$(python) blend_samples/turntable.py --out out/turntable $(ARGS)
 
 build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
 	$(python) tools/build_extension.py $(PLATFORM)

@@ -7,17 +7,19 @@
 vec2 end_depths;
 uint this_index;
 float dash_offset;
+ivec2 first_place;
 
 void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
 {
   end_depths = vec2(segment.start.z, segment.end.z);
   dash_offset = strand_offset(strand) + view.coverage_turn;
+  first_place = ivec2(view.first_column, view.first_row);
   this_index = uint(first_segment + strand * (view.drawn_points - 1) + piece);
 }
 
 void meet(ivec2 place, float along, float coverage)
 {
-  if (!is_covered(dash_offset, place + ivec2(view.first_column, view.first_row), coverage)) {
+  if (!is_covered(dash_offset, place + first_place, coverage)) {
     return;
   }
   // Of floats that are not negative the bits have the same order.

@@ -10,6 +10,7 @@ import numpy as np
 from ..core import picture
 from ..core.errors import HairError
 from . import drawing, drawn_scene, film, motion, properties, rendered_view, scene, viewport
+from . import render as offscreen
 from .frame import Frame
 from .translations import error_text, interface_text
 
@@ -23,7 +24,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
 
     bl_idname = NAME
     bl_label = "Vellus"
-    bl_use_gpu_context = True
+    # Without a window we make the context ourselves: where there is no driver Blender would crash.
+    bl_use_gpu_context = not bpy.app.background
     bl_use_eevee_viewport = True  # for Material Preview
     bl_use_shading_nodes_custom = False
 
@@ -47,9 +49,12 @@ class VellusRenderEngine(bpy.types.RenderEngine):
     def render(self, depsgraph):
         """Render a view layer in the depsgraph's frame."""
         try:
+            offscreen.start_gpu()
             self._render(depsgraph)
         except HairError as error:
             self.report({"ERROR"}, error_text(error))
+        except KeyboardInterrupt:  # a script's
+            self.report({"ERROR"}, interface_text("Stopped: nothing was rendered."))
         except Exception as error:  # a defect of ours must not pass a black picture off as the scene
             self.report({"ERROR"}, interface_text("Vellus could not render this: {error}", error=error))
             raise

@@ -9,6 +9,7 @@ import pytest
 
 from hair_addon.blender import drawing, film, render
 from hair_addon.blender.scene import read_camera
+from hair_addon.core.errors import HairError
 from tests.blender.reading import evaluated_points
 from tests.blender.rendering import configure, layers_of, read_layers, rendered
 
@@ -340,16 +341,30 @@ def test_what_cannot_be_rendered_is_said_in_a_sentence(lit, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_a_defect_writes_no_picture(lit, tmp_path, monkeypatch, capfd):
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (ZeroDivisionError("nothing to divide by"), "could not render this: nothing to divide by"),
+        (KeyboardInterrupt(), "Stopped: nothing was rendered"),
+        (HairError("A sentence."), "A sentence"),
+    ],
+)
+def test_what_ends_a_render_before_its_end_writes_no_picture(lit, tmp_path, monkeypatch, error, said):
+    """A defect of ours, Ctrl-C, what the artist can mend: said, in this frame and without going on to the next."""
+    calls = []
+
     def broken(*_args):
-        raise ZeroDivisionError("nothing to divide by")
+        calls.append(1)
+        raise error
 
     monkeypatch.setattr(film.Film, "add_pass", broken)
     configure(filepath=str(tmp_path / "nothing.png"))
-    with pytest.raises(RuntimeError, match="could not render this: nothing to divide by"):
+    with pytest.raises(RuntimeError, match=said):
         bpy.ops.render.render(write_still=True)
+    with pytest.raises(RuntimeError, match=said):
+        bpy.ops.render.render(animation=True)
     assert not list(tmp_path.iterdir())
-    assert "ZeroDivisionError" in capfd.readouterr().err
+    assert len(calls) == 2
 
 
 def test_blender_s_panels_are_shown_for_it_while_it_is_there(scene):

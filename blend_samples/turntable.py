@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""make turntable: the head turning under a fixed light, 24 frames as EXR with passes, rendered by the command line.
+
+Writes head.blend, frames/head_####.exr and sheet.png to a folder. Stopped and started again, it goes on.
+"""
+
+import argparse
+import math
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+import head  # beside this file
+import OpenEXR
+
+import hair_addon
+from hair_addon.blender import files, render
+
+COUNT = 24
+WIDTH, HEIGHT = 960, 540
+COLUMNS, SMALLER = 6, 4  # of the sheet: pictures in a row, pixels that become one
+
+
+def main():
+    """Make everything; the exit status is that of the command that renders."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--out", type=Path, default=Path("out/turntable"))
+    parser.add_argument("--samples", type=int, default=16, help="of each pixel")
+    parser.add_argument("--jobs", type=int, default=1, help="processes that share the frames")
+    options = parser.parse_args()
+    out = options.out.resolve()
+    hair_addon.register()
+    scene_file = out / "head.blend"
+    if not scene_file.exists():  # another file would be another sequence
+        _build(scene_file)
+    pattern = out / "frames" / "head_####.exr"
+    words = ["render", str(scene_file), "--frames", f"1-{COUNT}", "--out", str(pattern), "--passes"]
+    words += ["--samples", str(options.samples), "--jobs", str(options.jobs)]
+    print("python -m hair_addon", *words, flush=True)
+    root = Path(__file__).resolve().parent.parent
+    status = subprocess.run([sys.executable, "-m", "hair_addon", *words], cwd=root, check=False).returncode
+    if status == 0:
+        bpy.ops.wm.open_mainfile(filepath=str(scene_file))
+        frames = [_small(_combined(pattern.with_name(f"head_{frame:04}.exr"))) for frame in range(1, COUNT + 1)]
+        rows = [np.concatenate(frames[first : first + COLUMNS], axis=1) for first in range(0, COUNT, COLUMNS)]
+        render.write_picture(np.concatenate(rows[::-1]), out / "sheet.png", bpy.context.scene)
+        print(f"made: {out / 'sheet.png'}")
+    return status
+
+
+def _build(path):
+    """The head with its hair, which turns once about the vertical in front of a camera and lights that stay."""
+    skull = head.build()
+    head.grow(skull)
+    head.light()
+    scene = bpy.context.scene
+    # The last frame is followed by the first: it is a step short of a whole turn.
+    for frame, turn in ((1, 0.0), (COUNT + 1, 2.0 * math.pi)):
+        skull.rotation_euler.z = turn
+        skull.keyframe_insert("rotation_euler", index=2, frame=frame)
+    for curve in skull.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
+        for key in curve.keyframe_points:
+            key.interpolation = "LINEAR"
+    scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = COUNT, WIDTH, HEIGHT
+    with files.whole_file(path) as partial:
+        bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
+
+
+def _combined(path):
+    """(height, width, 4) float32 of an EXR, first row at the bottom."""
+    with OpenEXR.File(str(path), separate_channels=True) as file:
+        channels = file.channels()
+        names = [next(name for name in channels if name.endswith(f"Combined.{letter}")) for letter in "RGBA"]
+        return np.stack([channels[name].pixels for name in names], axis=-1)[::-1].astype(np.float32)
+
+
+def _small(pixels):
+    """Means of squares of pixels."""
+    height, width, channels = pixels.shape
+    return pixels.reshape(height // SMALLER, SMALLER, width // SMALLER, SMALLER, channels).mean(axis=(1, 3))
+
+
+if __name__ == "__main__":
+    status = main()
+    sys.stdout.flush()
+    # Blender's module may crash while it is torn down after drawing; all files are closed by now.
+    os._exit(status)
