@@ -67,34 +67,53 @@ def write_frame(path, frame, engine, settings):
     """
     blender_scene = bpy.context.scene
     blender_scene.frame_set(frame)
-    if engine == "vellus":
-        pixels = render.draw_picture(settings)
-        with files.whole_file(path) as partial:
-            render.write_picture(pixels, partial, blender_scene)
-    else:
-        with files.whole_file(path) as partial, _rendering(blender_scene, partial, ENGINES[engine], settings):
-            if bpy.ops.render.render(write_still=True, scene=blender_scene.name) != {"FINISHED"}:
-                raise HairError(f"Frame {frame} was not rendered: {engine} stopped before its end.")
+    with _set_for_a_while(_image_settings(blender_scene, Path(path).suffix.lower())):
+        if engine == "vellus":
+            pixels = render.draw_picture(settings)
+            with files.whole_file(path) as partial:
+                render.write_picture(pixels, partial, blender_scene)
+            return
+        with _set_for_a_while(_render_settings(blender_scene, ENGINES[engine], settings)):
+            _render(blender_scene, frame, engine)
+            with files.whole_file(path) as partial:
+                bpy.data.images["Render Result"].save_render(str(partial), scene=blender_scene)
 
 
-@contextlib.contextmanager
-def _rendering(blender_scene, path, engine, settings):
-    """The scene's own settings of renders are others for the time that it takes."""
-    file_format, color_depth = _FORMATS[path.suffix.lower()]
-    owner, image = blender_scene.render, blender_scene.render.image_settings
-    wanted = [
+def _render(blender_scene, frame, engine):
+    """Have Blender render what the scene's settings say. Raises `HairError`."""
+    if blender_scene.camera is None:
+        raise HairError("The scene has no camera to look through: add one.")
+    try:
+        outcome = bpy.ops.render.render(scene=blender_scene.name)
+    except RuntimeError as error:
+        raise HairError(f"{engine} could not make frame {frame}: {files.cause_of(error)}.") from error
+    if outcome != {"FINISHED"}:
+        raise HairError(f"{engine} stopped before frame {frame} was done.")
+
+
+def _image_settings(blender_scene, ending):
+    """[(owner, name, value)] of what Blender writes a picture by; a scene may be set to write a film."""
+    file_format, color_depth = _FORMATS[ending]
+    image = blender_scene.render.image_settings
+    values = {"media_type": "IMAGE", "file_format": file_format, "color_mode": "RGBA", "color_depth": color_depth}
+    return [(image, name, value) for name, value in values.items()]
+
+
+def _render_settings(blender_scene, engine, settings):
+    """[(owner, name, value)] of what Blender renders a picture by."""
+    owner = blender_scene.render
+    return [
         (owner, "engine", engine),
-        (owner, "filepath", str(path)),
-        (owner, "use_file_extension", False),
         (owner, "resolution_x", settings.width),
         (owner, "resolution_y", settings.height),
         (owner, "resolution_percentage", 100),
         (owner, "film_transparent", settings.is_transparent or owner.film_transparent),
-        (image, "media_type", "IMAGE"),
-        (image, "file_format", file_format),
-        (image, "color_mode", "RGBA"),
-        (image, "color_depth", color_depth),
     ]
+
+
+@contextlib.contextmanager
+def _set_for_a_while(wanted):
+    """Set [(owner, name, value)], and in the end what was there before."""
     before = [(owner, name, getattr(owner, name)) for owner, name, _value in wanted]
     try:
         _set(wanted)

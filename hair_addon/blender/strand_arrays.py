@@ -8,7 +8,6 @@ from ..core import strands
 from ..core.errors import HairError
 from . import curves, live_hair, scene, selection
 
-
 _AT_ONCE = 16_384  # strands, in double precision: all of them would take four times their memory
 
 

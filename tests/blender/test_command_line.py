@@ -287,13 +287,15 @@ def test_what_cannot_be_done_is_one_sentence_and_status_1(tmp_path, monkeypatch,
 def test_pictures_need_a_camera_an_ending_and_a_place_for_numbers(shot, tmp_path):
     bpy.context.scene.camera = None
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "blind.blend"))
-    for blend, out, said in (
+    for blend, out, said, *options in (
         (tmp_path / "blind.blend", "a.png", "no camera"),
+        (tmp_path / "blind.blend", "a.png", "no camera", "--engine", "cycles"),
         (shot, "a.gif", "written as .png or .exr"),
-        (shot, "a.png", "put #### where"),
+        (shot, "a.png", "put #### where", "--frames", "1-3"),
+        (shot, "a.png", "put #### where", "--frames", "all"),
+        (shot, "a.png", "Width must be", "--width", 0),
     ):
-        frames = () if blend != shot else ("--frames", "1-3")
-        ended = run_here("render", blend, *frames, "--out", tmp_path / out)
+        ended = run_here("render", blend, *options, "--out", tmp_path / out)
         assert ended.status == 1 and said in ended.errors, ended.errors
     assert not list(tmp_path.glob("a*"))
 
@@ -362,3 +364,16 @@ def test_readme_shows_commands_that_work(lit, tmp_path, monkeypatch):
         ended = run_here(*shlex.split(command))
         assert ended.status == 0, f"{command}: {ended.errors}"
     assert len(list((tmp_path / "frames").iterdir())) == 24
+
+
+@pytest.mark.parametrize("engine", ["vellus", "cycles"])
+@pytest.mark.parametrize("kind", ["VIDEO", "MULTI_LAYER_IMAGE"])
+def test_a_scene_that_is_set_to_write_something_else_is_left_so(lit, tmp_path, engine, kind):
+    scene = bpy.context.scene
+    scene.cycles.samples = 1
+    image = scene.render.image_settings
+    image.media_type = kind
+    before = (image.media_type, image.file_format, scene.render.engine, scene.render.resolution_x)
+    api.render(tmp_path / "a.png", engine=engine, width=32, height=24)
+    assert picture(tmp_path / "a.png").shape == (24, 32, 4)
+    assert (image.media_type, image.file_format, scene.render.engine, scene.render.resolution_x) == before
