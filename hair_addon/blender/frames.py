@@ -7,6 +7,7 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import HairError
+from ..core.long_work import run_now, unheard
 from . import files, render
 
 # As a user names them → Blender's name of the engine; we draw ourselves.
@@ -60,16 +61,17 @@ def _number_width(pattern):
     return len(name) - len(name.rstrip("#"))
 
 
-def write_frame(path, frame, engine, settings):
+def write_frame(path, frame, engine, settings, progress=unheard):
     """Make a frame of the open scene and write it; the file appears whole or not at all. Raises `HairError`.
 
-    engine: of `ENGINES`; settings: `render.PictureSettings`, of which other engines than ours take size and background.
+    engine: of `ENGINES`; settings: `render.PictureSettings`, of which other engines than ours take size and background;
+    progress(step, part): told how far ours is.
     """
     blender_scene = bpy.context.scene
     blender_scene.frame_set(frame)
     with _set_for_a_while(_image_settings(blender_scene, Path(path).suffix.lower())):
         if engine == "vellus":
-            pixels = render.draw_picture(settings)
+            pixels = run_now(render.drawing_picture(settings), progress)
             with files.whole_file(path) as partial:
                 render.write_picture(pixels, partial, blender_scene)
             return

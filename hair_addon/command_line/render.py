@@ -5,6 +5,7 @@ import time
 from pathlib import Path
 
 from .. import api
+from ..core.long_work import part_of
 from . import opening, options
 
 _ENGINES = ("vellus", "cycles", "eevee")
@@ -47,9 +48,10 @@ def run(given, console):
         wanted = frames.scene_frames()
         frames.require_pattern(given.out, len(wanted))
     for number, frame in enumerate(wanted):
-        console.progress(f"Frame {frame}", number / len(wanted))
+        progress = part_of(console.progress, number / len(wanted), (number + 1) / len(wanted))
+        progress(f"Frame {frame}", 0.0)
         started = time.perf_counter()
-        path = api.render(given.out, frame=frame, engine=given.engine, **settings)
+        path = api.render(given.out, frame=frame, engine=given.engine, progress=progress, **settings)
         seconds = time.perf_counter() - started
         values = {"verb": "render", "input": str(given.input), "frame": frame, "engine": given.engine}
         values |= {"out": str(path), "seconds": round(seconds, 3)}

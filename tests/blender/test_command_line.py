@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
+from hair_addon.blender import frames
 from hair_addon.core import exr, settings_file
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.settings_file import GroomSettings
@@ -217,9 +218,9 @@ def test_frames_are_drawn_each_to_its_file(shot, tmp_path):
         (3, "f_003.exr"),
     ]
     assert sorted(path.name for path in (tmp_path / "f").iterdir()) == ["f_001.exr", "f_002.exr", "f_003.exr"]
-    frames = [picture(tmp_path / "f" / f"f_00{number}.exr") for number in (1, 2, 3)]
-    assert all(frame.shape == (30, 40, 4) for frame in frames)
-    assert all(np.abs(first - second).max() > 0.01 for first, second in itertools.pairwise(frames))
+    pictures = [picture(tmp_path / "f" / f"f_00{number}.exr") for number in (1, 2, 3)]
+    assert all(made.shape == (30, 40, 4) for made in pictures)
+    assert all(np.abs(first - second).max() > 0.01 for first, second in itertools.pairwise(pictures))
 
 
 def test_without_frames_it_is_the_one_that_was_saved(shot, tmp_path):
@@ -229,6 +230,11 @@ def test_without_frames_it_is_the_one_that_was_saved(shot, tmp_path):
     assert run_here("render", shot, "--frames", "all", "--out", tmp_path / "all_#.png").status == 0
     assert np.array_equal(picture(tmp_path / "all_2.png"), picture(tmp_path / "saved.png"))
     assert (tmp_path / "all_3.png").exists()
+
+
+def test_every_engine_may_be_asked_for(capsys):
+    run_here("render", "--help")
+    assert f"{{{','.join(frames.ENGINES)}}}" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("engine", ["cycles", "eevee"])
