@@ -205,7 +205,7 @@ def draw(*, progress=unheard, **settings):
     return run_now(offscreen.drawing_picture(_changed(offscreen.PictureSettings, None, settings)), progress)
 
 
-def render(path, *, frame=None, engine="vellus", **settings):
+def render(path, *, frame=None, engine="vellus", progress=unheard, **settings):
     """Make a frame of the scene, the present one for None, and write it as .png or .exr, whole or not at all.
 
     engine: "vellus", "cycles" or "eevee"; settings: fields of `core.picture.FrameSettings`, width and height the
@@ -223,7 +223,7 @@ def render(path, *, frame=None, engine="vellus", **settings):
     frame = frames.present_frame() if frame is None else frame
     frames.require_pattern(path, 1)
     target = frames.path_of(path, frame)
-    frames.write_frame(target, frame, engine, settings)
+    frames.write_frame(target, frame, engine, settings, progress=progress)
     return target
 
 

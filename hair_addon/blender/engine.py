@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The render engine: surfaces and hair by the viewport's drawing code, of any size, without a window too."""
 
+import contextlib
 import math
 import time
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from ..core import picture
 from ..core.errors import HairError
+from ..core.long_work import Stopped, unheard
 from . import drawing, drawn_scene, film, motion, properties, rendered_view, scene, viewport
 from . import render as offscreen
 from .frame import Frame
@@ -17,6 +19,20 @@ from .translations import error_text, interface_text
 NAME = viewport.ENGINE
 
 _TURN = 0.002  # [s] between passes, in which a window that waits to be drawn gets its turn
+
+
+_listener = unheard  # what else is told how far a render is, and may raise `Stopped` to end it
+
+
+@contextlib.contextmanager
+def listening(progress):
+    """Tell progress(step, part) of renders, for a while; one ends without a picture where that raises `Stopped`."""
+    global _listener
+    _listener = progress
+    try:
+        yield
+    finally:
+        _listener = unheard
 
 
 class VellusRenderEngine(bpy.types.RenderEngine):
@@ -82,7 +98,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                 if not bpy.app.background:
                     time.sleep(_TURN)
                 self.update_progress(done / in_all)
-                if self.test_break():
+                if self.test_break() or _is_stopped(done / in_all):
                     return
             self._show(view_layer, window, frame.arrays())
 
@@ -119,6 +135,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             if render_pass.name in arrays:
                 render_pass.rect.foreach_set(np.ascontiguousarray(arrays[render_pass.name]).ravel())
         self.end_result(result)
+
+
+def _is_stopped(part):
+    try:
+        _listener("Rendering", part)
+    except Stopped:
+        return True
+    return False
 
 
 # (channels, kind) of passes that are not the colours of light.

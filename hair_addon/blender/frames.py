@@ -7,8 +7,10 @@ from pathlib import Path
 import bpy
 
 from ..core.errors import HairError
+from ..core.long_work import unheard
 from ..core.params import declared
 from ..core.picture import PassSettings
+from . import engine as render_engine
 from . import files, viewport
 
 # As a user names them → as Blender does.
@@ -67,10 +69,11 @@ def _number_width(pattern):
     return len(name) - len(name.rstrip("#"))
 
 
-def write_frame(path, frame, engine, settings, partial=None):
+def write_frame(path, frame, engine, settings, partial=None, progress=unheard):
     """Render a frame of the open scene and write it; the file appears whole or not at all. Raises `HairError`.
 
-    engine: of `ENGINES`; settings: `FrameSettings`; partial: of `files.whole_file`.
+    engine: of `ENGINES`; settings: `FrameSettings`; partial: of `files.whole_file`; progress(step, part): told how far
+    it is, and may raise to stop it: Vellus after any pass, others before the file is written.
     """
     blender_scene = bpy.context.scene
     if settings.has_passes and path.suffix.lower() != ".exr":
@@ -79,12 +82,15 @@ def write_frame(path, frame, engine, settings, partial=None):
         raise HairError("The scene has no camera to look through: add one.")
     with files.whole_file(path, partial) as partial, _rendering(blender_scene, partial, engine, settings):
         blender_scene.frame_set(frame)
+        progress(f"Frame {frame}", 0.0)
         try:
-            ended = bpy.ops.render.render(write_still=True, scene=blender_scene.name)
+            with render_engine.listening(lambda _step, part: progress(f"Frame {frame}", part)):
+                ended = bpy.ops.render.render(write_still=True, scene=blender_scene.name)
         except RuntimeError as error:
             raise HairError(f"Frame {frame} was not rendered: {files.cause_of(error)}.") from error
         if ended != {"FINISHED"}:
             raise HairError(f"Frame {frame} was not rendered: {engine} stopped before its end.")
+        progress(f"Frame {frame}", 1.0)
 
 
 @contextlib.contextmanager

@@ -138,8 +138,8 @@ def scripts_kept_from_running():
 
 
 def find_surface(name=""):
-    """The mesh object of the open scene, or the one of a name. Raises `HairError`."""
-    meshes = [o for o in bpy.context.scene.objects if o.type == "MESH"]
+    """The mesh object of the open view layer, or the one of a name. Raises `HairError`."""
+    meshes = [o for o in bpy.context.view_layer.objects if o.type == "MESH"]
     if name:
         meshes = [o for o in meshes if o.name == name]
         if not meshes:

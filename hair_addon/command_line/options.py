@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from ..core import settings_file
-from ..core.params import label_of
+from ..core.params import label_of, unit_of
 from .console import PROGRAM
 
 # Settings that a shorter word names better on a command line.
@@ -58,8 +58,8 @@ def add_groom_settings(parser):
 
 def _add_setting(parser, name, default, details):
     option = _OPTIONS.get(name, "--" + name.replace("_", "-"))
-    shown = f"{label_of(name, details)}: {details.description} [{_in_words(default)}]".replace("%", "%%")
-    described = {"dest": name, "default": argparse.SUPPRESS, "help": shown}
+    shown = f"{label_of(name, details)}: {details.description}{_in_words(default, unit_of(details))}"
+    described = {"dest": name, "default": argparse.SUPPRESS, "help": shown.replace("%", "%%")}
     if isinstance(default, bool):
         parser.add_argument(option, action=argparse.BooleanOptionalAction, **described)
     elif isinstance(default, tuple):
@@ -70,10 +70,10 @@ def _add_setting(parser, name, default, details):
         parser.add_argument(option, type=type(default), metavar="TEXT" if default == "" else "N", **described)
 
 
-def _in_words(default):
-    if isinstance(default, tuple):
-        return " ".join(f"{part:g}" for part in default)
-    return f"{default:g}" if isinstance(default, float) else str(default)
+def _in_words(default, unit):
+    parts = default if isinstance(default, tuple) else (default,)
+    words = [*(f"{part:g}" if isinstance(part, float) else str(part) for part in parts), unit]
+    return f" [{' '.join(filter(None, words))}]" if any(words) else ""
 
 
 def changed(settings, options, declarations):

@@ -59,9 +59,8 @@ def run(given, console):
     if frames.is_sequence(given.out):
         _make_sequence(given, console, numbers, settings)
     else:
-        console.progress(f"Frame {numbers[0]}", 0.0)
         started = time.perf_counter()
-        frames.write_frame(given.out, numbers[0], given.engine, settings)
+        frames.write_frame(given.out, numbers[0], given.engine, settings, progress=console.progress)
         _tell(given, console, numbers[0], given.out, started)
 
 
@@ -77,7 +76,7 @@ def _make_sequence(given, console, numbers, settings):
         return
 
     def write(path, number):
-        frames.write_frame(path, number, given.engine, settings, files.partial_of(path))
+        frames.write_frame(path, number, given.engine, settings, files.partial_of(path), console.progress)
 
     started = time.perf_counter()
     for number, path in sequence.make(given.out, numbers, write, console.progress):

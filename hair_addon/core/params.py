@@ -41,6 +41,11 @@ def label_of(name, details):
     return details.label or name.replace("_", " ").capitalize()
 
 
+def unit_of(details):
+    """The unit of a setting in a file or on a command line, empty where it has none."""
+    return {"ROTATION": "rad", "LENGTH": "m"}.get(details.unit, "")
+
+
 def like(default, value):
     """A value that JSON gave, as the type of a setting's default; raises TypeError or ValueError for another kind."""
     if isinstance(default, tuple) and isinstance(value, list):

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from .errors import HairError
 from .groom import GuideSettings, HairSettings
-from .params import declared, label_of, like
+from .params import declared, label_of, like, unit_of
 from .shading import lookup_tables
 from .shading.appearance import TABLE_FIELDS, Appearance
 
@@ -212,7 +212,9 @@ def schema():
 
 
 def _property(name, default, details):
-    described = {"title": label_of(name, details), "description": details.description, "default": default}
+    unit = unit_of(details)
+    description = f"{details.description} [{unit}]" if unit else details.description
+    described = {"title": label_of(name, details), "description": description, "default": default}
     if isinstance(default, tuple):
         count = len(default)
         numbers = {"type": "array", "items": _number("number", details), "minItems": count, "maxItems": count}

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
+from hair_addon.blender import frames
 from hair_addon.core import exr, settings_file
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.settings_file import GroomSettings
@@ -217,9 +218,9 @@ def test_frames_are_drawn_each_to_its_file(shot, tmp_path):
         (3, "f_003.exr"),
     ]
     assert sorted(path.name for path in (tmp_path / "f").glob("[!.]*")) == ["f_001.exr", "f_002.exr", "f_003.exr"]
-    frames = [picture(tmp_path / "f" / f"f_00{number}.exr") for number in (1, 2, 3)]
-    assert all(frame.shape == (30, 40, 4) for frame in frames)
-    assert all(np.abs(first - second).max() > 0.01 for first, second in itertools.pairwise(frames))
+    pictures = [picture(tmp_path / "f" / f"f_00{number}.exr") for number in (1, 2, 3)]
+    assert all(made.shape == (30, 40, 4) for made in pictures)
+    assert all(np.abs(first - second).max() > 0.01 for first, second in itertools.pairwise(pictures))
 
 
 def test_without_frames_it_is_the_one_that_was_saved(shot, tmp_path):
@@ -229,6 +230,11 @@ def test_without_frames_it_is_the_one_that_was_saved(shot, tmp_path):
     assert run_here("render", shot, "--frames", "all", "--out", tmp_path / "all_#.png").status == 0
     assert np.array_equal(picture(tmp_path / "all_2.png"), picture(tmp_path / "saved.png"))
     assert (tmp_path / "all_3.png").exists()
+
+
+def test_every_engine_may_be_asked_for(capsys):
+    run_here("render", "--help")
+    assert f"{{{','.join(frames.ENGINES)}}}" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("engine", ["cycles", "eevee"])
@@ -287,13 +293,15 @@ def test_what_cannot_be_done_is_one_sentence_and_status_1(tmp_path, monkeypatch,
 def test_pictures_need_a_camera_an_ending_and_a_place_for_numbers(shot, tmp_path):
     bpy.context.scene.camera = None
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "blind.blend"))
-    for blend, out, said in (
+    for blend, out, said, *options in (
         (tmp_path / "blind.blend", "a.png", "no camera"),
+        (tmp_path / "blind.blend", "a.png", "no camera", "--engine", "cycles"),
         (shot, "a.gif", "written as .png or .exr"),
-        (shot, "a.png", "put #### where"),
+        (shot, "a.png", "put #### where", "--frames", "1-3"),
+        (shot, "a.png", "put #### where", "--frames", "all"),
+        (shot, "a.png", "Width must be", "--width", 0),
     ):
-        frames = () if blend != shot else ("--frames", "1-3")
-        ended = run_here("render", blend, *frames, "--out", tmp_path / out)
+        ended = run_here("render", blend, *options, "--out", tmp_path / out)
         assert ended.status == 1 and said in ended.errors, ended.errors
     assert not list(tmp_path.glob("a*"))
 
@@ -362,3 +370,16 @@ def test_readme_shows_commands_that_work(lit, tmp_path, monkeypatch):
         ended = run_here(*shlex.split(command))
         assert ended.status == 0, f"{command}: {ended.errors}"
     assert len(list((tmp_path / "frames").glob("[!.]*"))) == 24
+
+
+@pytest.mark.parametrize("engine", ["vellus", "cycles"])
+@pytest.mark.parametrize("kind", ["VIDEO", "MULTI_LAYER_IMAGE"])
+def test_a_scene_that_is_set_to_write_something_else_is_left_so(lit, tmp_path, engine, kind):
+    scene = bpy.context.scene
+    scene.cycles.samples = 1
+    image = scene.render.image_settings
+    image.media_type = kind
+    before = (image.media_type, image.file_format, scene.render.engine, scene.render.resolution_x)
+    api.render(tmp_path / "a.png", engine=engine, width=32, height=24)
+    assert picture(tmp_path / "a.png").shape == (24, 32, 4)
+    assert (image.media_type, image.file_format, scene.render.engine, scene.render.resolution_x) == before

@@ -13,6 +13,7 @@ from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.settings_file import GroomSettings
 from hair_addon.core.shading import lookup_tables
 from hair_addon.core.shading.appearance import Appearance
+from tests.blender.layout import draw_all
 from tests.blender.reading import points, snapshot
 
 WANTED = GroomSettings(
@@ -103,3 +104,8 @@ def test_nothing_is_saved_without_hair_or_without_a_name(sphere, hair):
     bpy.ops.mesh.primitive_cube_add()
     assert not bpy.ops.vellus.save_groom_settings.poll()
     assert bpy.ops.vellus.load_groom_settings.poll()
+
+
+def test_the_output_panel_offers_both(hair):
+    drawn = draw_all([bpy.types.VELLUS_PT_output])
+    assert drawn["vellus.save_groom_settings"] == drawn["vellus.load_groom_settings"] == 1

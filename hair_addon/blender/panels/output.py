@@ -21,8 +21,8 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         layout.operator("vellus.render_picture", icon="IMAGE_DATA")
         layout.operator("vellus.toggle_drawing", icon="SHADING_RENDERED")
         row = layout.row(align=True)
-        row.operator("vellus.save_groom_settings", icon="EXPORT", text=interface_text("Save Settings…"))
-        row.operator("vellus.load_groom_settings", icon="IMPORT", text=interface_text("Load Settings…"))
+        row.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
+        row.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")
         hair = hair_of(context.object)
         if hair is not None and keyed.are_keyed(hair) and not context.scene.render.use_lock_interface:
             write(layout, context, interface_text("Keyed settings are rendered with a locked interface only."), "ERROR")
