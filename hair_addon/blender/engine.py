@@ -12,7 +12,6 @@ from ..core import picture
 from ..core.errors import HairError
 from ..core.long_work import Stopped, unheard
 from . import drawing, drawn_scene, film, motion, properties, rendered_view, scene, viewport
-from . import render as offscreen
 from .frame import Frame
 from .translations import error_text, interface_text
 
@@ -40,8 +39,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
 
     bl_idname = NAME
     bl_label = "Vellus"
-    # Without a window we make the context ourselves: where there is no driver Blender would crash.
-    bl_use_gpu_context = not bpy.app.background
+    bl_use_gpu_context = True
     bl_use_eevee_viewport = True  # for Material Preview
     bl_use_shading_nodes_custom = False
 
@@ -65,7 +63,6 @@ class VellusRenderEngine(bpy.types.RenderEngine):
     def render(self, depsgraph):
         """Render a view layer in the depsgraph's frame."""
         try:
-            offscreen.start_gpu()
             self._render(depsgraph)
         except HairError as error:
             self.report({"ERROR"}, error_text(error))

@@ -7,7 +7,7 @@ import numpy as np
 from . import drawing, drawn_scene, motion, render_programs
 from .hair_buffer import HairBuffer
 
-_MOST_SAMPLES = 4096  # along a tile's side: its textures take up to 700 MB
+_MOST_SAMPLES = 4096  # along a tile's side: its textures take 340 MB, 870 with all passes
 
 FAR = 1e10  # distance of what is nowhere, as Cycles has it
 

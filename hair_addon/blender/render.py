@@ -38,7 +38,7 @@ def draw_picture(settings):
 
 def drawing_picture(settings):
     """`draw_picture` as work in stages (core/long_work.py), all of which run where the graphics are."""
-    start_gpu()
+    _start_gpu()
     samples = settings.samples_per_side
     width, height = settings.width * samples, settings.height * samples
     largest = gpu.capabilities.max_texture_size_get()
@@ -68,7 +68,7 @@ def _resolved(buffer, settings):
     return np.array(pixels, np.float32).reshape(settings.height, settings.width, 4)
 
 
-def start_gpu():
+def _start_gpu():
     """In background Blender has no graphics until somebody asks."""
     if bpy.app.background:
         try:
