@@ -97,7 +97,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
                 self.update_progress(done / in_all)
                 if self.test_break() or _is_stopped(done / in_all):
                     return
-            self._show(view_layer, window, frame.arrays())
+            if index + 1 == len(moments) or not bpy.app.background:
+                self._show(view_layer, window, frame.arrays())
 
     def _others(self, depsgraph, size):
         """Where everything is a frame before and a frame after: [`motion.Places`]."""
@@ -121,9 +122,9 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             if any(moments):
                 self._set_time(now)
 
-    def _set_time(self, time):
-        frame = math.floor(time)
-        self.frame_set(frame, subframe=time - frame)
+    def _set_time(self, frames):
+        whole = math.floor(frames)
+        self.frame_set(whole, subframe=frames - whole)
 
     def _show(self, view_layer, window, arrays):
         """Hand over what there is of the picture."""

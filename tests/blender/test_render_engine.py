@@ -246,3 +246,55 @@ def test_blender_s_panels_are_shown_for_it_while_it_is_there(scene):
             scene.render.engine = "VELLUS"
     finally:
         hair_addon.register()
+
+
+def test_a_scene_without_anything_is_its_background(scene, tmp_path):
+    """No hair, no surface, no light: the world's colour, or nothing at all."""
+    bpy.ops.object.camera_add()
+    scene.camera = bpy.context.object
+    light_up((0.25, 0.5, 0.75))
+    view_layer = bpy.context.view_layer
+    view_layer.use_pass_shadow = view_layer.use_pass_vector = view_layer.vellus.has_lobes = True
+    passes = rendered(tmp_path)
+    assert (passes["Combined"] == (0.25, 0.5, 0.75, 1.0)).all()
+    assert all((pixels == 0.0).all() for name, pixels in passes.items() if name != "Combined")
+    assert (rendered(tmp_path, film_transparent=True)["Combined"] == 0.0).all()
+
+
+def test_what_renders_leave_out_is_left_out(lit, tmp_path):
+    """By the object's own switch; and guides always, which renders by Cycles and EEVEE leave out too."""
+    bpy.context.view_layer.vellus.has_hair_mask = True
+    bpy.data.objects["Sphere"].hide_render = True
+    seen = rendered(tmp_path, film_transparent=True)
+    np.testing.assert_array_equal(seen["Hair Mask"], seen["Combined"][..., 3])
+    bpy.data.objects["Guides"].hide_render = True
+    np.testing.assert_array_equal(rendered(tmp_path)["Hair Mask"], seen["Hair Mask"])
+    lit.hide_render = True
+    assert (rendered(tmp_path)["Combined"] == 0.0).all()
+
+
+def test_hair_that_is_instanced_is_rendered_at_each_place(lit, tmp_path):
+    bpy.context.view_layer.vellus.has_hair_mask = True
+    bpy.data.objects["Sphere"].hide_render = True
+    alone = rendered(tmp_path, film_transparent=True)["Hair Mask"]
+    collection = bpy.data.collections.new("Tuft")
+    collection.objects.link(lit)
+    bpy.ops.object.collection_instance_add(collection="Tuft", location=(0.0, 0.0, 1.5))
+    twice = rendered(tmp_path)["Hair Mask"]
+    assert 1.3 * alone.sum() < twice.sum() < 2.1 * alone.sum()
+    assert twice[-20:].sum() > 2.0 * alone[-20:].sum()
+
+
+def test_hair_s_own_modifiers_are_rendered(lit, tmp_path):
+    """As by Cycles: strands that a node group shortens are short."""
+    bpy.context.view_layer.vellus.has_hair_mask = True
+    before = rendered(tmp_path, film_transparent=True)["Hair Mask"]
+    tree = bpy.data.node_groups.new("Short", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    first, trim, last = map(tree.nodes.new, ("NodeGroupInput", "GeometryNodeTrimCurve", "NodeGroupOutput"))
+    trim.inputs["End"].default_value = 0.3
+    tree.links.new(first.outputs[0], trim.inputs["Curve"])
+    tree.links.new(trim.outputs["Curve"], last.inputs[0])
+    lit.modifiers.new("Short", "NODES").node_group = tree
+    assert rendered(tmp_path)["Hair Mask"].sum() < 0.6 * before.sum()

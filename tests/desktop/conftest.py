@@ -14,7 +14,7 @@ from tools import build_extension, desktop_blender
 
 ROOT = build_extension.ROOT
 WALK = Path(__file__).with_name("walk.py")
-PARTS = ["groom", "view", "mend"]
+PARTS = ["groom", "view", "render", "mend"]
 HEAD = ROOT / "blend_samples" / "head.obj"
 
 

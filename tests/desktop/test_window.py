@@ -32,8 +32,8 @@ def part(picture, rectangle):
 
 
 def test_the_walk_came_to_its_end(walk):
-    assert walk.statuses == [0, 0, 0], walk.log[-4000:]
-    assert walk.facts["done"] == ["groom", "view", "mend"], walk.log[-4000:]
+    assert walk.statuses == [0, 0, 0, 0], walk.log[-4000:]
+    assert walk.facts["done"] == ["groom", "view", "render", "mend"], walk.log[-4000:]
 
 
 def complaints(walk):
@@ -152,3 +152,16 @@ def test_selected_hair_is_shown_by_a_box(walk):
     red, green, blue = after[np.abs(after - before).max(axis=-1) > 0.2].T
     is_orange = (red > green + 0.15) & (green > blue + 0.1)
     assert np.count_nonzero(is_orange) > 200
+
+
+def test_our_engine_draws_surfaces_and_hair_in_the_window(walk):
+    """With hair and without; the head, which the same light falls on, is neither black nor the background."""
+    facts = walk.facts["steps"]["grown"]
+    drawn, bare = (part(walk.picture(name), facts["view"]) for name in ("engine", "engine_bare"))
+    assert (np.abs(drawn - bare).max(axis=-1) > 10.0 / 255.0).mean() > 0.02
+    assert np.ptp(bare.mean(axis=-1)) > 0.3
+
+
+def test_f12_renders_beside_the_window(walk):
+    assert walk.facts["windows"] == 2
+    assert np.ptp(walk.picture("rendered")) > 0.3

@@ -287,6 +287,35 @@ def write_files():
     facts["table_folder"] = bpy.data.hair_curves["Hair"].vellus.table_folder
 
 
+def render():
+    """Our engine, in a viewport with Rendered shading and by F12, which opens a window of its own."""
+    scene, hair = bpy.context.scene, bpy.data.objects["Hair"]
+    area, _region = viewport()
+    scene.render.engine, scene.render.film_transparent = "VELLUS", False
+    area.spaces.active.shading.type = "RENDERED"
+    yield from wait(2.0)
+    screen("engine")
+    hair.hide_set(True)
+    screen("engine_bare")
+    hair.hide_set(False)
+    with in_viewport():
+        bpy.ops.object.camera_add()
+        camera = scene.camera = bpy.context.object
+        camera.matrix_world = area.spaces.active.region_3d.view_matrix.inverted()
+        camera.hide_set(True)
+    area.spaces.active.shading.type = "SOLID"
+    scene.render.resolution_x, scene.render.resolution_y, scene.vellus.sample_count = 320, 240, 16
+    scene.render.use_motion_blur, scene.vellus.motion_steps = True, 2
+    scene.render.image_settings.file_format = "PNG"
+    scene.render.filepath = str(OUT / "rendered.png")
+    with in_viewport():
+        bpy.ops.render.render("INVOKE_DEFAULT", write_still=True)
+    yield from wait_for((OUT / "rendered.png").exists)
+    yield from wait(1.0)
+    facts["windows"] = len(bpy.context.window_manager.windows)
+    screen("f12")
+
+
 def save_and_load():
     """The file as it is, opened again."""
     hair = points("Hair")
@@ -352,6 +381,7 @@ def hurry():
 PARTS = {
     "groom": (install, hurry, head, grow, comb, save_and_load),
     "view": (hurry, reopen, click, shading_modes),
+    "render": (hurry, reopen, render),
     "mend": (hurry, reopen, break_shader, write_files, switch_off, twins),
 }
 
