@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A pass over a picture, several samples a pixel, joins the sum of all samples.
+// A pass over a picture, several samples a pixel, joins the weighted sum of all samples. Around the tile lies a margin.
+
+#include "include/film_filter.glsl"
 
 void main()
 {
@@ -8,9 +10,10 @@ void main()
     return;
   }
   vec4 total = imageLoad(sums, pixel);
-  for (int y = 0; y < samples_per_side; y++) {
-    for (int x = 0; x < samples_per_side; x++) {
-      total += texelFetch(picture, pixel * samples_per_side + ivec2(x, y), 0);
+  for (int y = 0; y < tap_count(); y++) {
+    for (int x = 0; x < tap_count(); x++) {
+      ivec2 tap = ivec2(x, y);
+      total += filter_weight(tap) * texelFetch(picture, pixel * samples_per_side + tap, 0);
     }
   }
   imageStore(sums, pixel, total);

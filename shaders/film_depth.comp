@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The same of what is no light: in how many samples hair is nearest, the least distance along the view's axis, and in how
-// many samples there is anything.
+// The same of what is no light: the weight of samples in which hair is nearest, the least distance along the view's axis, and
+// the weight of samples in which there is anything.
+
+#include "include/film_filter.glsl"
 
 const uint NO_SEGMENT = 0x7FFFFFFFu;
 
@@ -18,17 +20,18 @@ void main()
     return;
   }
   vec4 found = imageLoad(sums, pixel);
-  for (int y = 0; y < samples_per_side; y++) {
-    for (int x = 0; x < samples_per_side; x++) {
-      ivec2 place = pixel * samples_per_side + ivec2(x, y);
+  for (int y = 0; y < tap_count(); y++) {
+    for (int x = 0; x < tap_count(); x++) {
+      ivec2 tap = ivec2(x, y);
+      ivec2 place = pixel * samples_per_side + tap;
       float depth = texelFetch(surface_depth, place, 0).r;
       if (texelFetch(segments, place, 0).r < NO_SEGMENT) {
         depth = min(depth, uintBitsToFloat(texelFetch(depths, place, 0).r));
-        found.x += 1.0;
+        found.x += filter_weight(tap);
       }
       if (depth < 1.0) {
-        found.y = min(found.y, distance_at(depth, view_to_clip));
-        found.z += 1.0;
+        found.z += filter_weight(tap);
+        found.y = is_in_pixel(tap) ? min(found.y, distance_at(depth, view_to_clip)) : found.y;
       }
     }
   }

@@ -56,15 +56,20 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     return record
 
 
+def pass_shift(turn):
+    """(2,) [samples] by which a pass moves the picture, up to half of one: an even sequence [Roberts18]."""
+    return np.modf(turn * np.array([0.75487767, 0.56984029]) + 0.5)[0] - 0.5
+
+
 def pass_record(world_to_view, view_to_clip, size, turn=0, tile=None):
     """The `view_record` of a pass over a picture, each of which takes other places of its samples.
 
-    size: (width, height) of the picture [samples]; turn: which pass, the first one as it is and the others a part of a
-    sample to the side, by an even sequence [Roberts18]; tile: (left, bottom, width, height) [samples] of what is drawn.
+    size: (width, height) of the picture [samples]; turn: which pass, the first one as it is and the others moved by
+    `pass_shift`; tile: (left, bottom, width, height) [samples] of what is drawn.
     """
     left, bottom, width, height = tile or (0, 0, *size)
     shift, window = np.eye(4), np.eye(4)
-    shift[:2, 3] = (np.modf(turn * np.array([0.75487767, 0.56984029]) + 0.5)[0] - 0.5) * 2.0 / size
+    shift[:2, 3] = pass_shift(turn) * 2.0 / size
     window[0, 0], window[1, 1] = size[0] / width, size[1] / height
     window[0, 3] = (size[0] - 2.0 * left) / width - 1.0
     window[1, 3] = (size[1] - 2.0 * bottom) / height - 1.0

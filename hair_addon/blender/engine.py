@@ -78,9 +78,9 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         size, window = scene.picture_size(blender_scene.render)
         moments = _moments(blender_scene.render, blender_scene.vellus.motion_steps)
         sample_count = view_layer.samples or blender_scene.vellus.sample_count
-        is_transparent = blender_scene.render.film_transparent
         passes = _passes(view_layer, blender_scene.render.use_motion_blur)
-        frame = Frame(size, window, -(-sample_count // len(moments)), passes, is_transparent)
+        film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
+        frame = Frame(size, window, -(-sample_count // len(moments)), *film_settings)
         others = self._others(depsgraph, size) if "Vector" in passes else []
         known, done, in_all = {}, 0, frame.pass_count * len(moments)
         for index in self._at(blender_scene, moments):

@@ -11,16 +11,15 @@ class Frame:
     """Arrays {pass: (height, width, channels) float32} of a window of a picture, first row at the bottom.
 
     size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of what is rendered;
-    sample_count: of a pixel in each moment; passes, is_transparent: of `film.Film`; tile_side: the longest side of a
-    tile [pixels], None: what the graphics driver takes.
+    sample_count: of a pixel in each moment; passes, is_transparent, filter_width: of `film.Film`.
     """
 
-    def __init__(self, size, window, sample_count, passes, is_transparent, tile_side=None):
+    def __init__(self, size, window, sample_count, passes, is_transparent, filter_width=0.0):
         self._size, self._window = size, window
         self._per_side = picture.samples_per_side(sample_count)
         self._turns = sample_count // self._per_side**2
-        self._tiles = picture.tiles(window, tile_side or film.largest_tile(self._per_side))
-        self._new_film = lambda tile: film.Film(tile[2:], self._per_side, passes, is_transparent)
+        self._tiles = picture.tiles(window, film.largest_tile(self._per_side, filter_width))
+        self._new_film = lambda tile: film.Film(tile[2:], self._per_side, passes, is_transparent, filter_width)
         self._film, self._moment_count, self._sums = None, 0, {}
 
     @property
@@ -33,18 +32,16 @@ class Frame:
 
         drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector".
         """
-        samples = tuple(length * self._per_side for length in self._size)
         for tile in self._tiles:
             if self._film is None or self._film.size != tile[2:]:
                 self._film = self._new_film(tile)
             self._film.clear()
             self._film.motion = motion
-            within = tuple(length * self._per_side for length in tile)
             for turn in range(self._turns):
                 with drawing.ALONE:
                     turns_before = self._moment_count * self._turns
-                    view = drawing.pass_record(world_to_view, view_to_clip, samples, turns_before + turn, within)
-                    self._film.add_pass(drawn, view, view_to_clip)
+                    camera = world_to_view, view_to_clip
+                    self._film.add_pass(drawn, *camera, self._size, turns_before + turn, tile[:2])
                 yield
             with drawing.ALONE:
                 self._add(tile, self._film.read())

@@ -26,9 +26,9 @@ def film_depth_program():
 def _film(file, samplers, constants=()):
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
-    for slot, (name, kind) in enumerate(samplers):
+    for slot, (name, kind) in enumerate((("filter_weights", "FLOAT_2D"), *samplers)):
         info.sampler(slot, kind, name)
-    for kind, name in (("INT", "samples_per_side"), *constants):
+    for kind, name in (("INT", "samples_per_side"), ("INT", "margin"), *constants):
         info.push_constant(kind, name)
     info.image(0, FILM_FORMAT, "FLOAT_2D", "sums", qualifiers={"READ", "WRITE"})
     return shaders.compile_compute(info, file)
@@ -83,6 +83,6 @@ def film_view_program():
     """The program that shows the mean of a film: see film_view.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("VEC2", "origin")  # [pixels] of the film in the framebuffer
-    info.push_constant("FLOAT", "sample_count")
+    info.push_constant("FLOAT", "weight_sum")
     info.sampler(0, "FLOAT_2D", "sums")
     return shaders.compile_drawing(info, "cover.vert", "film_view.frag")

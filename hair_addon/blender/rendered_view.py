@@ -20,7 +20,6 @@ class _View:
     film: Film
     drawn: DrawnScene | None = None
     seen: tuple = ()
-    turn: int = 0
 
 
 def draw(context):
@@ -33,11 +32,9 @@ def draw(context):
         seen = tuple(map(float, (*camera[0].ravel(), *camera[1].ravel())))
         if view.drawn is not drawn or view.seen != seen:
             view.film.clear()
-            view.drawn, view.seen, view.turn = drawn, seen, 0
+            view.drawn, view.seen = drawn, seen
         if view.film.sample_count < hair_picture.SAMPLE_COUNT:
-            samples = region.width * per_side, region.height * per_side
-            view.film.add_pass(drawn, drawing.pass_record(*camera, samples, view.turn), camera[1])
-            view.turn += 1
+            view.film.add_pass(drawn, *camera, view.film.size, view.film.pass_count)
         view.film.show()
         return view.film.sample_count < hair_picture.SAMPLE_COUNT
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What a picture is made of: samples of its pixels, moments of its exposure, tiles."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,6 +54,26 @@ class PassSettings(Settings):
 def samples_per_side(sample_count):
     """Along each side of a pixel in each pass over a picture: as many as make up the samples in whole passes."""
     return next(side for side in range(_MOST_PER_SIDE, 0, -1) if sample_count % side**2 == 0)
+
+
+def filter_margin(side, width):
+    """Samples around a pixel of side × side that `filter_weights` takes into account."""
+    return 0 if width <= 1.0 else math.ceil((0.5 * width - 0.5) * side + 0.5)
+
+
+def filter_weights(side, width, shift):
+    """(side + 2 `filter_margin`,) weights of samples along an axis for a pixel: a Blackman-Harris window [Harris78].
+
+    side: samples along the pixel's side; width: of the window [pixels], up to one a box of a pixel; shift: by which the
+    picture is moved against the samples [samples], up to half of one.
+    """
+    margin = filter_margin(side, width)
+    if margin == 0:
+        return np.ones(side)
+    places = (np.arange(side + 2 * margin) - margin + 0.5 - shift) / side - 0.5
+    turn = 2.0 * np.pi * np.clip(places / width, -0.5, 0.5)
+    terms = ((0.35875, 0.0), (0.48829, 1.0), (0.14128, 2.0), (0.01168, 3.0))
+    return sum(weight * np.cos(order * turn) for weight, order in terms)
 
 
 def moments(shutter, position, count):

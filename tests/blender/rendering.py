@@ -29,7 +29,13 @@ def layers_of(folder, **settings):
 def configure(**settings):
     """A small picture by our engine, and what else is asked for."""
     scene = bpy.context.scene
-    settings = {"engine": "VELLUS", "resolution_x": 96, "resolution_y": 72, "sample_count": 4} | settings
+    settings = {
+        "engine": "VELLUS",
+        "resolution_x": 96,
+        "resolution_y": 72,
+        "sample_count": 4,
+        "filter_size": 0.0,
+    } | settings
     for name, value in settings.items():
         setattr(scene.vellus if hasattr(scene.vellus, name) else scene.render, name, value)
 

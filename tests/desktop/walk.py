@@ -20,7 +20,18 @@ from mathutils import Vector
 MODULE = "bl_ext.user_default.vellus"
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
-from tests.desktop.window import drag, in_viewport, places, press, rectangle, take_picture, viewport, wait, wait_for  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    drag,
+    in_viewport,
+    offscreen_light,
+    places,
+    press,
+    rectangle,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+)
 
 PART, ZIP, HEAD, OUT, SITE_PACKAGES = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
@@ -121,35 +132,10 @@ def grow():
     bpy.data.objects["Guides"].hide_set(True)
     show("grown", results=[list(distributed), list(interpolated)])
     facts["sidebar"] = {"rectangle": rectangle(sidebar), "category": sidebar.active_panel_category}
-    np.save(OUT / "offscreen.npy", offscreen())
-    yield
-
-
-def offscreen():
-    """(height, width, 4) linear premultiplied light of what the 3-D view shows of hair, 16 samples a pixel."""
-    import gpu
-
-    blender = sys.modules[f"{MODULE}.hair_addon.blender"]
-    drawing, drawn_scene = blender.viewport.drawing, blender.viewport.drawn_scene
-    area, region = viewport()
-    view, samples = area.spaces.active.region_3d, 4
-    size = (region.width * samples, region.height * samples)
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, area.spaces.active)
-    matrices = np.array(view.view_matrix, np.float64), np.array(view.window_matrix, np.float64)
-    record = drawing.view_record(*matrices, size[1], least_width=1.0)
-    buffer = blender.hair_picture.HairBuffer(*size)
-    with buffer.surfaces():
-        drawn_scene.draw_hiding(drawn, record)
-    drawn_scene.draw_hair(drawn, record, buffer)
-    resolved = gpu.types.GPUTexture((region.width, region.height), format="RGBA32F")
-    target = gpu.types.GPUFrameBuffer(color_slots=resolved)
-    with target.bind():
-        drawing.resolve(buffer.color, samples)
-        pixels = np.array(target.read_color(0, 0, region.width, region.height, 4, 0, "FLOAT"), np.float32)
+    np.save(OUT / "offscreen.npy", offscreen_light(sys.modules[f"{MODULE}.hair_addon.blender"]))
     settings = bpy.context.scene.view_settings
     facts["transform"] = [settings.view_transform, settings.look, settings.exposure, settings.gamma]
-    return pixels.reshape(region.height, region.width, 4)
+    yield
 
 
 def shading_modes():

@@ -32,14 +32,16 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
 
 
 class VELLUS_PT_film(_OfEngine, bpy.types.Panel):
-    """What is behind the scene"""
+    """How samples become pixels, and what is behind the scene"""
 
     bl_label = "Film"
     bl_idname = "VELLUS_PT_film"
     bl_options = {"DEFAULT_CLOSED"}
 
     def draw(self, context):
-        split(self.layout).prop(context.scene.render, "film_transparent", text="Transparent")
+        layout, render = split(self.layout), context.scene.render
+        layout.prop(render, "filter_size")
+        layout.prop(render, "film_transparent", text="Transparent")
 
 
 class VELLUS_PT_motion_blur(_OfEngine, bpy.types.Panel):
