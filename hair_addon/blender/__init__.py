@@ -42,9 +42,9 @@ def register():
     keymap.register()
     handlers.register()
     viewport.register()
-    if bpy.app.module:
-        # A Blender program switches add-ons off before its graphics end; as a module it does not, and whatever is left
-        # on the GPU would be freed without them.
+    if not preferences.is_extension():
+        # Blender switches extensions off before its graphics end; of a checkout that a script has registered it knows
+        # nothing, and what is left on the GPU would be freed without them.
         atexit.register(unregister)
 
 

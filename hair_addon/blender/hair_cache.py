@@ -206,7 +206,7 @@ def _tables(settings, folder):
 
 def cache_folder():
     """The folder of tables that were baked before, for every file of this user; None where we are no extension."""
-    if not preferences.ADDON_MODULE.startswith("bl_ext."):
+    if not preferences.is_extension():
         return None  # run from a checkout
     # Empty where Blender could not make it, of which it has told the console.
     folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="tables", create=True)

@@ -23,6 +23,11 @@ class VellusPreferences(bpy.types.AddonPreferences):
     )
 
 
+def is_extension():
+    """Whether this is an installed extension, with folders of its own, and no checkout."""
+    return ADDON_MODULE.startswith("bl_ext.")
+
+
 def device():
     """Name of the Warp device that the user chose; the processor where there is no choice, or no such device."""
     addon = bpy.context.preferences.addons.get(ADDON_MODULE)

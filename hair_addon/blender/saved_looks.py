@@ -59,7 +59,7 @@ def _path(name, create):
 
 def _folder(create):
     """None where we are no extension."""
-    if not preferences.ADDON_MODULE.startswith("bl_ext."):
+    if not preferences.is_extension():
         return None
     folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="looks", create=create)
     return Path(folder) if folder else None

@@ -253,7 +253,7 @@ def test_an_empty_background_is_empty(shot, tmp_path):
         out = tmp_path / f"{engine}.exr"
         assert run_here("render", shot, "--engine", engine, "--transparent", "--out", out).status == 0
         alpha = picture(out)[..., 3]
-        assert alpha[0, 0] == 0.0 and alpha[15, 20] == 1.0
+        assert alpha[0, 0] == 0.0 and alpha[15, 20] == pytest.approx(1.0, abs=1e-6)
 
 
 # ------------------------------------------------------------------------------------------------ what is not done
