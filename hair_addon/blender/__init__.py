@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Everything Blender: classes in the order they need each other."""
 
+import atexit
+
 import bpy
 
 from . import (
@@ -40,11 +42,19 @@ def register():
     keymap.register()
     handlers.register()
     viewport.register()
+    atexit.register(_release)
+
+
+def _release():
+    """Python ends: what is on the GPU is freed while there is one. Blender's own handler of its exit comes too late."""
+    rendered_view.clear()
+    viewport.release()
 
 
 def unregister():
     """Undo `register` in reverse."""
     running.end(bpy.context)
+    atexit.unregister(_release)
     rendered_view.clear()
     viewport.unregister()
     handlers.unregister()
