@@ -202,9 +202,9 @@ def test_what_cannot_be_rendered_is_said_in_a_sentence(lit, tmp_path):
 @pytest.mark.parametrize(
     ("error", "said"),
     [
-        (ZeroDivisionError("nothing to divide by"), "could not render this: nothing to divide by"),
-        (KeyboardInterrupt(), "Stopped: nothing was rendered"),
-        (HairError("A sentence."), "A sentence"),
+        (ZeroDivisionError, "could not render this: A sentence"),
+        (KeyboardInterrupt, "Stopped: nothing was rendered"),
+        (HairError, "A sentence"),
     ],
 )
 def test_what_ends_a_render_before_its_end_writes_no_picture(lit, tmp_path, monkeypatch, error, said):
@@ -213,7 +213,7 @@ def test_what_ends_a_render_before_its_end_writes_no_picture(lit, tmp_path, monk
 
     def broken(*_args):
         calls.append(1)
-        raise error
+        raise error("A sentence.")  # a new one: its traceback holds on to what is on the GPU
 
     monkeypatch.setattr(film.Film, "add_pass", broken)
     configure(filepath=str(tmp_path / "nothing.png"))
