@@ -42,16 +42,19 @@ def register():
     keymap.register()
     handlers.register()
     viewport.register()
-    if not preferences.is_extension():
-        # Blender switches extensions off before its graphics end; of a checkout that a script has registered it knows
-        # nothing, and what is left on the GPU would be freed without them.
-        atexit.register(unregister)
+    atexit.register(_release)
+
+
+def _release():
+    """Python ends: what is on the GPU is freed while there is one. Blender's own handler of its exit comes too late."""
+    rendered_view.clear()
+    viewport.release()
 
 
 def unregister():
     """Undo `register` in reverse."""
-    atexit.unregister(unregister)
     running.end(bpy.context)
+    atexit.unregister(_release)
     rendered_view.clear()
     viewport.unregister()
     handlers.unregister()

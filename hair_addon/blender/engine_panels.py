@@ -23,7 +23,8 @@ def _panels():
     while pending:
         for panel in pending.pop().__subclasses__():
             pending.append(panel)
-            engines, name = getattr(panel, "COMPAT_ENGINES", ()), panel.__name__
+            # A panel of the shader editor shares its list with the one that it is made of.
+            engines, name = getattr(panel, "COMPAT_ENGINES", ()), panel.__name__.removeprefix("NODE_")
             if name in _OURS or (_GENERAL in engines and not name.startswith(_NOT_OURS)):
                 yield panel
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """GLSL files → the GPU programs that only renders need."""
 
-from functools import cache
-
 import gpu
 
 from . import shaders, uniforms
@@ -10,13 +8,13 @@ from . import shaders, uniforms
 FILM_FORMAT = "RGBA32F"  # of sums of samples
 
 
-@cache
+@shaders.kept
 def film_program():
     """The compute program that adds the samples of `picture` to a film: see film.comp."""
     return _film("film.comp", (("picture", "FLOAT_2D"),))
 
 
-@cache
+@shaders.kept
 def film_depth_program():
     """The same of what is no light: see film_depth.comp."""
     samplers = (("segments", "UINT_2D"), ("depths", "UINT_2D"), ("surface_depth", "FLOAT_2D"))
@@ -34,13 +32,13 @@ def _film(file, samplers, constants=()):
     return shaders.compile_compute(info, file)
 
 
-@cache
+@shaders.kept
 def strand_arrival_program():
     """The compute program that says how much light arrives at strands: see strand_arrival.comp."""
     return shaders.compile_compute(shaders.strand_samples_info(), "strand_arrival.comp")
 
 
-@cache
+@shaders.kept
 def surface_arrival_program():
     """The same of a surface: see surface_arrival.frag."""
     info, varying = shaders.surface_info()
@@ -52,7 +50,7 @@ def surface_arrival_program():
 MOTION_FORMAT = "RGBA32F"  # of how far things move
 
 
-@cache
+@shaders.kept
 def strand_motion_program():
     """The compute program that says how far strands move: see strand_motion.comp."""
     samplers = (("strands_before", "FLOAT_2D"), ("strands_after", "FLOAT_2D"))
@@ -61,7 +59,7 @@ def strand_motion_program():
     return shaders.compile_compute(info, "strand_motion.comp")
 
 
-@cache
+@shaders.kept
 def surface_motion_program():
     """The same of a surface: see surface_motion.vert."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -78,7 +76,7 @@ def surface_motion_program():
     return shaders.compile_drawing(info, "surface_motion.vert", "surface_motion.frag")
 
 
-@cache
+@shaders.kept
 def film_view_program():
     """The program that shows the mean of a film: see film_view.frag."""
     info = gpu.types.GPUShaderCreateInfo()

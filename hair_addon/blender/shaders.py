@@ -44,6 +44,22 @@ def expand(name, skipped=()):
     return "\n".join(text) + "\n", lines
 
 
+_makers = []  # of programs
+
+
+def kept(make):
+    """Decorate what makes a program: it is compiled once, and kept until `forget`."""
+    maker = cache(make)
+    _makers.append(maker)
+    return maker
+
+
+def forget():
+    """Let go of all programs: Blender ends, and may not free them after its graphics."""
+    for maker in _makers:
+        maker.cache_clear()
+
+
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
 VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z")  # see shaders/world_visibility.frag
 VISIBILITY_TARGETS = ("seen_x_y", "seen_z")
@@ -69,7 +85,7 @@ def has_image_atomics():
 _COLOR = (("color", "VEC4"),)
 
 
-@cache
+@kept
 def strip_program(fragment, shadow_samplers=(), targets=_COLOR):
     """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -77,7 +93,7 @@ def strip_program(fragment, shadow_samplers=(), targets=_COLOR):
     return compile_drawing(info, "strand.vert", fragment, targets)
 
 
-@cache
+@kept
 def strip_segments_program():
     """The program that draws strips of strands as samples of a picture: see strand_segments.frag."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -101,13 +117,13 @@ RUN_GROUP_SIZE = 64  # runs of segments that one work group of a program that wa
 RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.glsl
 
 
-@cache
+@kept
 def segments_program():
     """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
     return _walk("strand_segments.comp", ("depths", "segments"), ("first_segment", "is_depth"))
 
 
-@cache
+@kept
 def strand_shadow_program():
     """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
     return _walk("strand_shadow.comp", ("fronts", "counts"), ("is_front",), shadow_samplers=("hair_front",))
@@ -128,7 +144,7 @@ def _walk(file, images, constants, shadow_samplers=()):
 PICTURE_GROUP_SIZE = 8  # samples along each side of what one work group of a picture's programs fills
 
 
-@cache
+@kept
 def surface_depths_program():
     """The compute program that turns depth into numbers: see surface_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -141,7 +157,7 @@ def surface_depths_program():
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 
 
-@cache
+@kept
 def shading_program(file, blocks=(), tables=(), in_parts=False):
     """The compute program that shades strands: a model's .comp, its blocks and its samplers of tables.
 
@@ -176,7 +192,7 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT):
     return info
 
 
-@cache
+@kept
 def surface_program():
     """The program that draws a matt surface: attributes position, normal; uniform surface_color."""
     info, varying = surface_info()
@@ -188,7 +204,7 @@ def surface_program():
     return compile_drawing(info, "lit_surface.vert", "surface.frag")
 
 
-@cache
+@kept
 def surface_depth_program(fragment="shadow_surface.frag"):
     """The program that draws a surface into a shadow map, or one that only hides."""
     info, varying = surface_info()
@@ -208,7 +224,7 @@ def surface_info():
     return info, varying
 
 
-@cache
+@kept
 def visibility_program():
     """The program that adds up how much of the world the texels of `places` see, in two targets."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -217,19 +233,19 @@ def visibility_program():
     return compile_drawing(info, "cover.vert", "world_visibility.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
 
 
-@cache
+@kept
 def shadow_fill_program():
     """The program that fills gaps of `fronts`, a deep opacity map's first pass."""
     return _shadow_filter("shadow_fill.frag", "UINT_2D", "fronts")
 
 
-@cache
+@kept
 def shadow_counts_program():
     """The program that makes layers of `counts`, a deep opacity map's second pass where it is computed."""
     return _shadow_filter("shadow_counts.frag", "UINT_2D", "counts")
 
 
-@cache
+@kept
 def shadow_moments_program():
     """The program that blurs `surface_depth` along an axis: depths if is_depth, else what it made of them before."""
     constants = (("IVEC2", "along"), ("INT", "taps"), ("INT", "is_depth"), ("FLOAT", "deviation"))
@@ -245,7 +261,7 @@ def _shadow_filter(fragment, kind, sampler, constants=()):
     return compile_drawing(info, "cover.vert", fragment)
 
 
-@cache
+@kept
 def environment_program(fragment):
     """The program that draws a picture of the surroundings."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -255,7 +271,7 @@ def environment_program(fragment):
     return compile_drawing(info, "cover.vert", fragment)
 
 
-@cache
+@kept
 def resolve_program():
     """The program that averages blocks of samples_per_side² texels of `picture`."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -267,7 +283,7 @@ def resolve_program():
 MOVE_GROUP_SIZE = 64  # points that one work group of `move_program` brings to their places
 
 
-@cache
+@kept
 def move_program():
     """The compute program that writes the points of some strands into the texture of all."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -279,7 +295,7 @@ def move_program():
     return compile_compute(info, "move_strands.comp")
 
 
-@cache
+@kept
 def accumulate_program():
     """The program that adds a pass to the picture of a viewport: see accumulate.frag."""
     info = gpu.types.GPUShaderCreateInfo()
@@ -291,7 +307,7 @@ def accumulate_program():
     return compile_drawing(info, "cover.vert", "accumulate.frag")
 
 
-@cache
+@kept
 def display_program():
     """The program that shows hair over a viewport: see display.frag."""
     info = gpu.types.GPUShaderCreateInfo()

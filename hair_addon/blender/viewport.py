@@ -55,12 +55,18 @@ def unregister():
             curves.draw_natively(datablock, True)
     while _handles:
         bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+    release()
+    _told.clear()
+
+
+def release():
+    """Let go of all that is on the GPU."""
     forget()
     _shown.clear()
     _pictures.clear()
     hair_cache.clear()
     _display_table.cache_clear()
-    _told.clear()
+    shaders.forget()
 
 
 def forget(is_hair_only=False):

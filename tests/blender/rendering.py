@@ -55,3 +55,10 @@ def read_layers(path):
 def _stacked(channels):
     order = sorted(channels, key="RGBAXYZW".index)
     return channels[order[0]] if len(order) == 1 else np.stack([channels[letter] for letter in order], axis=-1)
+
+
+def light_up(color=(0.2, 0.3, 0.4)):
+    """A world of this colour."""
+    world = bpy.context.scene.world or bpy.data.worlds.new("World")
+    bpy.context.scene.world = world
+    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)

@@ -10,16 +10,9 @@ import pytest
 from hair_addon.blender import film
 from hair_addon.blender.scene import read_camera
 from tests.blender.reading import evaluated_points
-from tests.blender.rendering import configure, layers_of, rendered
+from tests.blender.rendering import configure, layers_of, light_up, rendered
 
 MODELS = [("KAJIYA_KAY", "energy"), ("MARSCHNER", "energy"), ("MARSCHNER", "classic")]
-
-
-def light_up(color=(0.2, 0.3, 0.4)):
-    """A world of this colour."""
-    world = bpy.context.scene.world or bpy.data.worlds.new("World")
-    bpy.context.scene.world = world
-    world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
 
 
 @pytest.mark.parametrize("is_varied", [False, True])
