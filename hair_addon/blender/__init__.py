@@ -17,6 +17,7 @@ from . import (
     properties,
     rendered_view,
     running,
+    shaders,
     translations,
     viewport,
 )
@@ -49,6 +50,7 @@ def _release():
     """Python ends: what is on the GPU is freed while there is one. Blender's own handler of its exit comes too late."""
     rendered_view.clear()
     viewport.release()
+    shaders.forget()
 
 
 def unregister():
