@@ -17,6 +17,7 @@ from . import (
     properties,
     rendered_view,
     running,
+    shaders,
     translations,
     viewport,
 )
@@ -42,6 +43,7 @@ def register():
     keymap.register()
     handlers.register()
     viewport.register()
+    atexit.unregister(_release)
     atexit.register(_release)
 
 
@@ -49,12 +51,12 @@ def _release():
     """Python ends: what is on the GPU is freed while there is one. Blender's own handler of its exit comes too late."""
     rendered_view.clear()
     viewport.release()
+    shaders.forget()
 
 
 def unregister():
     """Undo `register` in reverse."""
     running.end(bpy.context)
-    atexit.unregister(_release)
     rendered_view.clear()
     viewport.unregister()
     handlers.unregister()

@@ -60,13 +60,12 @@ def unregister():
 
 
 def release():
-    """Let go of all that is on the GPU."""
+    """Let go of all that is on the GPU but programs."""
     forget()
     _shown.clear()
     _pictures.clear()
     hair_cache.clear()
     _display_table.cache_clear()
-    shaders.forget()
 
 
 def forget(is_hair_only=False):
