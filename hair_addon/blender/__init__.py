@@ -43,6 +43,7 @@ def register():
     keymap.register()
     handlers.register()
     viewport.register()
+    atexit.unregister(_release)
     atexit.register(_release)
 
 
@@ -56,7 +57,6 @@ def _release():
 def unregister():
     """Undo `register` in reverse."""
     running.end(bpy.context)
-    atexit.unregister(_release)
     rendered_view.clear()
     viewport.unregister()
     handlers.unregister()

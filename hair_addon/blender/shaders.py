@@ -55,7 +55,10 @@ def kept(make):
 
 
 def forget():
-    """Let go of all programs: Blender ends, and may not free them after its graphics."""
+    """Let go of all programs: Blender ends, and may not free them after its graphics.
+
+    Not before: a program that is freed while it is bound is taken for bound when another one comes to lie where it lay.
+    """
     for maker in _makers:
         maker.cache_clear()
 

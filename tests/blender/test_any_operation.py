@@ -5,13 +5,16 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_nothing_breaks_whatever_an_artist_does():
+@pytest.mark.parametrize("seed", [1, 3])
+def test_nothing_breaks_whatever_an_artist_does(seed):
     """200 operations a run; the seed fixes the way."""
     walked = subprocess.run(
-        [sys.executable, "-u", "-m", "tests.blender.walk_operations", "12", "200", "1"],
+        [sys.executable, "-u", "-m", "tests.blender.walk_operations", "12", "200", str(seed)],
         cwd=ROOT,
         capture_output=True,
         text=True,
