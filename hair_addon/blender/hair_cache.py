@@ -17,6 +17,7 @@ from . import bindings, curves, files, hair_shading, preferences, properties, sc
 
 _strands = {}  # session_uid → StrandsOnGPU, or None where the datablock cannot be drawn
 _at_rest = {}  # session_uid → (points, radii, random numbers) before their surface carried them
+_roots = {}  # session_uid → (surface's session_uid, topology, vertices, barycentric) by which it was carried last
 _moved = {}  # session_uid → [(M,) indices of strands] that moved since then
 _surfaces = {}  # session_uid of a mesh object → (Surface, SurfaceMotion or None)
 _shading = {}  # settings → Shading
@@ -56,10 +57,12 @@ def _carried(datablock, points, chosen=slice(None)):
         _surfaces[uid] = _read_motion(surface_object)
     surface, motion = _surfaces[uid]
     if motion is None:
+        _roots[datablock.session_uid] = uid, datablock.vellus.topology, None, None
         return points
     from ..core import surface_frames  # Warp takes longer to import than the add-on may take to start
 
     vertices, barycentric = curves.root_places(datablock, surface)
+    _roots[datablock.session_uid] = uid, datablock.vellus.topology, vertices, barycentric
     return surface_frames.carry(points, motion, vertices[chosen], barycentric[chosen])
 
 
@@ -81,7 +84,7 @@ def refuse(datablock, error):
 
 def forget(session_uid):
     """Drop the strands of a datablock that changed."""
-    for cache in (_strands, _at_rest, _moved):
+    for cache in (_strands, _at_rest, _roots, _moved):
         cache.pop(session_uid, None)
 
 
@@ -121,10 +124,22 @@ def forget_unless_same(datablock):
         points, radii, randoms = _at_rest[uid]
         is_known = points is bound.points if bound is not None else _are_points(datablock, points)
         is_known = is_known and np.array_equal(radii.ravel(), curves.read_radii(datablock))
-        if not is_known or not np.array_equal(randoms, curves.read_randoms(datablock)):
+        is_known = is_known and np.array_equal(randoms, curves.read_randoms(datablock))
+        if not is_known or not _is_rooted_as_before(datablock):
             forget(uid)
     else:
         forget(uid)
+
+
+def _is_rooted_as_before(datablock):
+    """Whether its surface would carry it as it was carried last: guides may be told where they are by hair."""
+    if datablock.session_uid not in _roots or datablock.surface is None:
+        return datablock.session_uid not in _roots
+    surface_uid, topology, vertices, barycentric = _roots[datablock.session_uid]
+    if (surface_uid, topology) != (datablock.surface.session_uid, datablock.vellus.topology):
+        return False
+    now = curves.read_root_places(datablock)
+    return vertices is None or now is None or all(map(np.array_equal, (vertices, barycentric), now))
 
 
 def _are_points(datablock, points):
@@ -133,7 +148,7 @@ def _are_points(datablock, points):
 
 def clear():
     """Drop everything: after undo, with a new file, when the add-on is switched off."""
-    for cache in (_strands, _at_rest, _moved, _surfaces, _shading):
+    for cache in (_strands, _at_rest, _roots, _moved, _surfaces, _shading):
         cache.clear()
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hair_addon.blender import follow_nodes
+from hair_addon.blender import curves, follow_nodes, hair_cache, scene
 from hair_addon.core import hair_binding
 from tests.blender.counting import counts_of
 from tests.blender.following import assert_follows, drawn_points, grow, surface_points, update
@@ -266,3 +266,16 @@ def test_undo_while_deformed_leaves_hair_on_the_surface(arm, scene):
     bpy.ops.ed.redo()
     update()
     np.testing.assert_allclose(points(bpy.data.objects["Hair"]), after, atol=1e-6)
+
+
+def test_guides_that_were_told_other_roots_are_carried_from_there(sphere):
+    guides, _hair = grow(sphere)
+    key_shape(sphere, lambda vertices: vertices * np.float32([1.0, 2.0, 0.5]))
+    drawn_points(guides)
+    surface = scene.read_surface(sphere, bpy.context.evaluated_depsgraph_get())
+    roots = curves.stored_roots(guides.data, surface)
+    curves.write_roots(guides.data, surface, roots[::-1])
+    update()
+    drawn = drawn_points(guides)
+    hair_cache.forget(guides.data.session_uid)
+    np.testing.assert_array_equal(drawn, drawn_points(guides))
