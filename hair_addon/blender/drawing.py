@@ -53,6 +53,7 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     record["eye"][:3] = view_to_world[:3, 3] if record["is_perspective"] else view_to_world[:3, 2]
     record["pixels_per_unit"] = 0.5 * height * view_to_clip[1, 1]
     record["least_half_width"] = 0.5 * least_width / record["pixels_per_unit"]
+    record["seen_opacity"] = 1.0  # what is seen of the world holds for it where there is no hair
     return record
 
 

@@ -165,3 +165,19 @@ def test_a_cloud_of_strands_lets_through_what_rays_say(scene, rng):
     along = places @ directions.T
     ways = -along + np.sqrt(along**2 + 1.0 - np.square(places).sum(axis=1)[:, None])
     assert found == pytest.approx(np.exp(-density * ways).mean(), rel=0.05)
+
+
+@pytest.mark.parametrize("has_hair", [False, True])
+def test_an_even_world_gives_a_surface_its_colour(sphere, scene, has_hair):
+    """With and without hair in the scene, which has surfaces look through it."""
+    color = np.array([0.2, 0.4, 0.6])
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
+    if has_hair:
+        bpy.ops.vellus.add_hair(guide_count=3, strand_count=3, length=0.01, radius=1e-5)
+    bpy.ops.object.camera_add(location=(0.0, 0.0, 8.0))
+    scene.camera = bpy.context.object
+    drawn = render.draw_picture(render.PictureSettings(32, 32, 1, is_transparent=True))
+    surface = drawn[drawn[..., 3] == 1.0][:, :3]
+    assert len(surface) > 50
+    np.testing.assert_allclose(np.median(surface, axis=0), 0.8 * color, rtol=0.02)
