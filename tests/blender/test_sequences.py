@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import time
@@ -125,6 +126,19 @@ def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
     for name in ALL:
         np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))
     assert frame_numbers(run(*words(turning, tmp_path))) == []
+
+
+def test_another_machine_goes_on(turning, whole, tmp_path):
+    """Where the file and the frames have other paths: what counts is what is in them."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    shutil.copy(turning, here / "ball.blend")
+    assert run_here("render", here / "ball.blend", "--frames", "1-4", "--out", here / "f_###.png").status == 0
+    here.rename(there)
+    ended = run_here(*words(there / "ball.blend", there))
+    assert frame_numbers(ended) == [5, 6]
+    for name in ALL:
+        np.testing.assert_array_equal(pixels(there / name), pixels(whole / name))
 
 
 def test_processes_share_the_frames(turning, whole, tmp_path):
