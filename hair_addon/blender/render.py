@@ -108,9 +108,16 @@ def write_picture(pixels, path, blender_scene):
 def _save(image, path, blender_scene, file_format, color_depth):
     """Save through a scene's view transform, with image settings of our own for the time it takes."""
     settings = blender_scene.render.image_settings
-    before = settings.file_format, settings.color_mode, settings.color_depth
+    # The kind first: which formats there are depends on it, and a scene may be set to write a film.
+    wanted = {"media_type": "IMAGE", "file_format": file_format, "color_mode": "RGBA", "color_depth": color_depth}
+    before = {name: getattr(settings, name) for name in wanted}
     try:
-        settings.file_format, settings.color_mode, settings.color_depth = file_format, "RGBA", color_depth
+        _set(settings, wanted)
         image.save_render(path, scene=blender_scene)
     finally:
-        settings.file_format, settings.color_mode, settings.color_depth = before
+        _set(settings, before)
+
+
+def _set(owner, values):
+    for name, value in values.items():
+        setattr(owner, name, value)

@@ -229,3 +229,13 @@ def test_an_elliptic_section_is_the_classic_mode_s_alone(lit):
     assert np.isfinite(picture(width=48, height=48)).all()
     state.marschner.eccentricity = 1.0
     assert "n_trt_table" in hair_cache.shading_of(lit.data).samplers
+
+
+@pytest.mark.parametrize("kind", ["VIDEO", "MULTI_LAYER_IMAGE"])
+def test_a_scene_that_writes_something_else_is_left_so(lit, tmp_path, kind):
+    image = bpy.context.scene.render.image_settings
+    image.media_type = kind
+    before = image.media_type, image.file_format, image.color_mode
+    render.write_picture(np.ones((3, 4, 4), np.float32), tmp_path / "a.png", bpy.context.scene)
+    assert (tmp_path / "a.png").exists()
+    assert (image.media_type, image.file_format, image.color_mode) == before
