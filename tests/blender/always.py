@@ -102,7 +102,8 @@ def hair_is_what_its_settings_say():
 
 
 def what_is_drawn_is_what_is_there():
-    """What is kept on the GPU is what a first drawing would bring there."""
+    """What is kept on the GPU is what a first drawing would bring there, once what waits for an update has had it."""
+    bpy.context.view_layer.update()
     for datablock in {o.data for o in bpy.context.view_layer.objects if o.type == "CURVES"} & {*ours()}:
         kept = _drawn_points(datablock)
         hair_cache.forget(datablock.session_uid)
