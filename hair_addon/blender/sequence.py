@@ -5,6 +5,7 @@ A frame is done when its file is there, for files appear whole. What they are fr
 so that another command does not go on with pictures of something else.
 """
 
+import contextlib
 import hashlib
 import json
 import time
@@ -24,7 +25,8 @@ def description(input_path, engine, settings):
 
     input_path: the .blend; engine: of `frames.ENGINES`; settings: {name: value}.
     """
-    digest = hashlib.blake2b(Path(input_path).read_bytes(), digest_size=16).hexdigest()
+    with open(input_path, "rb") as file:
+        digest = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
     program = f"Vellus {files.addon_version()}"
     return {"sequence": _VERSION, "program": program, "input": digest, "engine": engine, "settings": settings}
 
@@ -38,11 +40,21 @@ def begin(pattern, numbers, described, replaces=False):
     record = record_of(pattern)
     files.require_writable(record)
     while True:
-        with claim(record) as is_ours:
+        with _claimed(record) as is_ours:
             if is_ours:
                 _begin(pattern, numbers, record, described, replaces)
                 return
         time.sleep(_PAUSE)
+
+
+@contextlib.contextmanager
+def _claimed(path):
+    """`claim`, with a sentence where the folder takes no further file. Raises `HairError`."""
+    try:
+        with claim(path) as is_ours:
+            yield is_ours
+    except OSError as error:
+        raise HairError(f"{path} cannot be written: {files.cause_of(error)}.") from error
 
 
 def record_of(pattern):
@@ -96,7 +108,7 @@ def make(pattern, numbers, write, told=unheard):
             told(f"Frame {number}", 1.0 - len(left) / len(numbers))
             path = frames.path_of(pattern, number)
             if not path.exists():
-                with claim(path) as is_ours:
+                with _claimed(path) as is_ours:
                     if not is_ours:
                         continue
                     if not path.exists():
@@ -113,6 +125,6 @@ def _sweep(pattern, numbers):
     """Take away what processes left that were killed in the middle of a frame that others have made since."""
     for path in [frames.path_of(pattern, number) for number in numbers]:
         if files.partial_of(path).exists() or claim_of(path).exists():
-            with claim(path) as is_ours:
+            with _claimed(path) as is_ours:
                 if is_ours:
                     files.partial_of(path).unlink(missing_ok=True)

@@ -2,6 +2,7 @@
 """Sequences of frames, stopped and gone on with, and shared by processes: no frame is made twice, none is broken."""
 
 import contextlib
+import errno
 import itertools
 import json
 import os
@@ -16,6 +17,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender import frames, sequence
+from hair_addon.core import claims
 from hair_addon.core.claims import claim
 from hair_addon.core.errors import HairError
 from tests.blender.commands import ROOT, command, run, run_here
@@ -24,6 +26,7 @@ COUNT = 6
 
 HOLD = """
 import sys, time
+from hair_addon.core import claims
 from hair_addon.core.claims import claim
 with claim(sys.argv[1]):
     print(flush=True)
@@ -184,6 +187,18 @@ def test_a_full_disk_leaves_what_was_whole(turning, tmp_path):
     assert not [path for path in tmp_path.iterdir() if path.suffix == ".exr"]
     assert run(*words(turning, tmp_path, ending="exr")).status == 0
     assert len(list(tmp_path.glob("f_*.exr"))) == COUNT
+
+
+def test_a_folder_that_takes_no_further_file_is_told(turning, tmp_path, monkeypatch):
+    """As on a disk that has no room for a name."""
+
+    def refuse(_path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(claims, "_locked", refuse)
+    ended = run_here(*words(turning, tmp_path))
+    assert ended.status == 1 and "No space left on device" in ended.errors and len(ended.errors.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_who_fails_among_several_says_why_once(turning, tmp_path):
