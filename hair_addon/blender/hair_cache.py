@@ -133,10 +133,11 @@ def forget_unless_same(datablock):
 
 def _is_rooted_as_before(datablock):
     """Whether its surface would carry it as it was carried last: guides may be told where they are by hair."""
-    if datablock.session_uid not in _roots or datablock.surface is None:
-        return datablock.session_uid not in _roots
+    if datablock.session_uid not in _roots:
+        return True  # it was not carried
     surface_uid, topology, vertices, barycentric = _roots[datablock.session_uid]
-    if (surface_uid, topology) != (datablock.surface.session_uid, datablock.vellus.topology):
+    surface = datablock.surface
+    if surface is None or (surface_uid, topology) != (surface.session_uid, datablock.vellus.topology):
         return False
     now = curves.read_root_places(datablock)
     return vertices is None or now is None or all(map(np.array_equal, (vertices, barycentric), now))
