@@ -33,6 +33,7 @@ class BoundHair:
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether what is not written is where points are, and perhaps the guide map
     is_map_written: bool = False  # whether the datablock holds this guide map
+    written_radii: np.ndarray | None = None  # (P,) that the datablock holds, None where somebody may have changed it
     is_report_due: bool = False  # whether Blender has yet to report what was written, which is no news
 
     @property
@@ -63,6 +64,9 @@ _bound = {}  # session_uid → BoundHair
 
 def keep(datablock, bound):
     """Keep what a hair Curves datablock is bound by."""
+    before = of(datablock)
+    if before is not None:
+        bound.written_radii = before.written_radii
     _bound[datablock.session_uid] = bound
 
 

@@ -100,25 +100,34 @@ def _hidden_as(curves_object):
     return "BOUNDS" if curves_object.select_get() else "WIRE"
 
 
-def write_strands(curves, surface, points, roots, radii, leaders=None, normals=None):
+def write_strands(curves, surface, points, roots, radii, leaders=None, normals=None, written_radii=None):
     """Fill Curves with strands.
 
-    points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) [m]; leaders: (S,) int32, the
-    strand that stands for the guide of each, or None where strands are guides themselves; normals: (S, 3) float32 of
-    the surface at the roots, if they are known.
+    points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) likewise; leaders: (S,) int32,
+    the strand that stands for the guide of each, or None where strands are guides themselves; normals: (S, 3) float32
+    of the surface at the roots, if they are known; written_radii: (P,) that the curves have, if they are known.
     """
     strand_count, point_count, _xyz = points.shape
     if strand_count == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
-    _resize(curves, strand_count, point_count)
+    is_new = _resize(curves, strand_count, point_count)
     _write_positions(curves, points)
-    _write_radii(curves, radii / surface.scale)
+    if is_new or "radius" not in curves.attributes or not np.array_equal(radii, written_radii):
+        _write_radii(curves, radii)
     if leaders is not None:
         # Blender's hair nodes look for this curve among the strands themselves: around it they clump, curl and braid.
         attributes.write(curves, "guide_curve_index", "INT", "CURVE", leaders)
-    attributes.write(curves, "id", "INT", "CURVE", np.arange(strand_count))
-    attributes.write(curves, "strand_random", "FLOAT", "CURVE", strands.random_numbers(strand_count))
+    identities, numbers = strand_numbers(surface, roots)
+    attributes.write(curves, "id", "INT", "CURVE", identities)
+    attributes.write(curves, "strand_random", "FLOAT", "CURVE", numbers)
     write_roots(curves, surface, roots, normals)
+
+
+def strand_numbers(surface, roots):
+    """(S,) int32 and (S,) float32 in [0, 1) by which strands are known and differ, whichever others are there."""
+    from ..core import rooting  # Warp takes longer to import than the add-on may take to start
+
+    return rooting.identities(surface.swap_winding(roots))
 
 
 def write_guide_map(curves, guide_map):
@@ -252,15 +261,17 @@ def read_root_places(curves):
 
 
 def _resize(curves, strand_count, point_count):
+    """Make room for strands; whether there was none, so that nothing is known of any."""
     if len(curves.curves) == strand_count and len(curves.points) == strand_count * point_count:
         sizes = point_counts(curves)
         if (sizes == point_count).all():
-            return
+            return False
     if len(curves.curves):
         curves.remove_curves()
     # Plain integers only.
     curves.add_curves([int(point_count)] * int(strand_count))
     curves.set_types(type="POLY")
+    return True
 
 
 def point_counts(curves):

@@ -4,6 +4,8 @@
 Strands are camera-facing strips without vertex attributes: the vertex shader pulls points from a texture.
 """
 
+import functools
+import math
 import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -27,7 +29,7 @@ class SurfaceOnGPU:
 
 @dataclass(frozen=True)
 class Steps:
-    """Which part of strands is drawn: how many points of each, how many strands in place of all, from which one on."""
+    """Which part of strands is drawn: how many points of each, how many strands in place of all, from which turn on."""
 
     point_count: int | None = None
     strand_count: int | None = None
@@ -107,9 +109,24 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     record["drawn_strands"] = min(strands.strand_count, steps.strand_count or strands.strand_count)
     record["drawn_points"] = min(strands.point_count, steps.point_count or strands.point_count)
     record["first_strand"] = steps.first_strand
+    record["part_size"], record["part_stride"] = _parts(strands.strand_count)
     record["thickness"] = strands.strand_count / record["drawn_strands"]
     record["row_strands"] = strands.row_strands
     return record
+
+
+# Strands in a part: with their stride they are multiplied in a shader, whose integers have 32 bits.
+_LARGEST_PART = 32_768
+
+
+@functools.cache
+def _parts(strand_count):
+    """Strands in each of as few equal parts as may be, and a stride near the golden ratio of it that meets them all."""
+    size = strand_count // -(-strand_count // _LARGEST_PART)
+    stride = round(0.61803399 * size)
+    while math.gcd(stride, size) != 1:
+        stride += 1
+    return size, stride
 
 
 def draw_strands(strands, program, view, lights, object_to_world, samplers=None, steps=_ALL):

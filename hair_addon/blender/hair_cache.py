@@ -116,6 +116,7 @@ def forget_unless_same(datablock):
             if uid not in _at_rest or _at_rest[uid][0] is not bound.points:
                 forget(uid)
             return
+        bound.written_radii = None
         if not _are_points(datablock, bound.points):
             bindings.forget(datablock)
             forget(uid)
@@ -157,10 +158,11 @@ def _read(datablock):
     """(S, P, 3) points at rest, (S, P) radii, in local coordinates, whatever the curves' point counts; (S,) numbers."""
     bound = bindings.of(datablock)
     if bound is not None:
-        count = len(bound.points)
-        is_there = len(datablock.curves) == count
-        randoms = curves.read_randoms(datablock) if is_there else strands.random_numbers(count)
-        return bound.points, np.tile(bound.radii, (count, 1)), randoms
+        if bound.is_written or bound.has_moved_only:
+            randoms = curves.read_randoms(datablock)
+        else:
+            _identities, randoms = curves.strand_numbers(bound.surface, bound.binding.roots)
+        return bound.points, np.tile(bound.radii, (len(bound.points), 1)), randoms
     return read_strands(datablock)
 
 

@@ -171,7 +171,7 @@ def _write_guides(target, surface_object, surface, guides, settings, key):
     target = target or curves.new_object("Guides", surface_object, is_rendered=False).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
     target.vellus.root_key = key
-    radii = np.full(guides.points.shape[1], 0.5e-3, np.float32)
+    radii = np.full(guides.points.shape[1], 0.5e-3 / surface.scale, np.float32)
     curves.write_strands(target, surface, surface.to_local(guides.numpy()), guides.roots, radii)
     curves.keep_surface(target, surface)
     return target
@@ -195,11 +195,13 @@ def write_hair(target):
     else:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
-        radii = groom.strand_radii(bound.settings, bound.points.shape[1])
-        binding = bound.binding
+        binding, radii = bound.binding, bound.radii
         leaders = hair_binding.leading_strands(bound.surface.mesh, bound.guides, binding)
         normals = binding.normals.numpy()
-        curves.write_strands(target, bound.surface, bound.points, binding.roots, radii, leaders, normals)
+        curves.write_strands(
+            target, bound.surface, bound.points, binding.roots, radii, leaders, normals, bound.written_radii
+        )
+        bound.written_radii = radii
     if not bound.is_map_written:
         curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
     state.is_stale = False  # as which another choice of guides marks it

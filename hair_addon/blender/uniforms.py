@@ -70,7 +70,9 @@ VIEW = Block(
         "drawn_points": "int",  # of each strand's points, evenly chosen: at least two
         "strand_count": "int",
         "drawn_strands": "int",  # of all, each as thick as those that it stands for
-        "first_strand": "int",  # of those that are drawn
+        "first_strand": "int",  # of the turns in which strands are drawn
+        "part_size": "int",  # strands: turns go from one such part of the strands to the next
+        "part_stride": "int",  # and so much further in each when they come back to it
         "thickness": "float",
         "seen_points": "int",  # of each strand's points, those of the visibility textures
         "seen_opacity": "float",  # of a strand, for which they hold

@@ -251,7 +251,7 @@ def bind_hair(
 
     sums = vector_interpolation if device == "cpu" else lane_interpolation
     _load_kernels(device, guide_weights, hash_grid, sums, rooting)
-    _load_kernels("cpu", fingerprint, leaders, transform)
+    _load_kernels("cpu", fingerprint, leaders, sampling, transform)
     if lines is not None:
         _load_kernels(device, part_lines, surface_query)
         lines = part_lines.lay(mesh, lines, device, drawn_on)

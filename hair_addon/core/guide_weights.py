@@ -27,7 +27,6 @@ from .cores import Rows
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 STRETCH = 1.25
-TOGETHER = 65_536  # strands that a processor makes by their guides' order: more rows than its caches see as near
 EVERYWHERE = 1e18  # [m]: a distance to search that leaves nothing out
 SURPLUS = 3  # times the guides wanted are looked at where a part line may be in the way of some
 
@@ -51,44 +50,16 @@ class GuideWeights:
     """The guides that each strand follows, nearest first: (S, k) arrays on one device.
 
     indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
-    cosine and sine of the angle about the normal from the guide's frame to the strand's; order: (S,) int32, the
-    strands by the guides that they follow first, some ten thousand neighbours in memory after the others.
+    cosine and sine of the angle about the normal from the guide's frame to the strand's.
     """
 
     indices: "wp.array2d[int]"
     weights: "wp.array2d[float]"
     turns: "wp.array2d[wp.vec2]"
-    order: "wp.array[int]"
 
-    def of(self, chosen, guide_count):
+    def of(self, chosen):
         """The same of some strands; chosen: int32 Warp array on the device."""
-        indices, weights, turns = (rows(array, chosen) for array in (self.indices, self.weights, self.turns))
-        return GuideWeights(indices, weights, turns, _order_by(indices, guide_count))
-
-
-def _order_by(indices, guide_count):
-    """The order of `GuideWeights` of these indices (S, k)."""
-    count, device = len(indices), indices.device
-    # Radix sort wants room for as many again.
-    order, keys = (wp.empty(2 * count, dtype=int, device=device) for _ in range(2))
-    together = TOGETHER if device.is_cpu else count
-    wp.launch(_keys, count, inputs=[indices, guide_count, together], outputs=[keys, order], device=device)
-    wp.utils.radix_sort_pairs(keys, order, count)
-    return order[:count]
-
-
-@wp.kernel
-def _keys(
-    indices: wp.array2d[int],
-    guide_count: int,
-    together: int,
-    # outputs
-    out_keys: wp.array[int],
-    out_strands: wp.array[int],
-):
-    strand = wp.tid()
-    out_keys[strand] = strand / together * guide_count + indices[strand, 0]
-    out_strands[strand] = strand
+        return GuideWeights(*(rows(array, chosen) for array in (self.indices, self.weights, self.turns)))
 
 
 @dataclass(frozen=True)
@@ -171,7 +142,7 @@ def weigh(candidates, normals, guide_normals, influence_distance, neighbour_limi
         outputs=[indices, weights, turns],
         device=device,
     )
-    return GuideWeights(indices, weights, turns, _order_by(indices, len(guide_normals)))
+    return GuideWeights(indices, weights, turns)
 
 
 def _nearest_guides(guide_roots, roots, count, regions):
@@ -250,7 +221,7 @@ def limited(guide_weights, guide_points, guide_normals, limits):
         outputs=[weights],
         device=device,
     )
-    return GuideWeights(guide_weights.indices, weights, guide_weights.turns, guide_weights.order)
+    return GuideWeights(guide_weights.indices, weights, guide_weights.turns)
 
 
 def _fade_of_cosine(angle):

@@ -107,7 +107,7 @@ def weights_now(binding, guides, chosen=None):
         )
     weights = binding.guide_weights
     if chosen is not None:
-        weights = weights.of(wp.array(chosen, dtype=int, device=binding.positions.device), len(guides))
+        weights = weights.of(wp.array(chosen, dtype=int, device=binding.positions.device))
     return guide_weights.limited(weights, _guide_points(binding, guides), binding.guide_normals, binding.limits)
 
 

@@ -2,9 +2,7 @@
 """The GPU's way to interpolation.py's sums: a strand is made by sixteen neighbouring threads, the lanes of half a warp.
 
 Lanes take neighbouring segments, so guides are read and strands written side by side; a sum over lanes makes points of
-segments [Harris07]; and nothing is written twice. Strands are taken in the order of the guide that they follow first,
-so that those at work at the same time read the same guides. Warp has no word for what lanes pass to each other; CUDA
-has.
+segments [Harris07]; and nothing is written twice. Warp has no word for what lanes pass to each other; CUDA has.
 """
 
 import warp as wp
@@ -133,7 +131,6 @@ def _sum_on_lanes(
 
 @wp.kernel
 def _strands_on_lanes(
-    order: wp.array[int],
     roots: wp.array[wp.vec3],
     normals: wp.array[wp.vec3],
     offsets: wp.array2d[wp.vec4],
@@ -146,7 +143,7 @@ def _strands_on_lanes(
 ):
     thread = wp.tid()
     # The last warp's lanes all have to be there: those of strands past the end make the last one again.
-    strand = order[wp.min(thread / wp.static(LANES), order.shape[0] - 1)]
+    strand = wp.min(thread / wp.static(LANES), roots.shape[0] - 1)
     normal = normals[strand]
     tangent, bitangent = frame(normal)
     _sum_on_lanes(
@@ -195,7 +192,6 @@ def by_lanes(roots, normals, guide_points, guide_normals, guide_weights, keep_le
         _strands_on_lanes,
         dim=-(-len(roots) // strands_in_a_warp) * 32,
         inputs=[
-            guide_weights.order,
             roots,
             normals,
             offsets,

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where roots are and which way the surface faces there: mesh.py's `positions` and `normals` on a device."""
+"""Where roots are and which way the surface faces there: mesh.py's `positions` and `normals` on a device.
+
+And what strands are told apart by, whichever others are there.
+"""
 
 import numpy as np
 import warp as wp
@@ -61,3 +64,33 @@ def rooted(mesh, points, device):
         device=device,
     )
     return positions, normals
+
+
+@wp.kernel
+def _identify(
+    triangle: wp.array[int],
+    barycentric: wp.array[wp.vec3i],  # its bits
+    # outputs
+    out_identities: wp.array[int],
+    out_numbers: wp.array[float],
+):
+    root = wp.tid()
+    state = wp.rand_init(triangle[root], barycentric[root][0])
+    state = wp.rand_init(int(state), barycentric[root][1])
+    out_identities[root] = int(state)
+    out_numbers[root] = wp.randf(state)
+
+
+def identities(points):
+    """What strands rooted at `SurfacePoints` are known by: (N,) int32, and numbers (N,) float32 in [0, 1).
+
+    Both follow from the root alone, so they stay when others come and go; two roots in some thousand millions share
+    theirs.
+    """
+    count = len(points)
+    found, numbers = np.empty(count, np.int32), np.empty(count, np.float32)
+    bits = np.ascontiguousarray(points.barycentric, np.float32).view(np.int32)
+    arrays = (points.triangle, int), (bits, wp.vec3i), (found, int), (numbers, float)
+    triangle, barycentric, *out = (wp.array(values, dtype=kind, device="cpu", copy=False) for values, kind in arrays)
+    cores.launch(_identify, count, inputs=[Rows(triangle), Rows(barycentric)], outputs=out, device="cpu")
+    return found, numbers

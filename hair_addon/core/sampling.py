@@ -2,9 +2,14 @@
 """Random roots by density × area  (Eq. 6 as corrected in DECISIONS.md)."""
 
 import numpy as np
+import warp as wp
 
+from . import cores
+from .cores import Rows
 from .errors import HairError
 from .mesh import SurfacePoints
+
+wp.set_module_options({"enable_backward": False})
 
 
 def check_density(mesh, density):
@@ -36,7 +41,8 @@ def sample_surface(mesh, count, seed, density=None):
     """`count` random points on a mesh, as `SurfacePoints`, distributed as density × area: linear inside triangles too.
 
     mesh: a checked `TriMesh`; density: (V,) per vertex, at least 0, or None for uniform. The same seed gives the same
-    points everywhere, and the first of many points are those that a smaller count would give.
+    points everywhere, and those that a smaller count would give are among them. Neighbours on the surface are
+    neighbours in memory (`surface_order`), so what is computed for one is at hand for the next.
     """
     if count <= 0:
         raise HairError(f"The number of roots must be positive, not {count}.")
@@ -44,21 +50,78 @@ def sample_surface(mesh, count, seed, density=None):
     random = np.random.Generator(np.random.PCG64(seed)).random((count, 4))
     # Eq. 6 draws and rejects; the running sum takes every draw, and takes it to a corner of a triangle.
     running = np.cumsum(masses)
-    drawn = random[:, 0] * running[-1]
-    order = np.argsort(drawn)  # neighbours in the sum are looked up one after the other: half the time
-    corner = np.empty(count, np.int32)
-    corner[order] = np.searchsorted(running, drawn[order], side="right")
-    corner = np.minimum(
-        corner, np.int32(np.flatnonzero(masses)[-1])
-    )  # rounding must not step past the last that has mass
-    triangle, corner = np.divmod(corner, np.int32(3))
-    # A corner's share of a linear density falls from it to nothing at the opposite edge: Dirichlet(2, 1, 1). That is
-    # how three cuts of a unit stick divide it, if two of the four pieces go to the corner [Devroye86, chapter V].
-    cuts = random[:, 1:].T.copy()
-    first, last = cuts.min(axis=0), cuts.max(axis=0)
-    barycentric = np.empty((count, 3), np.float32)
-    rows = np.arange(count)
-    barycentric[rows, (corner + 1) % 3] = first
-    barycentric[rows, (corner + 2) % 3] = 1.0 - last
-    barycentric[rows, corner] = last - first
+    order = _rising(random[:, 0])
+    ends = np.searchsorted(random[order, 0] * running[-1], running)
+    ends[np.flatnonzero(masses)[-1] :] = count  # rounding must not step past the last that has mass
+    corner = np.repeat(np.arange(len(masses), dtype=np.int32), np.diff(ends, prepend=0))
+    along = _runs(ends[2::3], surface_order(mesh))
+    triangle, barycentric = np.empty(count, np.int32), np.empty((count, 3), np.float32)
+    cores.launch(
+        _cut,
+        count,
+        inputs=[Rows(_there(along, int)), _there(order, int), _there(corner, int), _there(random, wp.vec4d)],
+        outputs=[_there(triangle, int), _there(barycentric, wp.vec3)],
+        device="cpu",
+    )
     return SurfacePoints(triangle, barycentric)
+
+
+@wp.kernel
+def _cut(
+    along: wp.array[int],
+    order: wp.array[int],
+    corners: wp.array[int],
+    random: wp.array[wp.vec4d],
+    # outputs
+    out_triangles: wp.array[int],
+    out_barycentric: wp.array[wp.vec3],
+):
+    """A corner's share of a linear density falls from it to nothing at the opposite edge: Dirichlet(2, 1, 1).
+
+    That is how three cuts of a unit stick divide it, if two of the four pieces go to the corner [Devroye86, chapter V].
+    """
+    root = wp.tid()
+    corner = corners[along[root]]
+    cuts = random[order[along[root]]]
+    first = wp.min(wp.min(cuts[1], cuts[2]), cuts[3])
+    last = wp.max(wp.max(cuts[1], cuts[2]), cuts[3])
+    weights = wp.vec3()
+    weights[corner % 3] = wp.float32(last - first)
+    weights[(corner + 1) % 3] = wp.float32(first)
+    weights[(corner + 2) % 3] = wp.float32(wp.float64(1.0) - last)
+    out_triangles[root] = corner / 3
+    out_barycentric[root] = weights
+
+
+def _there(array, dtype):
+    return wp.array(array, dtype=dtype, device="cpu", copy=False)
+
+
+def _rising(numbers):
+    """The order in which numbers (N,) in [0, 1) rise: sorted with their indices behind them, faster than these alone."""
+    index_bits = len(numbers).bit_length()
+    keys = (numbers * 2.0 ** (64 - index_bits)).astype(np.uint64) << np.uint64(index_bits)
+    keys |= np.arange(len(numbers), dtype=np.uint64)
+    keys.sort()
+    return (keys & np.uint64((1 << index_bits) - 1)).astype(np.int32)
+
+
+def _runs(ends, order):
+    """Indices of all items, run after run; ends: of runs that are side by side; order: in which they shall be."""
+    counts = np.diff(ends, prepend=0)[order]
+    return np.repeat((ends[order] - np.cumsum(counts)).astype(np.int32), counts) + np.arange(ends[-1], dtype=np.int32)
+
+
+# Cells along each axis of the box around a mesh, by which its triangles are put in order: a bit of a number for each
+# halving, three axes.
+_HALVINGS = 10
+
+
+def surface_order(mesh):
+    """(F,) indices of a mesh's triangles, so that neighbours on the surface are near each other: a Z-curve [Morton66]."""
+    centres = mesh.corners.mean(axis=1)
+    extent = max(float(np.ptp(centres, axis=0).max()), 1e-30)
+    cells = ((centres - centres.min(axis=0)) * ((2**_HALVINGS - 1) / extent)).astype(np.uint32)
+    for shift, kept in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
+        cells = (cells | cells << shift) & kept  # two zeros behind every bit
+    return np.argsort(cells @ np.array([1, 2, 4], np.uint32), kind="stable")

@@ -4,7 +4,6 @@
 import numpy as np
 
 from .mesh import TriMesh, positions
-from .sampling import sample_surface
 
 _SAMPLE_COUNT = 20_000
 
@@ -14,14 +13,15 @@ def misleading_share(mesh, corner_uvs):
 
     corner_uvs: (F, 3, 2). Where two faces overlap in UV one of them misleads, and a face without an area in UV does.
     """
+    from .sampling import sample_surface  # Warp takes longer to import than the add-on may take to start
+    from .surface_query import SurfaceQuery
+
     roots = sample_surface(mesh, _SAMPLE_COUNT, seed=0)
     # The layout as a flat mesh of its own, so that the place that a UV leads to is the nearest point there.
     flat = np.concatenate([corner_uvs.reshape(-1, 2), np.zeros((3 * len(corner_uvs), 1))], axis=1).astype(np.float32)
     layout = TriMesh(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
     if not (np.isfinite(flat).all() and np.any(layout.areas > 0.0)):
         return 1.0
-    from .surface_query import SurfaceQuery  # Warp takes longer to import than the add-on may take to start
-
     found = SurfaceQuery(layout).nearest(positions(layout, roots))
     apart = np.linalg.norm(positions(mesh, found) - positions(mesh, roots), axis=1)
     # Single precision: a UV layout of side 1 resolves some 1e-7 of it.

@@ -13,13 +13,15 @@ from .guide_weights import frame
 from .hash_grid import LIMIT
 from .lane_interpolation import CANCELLED, LONGEST, framed_offset
 
-# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+wp.set_module_options({"enable_backward": False})
 
 LANES = 8
 
 _SUMS = f"""
 #if !defined(__CUDA_ARCH__)
+  {{
+  // Products are added in one step where the processor can, as on a GPU: a tenth of the time.
+  #pragma clang fp contract(fast)
   typedef float lanes __attribute__((ext_vector_type({LANES})));
   const int point_count = out_points.shape[1];
   const int slot_count = indices.shape[1];
@@ -102,6 +104,7 @@ _SUMS = f"""
       for (int number = 0; number < 3 * (point_count - 1 - group * {LANES}); ++number) to[number] = whole[number];
     }}
   }}
+  }}
 #endif
 """
 
@@ -126,7 +129,6 @@ def _sum_in_vectors(
 
 @wp.kernel
 def _strands_in_vectors(
-    order: wp.array[int],
     roots: wp.array[wp.vec3],
     normals: wp.array[wp.vec3],
     offsets: wp.array3d[float],
@@ -137,7 +139,7 @@ def _strands_in_vectors(
     # outputs
     out_points: wp.array2d[wp.vec3],
 ):
-    strand = order[wp.tid()]
+    strand = wp.tid()
     normal = normals[strand]
     tangent, bitangent = frame(normal)
     _sum_in_vectors(
@@ -188,17 +190,15 @@ def by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep_
         _strands_in_vectors,
         len(roots),
         inputs=[
-            Rows(guide_weights.order),
-            roots,
-            normals,
+            Rows(roots),
+            Rows(normals),
             offsets,
-            guide_weights.indices,
-            guide_weights.weights,
-            guide_weights.turns,
+            Rows(guide_weights.indices),
+            Rows(guide_weights.weights),
+            Rows(guide_weights.turns),
             keep_length,
-            points,
         ],
-        outputs=[],
+        outputs=[points],
         device=roots.device,
     )
     return points

@@ -1,15 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Segments of strands, each between two neighbouring points, as they lie in a picture: needs the sampler strands.
 
+#include "include/drawn_strand.glsl"
 #include "include/strand.glsl"
 
-// Which strand is drawn at a turn, and from which of its points on a piece runs to where the next one starts.
-int drawn_strand(int turn)
-{
-  int strand = turn + view.first_strand;
-  return (strand < view.strand_count) ? strand : strand - view.strand_count;
-}
-
+// From which of a strand's points on a piece runs to where the next one starts.
 int piece_start(int piece)
 {
   return piece * (view.point_count - 1) / (view.drawn_points - 1);

@@ -23,6 +23,7 @@ from hair_addon.blender import (
     scene,
     shaders,
     strand_textures,
+    uniforms,
     viewport,
 )
 from hair_addon.core.errors import HairError
@@ -216,11 +217,47 @@ def test_further_hair_has_fewer_strands_and_points_one_by_one(many):
     assert (counts[1:][falling] > 0.9 * counts[:-1][falling]).all()  # a step of the distance is 1.3 %
 
 
+def drawn_strands(strand_count, steps):
+    """Which strands a shader draws, turn after turn."""
+    record = drawing.strand_record(
+        SimpleNamespace(strand_count=strand_count, point_count=2, row_strands=1),
+        uniforms.VIEW.record(),
+        np.eye(4),
+        steps,
+    )
+    found = glsl.evaluate(
+        glsl.source("include/drawn_strand.glsl"),
+        "float",
+        "float(drawn_strand(turn))",
+        structs=uniforms.VIEW.source,
+        blocks={"view": (uniforms.VIEW.type_name, record)},
+        turn=np.arange(steps.strand_count),
+    )
+    return found.astype(int)
+
+
+@pytest.mark.parametrize("count", [1, 2, 7, 1000, 32_768, 32_769, 100_003, 1_000_000])
+def test_any_turns_are_spread_over_all_strands(count):
+    """Strands lie in memory as they do on the surface: those that stand for all must not come from one side of it."""
+    drawn = max(count - 1, 1)
+    first = count // 3
+    found = drawn_strands(count, drawing.Steps(strand_count=drawn, first_strand=first))
+    assert len(set(found)) == drawn and 0 <= found.min() and found.max() < count
+    few = found[: min(drawn, 10_000)]
+    places = np.linspace(0, count, min(50, count) + 1)
+    expected = len(few) / (len(places) - 1)
+    assert abs(np.histogram(few, places)[0] - expected).max() <= 0.02 * expected + 2
+
+
+def test_all_strands_are_drawn_in_their_order():
+    np.testing.assert_array_equal(drawn_strands(1000, drawing.Steps(strand_count=1000)), np.arange(1000))
+
+
 def test_passes_take_all_strands_in_turn_but_those_that_the_artist_leaves_out(many):
     taken = np.zeros(50_000, bool)
     for turn in 0.61803399 * np.arange(16):
         steps = steps_from(many, 30.0, coverage_turn=turn)
-        taken[(steps.first_strand + np.arange(steps.strand_count)) % 50_000] = True
+        taken[drawn_strands(50_000, steps)] = True
     assert taken.all() and steps.strand_count < 30_000
     few = [steps_from(many, 1.5, 0.25, coverage_turn=turn) for turn in (0.0, 0.3)]
     assert {(one.strand_count, one.first_strand) for one in few} == {(12_500, 0)}
