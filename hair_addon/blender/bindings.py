@@ -5,6 +5,7 @@ Nothing here is the truth. All of it follows from the surface, the guides, the s
 Curves store, and may be forgotten at any time: the next change of a guide then searches once more.
 """
 
+from concurrent.futures import Future
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -28,7 +29,7 @@ class BoundHair:
     guides: Strands  # as they were when the hair followed them last
     guide_uid: int  # session_uid of their Curves
     surface: Surface
-    points: np.ndarray  # (S, P, 3) float32 at rest, in the surface's local coordinates
+    growing: Future  # of `points`
     shares: np.ndarray  # (S, k) float32, the weights of each strand's guides as they are combed now
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether what is not written is where points are, and perhaps the guide map
@@ -37,9 +38,14 @@ class BoundHair:
     is_report_due: bool = False  # whether Blender has yet to report what was written, which is no news
 
     @property
+    def points(self):
+        """(S, P, 3) float32 at rest, in the surface's local coordinates; waits until they are computed."""
+        return self.growing.result()
+
+    @property
     def radii(self):
         """(P,) float32 along every strand, in the surface's local units."""
-        return groom.strand_radii(self.settings, self.points.shape[1]) / np.float32(self.surface.scale)
+        return groom.strand_radii(self.settings, self.guides.point_count) / np.float32(self.surface.scale)
 
     @property
     def guide_map(self):

@@ -100,18 +100,16 @@ def _hidden_as(curves_object):
     return "BOUNDS" if curves_object.select_get() else "WIRE"
 
 
-def write_strands(curves, surface, points, roots, radii, leaders=None, normals=None, written_radii=None):
-    """Fill Curves with strands.
+def make_strands(curves, surface, roots, radii, leaders=None, normals=None, written_radii=None):
+    """Make room for strands, and write all of them but where their points are.
 
-    points: (S, P, 3) float32 in local coordinates; roots: `SurfacePoints`; radii: (P,) likewise; leaders: (S,) int32,
-    the strand that stands for the guide of each, or None where strands are guides themselves; normals: (S, 3) float32
-    of the surface at the roots, if they are known; written_radii: (P,) that the curves have, if they are known.
+    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; leaders: (S,) int32, the strand that stands for the
+    guide of each, or None where strands are guides themselves; normals: (S, 3) float32 of the surface at the roots, if
+    they are known; written_radii: (P,) that the curves have, if they are known.
     """
-    strand_count, point_count, _xyz = points.shape
-    if strand_count == 0:
+    if len(roots) == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
-    is_new = _resize(curves, strand_count, point_count)
-    _write_positions(curves, points)
+    is_new = _resize(curves, len(roots), len(radii))
     if is_new or "radius" not in curves.attributes or not np.array_equal(radii, written_radii):
         _write_radii(curves, radii)
     if leaders is not None:
@@ -189,9 +187,12 @@ def write_uvs(curves, surface):
     curves.update_tag()
 
 
-def write_points(curves, points):
-    """Move strands that `write_strands` made; points: (S, P, 3) float32 in local coordinates."""
-    _write_positions(curves, points)
+def write_points(curves, growing):
+    """Put strands that `make_strands` made where they are; growing: a future of local (S, P, 3) float32."""
+    # Who reaches for a point has Blender copy what it shares with its last evaluation, half of what writing takes: it
+    # may do so while strands grow.
+    _ = curves.attributes["position"].data[0]
+    _write_positions(curves, growing.result())
     curves.update_tag()
 
 
@@ -316,7 +317,7 @@ def _has_randoms(curves):
 
 
 def is_combed(curves):
-    """Whether points were moved, added or removed since `write_strands`."""
+    """Whether points were moved, added or removed since `write_points`."""
     from ..core.fingerprint import fingerprint  # Warp takes longer to import than the add-on may take to start
 
     written = curves.vellus.written

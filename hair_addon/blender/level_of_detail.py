@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How much of hair a viewport draws: the further, the fewer strands, each as much thicker, of fewer points.
 
-Any turns in a row stand for all strands, as they are spread over them (drawn_strand.glsl) [Cook07]; their number changes
-one by one with the distance, so that nothing pops. Each pass of a picture takes others: at rest all have their part in it.
+Any turns in a row stand for all strands, as they are spread over them (drawn_strand.glsl) [Cook07]; their number
+changes one by one with the distance, so that nothing pops. Each pass of a picture takes others: at rest all have their
+part in it.
 """
 
 import numpy as np

@@ -58,10 +58,10 @@ def _follow_combed(hair):
         return None
     combed = np.flatnonzero((guides.numpy() != before.numpy()).any(axis=(1, 2)))
     bound.guides = guides
-    moved = bound.reach.of(combed)
+    moved = np.arange(len(bound.shares)) if len(combed) == len(guides) else bound.reach.of(combed)
     if len(moved):
         # Beyond a half, to sort out those that stay would take longer.
-        follow_bound(bound, moved if len(moved) <= len(bound.points) // 2 else None)
+        follow_bound(bound, moved if len(moved) <= len(bound.shares) // 2 else None)
         bound.has_moved_only = bound.is_written or bound.has_moved_only
         bound.is_written = False
     return moved
@@ -72,7 +72,7 @@ def follow_bound(bound, moved):
     binding, guides, surface = bound.binding, bound.guides, bound.surface
     weights = hair_binding.weights_now(binding, guides, moved)
     if moved is None:
-        surface.to_local(hair_binding.strand_points(binding, guides, weights, bound.points), in_place=True)
+        bound.growing = hair_binding.growing_points(binding, guides, weights, surface.put_local, bound.points)
         bound.take_shares(weights.weights.numpy())
     else:
         points = hair_binding.follow_some(binding, guides, moved, weights)

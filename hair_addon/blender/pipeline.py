@@ -6,6 +6,7 @@ and its inputs, so `evaluate` can make it again.
 """
 
 import hashlib
+from concurrent.futures import Future
 
 import bpy
 import numpy as np
@@ -70,7 +71,7 @@ def bind_hair(guide_curves, settings, depsgraph, target=None):
 
 
 def _binding_hair(guide_curves, settings, depsgraph, target):
-    surface, density = _read_surface(guide_curves.surface, settings, depsgraph)
+    surface, density = _read_surface(guide_curves.surface, settings, depsgraph, target)
     guides = read_guides(guide_curves, surface)
     key = root_key(settings, density)
     parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
@@ -160,11 +161,10 @@ def _bind(surface, guides, settings, density, parting, roots, device, progress):
 
 
 def _strands(surface, binding, guides, progress):
-    """Strands (S, P, 3) float32 in the surface's local coordinates, and the weights of their guides (S, k) float32."""
+    """Growing strands, as `BoundHair` has them, and the weights of their guides (S, k) float32."""
     progress("Growing strands", 0.8)
     weights = hair_binding.weights_now(binding, guides)
-    points = surface.to_local(hair_binding.strand_points(binding, guides, weights), in_place=True)
-    return points, weights.weights.numpy()
+    return hair_binding.growing_points(binding, guides, weights, surface.put_local), weights.weights.numpy()
 
 
 def _write_guides(target, surface_object, surface, guides, settings, key):
@@ -172,7 +172,10 @@ def _write_guides(target, surface_object, surface, guides, settings, key):
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
     target.vellus.root_key = key
     radii = np.full(guides.points.shape[1], 0.5e-3 / surface.scale, np.float32)
-    curves.write_strands(target, surface, surface.to_local(guides.numpy()), guides.roots, radii)
+    points = Future()
+    points.set_result(surface.to_local(guides.numpy()))
+    curves.make_strands(target, surface, guides.roots, radii)
+    curves.write_points(target, points)
     curves.keep_surface(target, surface)
     return target
 
@@ -190,20 +193,17 @@ def _write_bound(target, surface_object, guide_curves, bound):
 def write_hair(target):
     """Bring a hair Curves datablock up to what it is bound to: the one place where hair is written."""
     bound, state = bindings.of(target), target.vellus
-    if bound.has_moved_only:
-        curves.write_points(target, bound.points)
-    else:
+    if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
         binding, radii = bound.binding, bound.radii
         leaders = hair_binding.leading_strands(bound.surface.mesh, bound.guides, binding)
         normals = binding.normals.numpy()
-        curves.write_strands(
-            target, bound.surface, bound.points, binding.roots, radii, leaders, normals, bound.written_radii
-        )
+        curves.make_strands(target, bound.surface, binding.roots, radii, leaders, normals, bound.written_radii)
         bound.written_radii = radii
     if not bound.is_map_written:
         curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
+    curves.write_points(target, bound.growing)
     state.is_stale = False  # as which another choice of guides marks it
     state.followed = guides_digest(state.guide_curves)
     bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
@@ -368,11 +368,16 @@ def inputs_of(target):
     return state.guide_curves, properties.to_settings(state.hair, groom.HairSettings)
 
 
-def _read_surface(surface_object, settings, depsgraph):
-    """`Surface` and the density (V,) or None that settings name, of a mesh object that may be changed."""
+def _read_surface(surface_object, settings, depsgraph, target=None):
+    """`Surface` and the density (V,) or None that settings name, of a mesh object that may be changed.
+
+    The surface that `target` is bound to, if that is the same: of which normals and areas are known.
+    """
     _check_surface(surface_object)
     curves.keep_rest(surface_object)
-    surface = scene.read_surface(surface_object, depsgraph)
+    surface, bound = scene.read_surface(surface_object, depsgraph), target and bindings.of(target)
+    if bound is not None and bound.surface.is_same(surface):
+        surface = bound.surface
     return surface, scene.read_vertex_group(surface_object, depsgraph, settings.density_group)
 
 

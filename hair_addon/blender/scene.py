@@ -38,6 +38,10 @@ class Surface:
 
         return transformed(points, np.linalg.inv(self.to_world_axes), points if in_place else None)
 
+    def put_local(self, points):
+        """The same in the points' own memory."""
+        self.to_local(points, in_place=True)
+
     def from_local(self, positions):
         """(..., 3) local coordinates → positions here, float32."""
         return _transformed(positions, self.to_world_axes)
@@ -52,13 +56,21 @@ class Surface:
         mine, its = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
         return all(map(np.array_equal, mine, its))
 
+    def is_same(self, other):
+        """Whether another surface is this one, so that all that was computed of it holds."""
+        mine, its = (
+            (s.rest, s.posed, s.mesh.triangles, s.faces.corner_vertices, s.faces.starts, s.to_world_axes, s.corner_uvs)
+            for s in (self, other)
+        )
+        return (self.name, self.uv_map) == (other.name, other.uv_map) and all(map(np.array_equal, mine, its))
+
     @property
     def mirror_normal(self):
         """(3,) unit: of the plane across the object's own X axis."""
         normal = np.linalg.inv(self.to_world_axes)[0]
         return normal / np.linalg.norm(normal)
 
-    @property
+    @cached_property
     def shape(self):
         """The `TriMesh` at rest that the object only turns and scales evenly to be `mesh`; None where it does more.
 

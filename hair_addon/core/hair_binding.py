@@ -4,11 +4,15 @@
 Warp takes long to import, so it is imported late.
 """
 
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 from .errors import HairError
 from .mesh import SurfacePoints, positions
 from .strands import Strands
+
+# Seconds in which other threads start their kernels, before this one takes Python's lock again and keeps it.
+HEAD_START = 0.001
 
 
 @dataclass(frozen=True)
@@ -59,30 +63,41 @@ def follow_guides(binding, guides) -> Strands:
     return Strands(_follow(binding, guides, binding.positions, binding.normals, weights), binding.roots)
 
 
-def strand_points(binding, guides, weights, out=None):
-    """(S, P, 3) float32 [m]: the points of `follow_guides` in the processor's memory; what live editing repeats.
+def growing_points(binding, guides, weights, finish=lambda _points: None, out=None):
+    """A future of the points of `follow_guides`, (S, P, 3) float32 [m] in the processor's memory, and then finished.
 
-    weights: what `weights_now` gives; out: such an array to fill and return, or None for a new one.
+    They are computed in other threads, so that this one can do what it has to do with something else. weights: what
+    `weights_now` gives; finish: what to do with such an array, in its own memory; out: one to fill, None for a new one.
     """
     import warp as wp
 
     from . import cores
 
     roots, normals, device = binding.positions, binding.normals, binding.positions.device
-    shape = len(roots), guides.point_count
     if out is None:
-        there = cores.empty_for_results(shape, device)
+        there = cores.empty_for_results((len(roots), guides.point_count), device)
+        out = there.numpy()
     else:
         there = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
-    if device.is_cpu:
-        return _follow(binding, guides, roots, normals, weights, there).numpy()
-    wp.copy(there, _follow(binding, guides, roots, normals, weights))
-    wp.synchronize_device(device)
-    return there.numpy()
+
+    def grow():
+        if device.is_cpu:
+            _follow(binding, guides, roots, normals, weights, there)
+        else:
+            wp.copy(there, _follow(binding, guides, roots, normals, weights))
+            wp.synchronize_device(device)
+        finish(out)
+        return out
+
+    with_a_thread = ThreadPoolExecutor(1, "vellus")
+    growing = with_a_thread.submit(grow)
+    with_a_thread.shutdown(wait=False)  # its thread ends with its work
+    wait([growing], timeout=HEAD_START)
+    return growing
 
 
 def follow_some(binding, guides, chosen, weights):
-    """(M, P, 3) float32 [m]: the points that `strand_points` gives some strands, and no others are computed.
+    """(M, P, 3) float32 [m]: the points that `growing_points` gives some strands, and no others are computed.
 
     chosen: (M,) indices of strands, such as `guide_weights.Reach` finds for the guides that moved; weights: theirs, as
     `weights_now` gives them.

@@ -356,10 +356,11 @@ def _sorted_by_cell(points, queries, width):
         outputs=[cells],
         device=queries.device,
     )
-    cells = cells.numpy()
-    order = np.argsort(cells).astype(np.int32)
-    changes = np.flatnonzero(np.diff(cells[order])) + 1
-    return order, np.concatenate([[0], changes, [len(cells)]]).astype(np.int32)
+    # Sorted as one number each, cell and then query: faster than an order of indices, and what reads along them.
+    pairs = (cells.numpy().astype(np.int64) << 32) | np.arange(len(queries))
+    pairs.sort()
+    changes = np.flatnonzero(np.diff(pairs >> 32)) + 1
+    return pairs.astype(np.int32), np.concatenate([[0], changes, [len(queries)]]).astype(np.int32)
 
 
 def _first_radius(points, distance, limit):

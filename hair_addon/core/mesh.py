@@ -8,6 +8,9 @@ import numpy as np
 
 from .errors import HairError
 
+# Of the box around a mesh along each axis, into the cells by which triangles are put in order.
+_HALVINGS = 10
+
 
 @dataclass(frozen=True)
 class SurfacePoints:
@@ -84,6 +87,16 @@ class TriMesh:
                     self.triangles[:, corner], weights=angles * face_normals[:, axis], minlength=len(normals)
                 )
         return _unit(normals).astype(np.float32)
+
+    @cached_property
+    def surface_order(self):
+        """(F,) indices of triangles, so that neighbours on the surface are near each other: a Z-curve [Morton66]."""
+        centres = self.corners.mean(axis=1)
+        extent = max(float(np.ptp(centres, axis=0).max()), 1e-30)
+        cells = ((centres - centres.min(axis=0)) * ((2**_HALVINGS - 1) / extent)).astype(np.uint32)
+        for shift, kept in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
+            cells = (cells | cells << shift) & kept  # two zeros behind every bit
+        return np.argsort(cells @ np.array([1, 2, 4], np.uint32), kind="stable")
 
 
 @dataclass(frozen=True)

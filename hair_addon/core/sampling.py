@@ -42,7 +42,7 @@ def sample_surface(mesh, count, seed, density=None):
 
     mesh: a checked `TriMesh`; density: (V,) per vertex, at least 0, or None for uniform. The same seed gives the same
     points everywhere, and those that a smaller count would give are among them. Neighbours on the surface are
-    neighbours in memory (`surface_order`), so what is computed for one is at hand for the next.
+    neighbours in memory (`TriMesh.surface_order`), so what is computed for one is at hand for the next.
     """
     if count <= 0:
         raise HairError(f"The number of roots must be positive, not {count}.")
@@ -54,7 +54,7 @@ def sample_surface(mesh, count, seed, density=None):
     ends = np.searchsorted(random[order, 0] * running[-1], running)
     ends[np.flatnonzero(masses)[-1] :] = count  # rounding must not step past the last that has mass
     corner = np.repeat(np.arange(len(masses), dtype=np.int32), np.diff(ends, prepend=0))
-    along = _runs(ends[2::3], surface_order(mesh))
+    along = _runs(ends[2::3], mesh.surface_order)
     triangle, barycentric = np.empty(count, np.int32), np.empty((count, 3), np.float32)
     cores.launch(
         _cut,
@@ -98,7 +98,7 @@ def _there(array, dtype):
 
 
 def _rising(numbers):
-    """The order in which numbers (N,) in [0, 1) rise: sorted with their indices behind them, faster than these alone."""
+    """The order in which numbers (N,) in [0, 1) rise; sorted with their indices as one number each, which is faster."""
     index_bits = len(numbers).bit_length()
     keys = (numbers * 2.0 ** (64 - index_bits)).astype(np.uint64) << np.uint64(index_bits)
     keys |= np.arange(len(numbers), dtype=np.uint64)
@@ -110,18 +110,3 @@ def _runs(ends, order):
     """Indices of all items, run after run; ends: of runs that are side by side; order: in which they shall be."""
     counts = np.diff(ends, prepend=0)[order]
     return np.repeat((ends[order] - np.cumsum(counts)).astype(np.int32), counts) + np.arange(ends[-1], dtype=np.int32)
-
-
-# Cells along each axis of the box around a mesh, by which its triangles are put in order: a bit of a number for each
-# halving, three axes.
-_HALVINGS = 10
-
-
-def surface_order(mesh):
-    """(F,) indices of a mesh's triangles, so that neighbours on the surface are near each other: a Z-curve [Morton66]."""
-    centres = mesh.corners.mean(axis=1)
-    extent = max(float(np.ptp(centres, axis=0).max()), 1e-30)
-    cells = ((centres - centres.min(axis=0)) * ((2**_HALVINGS - 1) / extent)).astype(np.uint32)
-    for shift, kept in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
-        cells = (cells | cells << shift) & kept  # two zeros behind every bit
-    return np.argsort(cells @ np.array([1, 2, 4], np.uint32), kind="stable")

@@ -106,3 +106,13 @@ def lit(hair):
 def blender_scene(scene):
     """The empty scene, where a module is called `scene`."""
     return scene
+
+
+@pytest.fixture
+def thin(lit):
+    """Hair of which a strand covers a fifth of a pixel."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    bpy.data.objects["Hair"].data.vellus.hair.strand_count = 4000
+    bpy.data.objects["Hair"].data.vellus.hair.radius = 0.003
+    bpy.context.view_layer.update()
+    return lit

@@ -8,7 +8,7 @@ _COUNTED = {
     "searches": [(hash_grid, "neighbours")],
     "uploads": [(strand_textures, "upload_strands")],
     "moves": [(strand_textures, "move_strands")],
-    "writes": [(curves, "write_strands"), (curves, "write_points")],
+    "writes": [(curves, "write_points")],
 }
 
 

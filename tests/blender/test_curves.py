@@ -8,6 +8,7 @@ from mathutils import Matrix
 
 from hair_addon.blender import curves, scene
 from hair_addon.core import mesh as mesh_math
+from hair_addon.core.mesh import SurfacePoints
 from tests.blender.reading import attribute, points, vertex_positions
 
 EXPECTED_ATTRIBUTES = {
@@ -95,7 +96,7 @@ def test_a_radius_means_metres_whatever_the_scale(sphere):
 
 def test_an_empty_list_of_strands_never_reaches_blender(guides):
     with pytest.raises(ValueError, match="no strands"):
-        curves.write_strands(guides.data, None, np.empty((0, 41, 3), np.float32), None, None, None)
+        curves.make_strands(guides.data, None, SurfacePoints(np.empty(0, np.int32), np.empty((0, 3))), np.ones(41))
 
 
 def test_combed_is_what_somebody_moved(guides):

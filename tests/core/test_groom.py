@@ -109,11 +109,14 @@ def test_strands_in_the_processors_memory(head, scalp, guides, hair, hair_settin
     """Wherever they were computed: in new memory, in what is given, and some of them alone."""
     binding = bind_hair(head, guides, hair_settings, density=scalp)
     weights = hair_binding.weights_now(binding, guides)
-    made, given = hair_binding.strand_points(binding, guides, weights), np.full_like(hair.numpy(), np.nan)
-    filled = hair_binding.strand_points(binding, guides, weights, given)
-    assert np.shares_memory(filled, given) and not np.shares_memory(made, given)
-    for points in (made, given):
-        np.testing.assert_array_equal(points, hair.numpy())
+    made, given = hair_binding.growing_points(binding, guides, weights).result(), np.full_like(hair.numpy(), np.nan)
+
+    def finish(points):
+        points *= 2.0
+
+    assert hair_binding.growing_points(binding, guides, weights, finish, given).result() is given
+    np.testing.assert_array_equal(made, hair.numpy())
+    np.testing.assert_array_equal(given, 2.0 * hair.numpy())
     chosen = np.arange(3, 2000, 7)
     some = hair_binding.follow_some(binding, guides, chosen, hair_binding.weights_now(binding, guides, chosen))
     np.testing.assert_array_equal(some, made[chosen])
