@@ -5,6 +5,7 @@ Nothing here holds a reference to Blender's data, so undo, deletion and a new fi
 """
 
 import sys
+from concurrent.futures import wait
 from pathlib import Path
 
 import bpy
@@ -34,7 +35,9 @@ def hair_on_gpu(datablock):
 
 def strands_on_gpu(datablock):
     """`StrandsOnGPU` of any Curves datablock, where its surface carries them; uploaded as far as they have changed."""
-    uid = datablock.session_uid
+    uid, bound = datablock.session_uid, bindings.of(datablock)
+    if bound is not None:
+        wait([bound.growing])  # in the memory of the points that are known here
     moved = _moved.pop(uid, None)
     if uid not in _strands:
         if uid not in _at_rest:

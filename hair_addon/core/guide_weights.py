@@ -201,7 +201,14 @@ def limited(guide_weights, guide_points, guide_normals, limits):
     """
     device = guide_points.device
     shapes = wp.empty((len(guide_points), vector_weights.NUMBERS), dtype=float, device=device)
-    wp.launch(_shapes, len(guide_points), inputs=[guide_points, guide_normals], outputs=[shapes], device=device)
+    cores.launch(
+        _shapes,
+        len(guide_points),
+        inputs=[Rows(guide_points), Rows(guide_normals)],
+        outputs=[shapes],
+        device=device,
+        least_rows=256,
+    )
     cosine_none, cosine_all = _fade_of_cosine(limits.angle)
     length_limit = min(math.log(limits.length), UNLIMITED)
     weights = wp.empty_like(guide_weights.weights)

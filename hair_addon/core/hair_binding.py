@@ -5,7 +5,9 @@ Warp takes long to import, so it is imported late.
 """
 
 from concurrent.futures import ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from .errors import HairError
 from .mesh import SurfacePoints, positions
@@ -123,7 +125,8 @@ def weights_now(binding, guides, chosen=None):
     weights = binding.guide_weights
     if chosen is not None:
         weights = weights.of(wp.array(chosen, dtype=int, device=binding.positions.device))
-    return guide_weights.limited(weights, _guide_points(binding, guides), binding.guide_normals, binding.limits)
+    now = guide_weights.limited(*_followed(binding, guides, weights), binding.limits)
+    return replace(weights, weights=now.weights)
 
 
 def _guide_points(binding, guides):
@@ -131,11 +134,27 @@ def _guide_points(binding, guides):
     return guides.points.to(binding.positions.device)
 
 
+def _followed(binding, guides, weights):
+    """`GuideWeights`, points and normals of the guides that strands follow: few strands have no need of all guides."""
+    import warp as wp
+
+    from .guide_weights import rows
+
+    points, normals = _guide_points(binding, guides), binding.guide_normals
+    if weights.indices.size > len(normals):
+        return weights, points, normals
+    indices = weights.indices.numpy()
+    followed, places = np.unique(np.append(-1, indices), return_inverse=True)
+    places = wp.array((places[1:] - 1).reshape(indices.shape), dtype=int, device=normals.device)
+    followed = wp.array(followed[1:], dtype=int, device=normals.device)
+    return replace(weights, indices=places), rows(points, followed), rows(normals, followed)
+
+
 def _follow(binding, guides, roots, root_normals, weights, out=None):
     from . import interpolation
 
-    points, guide_normals = _guide_points(binding, guides), binding.guide_normals
-    return interpolation.interpolate(roots, root_normals, points, guide_normals, weights, binding.keep_length, out)
+    weights, points, normals = _followed(binding, guides, weights)
+    return interpolation.interpolate(roots, root_normals, points, normals, weights, binding.keep_length, out)
 
 
 def leading_strands(mesh, guides, binding):

@@ -166,11 +166,12 @@ def _offsets_in_vectors(
     # outputs
     out_offsets: wp.array3d[float],
 ):
-    guide, group = wp.tid()
-    for lane in range(wp.static(LANES)):
-        offset = framed_offset(guide_points, guide, 1 + wp.static(LANES) * group + lane, guide_normals[guide])
-        for part in range(4):
-            out_offsets[guide, group, wp.static(LANES) * part + lane] = offset[part]
+    guide = wp.tid()
+    for group in range(out_offsets.shape[1]):
+        for lane in range(wp.static(LANES)):
+            offset = framed_offset(guide_points, guide, 1 + wp.static(LANES) * group + lane, guide_normals[guide])
+            for part in range(4):
+                out_offsets[guide, group, wp.static(LANES) * part + lane] = offset[part]
 
 
 def by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep_length=1.0, out=None):
@@ -178,12 +179,13 @@ def by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep_
     guide_count, point_count = guide_points.shape
     group_count = -(-(point_count - 1) // LANES)
     offsets = wp.empty((guide_count, group_count, 4 * LANES), dtype=float, device=roots.device)
-    wp.launch(
+    cores.launch(
         _offsets_in_vectors,
-        dim=(guide_count, group_count),
-        inputs=[guide_points, guide_normals],
+        guide_count,
+        inputs=[Rows(guide_points), Rows(guide_normals)],
         outputs=[offsets],
         device=roots.device,
+        least_rows=256,
     )
     points = cores.empty_vectors((len(roots), point_count), roots.device) if out is None else out
     cores.launch(
