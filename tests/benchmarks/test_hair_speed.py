@@ -157,6 +157,7 @@ def test_editing_guides(head_and_guides, count, monkeypatch):
     def follow(chosen=None):
         bound.guides = pipeline.read_guides(guides.data, bound.surface)
         live_hair.follow_bound(bound, chosen)
+        assert bound.points is not None  # waits for them
 
     times = best_times({"ours, all guides": follow, "ours, one guide": lambda: follow(moved)}, 9)
     modifier_times = []

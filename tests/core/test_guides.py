@@ -61,7 +61,7 @@ def test_lengths_vary_as_asked(sphere, roots):
 
 @pytest.mark.parametrize("gravity", [0.25, 1.0])
 def test_bending_keeps_lengths(sphere, roots, gravity):
-    """The curve cuts the corners of its controls a little: 5 % on one in a hundred, 17 where one turns back on the spot."""
+    """The curve cuts the corners of its controls a little: 5 % on one in a hundred, 17 where one turns back."""
     bent = lengths(grown(sphere, roots, gravity=gravity, tilt=0.3))
     assert np.all(bent <= 0.5 + 1e-4)
     assert bent.mean() > 0.99 * 0.5 and np.quantile(bent, 0.02) > 0.94 * 0.5 and bent.min() > 0.8 * 0.5
