@@ -182,7 +182,7 @@ def test_opposite_normals_keep_the_length():
         np.testing.assert_allclose(points[0, -1] @ normals[0], 0.3, atol=1e-3)
 
 
-@pytest.mark.parametrize("point_count", [1, 2, 15, 16, 17, 41, 64])
+@pytest.mark.parametrize("point_count", [1, 2, 6, 7, 40, 41, 42, 81])
 def test_any_number_of_points(scene, point_count):
     """A strand's points do not depend on how many follow."""
     guides = np.concatenate([scene["guides"]] * 4, axis=1)[:, :point_count]
@@ -192,16 +192,33 @@ def test_any_number_of_points(scene, point_count):
 
 
 @pytest.mark.skipif(DEVICE == "cpu", reason="needs VELLUS_TEST_DEVICE")
-@pytest.mark.parametrize("point_count", [1, 3, 15, 16, 17, 32, 33, 41, 100])
-@pytest.mark.parametrize("strand_count", [1, 2, 7, 40])
-def test_both_ways_are_one(scene, point_count, strand_count):
+@pytest.mark.parametrize("point_count", [1, 3, 6, 40, 41, 42, 81, 100])
+@pytest.mark.parametrize("strand_count", [1, 4, 7, 16, 41])
+@pytest.mark.parametrize("limit", [1, 8, 20])
+def test_both_ways_are_one(scene, point_count, strand_count, limit):
     """The processor's way and the GPU's: the same sums, added up in another order."""
     guides = np.concatenate([scene["guides"]] * 5, axis=1)[:, :point_count]
     arrays = scene["roots"][:strand_count], scene["normals"][:strand_count], guides, scene["guide_normals"]
 
     def strands_on(device):
         roots, normals, guides, guide_normals = (vectors(array).to(device) for array in arrays)
-        weights = find_guides(roots, normals, guides[:, 0].contiguous(), guide_normals, None, 8)
+        weights = find_guides(roots, normals, guides[:, 0].contiguous(), guide_normals, None, limit)
         return interpolation.interpolate(roots, normals, guides, guide_normals, weights).numpy()
 
     np.testing.assert_allclose(strands_on("cpu"), strands_on(DEVICE), atol=1e-5)
+
+
+@pytest.mark.parametrize("point_count", [20, 41, 60])
+def test_strands_fill_rows_of_a_larger_array(scene, point_count):
+    """Wherever in memory these begin, and no more than these."""
+    guides = np.concatenate([scene["guides"]] * 3, axis=1)[:, :point_count]
+    expected = strands_between(**scene | {"guides": guides})
+    roots, normals, guides, guide_normals = (
+        vectors(array) for array in (scene["roots"], scene["normals"], guides, scene["guide_normals"])
+    )
+    weights = find_guides(roots, normals, guides[:, 0].contiguous(), guide_normals, None, 8)
+    for before in (0, 1, 3):
+        rows = wp.full((210, point_count), wp.vec3(7.0), dtype=wp.vec3, device=DEVICE)
+        interpolation.interpolate(roots, normals, guides, guide_normals, weights, 1.0, rows[before : before + 200])
+        np.testing.assert_array_equal(rows.numpy()[before : before + 200], expected)
+        assert np.all(rows.numpy()[:before] == 7.0) and np.all(rows.numpy()[before + 200 :] == 7.0)
