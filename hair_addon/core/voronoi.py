@@ -143,7 +143,8 @@ def some_sites(ground, sites, points):
     """(Q,) int Warp array: a site that is not far from each point, for a search to begin with."""
     found = wp.empty(len(points), dtype=int, device=points.device)
     radius = float(np.sqrt(ground.parts.areas.sum() / len(sites.places)))
-    wp.launch(_some_site, len(points), [sites, points, ground.grid.id, radius], [found], device=points.device)
+    inputs, shares = [sites, points, ground.grid.id, radius], share_count(len(points), LEAST_SHARE, points.device)
+    in_threads(_some_site, len(points), inputs, [[found]] * shares, points.device)
     return found
 
 
@@ -173,10 +174,11 @@ def _some_site(
     points: wp.array[wp.vec3],
     grid: wp.uint64,
     first_radius: float,
+    first_point: int,
     # outputs
     out_sites: wp.array[int],
 ):
-    point = wp.tid()
+    point = first_point + wp.tid()
     place = points[point]
     found = int(-1)
     nearest = float(wp.inf)
