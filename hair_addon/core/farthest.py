@@ -33,9 +33,8 @@ def farthest(ground, points, squares, wanted):
     its_islands = np.full(known.shape[1], -1, np.int32)
     its_islands[:count] = islands
     arrays = (known, float), (its_islands, int), (wanted.astype(np.int32), int), (found, int)
-    wp.launch(
-        _take_farthest, 1, [wp.array(a, dtype=kind, device="cpu", copy=False) for a, kind in arrays], device="cpu"
-    )
+    there = [wp.array(values, dtype=kind, device="cpu", copy=False) for values, kind in arrays]
+    wp.launch(_take_farthest, 1, there, device="cpu")
     return found[found >= 0]
 
 

@@ -45,6 +45,8 @@ class Parts:
 
     def chosen(self, selection):
         """The parts of a mask or an index array."""
+        if selection.dtype == bool and selection.all():
+            return self
         return Parts(*(getattr(self, field.name)[selection] for field in fields(self)))
 
     def joined(self, *others):
@@ -56,7 +58,8 @@ class Parts:
 
     def centres(self):
         """`SurfacePoints`."""
-        return SurfacePoints(self.triangle.astype(np.int32), self.barycentric.mean(axis=1).astype(np.float32))
+        centres = self.barycentric[:, 0] + self.barycentric[:, 1] + self.barycentric[:, 2]
+        return SurfacePoints(self.triangle.astype(np.int32), (centres / 3.0).astype(np.float32))
 
 
 class Ground:
@@ -69,7 +72,9 @@ class Ground:
 
     def __init__(self, mesh, site_count, density=None, texture=None, mirror=None, device="cpu"):
         has_area = mesh.areas > 0.0
-        used = mesh.vertices[mesh.triangles[has_area].ravel()]
+        is_used = np.zeros(len(mesh.vertices), bool)
+        is_used[mesh.triangles[has_area]] = True
+        used = mesh.vertices[is_used]
         lowest, highest = used.min(axis=0), used.max(axis=0)
         self.size = float((highest - lowest).max())
         self.origin = lowest.astype(np.float64)
