@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core import groom
+from ..core import groom, hair_binding
 from ..core.groom import HairSettings
 from ..core.hair_binding import HairBinding
 from ..core.strands import Strands
@@ -29,8 +29,8 @@ class BoundHair:
     guides: Strands  # as they were when the hair followed them last
     guide_uid: int  # session_uid of their Curves
     surface: Surface
-    growing: Future  # of `points`
-    shares: np.ndarray  # (S, k) float32, the weights of each strand's guides as they are combed now
+    shares: np.ndarray | None = None  # (S, k) float32, the weights of each strand's guides as they are combed now
+    growing: Future | None = None  # of `points`
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether what is not written is where points are, and perhaps the guide map
     is_map_written: bool = False  # whether the datablock holds this guide map
@@ -56,6 +56,16 @@ class BoundHair:
         """Bring the guide map up to guides that were combed: the weights of strands, or of (M,) indices of them."""
         self.is_map_written = self.is_map_written and np.array_equal(shares, self.shares[moved])
         self.shares[moved] = shares
+
+    @cached_property
+    def leaders(self):
+        """(S,) int32: the strand that stands for the guide that each follows first."""
+        return hair_binding.leading_strands(self.surface.mesh, self.guides, self.binding)
+
+    @cached_property
+    def identities(self):
+        """Of `Surface.identities`."""
+        return self.surface.identities(self.binding.roots)
 
     @cached_property
     def reach(self):

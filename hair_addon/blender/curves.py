@@ -100,12 +100,12 @@ def _hidden_as(curves_object):
     return "BOUNDS" if curves_object.select_get() else "WIRE"
 
 
-def make_strands(curves, surface, roots, radii, leaders=None, normals=None, written_radii=None):
+def make_strands(curves, surface, roots, radii, identities, *, leaders=None, normals=None, written_radii=None):
     """Make room for strands, and write all of them but where their points are.
 
-    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; leaders: (S,) int32, the strand that stands for the
-    guide of each, or None where strands are guides themselves; normals: (S, 3) float32 of the surface at the roots, if
-    they are known; written_radii: (P,) that the curves have, if they are known.
+    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: of `Surface.identities`; leaders: (S,)
+    int32, the strand that stands for the guide of each, or None where strands are guides themselves; normals: (S, 3)
+    float32 of the surface at the roots, if they are known; written_radii: (P,) that the curves have, if they are known.
     """
     if len(roots) == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
@@ -115,17 +115,9 @@ def make_strands(curves, surface, roots, radii, leaders=None, normals=None, writ
     if leaders is not None:
         # Blender's hair nodes look for this curve among the strands themselves: around it they clump, curl and braid.
         attributes.write(curves, "guide_curve_index", "INT", "CURVE", leaders)
-    identities, numbers = strand_numbers(surface, roots)
-    attributes.write(curves, "id", "INT", "CURVE", identities)
-    attributes.write(curves, "strand_random", "FLOAT", "CURVE", numbers)
+    for name, data_type, values in zip(("id", "strand_random"), ("INT", "FLOAT"), identities, strict=True):
+        attributes.write(curves, name, data_type, "CURVE", values)
     write_roots(curves, surface, roots, normals)
-
-
-def strand_numbers(surface, roots):
-    """(S,) int32 and (S,) float32 in [0, 1) by which strands are known and differ, whichever others are there."""
-    from ..core import rooting  # Warp takes longer to import than the add-on may take to start
-
-    return rooting.identities(surface.swap_winding(roots))
 
 
 def write_guide_map(curves, guide_map):

@@ -164,7 +164,7 @@ def _read(datablock):
         if bound.is_written or bound.has_moved_only:
             randoms = curves.read_randoms(datablock)
         else:
-            _identities, randoms = curves.strand_numbers(bound.surface, bound.binding.roots)
+            _identities, randoms = bound.identities
         return bound.points, np.tile(bound.radii, (len(bound.points), 1)), randoms
     return read_strands(datablock)
 

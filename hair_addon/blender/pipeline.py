@@ -84,10 +84,9 @@ def _binding_hair(guide_curves, settings, depsgraph, target):
             binding = _bind(surface, guides, settings, density, parting, roots, device, progress)
         else:
             binding = hair_binding.weigh_again(found, settings)
-        return binding, *_strands(surface, binding, guides, progress)
+        return _growing(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface), progress)
 
-    binding, *made = yield compute
-    return BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, *made)
+    return (yield compute)
 
 
 def _found_guides(target, settings, key, parting_key, guides, surface):
@@ -111,7 +110,7 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
     surface, density = _read_surface(surface_object, guide_settings, depsgraph)
     texture = scene.read_texture(surface, guide_settings.density_image)
     parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
-    device, place = preferences.device(), Remembered(surface_object)
+    device, place, hair_key = preferences.device(), Remembered(surface_object), root_key(hair_settings, density)
 
     def compute(progress):
         grown = groom.distribute_guides(
@@ -127,14 +126,13 @@ def adding_hair(surface_object, guide_settings, hair_settings, depsgraph):
         guides = _as_written(grown, surface, device)
         progress = part_of(progress, 0.5, 1.0)
         binding = _bind(surface, guides, hair_settings, density, parting, None, device, progress)
-        return grown, guides, binding, *_strands(surface, binding, guides, progress)
+        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface)
+        return grown, _growing(bound, progress)
 
-    grown, guides, binding, *made = yield compute
+    grown, bound = yield compute
     key = root_key(guide_settings, density, texture and texture.values)
     guide_curves = _write_guides(None, place.find(), surface, grown, guide_settings, key)
-    key = root_key(hair_settings, density)
-    guide_uid = guide_curves.session_uid
-    bound = BoundHair(binding, hair_settings, key, parting.key, guides, guide_uid, surface, *made)
+    bound.guide_uid = guide_curves.session_uid
     return guide_curves, _write_bound(None, place.find(), guide_curves, bound)
 
 
@@ -160,11 +158,14 @@ def _bind(surface, guides, settings, density, parting, roots, device, progress):
     )
 
 
-def _strands(surface, binding, guides, progress):
-    """Growing strands, as `BoundHair` has them, and the weights of their guides (S, k) float32."""
+def _growing(bound, progress):
+    """The `BoundHair` when all about its strands is known but where their points are: these grow on other threads."""
     progress("Growing strands", 0.8)
-    weights = hair_binding.weights_now(binding, guides)
-    return hair_binding.growing_points(binding, guides, weights, surface.put_local), weights.weights.numpy()
+    weights = hair_binding.weights_now(bound.binding, bound.guides)
+    bound.shares = weights.weights.numpy()
+    _ = bound.leaders, bound.identities  # now, and not while other threads need the processor
+    bound.growing = hair_binding.growing_points(bound.binding, bound.guides, weights, bound.surface.put_local)
+    return bound
 
 
 def _write_guides(target, surface_object, surface, guides, settings, key):
@@ -174,7 +175,7 @@ def _write_guides(target, surface_object, surface, guides, settings, key):
     radii = np.full(guides.points.shape[1], 0.5e-3 / surface.scale, np.float32)
     points = Future()
     points.set_result(surface.to_local(guides.numpy()))
-    curves.make_strands(target, surface, guides.roots, radii)
+    curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
     curves.write_points(target, points)
     curves.keep_surface(target, surface)
     return target
@@ -197,9 +198,17 @@ def write_hair(target):
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
         binding, radii = bound.binding, bound.radii
-        leaders = hair_binding.leading_strands(bound.surface.mesh, bound.guides, binding)
         normals = binding.normals.numpy()
-        curves.make_strands(target, bound.surface, binding.roots, radii, leaders, normals, bound.written_radii)
+        curves.make_strands(
+            target,
+            bound.surface,
+            binding.roots,
+            radii,
+            bound.identities,
+            leaders=bound.leaders,
+            normals=normals,
+            written_radii=bound.written_radii,
+        )
         bound.written_radii = radii
     if not bound.is_map_written:
         curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)

@@ -112,6 +112,12 @@ class Surface:
         local = normals @ self.to_world_axes.astype(np.float32)
         return local / np.linalg.norm(local, axis=-1, keepdims=True)
 
+    def identities(self, roots):
+        """(S,) int32 and (S,) float32 in [0, 1) by which strands are known and differ, whichever others are there."""
+        from ..core import rooting  # Warp takes longer to import than the add-on may take to start
+
+        return rooting.identities(self.swap_winding(roots))
+
     def uvs(self, points):
         """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
         if self.corner_uvs is None:

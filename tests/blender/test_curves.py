@@ -96,7 +96,7 @@ def test_a_radius_means_metres_whatever_the_scale(sphere):
 
 def test_an_empty_list_of_strands_never_reaches_blender(guides):
     with pytest.raises(ValueError, match="no strands"):
-        curves.make_strands(guides.data, None, SurfacePoints(np.empty(0, np.int32), np.empty((0, 3))), np.ones(41))
+        curves.make_strands(guides.data, None, SurfacePoints(np.empty(0, np.int32), np.empty((0, 3))), np.ones(41), ())
 
 
 def test_combed_is_what_somebody_moved(guides):
