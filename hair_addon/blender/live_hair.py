@@ -11,7 +11,7 @@ import numpy as np
 
 from ..core import hair_binding
 from ..core.errors import HairError
-from . import bindings, curves, hair_cache, pipeline
+from . import bindings, curves, edited_surfaces, hair_cache, pipeline
 
 # Seconds without a change after which an interaction is over, unless its operator still runs.
 _PAUSE = 0.3
@@ -182,7 +182,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             continue
         try:
             curves.require_editable(guides)
-            was_edited = pipeline.follow_surface(guides, depsgraph, axes_before)
+            was_edited = edited_surfaces.follow_surface(guides, depsgraph, axes_before)
             if is_mesh_edited and not was_edited and pipeline.has_other_density(guides, depsgraph):
                 state.is_stale = True
         except HairError as error:
@@ -226,7 +226,7 @@ def _parts_by(state, changed):
 
 def mark_followers(guide_curves):
     """Mark all hair between some guides as stale."""
-    for hair in pipeline.followers(guide_curves):
+    for hair in edited_surfaces.followers(guide_curves):
         _mark(hair)
 
 

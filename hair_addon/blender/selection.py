@@ -3,7 +3,7 @@
 
 import bpy
 
-from .pipeline import followers
+from .edited_surfaces import followers
 
 
 def active_of_kind(active, kind):

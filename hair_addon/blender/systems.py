@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import mesh, uv_layout
 from ..core.errors import HairError
-from . import curves, materials, pipeline, scene
+from . import curves, edited_surfaces, materials, scene
 from .selection import curves_on
 
 _UV_MAP = "Hair"
@@ -117,4 +117,4 @@ def apply_scale(surface_object, view_layer):
         bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
     view_layer.update()
     for guides in curves_on(surface_object, "GUIDES"):  # those too that are not live
-        pipeline.follow_surface(guides, bpy.context.evaluated_depsgraph_get(), axes_before)
+        edited_surfaces.follow_surface(guides, bpy.context.evaluated_depsgraph_get(), axes_before)
