@@ -33,9 +33,21 @@ WIDENINGS = 3  # doublings of the search radius before all points are read inste
 
 
 @wp.func
-def _key(squared: float, point: int):
+def key_of(squared: float, point: int):
     """A number that sorts as a squared distance, and then as an index: bits of floats that are not negative do."""
     return wp.bit_or(wp.lshift(wp.uint64(wp.cast(squared, dtype=wp.uint32)), wp.uint64(32)), wp.uint64(point))
+
+
+@wp.func
+def point_of(key: wp.uint64):
+    """The index in a key."""
+    return int(wp.bit_and(key, wp.uint64(0xFFFFFFFF)))
+
+
+@wp.func
+def square_of(key: wp.uint64):
+    """The squared distance in a key."""
+    return wp.cast(wp.uint32(wp.rshift(key, wp.uint64(32))), dtype=float)
 
 
 @wp.func
@@ -72,13 +84,13 @@ def _widened(
         for point in wp.hash_grid_query(grid, position, radius):
             squared = _squared_distance(points[point], position)
             if squared < radius * radius:
-                nearest = _inserted(nearest, _key(squared, point), limit)
+                nearest = _inserted(nearest, key_of(squared, point), limit)
         searching = nearest[limit - 1] == NO_KEY and (radius < distance or nearest[0] == NO_KEY)
         widening += 1
     if searching:
         nearest = key_list(NO_KEY)
         for point in range(points.shape[0]):
-            nearest = _inserted(nearest, _key(_squared_distance(points[point], position), point), limit)
+            nearest = _inserted(nearest, key_of(_squared_distance(points[point], position), point), limit)
     return nearest
 
 
@@ -86,8 +98,8 @@ def _widened(
 def _write(nearest: key_list, distance: float, out_indices: wp.array[int], out_distances: wp.array[float]):
     for slot in range(out_indices.shape[0]):
         key = nearest[slot]
-        point = int(wp.bit_and(key, wp.uint64(0xFFFFFFFF)))
-        apart = wp.sqrt(wp.cast(wp.uint32(wp.rshift(key, wp.uint64(32))), dtype=float))
+        point = point_of(key)
+        apart = wp.sqrt(square_of(key))
         # What is out of reach does not count, except for the very nearest.
         if key == NO_KEY or (slot > 0 and apart >= distance):
             point = -1

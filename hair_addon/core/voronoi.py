@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
+from .hash_grid import CELLS_PER_RADIUS, NO_KEY, key_of, point_of, square_of
 from .mesh import positions
 from .threads import LEAST_SHARE, in_threads, share_count
 
@@ -27,8 +28,7 @@ DETOUR = 2.0  # by which a site on the other side of a thin part counts as farth
 
 UNIT = wp.constant(wp.float64(2.0**54))  # sums over a surface with a mass of one stay below 2^63
 
-near_list = wp.types.vector(length=SITES_AROUND, dtype=int)
-near_squares = wp.types.vector(length=SITES_AROUND, dtype=float)
+near_keys = wp.types.vector(length=SITES_AROUND, dtype=wp.uint64)
 
 
 @wp.struct
@@ -132,7 +132,7 @@ def sites_on(ground, points, device):
     sites.apart = wp.empty(shape, dtype=float, device=device)
     sites.spacings = wp.empty(len(points), dtype=float, device=device)
     radius = SEARCH_RADIUS * float(np.sqrt(ground.parts.areas.sum() / len(points)))
-    ground.grid.build(sites.places, radius)
+    ground.grid.build(sites.places, CELLS_PER_RADIUS * radius)
     inputs, outputs = [sites.places, ground.grid.id, radius], [sites.around, sites.apart, sites.spacings]
     shares = share_count(len(points), LEAST_SHARE // 8, device)
     in_threads(_find_around, len(points), inputs, [outputs] * shares, device)
@@ -208,36 +208,29 @@ def _find_around(
     site = first_site + wp.tid()
     limit = out_around.shape[1]
     place = places[site]
-    around = near_list()
-    squares = near_squares()
+    nearest = near_keys()
     radius = first_radius
     count = int(0)
     while count < limit:
+        nearest = near_keys(NO_KEY)
         count = int(0)
-        last = radius * radius
         for other in wp.hash_grid_query(grid, place, radius):
             square = wp.length_sq(places[other] - place)
-            if square <= last:
-                if count == limit and square == last and other > around[limit - 1]:
-                    continue
-                slot = wp.min(count, limit - 1)
-                while slot > 0 and (
-                    squares[slot - 1] > square or (squares[slot - 1] == square and around[slot - 1] > other)
-                ):
-                    squares[slot] = squares[slot - 1]
-                    around[slot] = around[slot - 1]
-                    slot -= 1
-                squares[slot] = square
-                around[slot] = other
-                count = wp.min(count + 1, limit)
-                if count == limit:
-                    last = squares[limit - 1]
+            if square <= radius * radius:
+                key = key_of(square, other)
+                # In its place, and the last dropped, without a branch that nobody could foretell.
+                for slot in range(wp.static(SITES_AROUND)):
+                    kept = nearest[slot]
+                    nearest[slot] = wp.min(kept, key)
+                    key = wp.max(kept, key)
+                count += 1
         radius = 1.5 * radius
-    for slot in range(limit):
-        out_around[site, slot] = around[slot]
-        out_apart[site, slot] = wp.sqrt(squares[slot])
     ring = wp.min(FIRST_RING, limit)
     total = float(0.0)
-    for slot in range(1, ring):
-        total += wp.sqrt(squares[slot])
+    for slot in range(limit):
+        apart = wp.sqrt(square_of(nearest[slot]))
+        out_around[site, slot] = point_of(nearest[slot])
+        out_apart[site, slot] = apart
+        if slot > 0 and slot < ring:
+            total += apart
     out_spacings[site] = total / float(wp.max(ring - 1, 1))
