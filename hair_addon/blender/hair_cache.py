@@ -113,13 +113,14 @@ def forget_unless_same(datablock):
     """
     uid, bound = datablock.session_uid, bindings.of(datablock)
     if bound is not None:
+        if not bound.is_report_due:
+            bound.written_radii = None
         if not bound.is_written:
             return
         if bound.is_report_due:
             if uid not in _at_rest or _at_rest[uid][0] is not bound.points:
                 forget(uid)
             return
-        bound.written_radii = None
         if not _are_points(datablock, bound.points):
             bindings.forget(datablock)
             forget(uid)

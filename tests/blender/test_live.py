@@ -2,12 +2,13 @@
 """Hair follows what it was made from: settings, guides, surface; and is kept where somebody's hand was in it."""
 
 import math
+from dataclasses import replace
 
 import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender import properties
+from hair_addon.blender import curves, pipeline, properties
 from hair_addon.core import groom
 from hair_addon.core.groom import GuideSettings, HairSettings
 from hair_addon.core.params import declared
@@ -38,6 +39,30 @@ def test_a_changed_guide_setting_makes_guides_and_their_hair_again(hair):
     lengths = np.linalg.norm(np.diff(points(guides), axis=1), axis=-1).sum(axis=1)
     assert lengths.mean() == pytest.approx(0.8, rel=0.1)
     assert not np.array_equal(points(hair), before)
+
+
+def test_radii_are_written_where_they_are_others(hair, monkeypatch):
+    """Again where somebody has changed them, and not while they are what was written."""
+    written = []
+    write = curves._write_radii
+    monkeypatch.setattr(curves, "_write_radii", lambda *args: (written.append(1), write(*args)))
+    before = attribute(hair, "radius")
+    settings = properties.to_settings(hair.data.vellus.hair, HairSettings)
+
+    def make(seed):
+        guides, depsgraph = hair.data.vellus.guide_curves, bpy.context.evaluated_depsgraph_get()
+        pipeline.interpolate_hair(guides, replace(settings, seed=seed), depsgraph, hair.data)
+        update()
+
+    make(2)
+    make(3)
+    assert written == []
+    hair.data.attributes["radius"].data.foreach_set("value", 3.0 * before)
+    hair.data.update_tag()
+    update()
+    make(4)
+    assert len(written) == 1
+    np.testing.assert_array_equal(attribute(hair, "radius"), before)
 
 
 def test_hair_follows_a_combed_guide(hair):
