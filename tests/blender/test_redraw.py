@@ -50,7 +50,7 @@ def test_what_else_changes_is_read_again(change, hair, forgotten):
     assert False in forgotten
 
 
-def test_a_stroke_reads_no_surfaces_and_draws_coarse_shadows(hair, monkeypatch):
+def test_a_stroke_reads_no_surfaces_and_draws_coarse_shadows(lit, monkeypatch):
     calls = []
 
     def counted(module, name):
