@@ -64,7 +64,7 @@ class BoundHair:
 
     @cached_property
     def identities(self):
-        """Of `Surface.identities`."""
+        """(S,) int32 and float32: what strands are known by, and differ by (`Surface.identities`)."""
         return self.surface.identities(self.binding.roots)
 
     @cached_property

@@ -103,9 +103,10 @@ def _hidden_as(curves_object):
 def make_strands(curves, surface, roots, radii, identities, *, leaders=None, normals=None, written_radii=None):
     """Make room for strands, and write all of them but where their points are.
 
-    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: of `Surface.identities`; leaders: (S,)
-    int32, the strand that stands for the guide of each, or None where strands are guides themselves; normals: (S, 3)
-    float32 of the surface at the roots, if they are known; written_radii: (P,) that the curves have, if they are known.
+    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: as `Surface.identities` gives them;
+    leaders: (S,) int32, the strand that stands for the guide of each, or None where strands are guides themselves;
+    normals: (S, 3) float32 of the surface at the roots, if they are known; written_radii: (P,) that the curves have, if
+    they are known.
     """
     if len(roots) == 0:
         raise ValueError("no strands: an empty list of curves would crash Blender")
@@ -368,6 +369,11 @@ def root_places(curves, surface):
     firsts = np.concatenate([[0], np.cumsum(counts[:-1])])
     roots = _nearest_roots(surface, surface.from_local(read_points(curves)[firsts]))
     return surface.root_vertices(roots), surface.swap_winding(roots).barycentric
+
+
+def followers(guide_curves):
+    """The hair Curves that follow some guides."""
+    return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and c.vellus.guide_curves == guide_curves]
 
 
 def require_editable(datablock):

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guides on a surface whose mesh was edited: carried with it, or rooted anew where its faces are others."""
 
-import bpy
 import numpy as np
 
 from ..core.mesh import require_finite
@@ -28,7 +27,7 @@ def follow_surface(guide_curves, depsgraph, axes_before=None):
     applied = None if axes_before is None else np.linalg.solve(surface.to_world_axes, axes_before)
     if applied is not None and np.allclose(before @ applied.T, surface.rest, rtol=0.0, atol=1e-5 * surface.extent):
         # The object's rotation or scale was applied: in the world nothing has moved.
-        for target in (guide_curves, *followers(guide_curves)):
+        for target in (guide_curves, *curves.followers(guide_curves)):
             curves.transform(target, applied)
             bindings.forget(target)
     else:
@@ -39,11 +38,6 @@ def follow_surface(guide_curves, depsgraph, axes_before=None):
     curves.write_roots(guide_curves, surface, curves.stored_roots(guide_curves, surface))
     curves.keep_surface(guide_curves, surface)
     return True
-
-
-def followers(guide_curves):
-    """The hair Curves that follow some guides."""
-    return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and c.vellus.guide_curves == guide_curves]
 
 
 def _root_again(guide_curves, surface):

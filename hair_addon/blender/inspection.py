@@ -9,7 +9,7 @@ from ..core import estimate
 from ..core.errors import HairError
 from ..core.groom import GuideSettings, HairSettings
 from . import curves, properties, scene, strand_arrays, surface_checks
-from .edited_surfaces import followers
+from .curves import followers
 
 
 def open_file():

@@ -226,7 +226,7 @@ def _parts_by(state, changed):
 
 def mark_followers(guide_curves):
     """Mark all hair between some guides as stale."""
-    for hair in edited_surfaces.followers(guide_curves):
+    for hair in curves.followers(guide_curves):
         _mark(hair)
 
 

@@ -3,7 +3,7 @@
 
 import bpy
 
-from .edited_surfaces import followers
+from .curves import followers
 
 
 def active_of_kind(active, kind):

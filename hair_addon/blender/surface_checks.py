@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from .edited_surfaces import followers
+from .curves import followers
 from .translations import interface_text
 
 
