@@ -3,7 +3,7 @@
 
 const JOB_TYPE = {
     label: "Vellus Render",
-    description: "Frames with hair by Vellus, Cycles or EEVEE; frames that are there already are not made again",
+    description: "Render frames with hair by Vellus, Cycles or EEVEE; existing frames are kept",
     settings: [
         {
             key: "frames", type: "string", required: true,
@@ -13,26 +13,26 @@ const JOB_TYPE = {
         },
         {
             key: "chunk_size", type: "int32", default: 4, propargs: { min: 1 }, visible: "submission",
-            description: "How many frames a task renders",
+            description: "Number of frames per task",
         },
         {
             key: "pattern", type: "string", subtype: "file_path", required: true,
             default: "//frames/frame_####.exr", eval: "bpy.path.abspath(settings.pattern)",
-            description: "Pictures, .exr or .png, in a folder that all workers see: #### becomes the number of a frame",
+            description: "Image files, .exr or .png, in a folder shared by all workers; #### is the frame number",
         },
         {
             key: "engine", type: "string", required: true, default: "vellus", choices: ["vellus", "cycles", "eevee"],
-            description: "Who renders",
+            description: "Render engine",
         },
         {
             key: "samples", type: "int32", default: 0, propargs: { min: 0 },
-            description: "Samples of each pixel; 0: as many as the scene asks for",
+            description: "Samples per pixel; 0 uses the scene's setting",
         },
-        { key: "passes", type: "bool", default: true, description: "All passes, as layers of the .exr" },
-        { key: "transparent", type: "bool", default: false, description: "Leave the background empty" },
+        { key: "passes", type: "bool", default: true, description: "Write all passes as layers of the .exr" },
+        { key: "transparent", type: "bool", default: false, description: "Render a transparent background" },
         {
             key: "blendfile", type: "string", required: true, visible: "web",
-            description: "The .blend file, where all workers see it",
+            description: "The .blend file, in a folder shared by all workers",
         },
     ],
 };
@@ -40,8 +40,8 @@ const JOB_TYPE = {
 function compileJob(job) {
     const settings = job.settings;
     const rendering = frameChunker(settings.frames, settings.chunk_size).map((chunk) => renderTask(settings, chunk));
-    // The same command over all frames makes what is missing, and nothing where nothing is: the job ends with every
-    // frame there, whatever became of the workers.
+    // The same command for all frames renders missing ones, if any: the job ends with all frames, even if workers
+    // were lost.
     const checking = renderTask(settings, settings.frames);
     checking.name = "check";
     for (const task of rendering) {
