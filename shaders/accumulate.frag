@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A pass over the hair, several samples a pixel, joins the sum of passes: mean light, and the depth of the nearest sample.
+// Adds a pass, with several samples per pixel, to the sum of passes: mean light, and the depth of the nearest sample.
 
 void main()
 {

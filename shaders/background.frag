@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The surroundings behind everything, as the camera sees them.
+// The environment as the background of the camera.
 
 #include "include/environment.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Hair over a viewport that the view transform has been applied to: light as the scene's colour management shows it.
+// Hair over a viewport, after the view transform: light through the scene's colour management.
 
 #include "include/display_place.glsl"
 
@@ -13,7 +13,7 @@ void main()
   float side = float(textureSize(display_table, 0).x);
   vec3 at = display_place(exposure * light.rgb / light.a);
   vec3 display = textureLod(display_table, (at * (side - 1.0) + 0.5) / side, 0.0).rgb;
-  // Blender takes what is drawn over a viewport for display colours to the power of 2.2, however the display is encoded.
+  // Blender interprets colours drawn over a viewport as display colours to the power of 2.2, for any display encoding.
   color = vec4(pow(display, vec3(2.2)), 1.0) * (opacity * light.a / float(pass_count));
   gl_FragDepth = texelFetch(depths, pixel, 0).r;
 }

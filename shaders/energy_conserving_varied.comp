@@ -25,7 +25,7 @@ FibreLobes half_circle_lobes(vec2 at)
                       half_circle_channel(at, sigma_a.b));
 }
 
-// Of the strands around, which have turned from root to tip as far as this one.
+// Of the surrounding strands, at the same position along the gradient.
 vec3 dual(int row, float theta_i)
 {
   float step_count = float(textureSize(dual_table, 0).z);
@@ -33,7 +33,7 @@ vec3 dual(int row, float theta_i)
   return textureLod(dual_table, at, 0.0).rgb;
 }
 
-// As `albedo.azimuthal_moments`: with what the strands behind send back.
+// As `albedo.azimuthal_moments`: includes backscattering by the strands behind.
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
 {
   fibre_return(sin_theta_o, returned, towards);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The surroundings, unrolled by longitude and latitude: each texel the mean over its part of the picture.
+// The environment as an equirectangular image: each texel is the mean over its part of the source.
 
 #include "include/environment.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A pass over a picture, several samples a pixel, joins the weighted sum of all samples. Around the tile lies a margin.
+// Adds a pass, with several samples per pixel, to the weighted sum of all samples. The tile has a margin around it.
 
 #include "include/film_filter.glsl"
 

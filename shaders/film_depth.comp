@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The same of what is no light: the weight of samples in which hair is nearest, the least distance along the view's axis, and
-// the weight of samples in which there is anything.
+// Data passes: the weight of samples in which hair is nearest, the least distance along the view axis, and the weight of
+// samples that are not background.
 
 #include "include/film_filter.glsl"
 
 const uint NO_SEGMENT = 0x7FFFFFFFu;
 
-// clip: what brings a place on the axis to clip space, its last two rows and columns, row by row.
+// clip: the transform of a point on the axis to clip space, its last two rows and columns, row by row.
 float distance_at(float depth, vec4 clip)
 {
   float ndc = 2.0 * depth - 1.0;

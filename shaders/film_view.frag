@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A film in a viewport: scene-linear light, which Blender brings through the view transform.
+// A film in a viewport: scene-linear light, to which Blender applies the view transform.
 
 void main()
 {

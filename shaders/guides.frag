@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The report's locator: each guide in a colour of its own.
+// The report's locator: each guide in its own colour.
 
 vec3 hue(float turn)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A corner of a triangle, with what it sees of the world.
+// A corner of a triangle, with its visibility of the world.
 
 void main()
 {

@@ -5,7 +5,7 @@
 #include "include/fibre.glsl"
 #include "include/marschner.glsl"
 
-// M is as it was baked, for light from one direction: the blur of a light with a size is left out.
+// M is baked for light from one direction: the size of lights is ignored.
 vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
 {
   float sin_theta_i = dot(T, L);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Points of some strands, put where they belong in the texture of all: what combing changes.
+// Copies the points of some strands into the texture of all: changes by combing.
 
 #include "include/strand.glsl"
 
@@ -11,7 +11,7 @@ void main()
     return;
   }
   int point = place - moved * point_count;
-  // Each strand brings one texel more than it has points: first which strand it is.
+  // Each strand has one texel more than points: the first is its index.
   int strand = int(texelFetch(moved_strands, strand_texel(moved, 0, point_count + 1, moved_row_strands), 0).x);
   vec4 value = texelFetch(moved_strands, strand_texel(moved, point + 1, point_count + 1, moved_row_strands), 0);
   imageStore(strands, strand_texel(strand, point, point_count, row_strands), value);

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The mean of a block of samples: a supersampled picture at its final size.
+// The mean of a block of samples: downsampling of a supersampled picture.
 
 void main()
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What strand_shadow.comp has counted in each layer, as an opacity map holds it: all up to a layer's far side.
+// Cumulative opacity per layer from the counts of strand_shadow.comp.
 
 #include "include/opacity.glsl"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Between the first pass of a shadow map and the second: where no strand is, the nearest of those around it, so that a
-// front between two texels does not lie half way to nowhere.
+// Between the first pass of a shadow map and the second: texels without strands get the nearest front around them, so
+// that interpolation of the front is valid.
 
 #include "include/opacity.glsl"
 

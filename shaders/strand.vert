@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// One vertex of the strip of a strand, pulled from the strand texture by its index.
+// One vertex of a strand's strip, fetched from the strand texture by index.
 
 #include "include/segment.glsl"
 
@@ -13,7 +13,7 @@ void main()
   vec4 here = strand_point(strand, point);
   vec3 along = strand_point(strand, min(point + 1, view.point_count - 1)).xyz -
                strand_point(strand, max(point - 1, 0)).xyz;
-  // A strand that turns back on itself has no tangent there; any will do, as long as it is one.
+  // A strand that folds back on itself has no tangent there; any unit vector is valid.
   along = (dot(along, along) > 0.0) ? along : vec3(0.0, 0.0, 1.0);
 
   strand_index = strand;
@@ -21,7 +21,7 @@ void main()
   vec3 tangent = (view.object_to_world * vec4(along, 0.0)).xyz;
   drawn_position = (view.object_to_world * vec4(here.xyz, 1.0)).xyz;
   vec3 to_view = view.is_perspective != 0 ? view.eye.xyz - drawn_position : view.eye.xyz;
-  // Length under the least half width that the picture asks for, in pixels of this depth.
+  // The picture's minimum half width at this depth.
   float depth = view.is_perspective != 0 ? (view.world_to_clip * vec4(drawn_position, 1.0)).w : 1.0;
   float true_half_width = here.w * view.object_scale * view.thickness;
   float half_width = max(true_half_width, view.least_half_width * abs(depth));

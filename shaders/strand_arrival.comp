@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How much of the lights arrives at strands: one where nothing is in their way, zero in the dark.
+// Visibility of the lights from strands: one if unoccluded, zero in full shadow.
 
 #include "include/arrival.glsl"
 #include "include/strand_samples.glsl"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far strands move in a picture.
+// Motion vectors of strands.
 
 #include "include/motion.glsl"
 #include "include/strand_samples.glsl"

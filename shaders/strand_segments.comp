@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The samples of a picture that strands cover: first the depth of the nearest, then which segment it is.
+// Visibility buffer of strands: first the depth of the nearest segment, then its index.
 
 #include "include/coverage.glsl"
 #include "include/walk_segment.glsl"
@@ -22,11 +22,11 @@ void meet(ivec2 place, float along, float coverage)
   if (!is_covered(dash_offset, place + first_place, coverage)) {
     return;
   }
-  // Of floats that are not negative the bits have the same order.
+  // The bits of non-negative floats sort like their values.
   uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, along), 0.0));
   uint nearest = imageLoad(depths, place).r;
   if (is_depth != 0) {
-    // Most samples lie behind others: to look first is cheaper than to write.
+    // Most samples are occluded: reading first is cheaper than writing.
     if (depth < nearest) {
       imageAtomicMin(depths, place, depth);
     }

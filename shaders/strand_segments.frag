@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strips of strands as samples of a picture: which segment of which strand, and how deep.
+// Visibility buffer of strands drawn as strips: segment index and depth.
 
 #include "include/coverage.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strands in a deep opacity map: first the depth of the nearest, then how much of them lies in each layer behind it.
+// Strands in a deep opacity map: first the depth of the nearest, then the opacity of each layer behind it.
 
 #include "include/opacity.glsl"
 #include "include/walk_segment.glsl"

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The surface under the hair: matt, in the scene's light, so that the hair has something to hide and to be hidden by.
+// The surface under the hair: diffuse, in the scene's light.
 
 #include "include/shadow.glsl"
 #include "include/world.glsl"

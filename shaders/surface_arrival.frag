@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How much of the lights arrives at a surface; it is in its own way where it faces away.
+// Visibility of the lights from a surface, including its own shadow where it faces away.
 
 #include "include/arrival.glsl"
 

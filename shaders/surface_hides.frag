@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A surface that Blender draws: here it only hides the hair behind it.
+// A surface drawn by Blender: here it only occludes the hair behind it.
 
 void main()
 {

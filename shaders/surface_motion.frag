@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far a surface moves in a picture.
+// Motion vectors of a surface.
 
 #include "include/motion.glsl"
 

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How much of the world each place sees: a texel a place, the sum over the directions that the opacity maps look from.
+// Visibility of the world: a texel per point, the sum over the directions of the opacity maps.
 
 #include "include/shadow.glsl"
 #include "include/strand.glsl"

@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The one exception that is meant for the user's eyes."""
+"""The one exception that is meant for the user's eyes, and what other exceptions say."""
 
 
 class HairError(Exception):
-    """Something the user can mend: one sentence that says what is wrong and what to do.
+    """An error that the user can fix: one sentence with the problem and the fix.
 
-    Values may be kept apart, HairError("{name} has no faces.", name=…), so that the sentence can be translated.
+    Values may be given separately, HairError("{name} has no faces.", name=…), so that the sentence can be translated.
     """
 
-    def __init__(self, sentence, **values):
+    def __init__(self, sentence: str, **values: object) -> None:
         super().__init__(sentence.format(**values) if values else sentence)
         self.sentence, self.values = sentence, values
+
+
+def cause_of(error: Exception) -> str:
+    """Return a short description of an error of the system or of an operator."""
+    if isinstance(error, OSError) and error.strerror:
+        return error.strerror
+    lines = [line for line in str(error).splitlines() if line.strip()] or [type(error).__name__]
+    # For an operator in Python, Blender passes on the whole traceback, which ends with the error.
+    line = lines[-1] if "Traceback" in lines[0] else lines[0]
+    return line.strip().removeprefix("Error: ").rstrip(".")

@@ -1,41 +1,47 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Work in steps: what must happen on the caller's thread, and what may happen on another one while a window lives on.
+"""Long operations as generators: steps on the caller's thread, and computations that may run on another one.
 
-Such work is a generator. It reads, yields a function of (progress) that computes, gets its result sent back, and
-writes; what it returns is what was made. `run_now` runs it in one go, and a `Job` runs one computation in a thread.
-Kernels run without Python's lock, so a window is drawn meanwhile.
+A generator reads, yields a function of (progress) that computes, receives its result, writes, and returns what it
+created. `run_now` runs it at once, and a `Job` runs one computation in a thread. Kernels release the GIL, so the
+window is drawn meanwhile.
 """
 
 import threading
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
+from typing import Any
+
+Progress = Callable[[str, float], None]  # told a step and the part of the work that is done
+Compute = Callable[[Progress], Any]
+type Work[T] = Generator[Compute, Any, T]
 
 
 class Stopped(Exception):
-    """Raised inside a computation that somebody has stopped."""
+    """Raised inside a computation that was cancelled."""
 
 
-def unheard(_step, _part):
-    """Progress that nobody watches. step: what is being done, in a word or two; part: of the whole, in [0, 1]."""
+def no_progress(_step: str, _part: float) -> None:
+    """Ignore progress. step: the current step, in a word or two; part: completed fraction, in [0, 1]."""
 
 
 @dataclass(frozen=True)
 class Stage:
-    """What work yields before a stage that must run on the caller's thread: there it is told, and may be stopped."""
+    """Yielded before a stage that must run on the caller's thread, to report progress and allow cancelling."""
 
     step: str
     part: float
 
-    def __call__(self, progress):
+    def __call__(self, progress: Progress) -> None:
         progress(self.step, self.part)
 
 
-def part_of(progress, first, last):
+def part_of(progress: Progress, first: float, last: float) -> Progress:
     """Progress of a stage that makes up the part between `first` and `last` of the whole."""
     return lambda step, part: progress(step, first + (last - first) * part)
 
 
-def run_now(work, progress=unheard):
-    """Run a generator of the kind above to its end; returns what it returns. progress: told how far each part is."""
+def run_now[T](work: Work[T], progress: Progress = no_progress) -> T:
+    """Run such a generator to its end; returns its result. progress: callback for each computation."""
     try:
         compute = next(work)
         while True:
@@ -45,11 +51,12 @@ def run_now(work, progress=unheard):
 
 
 class Job:
-    """A computation in a thread of its own; step and part say how far it is."""
+    """A computation in its own thread, with its progress as step and part."""
 
-    def __init__(self, compute):
+    def __init__(self, compute: Compute) -> None:
         self.step, self.part = "", 0.0
-        self._result, self._error = None, None
+        self._result: Any = None
+        self._error: BaseException | None = None
         self._is_stopped = threading.Event()
         self._thread = threading.Thread(target=self._run, args=(compute,), name="vellus", daemon=True)
         self._thread.start()
@@ -59,7 +66,7 @@ class Job:
     def _run(self, compute):
         try:
             self._result = compute(self._progress)
-        except BaseException as error:  # whatever it is belongs to whoever asks for the result
+        except BaseException as error:  # re-raised by `result`
             self._error = error
 
     def _progress(self, step, part):
@@ -68,25 +75,25 @@ class Job:
         self.step, self.part = step, part
 
     @property
-    def is_done(self):
+    def is_done(self) -> bool:
         """Whether `result` returns at once."""
         return not self._thread.is_alive()
 
-    def stop(self):
+    def stop(self) -> None:
         """Ask the computation to end at its next step."""
         self._is_stopped.set()
 
     @property
-    def is_stopping(self):
+    def is_stopping(self) -> bool:
         """Whether it was asked to end."""
         return self._is_stopped.is_set()
 
-    def wait(self):
+    def wait(self) -> None:
         """Return when the computation has ended, however it did."""
         self._thread.join()
 
-    def result(self):
-        """What was computed; waits for it. Raises what the computation raised, `Stopped` if it was stopped."""
+    def result(self) -> Any:
+        """The result; waits for it. Re-raises exceptions of the computation, `Stopped` if it was stopped."""
         self.wait()
         if self._error is not None:
             raise self._error

@@ -1,18 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A setting is declared once: default, range, unit and tooltip stand together in a frozen `Settings` dataclass.
+"""Declaration of settings: default, range, unit and tooltip in a frozen `Settings` dataclass.
 
 Blender's properties, the panel's rows, the command line's options and the checks below all follow from it.
 """
 
 import math
-from dataclasses import dataclass, field, fields
+import numbers
+import reprlib
+from collections.abc import Mapping, Set
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
 
 from .errors import HairError
 
 
 @dataclass(frozen=True)
 class Param:
-    """What is known of a setting beside its name, type and default."""
+    """Attributes of a setting, apart from its name, type and default."""
 
     description: str
     label: str = ""  # empty: the field's name in words
@@ -24,29 +30,66 @@ class Param:
     subtype: str = "NONE"  # Blender's names: ANGLE, DISTANCE, FACTOR, COLOR
     precision: int = 3
     choices: tuple[tuple[str, str, str], ...] = ()  # (value, label, tooltip) of an enumeration
+    typical: float | None = None  # of a setting that is None, and follows from the surface, unless it is given
+    diameter: tuple[str, str] | None = None  # of a radius: property that shows it in mm, and its description
 
 
-def param(default, description, **details):
+def param(default: Any, description: str, **details: Any) -> Any:
     """A dataclass field that carries a `Param`; `details` are its other attributes."""
     return field(default=default, metadata={"param": Param(description, **details)})
 
 
-def declared(settings_class):
-    """[(name, default, Param)] of a `Settings` class, in the order of declaration."""
-    return [(f.name, f.default, f.metadata["param"]) for f in fields(settings_class)]
+def param_from_surface(typical: Any, description: str, **details: Any) -> Any:
+    """A dataclass field that is None unless given: core/grooming/groom_defaults.py then computes it from the surface.
+
+    typical: the value for a human head, of the type that the setting has.
+    """
+    return param(None, description, typical=typical, **details)
 
 
-def label_of(name, details):
+def param_of(settings_class: type["Settings"], name: str, default: Any = None, **details: Any) -> Any:
+    """A dataclass field as another class declares it, its default too unless one is given; `details` replace its."""
+    declaration = settings_class.__dataclass_fields__[name]
+    metadata = {"param": replace(declaration.metadata["param"], **details)}
+    return field(default=declaration.default if default is None else default, metadata=metadata)
+
+
+def declared(settings_class: type["Settings"]) -> list[tuple[str, Any, Param]]:
+    """[(name, default, Param)] of a `Settings` class, in the order of declaration.
+
+    The default of a setting that follows from the surface is its typical value.
+    """
+    described = [(f.name, f.default, f.metadata["param"]) for f in fields(settings_class)]
+    return [(name, details.typical if default is None else default, details) for name, default, details in described]
+
+
+def from_surface(settings_class: type["Settings"]) -> tuple[str, ...]:
+    """Names of the settings of a class that are computed from the surface unless given."""
+    return tuple(name for name, _default, details in declared(settings_class) if details.typical is not None)
+
+
+def given(settings: "Settings") -> dict[str, Any]:
+    """{name: value} of `Settings`, without those to be computed from the surface."""
+    values = {name: getattr(settings, name) for name, *_ in declared(type(settings))}
+    return {name: value for name, value in values.items() if value is not None}
+
+
+def label_of(name: str, details: Param) -> str:
     """The words an artist reads: the declared label, or the field's name."""
     return details.label or name.replace("_", " ").capitalize()
 
 
-def unit_of(details):
+def unit_of(details: Param) -> str:
     """The unit of a setting in a file or on a command line, empty where it has none."""
     return {"ROTATION": "rad", "LENGTH": "m"}.get(details.unit, "")
 
 
-def like(default, value):
+def is_text(value: str) -> bool:
+    """Whether a str can be a name or a path in Blender: valid UTF-8 without null characters."""
+    return "\0" not in value and not any("\ud800" <= character <= "\udfff" for character in value)
+
+
+def like(default: Any, value: Any) -> Any:
     """A value that JSON gave, as the type of a setting's default; raises TypeError or ValueError for another kind."""
     if isinstance(default, tuple) and isinstance(value, list):
         return tuple(like(example, component) for example, component in zip(default, value, strict=True))
@@ -59,30 +102,95 @@ def like(default, value):
 
 @dataclass(frozen=True)
 class Settings:
-    """Base of every stage's settings. Making one with a value outside its range raises `HairError`."""
+    """Base of every stage's settings. Values become plain Python values of their defaults' types.
 
-    def __post_init__(self):
+    Whole floats, NumPy's numbers, and any sequence for a tuple are taken. Raises `HairError` for a value of another
+    type or outside its range.
+    """
+
+    def __post_init__(self) -> None:
         for name, default, details in declared(type(self)):
-            _check(label_of(name, details), getattr(self, name), default, details)
+            value = getattr(self, name)
+            if value is None and details.typical is not None:
+                continue
+            value = plain_value(label_of(name, details), value, default, details)
+            object.__setattr__(self, name, value)  # the class is frozen
 
 
-def _check(label, value, default, details):
+def require_class(value: object, settings_class: type, name: str) -> None:
+    """Raise `HairError` unless a value is of a class of settings; name: of the argument that it was given as."""
+    if not isinstance(value, settings_class):
+        module = settings_class.__module__.rpartition(".")[2]
+        raise HairError(f"{name} must be {module}.{settings_class.__name__}, not {described(value)}.")
+
+
+def described(value: object) -> str:
+    """Describe a value of any type on one line."""
+    if isinstance(value, str):
+        return reprlib.repr(value)
+    if value is None or isinstance(value, bool | np.bool_):
+        return str(value)
+    if isinstance(value, numbers.Real):
+        return f"{_as_float(value):g}"
+    return f"a value of type {type(value).__name__}"
+
+
+def plain_value(label: str, value: Any, default: Any, details: Param) -> Any:
+    """A value as the type of a setting's default, within its range. Raises `HairError`."""
     if isinstance(default, str):
-        allowed = [choice[0] for choice in details.choices]
-        if allowed and value not in allowed:
-            raise HairError(f"{label} must be one of {', '.join(allowed)}, not {value!r}.")
-        return
+        return _plain_text(label, value, details)
     if isinstance(default, bool):
-        return
-    components = value if isinstance(default, tuple) else (value,)
-    if isinstance(default, tuple) and len(components) != len(default):
-        raise HairError(f"{label} needs {len(default)} numbers, not {len(components)}.")
-    for component in components:
-        if isinstance(default, int) and component != int(component if math.isfinite(component) else 0):
-            raise HairError(f"{label} must be a whole number, not {component:g}.")
-        # Written so that NaN fails too: every comparison with it is false.
-        if not (math.isfinite(component) and details.low <= component <= details.high and component > details.above):
-            raise HairError(f"{label} must be {_range(details)}, not {component:g}.")
+        if not isinstance(value, bool | np.bool_):
+            raise HairError(f"{label} must be True or False, not {described(value)}.")
+        return bool(value)
+    if not isinstance(default, tuple):
+        return _plain_number(label, value, isinstance(default, int), details)
+    count = _length(value)
+    if count != len(default):
+        raise HairError(f"{label} needs {len(default)} numbers, not {described(value) if count is None else count}.")
+    return tuple(_plain_number(label, component, False, details) for component in value)
+
+
+def _length(value):
+    """Of any sequence but text; None for other values."""
+    if not hasattr(value, "__len__") or isinstance(value, str | bytes | Mapping | Set):
+        return None
+    if isinstance(value, np.ndarray) and value.ndim == 0:  # has the method, and no length
+        return None
+    return len(value)
+
+
+def _plain_text(label, value, details):
+    if not isinstance(value, str):
+        raise HairError(f"{label} must be text, not {described(value)}.")
+    allowed = [choice[0] for choice in details.choices]
+    if allowed and value not in allowed:
+        raise HairError(f"{label} must be one of {', '.join(allowed)}, not {described(value)}.")
+    # Blender truncates text at a null character, and rejects lone surrogates.
+    if "\0" in value or not is_text(value):
+        raise HairError(f"{label} has a character that is not allowed: {value[:40]!a}.")
+    return str(value)
+
+
+def _plain_number(label, value, is_whole, details):
+    kind = "whole number" if is_whole else "number"
+    if isinstance(value, bool) or not isinstance(value, numbers.Real):
+        raise HairError(f"{label} must be a {kind}, not {described(value)}.")
+    number = _as_float(value)
+    if is_whole and not number.is_integer() and abs(number) != math.inf:
+        raise HairError(f"{label} must be a whole number, not {number:g}.")
+    # Written so that NaN fails too: every comparison with it is false.
+    if not (math.isfinite(number) and details.low <= number <= details.high and number > details.above):
+        raise HairError(f"{label} must be {_range(details)}, not {number:g}.")
+    return round(value) if is_whole else number
+
+
+def _as_float(number):
+    """Any real number as a float; infinity where it is too large for one."""
+    try:
+        return float(number)
+    except OverflowError:
+        return math.inf if number > 0 else -math.inf
 
 
 def _range(details):

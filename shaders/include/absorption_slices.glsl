@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where sigma_a lies among slices that are evenly spaced in its root, and what lies between two of them.
+// Lookup of sigma_a in slices evenly spaced in its square root, and interpolation between them.
 
-// (the slice below, which part of the way to the next one in sigma_a)
+// (the slice below, the fraction to the next one in sigma_a)
 vec2 slice_of(float sigma_a, float low, float high, int slice_count)
 {
   float step_size = max(high - low, 1e-6) / float(slice_count - 1);

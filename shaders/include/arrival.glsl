@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What lights send to a place, and which part of it arrives: for passes of a render.
+// Irradiance of lights at a point, and its visible part: for render passes.
 
 #include "include/shadow.glsl"
 
@@ -9,7 +9,7 @@ vec3 irradiance_of(Light light, vec3 position)
       light.kind, light.position.xyz, light.axis.xyz, light.power.rgb, light.cos_cone, light.blend, position);
 }
 
-// Nothing of nothing is nothing.
+// Avoids 0 / 0.
 vec3 part_of(vec3 arriving, vec3 sent)
 {
   return arriving / max(sent, vec3(1e-12));

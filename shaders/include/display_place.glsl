@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 
-// Where scene-linear light stands along the sides of a display table, from 0 to 1: `display_transform.display_place`.
+// Coordinates of scene-linear light in a display table, from 0 to 1: `display_transform.display_place`.
 vec3 display_place(vec3 light)
 {
   const float MOST = 512.0;

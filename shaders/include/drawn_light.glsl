@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Which part of a strand's light is drawn: all of it, unless a program has constants of these names in place of this file.
+// The drawn components of a strand's light: all, unless a program defines constants of these names instead.
 
-const vec4 drawn_lobes = vec4(1.0);  // R, TT, TRT and all else that comes from lights
+const vec4 drawn_lobes = vec4(1.0);  // R, TT, TRT and all other light from lights
 const float drawn_world = 1.0;

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Some strands in place of all.
+// Subset of strands for the level of detail.
 
-// Which strand is drawn at a turn. Neighbours in memory are neighbours on the surface, so any turns in a row are spread
-// over all of them: a turn goes to the next part of the strands, and around each part in strides of the golden ratio.
+// The strand of an index in drawing order. Neighbours in memory are neighbours on the surface, so consecutive indices are
+// spread over all strands: an index goes to the next part of the strands, and within it by strides of the golden ratio.
 int drawn_strand(int turn)
 {
   if (view.drawn_strands == view.strand_count) {

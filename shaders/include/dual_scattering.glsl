@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Light among many fibres [Zinke08]: what strands in front pass on, and what those behind send back.
+// Dual scattering [Zinke08]: forward scattering by strands in front, backscattering by strands behind.
 
 #include "include/longitudinal.glsl"
 
-// How what comes back from behind a strand is spread over |phi|, with the integral pi; for light from one direction,
+// Azimuthal distribution of backscattered light over |phi|, with the integral pi; for light from one direction,
 // and for light from a half circle, the mean of the first over it.
 float back_azimuth(float phi)
 {
@@ -16,13 +16,13 @@ float spread_back_azimuth(float phi)
   return (turn < 0.5) ? 0.75 - turn * turn : 0.25 + (1.0 - turn) * (1.0 - turn);
 }
 
-// Part of light that meets no strand where a mean of `count` stand in its way.
+// Unscattered part of light behind a mean of `count` strands.
 float direct_part(float count)
 {
   return exp(-count);
 }
 
-// Part that arrives through at least one strand, each of which passes on a_f: the mean of a_f^k over a
+// Part that arrives through at least one strand, each with the forward scattering a_f: the mean of a_f^k over a
 // Poisson-distributed k >= 1.
 vec3 scattered_part(float count, vec3 a_f)
 {

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A fibre whose section is an ellipse [Marschner03]: the inner reflection sees another index from each side.
+// Elliptic fibres [Marschner03]: the effective index of the internal reflection depends on the azimuth.
 
 #include "include/constants.glsl"
 
-// The section's major axis: a direction of the strand's own, across the fibre. It turns with the fibre, and has a seam
-// only where a strand runs along that one direction.
+// The section's major axis: a random direction per strand, perpendicular to the fibre. It rotates with the fibre, and has
+// a seam only where a strand runs along that direction.
 vec3 major_axis(vec3 T, float random)
 {
   float z = 2.0 * random - 1.0;
@@ -23,7 +23,7 @@ float cos_twice_phi_h(vec3 T, vec3 axis, vec3 L, vec3 V)
   return (l.x * v.x - l.y * v.y) * inversesqrt(max(dot(l, l) * dot(v, v), 1e-12));
 }
 
-// How much of each of four indices from eta*_1 to eta*_2 the fibre shows.
+// Weights of the four indices from eta*_1 to eta*_2.
 vec4 layer_weights(float cosine)
 {
   float place = 1.5 * (1.0 - cosine);

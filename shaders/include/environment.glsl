@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Pictures of the surroundings, by unit directions: x is at azimuth 0, z at the top.
+// Lookup of environment images by unit directions: x is at azimuth 0, z at the top.
 
 #include "include/constants.glsl"
 

@@ -24,6 +24,6 @@ float relative_azimuth(vec3 T, vec3 L, vec3 V)
   vec3 v = V - dot(T, V) * T;
   float across = abs(dot(T, cross(l, v)));
   float along = dot(l, v);
-  // An arc cosine would lose half of the digits at 0 and pi, and drivers' own is good for 1e-3 at best.
+  // An arc cosine would lose half of the digits at 0 and pi, and the drivers' has errors of at least 1e-3.
   return (max(across, abs(along)) < 1e-12) ? 0.0 : atan(across, along);
 }

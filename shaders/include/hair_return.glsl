@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a strand sends back of light from everywhere, from the table of `albedo.azimuthal_moments`: needs the sampler
+// Response of a strand to ambient light, from the table of `albedo.azimuthal_moments`: needs the sampler
 // return_table.
 
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)

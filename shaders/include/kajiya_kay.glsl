@@ -19,15 +19,15 @@ float kajiya_kay_specular(vec3 T, vec3 L, vec3 V, float exponent)
   return pow(max(0.0, cone), exponent);
 }
 
-// What the highlight returns of a uniform surrounding, the mean over all directions of view: with s = theta_i + theta_o
-// it is pi/2 times the integral of cos(s)^exponent ((pi - |s|) cos(s) + sin|s|), and close to pi²/2 times that of
-// cos(s)^(exponent + 1). Within 0.5 % for an exponent of 10 and more, 5 % for 1.
+// Directional albedo of the highlight under uniform light, the mean over all directions of view: with
+// s = theta_i + theta_o it is pi/2 times the integral of cos(s)^exponent ((pi - |s|) cos(s) + sin|s|), and close to
+// pi²/2 times that of cos(s)^(exponent + 1). Within 0.5 % for an exponent of 10 and more, 5 % for 1.
 float kajiya_kay_specular_albedo(float exponent)
 {
   return 0.5 * PI * PI * sqrt(2.0 * PI / (exponent + 1.5));
 }
 
-// Exponent of a highlight of light whose direction has a variance: that of the highlight is close to 1 / exponent.
+// Exponent of a highlight of light with an angular variance: the variance of the highlight is close to 1 / exponent.
 float blurred_exponent(float exponent, float blur)
 {
   return exponent / (1.0 + exponent * blur);
@@ -39,13 +39,13 @@ float highlight_exponent(float roughness)
   return clamp(1.0 / variance_from_roughness(roughness), 1.0, 10000.0);
 }
 
-// Brightness of the middle of a highlight that returns `reflectance` of a uniform surrounding.
+// Peak of a highlight whose directional albedo under uniform light is `reflectance`.
 float highlight_peak(float reflectance, float exponent)
 {
   return min(reflectance / kajiya_kay_specular_albedo(exponent), 1.0);
 }
 
-// The colour that light takes on among many fibres [Chiang16].
+// Colour of multiply scattered light in hair [Chiang16].
 vec3 color_from_falloff(vec3 sigma_a, float falloff)
 {
   return exp(-falloff * sqrt(sigma_a));

@@ -23,7 +23,7 @@ float light_blur(int kind, vec3 light_position, float radius, vec3 position)
   return 0.25 * min(squared, 1.0);
 }
 
-// How much of a spot light's beam arrives at an angle: one inside, zero outside the cone, smooth over the part
+// Attenuation of a spot light's beam at an angle: one inside, zero outside the cone, smooth over the part
 // `blend` of the way, in cosines, from the cone to the axis.
 float spot_falloff(float cos_angle, float cos_cone, float blend)
 {

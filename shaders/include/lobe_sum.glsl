@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The lobes of the energy-conserving model [DEon11] [Chiang16], put together.
+// Sum of the lobes of the energy-conserving model [DEon11] [Chiang16].
 
 // N of a fibre at one azimuth and inclination.
 struct FibreLobes {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How light spreads along a rough fibre: [DEon11] with the roughness of [Chiang16].
+// Longitudinal scattering of a rough fibre: [DEon11] with the roughness of [Chiang16].
 
 #include "include/fibre.glsl"
 #include "include/principled.glsl"
@@ -27,7 +27,7 @@ float d_eon_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float v)
   return i0e(cos_i * cos_o / v) * exp(beside_cone / v) / (v * (1.0 - exp(-2.0 / v)));
 }
 
-// One lobe of m_lobes(): the view's inclination turned back by the lobe's shift.
+// One lobe of m_lobes(): the view's inclination shifted back by the lobe's tilt.
 float shifted_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float shift, float v)
 {
   float sin_turned = sin_o * cos(shift) - cos_o * sin(shift);
@@ -35,7 +35,7 @@ float shifted_lobe(float sin_i, float cos_i, float sin_o, float cos_o, float shi
   return d_eon_lobe(sin_i, cos_i, sin_turned, cos_turned, v);
 }
 
-// M_R, M_TT, M_TRT and M of the residual; tilt_trt: shift of TRT per tilt, in theta_i + theta_o; widening: what is added
+// M_R, M_TT, M_TRT and M of the residual; tilt_trt: shift of TRT per tilt, in theta_i + theta_o; widening: added
 // to each variance.
 vec4 m_lobes(float sin_theta_i,
              float sin_theta_o,

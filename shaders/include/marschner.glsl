@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// [Marschner03] from baked tables: where to look, and how the lobes are put together (Eq. 14).
+// [Marschner03] from baked tables: texture coordinates, and the sum of the lobes (Eq. 14).
 
 #include "include/fibre.glsl"
 #include "include/principled.glsl"
@@ -14,7 +14,7 @@ vec2 m_coordinates(float sin_theta_i, float sin_theta_o, int axes)
   if (axes == AXES_COSINES) {
     return 0.5 * sines + 0.5;
   }
-  // The arc sine by way of atan, which drivers compute a hundred times more closely.
+  // The arc sine by atan, which drivers compute a hundred times more accurately.
   vec2 thetas = atan(sines, vec2(sin_from_cos(sines.x), sin_from_cos(sines.y)));
   return thetas / PI + 0.5;
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// How far what is seen moves in a picture, as Cycles has it: to where it was a frame before, and from where it will be a frame
-// after [pixels].
+// Motion vectors [pixels] with Cycles' conventions: to the position in the previous frame, and from that in the next.
 
 vec2 picture_place(vec4 clip, vec2 size)
 {

@@ -3,8 +3,8 @@
 
 #include "include/lights.glsl"
 
-// Depth as shadows of surfaces are filtered by: what is far behind counts for little beside what is in front, so that a
-// part of it is told from the whole [Lauritzen08].
+// Warped depth for filtering the shadows of surfaces: distant occluders get a low weight, which reduces light bleeding
+// [Lauritzen08].
 const float WARP = 5.0;
 
 float warped_depth(float depth)
@@ -12,21 +12,21 @@ float warped_depth(float depth)
   return -exp(-WARP * max(depth, -0.25));
 }
 
-// Depths of the four layers' far sides behind the first strand, as parts of the hair's extent: thin where light dies.
+// Depths of the four layers' far sides behind the first strand, as parts of the hair's extent: thin where light fades.
 const vec4 LAYER_ENDS = vec4(0.007, 0.058, 0.205, 0.5);
 
-// Depth of what no light meets.
+// Depth of unlit texels.
 const float FAR = 2.0;
 
-// Depth along a light: how far its light has come beyond the near side of the hair, as a part of the hair's extent. What
-// is far off on either side counts as a little outside: depths are averaged.
+// Depth along a light, from the near side of the hair, as a part of the hair's extent. Depths far outside are clamped
+// to just outside, as depths are averaged.
 float light_depth(int kind, vec3 light_position, vec3 axis, float near, float extent, vec3 position)
 {
   float way = (kind == LIGHT_SUN) ? dot(axis, position) : distance(light_position, position);
   return clamp((way - near) / extent, -1.0, FAR);
 }
 
-// Layers that lie behind a strand at this depth, as parts of the extent: it darkens its own and all deeper ones.
+// Opacity of the layers by a strand at this depth, as parts of the extent: its own and all deeper ones.
 vec4 layers_behind(float depth)
 {
   return vec4(lessThanEqual(vec4(depth), LAYER_ENDS)) + vec4(0.0, 0.0, 0.0, float(depth > LAYER_ENDS.w));
@@ -39,10 +39,10 @@ int layer_of(float depth)
   return min(int(dot(ends, vec4(1.0))), 3);
 }
 
-// Strands are counted in whole numbers of this part of one: sums do not depend on their order.
+// Strands are counted in integer multiples of this fraction: sums do not depend on the order.
 const float COUNT_UNIT = 4096.0;
 
-// A front as a whole number, and back.
+// A front depth as an integer, and back.
 uint front_bits(float depth)
 {
   return floatBitsToUint(depth + 1.0);  // not negative: then bits have the order of floats

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Segments of strands, each between two neighbouring points, as they lie in a picture: needs the sampler strands.
+// Segments of strands, each between two neighbouring points, in image space: needs the sampler strands.
 
 #include "include/drawn_strand.glsl"
 #include "include/strand.glsl"
 
-// From which of a strand's points on a piece runs to where the next one starts.
+// Index of the strand point at which a segment starts.
 int piece_start(int piece)
 {
   return piece * (view.point_count - 1) / (view.drawn_points - 1);
@@ -16,7 +16,7 @@ vec4 strand_point(int strand, int point)
   return texelFetch(strands, strand_texel(strand, point, view.point_count, view.row_strands), 0);
 }
 
-// What of a segment lies in front of the near plane: its two ends.
+// The part of a segment in front of the near plane: its two ends.
 struct Segment {
   vec3 start;  // [samples], and the depth from 0 to 1
   vec3 end;
@@ -60,11 +60,11 @@ bool segment_in_front(vec4 start, vec4 end, vec2 radii, vec2 size, out Segment s
   return true;
 }
 
-// How far from the first to the second point a place of the picture lies, on the axis of the segment.
+// Parameter in [0, 1] of a point of the picture along the axis of a segment.
 float place_on_segment(Segment segment, vec2 place)
 {
   vec2 along = segment.end.xy - segment.start.xy;
   float on_screen = clamp(dot(place - segment.start.xy, along) / max(dot(along, along), 1e-12), 0.0, 1.0);
-  float near_end = on_screen * segment.w.x;  // what is further away is shorter
+  float near_end = on_screen * segment.w.x;  // perspective
   return mix(segment.part.x, segment.part.y, near_end / mix(segment.w.y, segment.w.x, on_screen));
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The main that every shading model includes: hair_bsdf() summed over the scene's lights, plus the world's light, for each
+// The main function of all shading models: the sum over the scene's lights plus the world's light, for each
 // sample of a picture in which a strand of this hair is nearest.
 //
 // vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
 //     light leaving the fibre towards V for unit irradiance from around L outside the hair, with a mean of `count` strands
 //     between; blur: variance of the light's direction along an axis [rad²]
 // void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
-//     what it sends back of light from everywhere: the integral over phi, and the same weighted with the cosine of phi
+//     response to uniform light: the integral over phi, and the same weighted with the cosine of phi
 
 #include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
@@ -14,7 +14,7 @@
 #include "include/strand_samples.glsl"
 #include "include/world.glsl"
 
-const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not seen beside any light
+const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not visible
 
 // Radiance towards the viewer of the place that `find_place` found.
 vec3 strand_light()
@@ -53,7 +53,7 @@ vec3 strand_light()
       count = crossed_strands(at, depth);
       radiance += drawn_lobes.w * irradiance * surface_bounce(at, depth, count) * returned;
     }
-    // Most of a head of hair lies in the shadow of the rest, where nothing is left to scatter.
+    // Most strands are in the shadow of the others, with no light to scatter.
     vec3 arriving = irradiance * transmitted(count, view.hair_forward.rgb);
     if (max(arriving.r, max(arriving.g, arriving.b)) > LEAST_IRRADIANCE) {
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);

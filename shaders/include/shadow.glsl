@@ -3,11 +3,11 @@
 
 #include "include/opacity.glsl"
 
-// How far around a strand, as a part of the map, and how far behind it, as a part of the hair, surfaces light it.
+// Range around a strand, as a part of the map, and behind it, as a part of the hair, in which surfaces light it.
 const float BOUNCE_REACH = 0.025;
 const float BOUNCE_DISTANCE = 0.25;
 
-// How far apart a surface and itself may be, as a part of the hair's extent.
+// Depth bias of surfaces, as a part of the hair's extent.
 const float SURFACE_BIAS = 0.01;
 
 // Place of a point in a light's maps, and its depth; false where the maps do not reach: they hold the hair and what is
@@ -24,7 +24,7 @@ bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
   return clip.w > 0.0 && at.xy == clamp(at.xy, vec2(0.0), vec2(1.0));
 }
 
-// Part of the light that gets past surfaces: at most this part of those around have a depth beyond it [Donnelly06].
+// Visibility of the light past surfaces: the upper bound of the part with a greater depth [Donnelly06].
 float lit_part(vec3 at, float depth)
 {
   vec2 moments = textureLod(surface_moments, at, 0.0).rg;
@@ -44,8 +44,8 @@ float crossed_strands(vec3 at, float depth)
   return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
 }
 
-// How much of the light's way on is barred by a surface near enough to light a strand from below: the mean over places
-// around it, as no surface ends for a strand where it ends for a ray.
+// Part of the light stopped by a surface near enough to light a strand from below: the mean over points around it,
+// which softens the surface's border.
 float surface_under(vec3 at, float depth)
 {
   float barred = 0.0;
@@ -57,8 +57,8 @@ float surface_under(vec3 at, float depth)
   return 0.25 * barred;
 }
 
-// What the surface under the hair sends back to a strand from below, for unit irradiance of the light: through the rest
-// of the hair, off a matt surface, and through the hair again.
+// Light reflected to a strand from the surface below, for unit irradiance of the light: through the rest
+// of the hair, off a diffuse surface, and through the hair again.
 vec3 surface_bounce(vec3 at, float depth, float count)
 {
   float surface = min(textureLod(surface_moments, at, 0.0).b, depth + BOUNCE_DISTANCE);
@@ -68,7 +68,7 @@ vec3 surface_bounce(vec3 at, float depth, float count)
   return view.surface_color.rgb * way * surface_under(at, depth) * (2.0 / 3.0) * 0.5 / PI;
 }
 
-// Part of a light that arrives at a surface: the mean over 3 × 3 texels. forward: what one strand passes on.
+// Visibility of a light from a surface: the mean over 3 × 3 texels. forward: the forward scattering of one strand.
 vec3 surface_visibility(Light light, vec3 position, vec3 forward)
 {
   vec3 at;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// For models that know one fibre only: light is dimmed on its way through strands, and keeps its direction.
+// For models without multiple scattering: light is attenuated by strands, and keeps its direction.
 
 #include "include/opacity.glsl"
 

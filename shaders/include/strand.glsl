@@ -12,7 +12,7 @@ void strip_vertex(int vertex, int point_count, out int strand, out int point, ou
   side = float(2 * (local - 2 * point) - 1);
 }
 
-// Every how many-th point of a strand has a texel of its own in the visibility textures.
+// Interval of the strand points that have a texel in the visibility textures.
 const int SEEN_STEP = 4;
 
 // Texel of a point: each row of the texture holds `row_strands` whole strands.

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Absorption that differs from strand to strand and from root to tip. Variation: `strand_variation.Settings`.
+// Absorption that varies between and along strands. Variation: `strand_variation.Settings`.
 
 // How the amount of pigment changes with a strand's random number, as Cycles changes melanin.
 float pigment_factor(float melanin, float random_color, float random)

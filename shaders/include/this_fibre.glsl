@@ -34,7 +34,7 @@ float between_ends(float value, float texel_count)
   return (clamp(value, 0.0, 1.0) * (texel_count - 1.0) + 0.5) / texel_count;
 }
 
-// Of light from everywhere, what one channel's absorption sends back towards theta_o: the integral over phi, and the
+// Response to uniform light towards theta_o for one channel's absorption: the integral over phi, and the
 // same weighted with the cosine of phi. As `albedo.fibre_moments`.
 vec2 channel_return(float u, float sigma_a)
 {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Where on which strand a sample of the picture lies, for all that shades it.
+// The strand and the position along it of a sample, for shading.
 
 #include "include/segment.glsl"
 
@@ -8,7 +8,7 @@ float strand_position;  // root 0 to tip 1
 vec3 strand_tangent;
 vec3 drawn_position;
 
-// Direction of a strand at a point, as long as it may be; any where the strand turns back on itself.
+// Direction of a strand at a point, of any length; arbitrary where the strand folds back on itself.
 vec3 tangent_at(vec3 before, vec3 after)
 {
   vec3 along = after - before;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What differs from strand to strand and along each, where this sample lies: needs the sampler strand_randoms and the
+// Variation between and along strands at this sample: needs the sampler strand_randoms and the
 // block variation.
 
 #include "include/constants.glsl"

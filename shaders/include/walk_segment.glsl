@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strands as samples of a picture, a thread for each run of segments. Hair is lines a sample wide, for which this is faster
-// than triangles: graphics hardware draws those four samples at a time, software drivers at an even greater cost.
+// Rasterisation of strands, a thread for each run of segments. Hair consists of lines one sample wide, for which this is
+// faster than triangles: graphics hardware draws those four samples at a time, software drivers at an even greater cost.
 
 #include "include/segment.glsl"
 
-// Segments that a thread takes one after the other: their points are read and brought into the picture once.
+// Consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;
 
-// What a program does at the start of a segment, and at each sample that it covers: how far along, and how much of the width
-// that is drawn is the strand's own.
+// Functions that a program defines for the start of a segment, and for each covered sample: its parameter along the
+// segment, and the coverage of the drawn width by the strand.
 void begin(int strand, int piece, Segment segment, vec4 first, vec4 second);
 void meet(ivec2 place, float along, float coverage);
 

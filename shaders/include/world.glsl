@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The light of the world, as far as it gets through hair and past surfaces: six sides, each with its own radiance and the
-// part of its directions that is open, `sphere.SIDES` as +x -x +y -y and +z -z.
+// Light of the world, attenuated by hair and surfaces: an ambient cube, each side with its radiance and the
+// visible part of its directions, `sphere.SIDES` as +x -x +y -y and +z -z.
 
 #include "include/fibre.glsl"
 
@@ -26,17 +26,17 @@ vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
 {
   vec3 irradiance = vec3(0.0);
   for (int axis = 0; axis < 3; axis++) {
-    // Squared cosines share the half sphere out among three sides.
+    // Squared cosines distribute the half sphere among three sides.
     irradiance += PI * N[axis] * N[axis] * (N[axis] > 0.0 ? plus[axis] : minus[axis]);
   }
   return irradiance;
 }
 
-// Radiance of a strand towards V. returned: what it sends back of light from everywhere; towards: the moment of that over
-// the cosine of phi, by which it sends more to where the light comes from, or less.
+// Radiance of a strand towards V. returned: response to uniform light; towards: its moment with the cosine of phi,
+// positive if the strand scatters more light backward.
 vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 towards)
 {
-  // A fibre receives light in proportion to its sine with the direction, from either end alike.
+  // A fibre receives light in proportion to the sine between tangent and direction.
   vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
   float sin_theta_o = dot(T, V);
   // sin(T, side) cos(phi) of each side: V across the strand.

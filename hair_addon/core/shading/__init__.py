@@ -1,2 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How a fibre scatters light: the reference that the shaders must match."""
+"""Light scattering by fibres: the reference for the shaders."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import appearance, fibre, presets, tables
+else:
+    __getattr__ = submodules(__name__)

@@ -1,16 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What artists set, once, for the viewport's models and for Cycles: names, units and defaults are Principled Hair's."""
+"""What artists set, once, for the viewport's models and for Cycles: names and units are Principled Hair's.
+
+So are the defaults, but for the pigment: dark blond, which shows its shading in the light of Blender's start-up scene.
+"""
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
-from ..params import Settings, param
-from . import kajiya_kay, lookup_tables, strand_variation
-from .fresnel import dielectric_reflectance
-from .marschner import beta_r_of
-from .pigment import color_falloff, color_from_sigma_a, sigma_a_from_color, sigma_a_from_melanin
+from ..params import Settings, param, param_of
+from .fibre import kajiya_kay, marschner, strand_variation
+from .fibre.fresnel import dielectric_reflectance
+from .fibre.pigment import color_falloff, color_from_sigma_a, sigma_a_from_color, sigma_a_from_melanin
+from .tables import lookup_tables
 
 _WHITE = (1.0, 1.0, 1.0)
 
@@ -28,79 +32,75 @@ COLOR_FIELDS = {"MELANIN": ("melanin", "redness", "tint"), "COLOR": ("color",), 
 class Appearance(Settings):
     """The look of hair."""
 
-    mode: str = param(
-        "energy",
-        "Which of Marschner's models the viewport draws",
-        label="Model",
-        choices=(
-            ("energy", "Energy Conserving", "A rough fibre that loses nothing, as Cycles has it [Chiang16]"),
-            ("classic", "Classic", "Gaussian lobes of a smooth fibre, with glints [Marschner03]"),
-        ),
-    )
+    mode: str = param_of(marschner.Settings, "mode", "energy")
     parametrization: str = param(
         "MELANIN",
-        "What the colour of hair follows from",
+        "Method to set the hair color",
         label="Color from",
         choices=(
-            ("MELANIN", "Melanin", "Amount and kind of natural pigment, and a dye"),
-            ("COLOR", "Color", "The colour of a full head of hair"),
-            ("ABSORPTION", "Absorption", "What the fibre absorbs per radius"),
+            ("MELANIN", "Melanin", "Natural pigment and an optional dye"),
+            ("COLOR", "Color", "Overall color of the hair"),
+            ("ABSORPTION", "Absorption", "Absorption coefficient of the fiber"),
         ),
     )
-    melanin: float = param(0.8, "Amount of pigment: 0.2 is blond, 0.66 brown, 1 black", low=0.0, high=1.0)
-    redness: float = param(1.0, "Part of the pigment that is red", label="Redness", low=0.0, high=1.0)
-    tint: tuple = param(_WHITE, "Colour of a dye over the melanin", low=0.0, high=1.0, subtype="COLOR")
+    melanin: float = param(
+        0.34, "Amount of pigment; higher values are darker: 0.2 is blond, 0.66 brown, 1 black", low=0.0, high=1.0
+    )
+    redness: float = param(
+        0.3, "Proportion of red pigment; higher values are redder", label="Redness", low=0.0, high=1.0
+    )
+    tint: tuple = param(_WHITE, "Color of a dye over the melanin; white is no dye", low=0.0, high=1.0, subtype="COLOR")
     color: tuple = param(
-        (0.017513, 0.005763, 0.002059), "Colour of a full head of hair", low=0.0, high=1.0, subtype="COLOR"
+        (0.017513, 0.005763, 0.002059), "Overall color of the hair", low=0.0, high=1.0, subtype="COLOR"
     )
-    absorption: tuple = param(
-        (0.245531, 0.52, 1.365), "Absorption of red, green and blue light per fibre radius", low=0.0, high=1000.0
-    )
-    roughness: float = param(0.3, "Spread of highlights along the fibre", low=0.0, high=1.0, subtype="FACTOR")
-    radial_roughness: float = param(0.3, "Spread of light around the fibre", low=0.0, high=1.0, subtype="FACTOR")
-    coat: float = param(
-        0.0, "How much sharper the first highlight is than the others", low=0.0, high=1.0, subtype="FACTOR"
-    )
-    ior: float = param(1.55, "Refractive index of the fibre", label="IOR", low=1.01, high=3.0, soft_high=2.0)
-    cuticle_angle: float = param(
-        math.radians(2.0),
-        "Tilt of the cuticle's scales, which moves the highlights apart",
-        low=math.radians(-20.0),
-        high=math.radians(20.0),
-        unit="ROTATION",
-        subtype="ANGLE",
-    )
+    absorption: tuple = param_of(marschner.Settings, "sigma_a", (0.245531, 0.52, 1.365))
+    roughness: float = param_of(marschner.Settings, "roughness")
+    radial_roughness: float = param_of(marschner.Settings, "radial_roughness")
+    coat: float = param_of(marschner.Settings, "coat")
+    ior: float = param_of(marschner.Settings, "eta")
+    cuticle_angle: float = param_of(marschner.Settings, "tilt", math.radians(2.0))
     random_color: float = param(
-        0.0, "How much pigment differs from strand to strand", low=0.0, high=1.0, subtype="FACTOR"
+        0.0, "Random variation of the pigment between strands", low=0.0, high=1.0, subtype="FACTOR"
     )
     random_roughness: float = param(
-        0.0, "How much roughness differs from strand to strand", low=0.0, high=1.0, subtype="FACTOR"
+        0.0, "Random variation of the roughness between strands", low=0.0, high=1.0, subtype="FACTOR"
     )
     tip_absorption: float = param(
-        1.0, "Pigment at the tip, relative to the root: below 1 bleached, above 1 darker", low=0.0, high=10.0
+        1.0,
+        "Pigment at the tip relative to the root; values below 1 bleach the tips, values above 1 darken them",
+        low=0.0,
+        high=10.0,
     )
-    tip_tint: tuple = param(_WHITE, "Colour of a dye at the tip", low=0.0, high=1.0, subtype="COLOR")
+    tip_tint: tuple = param(_WHITE, "Color of a dye at the tip; white is no dye", low=0.0, high=1.0, subtype="COLOR")
     gradient_start: float = param(
-        0.3, "Part of the length at which the tip's colour begins", low=0.0, high=1.0, subtype="FACTOR"
+        0.3,
+        "Position along the strand where the tip color begins; 0 is the root, 1 the tip",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
     )
     gradient_end: float = param(
-        1.0, "Part of the length at which the tip's colour is reached", low=0.0, high=1.0, subtype="FACTOR"
+        1.0,
+        "Position along the strand where the tip color is reached; 0 is the root, 1 the tip",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
     )
 
 
-def sigma_a(appearance):
+def sigma_a(appearance: Appearance) -> tuple[float, ...]:
     """Absorption per radius, RGB, of an average strand at its root."""
     strands = strand_settings(appearance)
     return tuple(float(pigment + dye) for pigment, dye in zip(strands.pigment, strands.dye, strict=True))
 
 
-def mean_color(appearance):
+def mean_color(appearance: Appearance) -> np.ndarray:
     """The colour of a full head of this hair, RGB (3,), the mean over all strands from root to tip."""
     sigma_a_everywhere = strand_variation.sample_sigma_a(strand_settings(appearance))
     return color_from_sigma_a(sigma_a_everywhere, appearance.radial_roughness).reshape(-1, 3).mean(axis=0)
 
 
-def strand_settings(appearance):
+def strand_settings(appearance: Appearance) -> strand_variation.Settings:
     """`Appearance` → `strand_variation.Settings`: absorption from strand to strand and along each."""
     pigment, dye, melanin = _absorption(appearance)
     return strand_variation.Settings(
@@ -133,7 +133,7 @@ def _dye(tint, radial_roughness):
     )
 
 
-def table_settings(appearance, base=None):
+def table_settings(appearance: Appearance, base: lookup_tables.Settings | None = None) -> lookup_tables.Settings:
     """`Appearance` → `lookup_tables.Settings` of an average strand at its root.
 
     base: settings that the rest is taken from: size and axes of the tables, shifts, glints of the classic mode.
@@ -147,11 +147,11 @@ def table_settings(appearance, base=None):
         roughness=appearance.roughness,
         radial_roughness=appearance.radial_roughness,
         coat=appearance.coat,
-        beta_r=float(beta_r_of(appearance.roughness)),
+        beta_r=float(marschner.beta_r_of(appearance.roughness)),
     )
 
 
-def kajiya_kay_settings(appearance):
+def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
     """`Appearance` → `kajiya_kay.Settings`: the groom's colour, and a highlight with R's width and R's energy."""
     exponent = float(kajiya_kay.highlight_exponent((1.0 - appearance.coat) * appearance.roughness))
     peak = float(kajiya_kay.highlight_peak(_mean_reflectance(appearance.ior), exponent))
@@ -159,7 +159,7 @@ def kajiya_kay_settings(appearance):
     return kajiya_kay.Settings(tuple(map(float, color)), (peak,) * 3, exponent)
 
 
-def kajiya_kay_strand_settings(appearance):
+def kajiya_kay_strand_settings(appearance: Appearance) -> kajiya_kay.StrandSettings:
     """`Appearance` → `kajiya_kay.StrandSettings`: the same for strands that differ."""
     return kajiya_kay.StrandSettings(
         falloff=float(color_falloff(appearance.radial_roughness)),
@@ -170,7 +170,7 @@ def kajiya_kay_strand_settings(appearance):
 
 
 def _mean_reflectance(eta):
-    """What the surface of a fibre reflects of light from everywhere."""
+    """Directional albedo of a fibre's surface under uniform light."""
     nodes, weights = np.polynomial.legendre.leggauss(32)
     theta, gamma = 0.25 * np.pi * (1.0 + nodes)[:, None], 0.25 * np.pi * (1.0 + nodes)[None, :]
     # Of directions cos(theta), of offsets in the width cos(gamma): both quadratures sum to one.
@@ -178,7 +178,7 @@ def _mean_reflectance(eta):
     return float(np.average(dielectric_reflectance(np.cos(theta) * np.cos(gamma), eta), weights=measure))
 
 
-def principled_sockets(appearance):
+def principled_sockets(appearance: Appearance) -> dict[str, Any]:
     """`Appearance` → {socket: value} of Principled Hair: model Chiang, parametrization Absorption.
 
     The absorption is that of an average strand at its root; `strand_settings` says how the others differ.

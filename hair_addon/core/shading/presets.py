@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Named looks of hair, as data: {identifier: (label, Appearance)} in the order of a menu.
 
-Water lies on a wet fibre in place of air: it fills the gaps between the cuticle's scales, which leaves one smooth
-surface (narrow highlights, no tilt, a coat), and lowers the index that light inside the hair meets: 1.55 / 1.33.
+Water covers a wet fibre: it fills the gaps between the cuticle's scales, which gives a smooth surface (narrow
+highlights, no tilt, a coat), and lowers the relative index of refraction: 1.55 / 1.33.
 """
 
 from dataclasses import replace
@@ -19,7 +19,7 @@ _LIGHT_BROWN = Appearance(melanin=0.48, redness=0.3, random_color=0.1, random_ro
 _BLOND = Appearance(melanin=0.22, redness=0.3, random_color=0.15, random_roughness=0.1)
 _AUBURN = Appearance(melanin=0.68, redness=0.8, random_color=0.1)
 
-# Grey hair is white and dark strands side by side, coarser than what grew before. A little melanin would make it blond.
+# Grey hair is a mixture of white and dark strands, coarser than before. A little melanin would make it blond.
 _GREY = Appearance(
     parametrization="COLOR", color=(0.02, 0.0185, 0.017), roughness=0.35, random_color=1.0, random_roughness=0.2
 )
@@ -38,7 +38,7 @@ PRESETS = {
     ),
     "AUBURN": ("Auburn", _AUBURN),
     "GINGER": ("Ginger", Appearance(melanin=0.42, redness=0.97, random_color=0.12)),
-    "GREY": ("Grey", _GREY),
+    "GREY": ("Gray", _GREY),
     "WHITE": ("White", Appearance(melanin=0.02, redness=0.2, roughness=0.35, random_color=0.2)),
     "DYED_BLUE": ("Dyed Blue", Appearance(melanin=0.03, redness=0.3, tint=(0.02, 0.08, 0.6), random_color=0.1)),
     "DYED_PINK": (

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files of settings and tables, and file locks between processes."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import file_lock, settings_file, table_cache, table_exr, whole_file
+else:
+    __getattr__ = submodules(__name__)

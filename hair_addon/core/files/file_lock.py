@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""File locks that assign a file to one of several processes, on one machine or on several.
+
+A claim is a lock on a file beside the one to be written. The operating system releases it when its process ends, in
+any way: so killed processes do not block others.
+"""
+
+import contextlib
+import errno
+import os
+import sys
+from collections.abc import Generator
+from pathlib import Path
+
+if sys.platform == "win32":
+    import msvcrt
+else:
+    import fcntl
+
+_HELD = {errno.EACCES, errno.EAGAIN, errno.EDEADLK, errno.EWOULDBLOCK}
+_NO_LOCKS = {errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP, errno.ENOTSUP, errno.EINVAL}
+
+
+@contextlib.contextmanager
+def claim(path: str | Path) -> Generator[bool]:
+    """Whether a file is this process's to make, for as long as this is entered: False where another is at it.
+
+    On file systems without locks every claim succeeds: work is then done twice, and each file is still complete. Raises
+    OSError if the folder is not writable.
+    """
+    beside = claim_of(path)
+    descriptor = _locked(beside)
+    try:
+        yield descriptor is not None
+    finally:
+        if descriptor is not None:
+            # Removed while it is locked: a process that waits for this file detects that it is no longer at its path.
+            with contextlib.suppress(OSError):  # Windows does not remove open files
+                beside.unlink()
+            os.close(descriptor)
+            with contextlib.suppress(OSError):
+                if sys.platform == "win32":
+                    beside.unlink()
+
+
+def claim_of(path: str | Path) -> Path:
+    """The file that is locked while a path is written."""
+    path = Path(path)
+    return path.with_name(f".{path.name}.claim")
+
+
+def _locked(path):
+    """A descriptor that holds the lock of a file, or None where another process does."""
+    while True:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            _lock(descriptor)
+        except OSError as error:
+            if error.errno in _NO_LOCKS:
+                return descriptor
+            os.close(descriptor)
+            if error.errno in _HELD:
+                return None
+            raise
+        if _is_at(descriptor, path):
+            return descriptor
+        os.close(descriptor)  # its last owner has removed the file meanwhile
+
+
+def _lock(descriptor):
+    if sys.platform == "win32":
+        msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+    else:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+
+def _is_at(descriptor, path):
+    try:
+        return os.path.samestat(os.fstat(descriptor), os.stat(path))
+    except FileNotFoundError:
+        return False

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Files that appear whole or not at all: written beside their place, and moved there in the end."""
+
+import contextlib
+import os
+import secrets
+from collections.abc import Generator, Iterable
+from pathlib import Path
+
+from ..errors import HairError, cause_of
+
+
+@contextlib.contextmanager
+def whole_file(path: str | Path, partial: Path | None = None) -> Generator[Path]:
+    """`whole_files` of one file; partial: the temporary path, None for a new one."""
+    with whole_files([path], None if partial is None else [partial]) as (there,):
+        yield there
+
+
+@contextlib.contextmanager
+def whole_files(paths: Iterable[str | Path], partials: list[Path] | None = None) -> Generator[list[Path]]:
+    """Paths beside `paths` to write to: when all are written they take their places, after an error none does.
+
+    partials: those paths, None for new ones. Raises `HairError` where a folder may not be written or its disk is full,
+    of which not every program that writes tells.
+    """
+    places = [Path(path) for path in paths]
+    for path in places:
+        _require_file(path)
+    # In the same folder, otherwise paths relative to the file would be wrong.
+    partials = partials or [path.with_name(f".vellus_{secrets.token_hex(4)}{path.suffix}") for path in places]
+    try:
+        for path in places:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        yield partials
+        for path, partial in zip(places, partials, strict=True):
+            if not (partial.is_file() and partial.stat().st_size):
+                raise HairError(f"{path} was not written: its exporter left no file, or an empty one.")
+        require_room(partial, 65_536)
+        for path, partial in zip(places, partials, strict=True):
+            os.replace(partial, path)
+    except (OSError, RuntimeError) as error:
+        raise HairError("{path} cannot be written: {cause}.", path=places[0], cause=cause_of(error)) from error
+    finally:
+        for partial in partials:
+            with contextlib.suppress(OSError):  # it has moved to its place, or was never made
+                partial.unlink()
+
+
+def partial_of(path: Path) -> Path:
+    """Return the path for writing a claimed file: leftovers of killed processes are replaced there."""
+    return path.with_name(f".vellus_{path.name}")
+
+
+def require_room(path: Path, byte_count: int) -> None:
+    """Raise OSError unless a file can grow by `byte_count`; it is left unchanged, and is created empty if missing."""
+    with open(path, "ab") as file:
+        size = file.seek(0, os.SEEK_END)
+        try:
+            for start in range(0, byte_count, 2**20):
+                file.write(bytes(min(2**20, byte_count - start)))
+            file.flush()
+            os.fsync(file.fileno())
+        finally:
+            file.truncate(size)
+
+
+def require_place(path: str | Path) -> None:
+    """Raise `HairError` unless a file could be written at `path`: asked before long work."""
+    path = Path(path)
+    _require_file(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(f".vellus_{secrets.token_hex(4)}")
+        partial.touch()
+        partial.unlink()
+    except OSError as error:
+        raise HairError("{path} cannot be written: {cause}.", path=path, cause=cause_of(error)) from error
+
+
+def _require_file(path):
+    """Raise `HairError` unless there is a file at a path, or nothing; a device would give its place to the file."""
+    try:
+        is_taken = path.stat() and not path.is_file()
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError) as error:  # ValueError: a character not allowed in file names
+        raise HairError("{path} cannot be written: {cause}.", path=path, cause=cause_of(error)) from error
+    if is_taken:
+        raise HairError("{path} cannot be written: {cause}.", path=path, cause="it is a folder or a device")

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes and polylines as arrays: sampling, nearest neighbours, evaluation, surface deformation."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        bspline,
+        closest_point,
+        connected_components,
+        curvature,
+        fingerprint,
+        hash_grid,
+        mesh,
+        resampling,
+        root_frames,
+        sampling,
+        strands,
+        surface_deform,
+        texture,
+        transform,
+        uv_check,
+    )
+else:
+    __getattr__ = submodules(__name__)

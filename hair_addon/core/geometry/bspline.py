@@ -1,0 +1,142 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""B-spline curves three ways: the recursive basis, subdivision, and a constant matrix on Warp  ([Report12] 2.2).
+
+The report states that the first two cannot run in parallel. But curves are always evaluated at the same parameters,
+so the basis is computed once, and every point of a curve is a small product with its control points.
+"""
+
+from functools import lru_cache
+
+import numpy as np
+import warp as wp
+
+from ..kernels import kernel_cache
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+
+def clamped_knots(control_count: int, degree: int = 3) -> np.ndarray:
+    """(control_count + degree + 1,) knots on [0, 1]: ends repeated, so that curves start and end at their controls."""
+    if not 1 <= degree < control_count:
+        raise ValueError(f"a B-spline of degree {degree} needs more than {degree} control points, not {control_count}")
+    inside = np.linspace(0.0, 1.0, control_count - degree + 1)
+    return np.concatenate([np.zeros(degree), inside, np.ones(degree)])
+
+
+def greville_abscissae(control_count: int, degree: int = 3) -> np.ndarray:
+    """(control_count,) parameters: controls spaced like these along a line give points evenly spaced along it."""
+    knots = clamped_knots(control_count, degree)
+    return np.array([knots[i + 1 : i + degree + 1].mean() for i in range(control_count)])
+
+
+def basis(parameters: np.ndarray, control_count: int, degree: int = 3) -> np.ndarray:
+    """N_{i,p}(t): (T,) parameters in [0, 1] → (T, control_count) float64, by the recursion of Cox and de Boor."""
+    knots = clamped_knots(control_count, degree)
+    t = np.asarray(parameters, dtype=np.float64)[:, None]
+    values = ((knots[:-1] <= t) & (t < knots[1:])).astype(np.float64)  # Eq. 2
+    # With half-open spans only, nothing would hold the tip: the last span that is not empty is closed.
+    values[t[:, 0] == 1.0, control_count - 1] = 1.0
+    for p in range(1, degree + 1):  # Eq. 3, with 0/0 = 0 where knots repeat
+        rising = _ratio(t - knots[: -p - 1], knots[p:-1] - knots[: -p - 1])
+        falling = _ratio(knots[p + 1 :] - t, knots[p + 1 :] - knots[1:-p])
+        values = rising * values[:, :-1] + falling * values[:, 1:]
+    return values
+
+
+def evaluate_recursive(
+    controls: np.ndarray, parameters: np.ndarray, degree: int = 3, weights: np.ndarray | None = None
+) -> np.ndarray:
+    """Controls (C, n, 3) [m] at (T,) parameters in [0, 1] → (C, T, 3) float64 [m].  Eq. 1 as corrected.
+
+    weights: (n,) or (C, n), positive, for rational curves (NURBS); None for plain ones.
+    """
+    controls = np.asarray(controls, dtype=np.float64)
+    values = basis(parameters, controls.shape[1], degree)
+    if weights is None:
+        return values @ controls
+    weights = np.broadcast_to(np.asarray(weights, dtype=np.float64), controls.shape[:2])[..., None]
+    return (values @ (weights * controls)) / (values @ weights)
+
+
+def subdivide(controls: np.ndarray, levels: int) -> np.ndarray:
+    """Controls (C, n, 3) [m] → (C, (n - 1) 2^levels + 1, 3) float64 [m]: each level puts a point between two old ones.
+
+    The limit is the *uniform* cubic B-spline, its ends held by a phantom control mirrored beyond each: another curve
+    than the clamped one of `evaluate_recursive`. The points reach it only in the limit.
+    """
+    points = np.asarray(controls, dtype=np.float64)
+    for _ in range(levels):
+        finer = np.empty((points.shape[0], 2 * points.shape[1] - 1, 3))
+        finer[:, 2:-1:2] = (points[:, :-2] + 6.0 * points[:, 1:-1] + points[:, 2:]) / 8.0  # Eq. 4
+        finer[:, 1::2] = (points[:, :-1] + points[:, 1:]) / 2.0
+        finer[:, 0], finer[:, -1] = points[:, 0], points[:, -1]  # Eq. 5
+        points = finer
+    return points
+
+
+@lru_cache(maxsize=16)
+def basis_matrix(control_count: int, point_count: int, degree: int = 3) -> np.ndarray:
+    """W (point_count, control_count) float64, read-only: points = W @ controls, at evenly spaced parameters."""
+    matrix = basis(np.linspace(0.0, 1.0, point_count), control_count, degree)
+    matrix.flags.writeable = False
+    return matrix
+
+
+def evaluate(
+    controls: np.ndarray, point_count: int, device: wp.DeviceLike = "cpu", degree: int = 3
+) -> wp.array2d[wp.vec3]:
+    """Controls (C, n, 3) float32 [m] → points (C, point_count) vec3 [m] on the device, by the constant matrix.
+
+    On a GPU a kernel. On the CPU, where Warp shares NumPy's memory, one BLAS call is four times faster than that.
+    """
+    if not wp.get_device(device).is_cpu:
+        return evaluate_on_warp(controls, point_count, device, degree)
+    controls = np.asarray(controls, dtype=np.float32)
+    curve_count, control_count, _ = controls.shape
+    points = controls.reshape(curve_count, -1) @ _flat_matrix(control_count, point_count, degree)
+    points = points.reshape(curve_count, point_count, 3)
+    return wp.array(points, dtype=wp.vec3, device=device, copy=False)
+
+
+def evaluate_on_warp(
+    controls: np.ndarray, point_count: int, device: wp.DeviceLike = "cpu", degree: int = 3
+) -> wp.array2d[wp.vec3]:
+    """The same as `evaluate`, by a kernel on any device."""
+    controls = wp.array(np.asarray(controls, dtype=np.float32), dtype=wp.vec3, device=device)
+    matrix = _device_matrix(controls.shape[1], point_count, degree, device)
+    points = wp.empty((controls.shape[0], point_count), dtype=wp.vec3, device=device)
+    kernel_cache.launch(_evaluate, dim=points.shape, inputs=[controls, matrix], outputs=[points], device=device)
+    return points
+
+
+@wp.kernel
+def _evaluate(
+    controls: wp.array2d[wp.vec3],
+    matrix: wp.array2d[float],
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    curve, point = wp.tid()
+    position = wp.vec3()
+    for i in range(matrix.shape[1]):
+        position += matrix[point, i] * controls[curve, i]
+    out_points[curve, point] = position
+
+
+@lru_cache(maxsize=16)
+def _device_matrix(control_count, point_count, degree, device):
+    """W (point_count, control_count) float32 on the device."""
+    return wp.array(basis_matrix(control_count, point_count, degree), dtype=float, device=device)
+
+
+@lru_cache(maxsize=16)
+def _flat_matrix(control_count, point_count, degree):
+    """(3 control_count, 3 point_count) float32: takes a curve's coordinates, one after the other, to its points'."""
+    matrix = basis_matrix(control_count, point_count, degree)
+    return np.ascontiguousarray(np.kron(matrix, np.eye(3)).T, dtype=np.float32)
+
+
+def _ratio(numerator, denominator):
+    """numerator / denominator, zero where the denominator is."""
+    return np.where(denominator > 0.0, numerator, 0.0) / np.where(denominator > 0.0, denominator, 1.0)

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Random roots by density × area  (Eq. 6 as corrected in DECISIONS.md)."""
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..kernels import parallel
+from ..kernels.parallel import Rows
+from .mesh import SurfacePoints, TriMesh
+
+wp.set_module_options({"enable_backward": False})
+
+
+def check_density(mesh: TriMesh, density: np.ndarray | None) -> np.ndarray:
+    """(V,) float64 per vertex, all one where `density` is None; `HairError` unless something grows with it."""
+    if density is None:
+        return np.ones(len(mesh.vertices))
+    density = np.asarray(density, dtype=np.float64)
+    if density.shape != (len(mesh.vertices),):
+        raise HairError(
+            f"The density has {density.size} values for {len(mesh.vertices)} vertices: it must have one per vertex."
+        )
+    bad_count = int(np.count_nonzero(~(np.isfinite(density) & (density >= 0.0))))
+    if bad_count:
+        raise HairError(f"The density of {bad_count} vertices is negative or not a number: it must be at least zero.")
+    if not np.any(corner_masses(mesh, density) > 0.0):
+        raise HairError("The density is zero everywhere: paint weight where hair should grow.")
+    return density
+
+
+def corner_masses(mesh: TriMesh, density: np.ndarray) -> np.ndarray:
+    """(F, 3): the part of density × area that each corner's vertex brings to a triangle.
+
+    Density is linear inside a triangle, so the integral over it is area × mean of its corners' densities.
+    """
+    return mesh.areas[:, None] / 3.0 * density[mesh.triangles]
+
+
+def sample_surface(mesh: TriMesh, count: int, seed: int, density: np.ndarray | None = None) -> SurfacePoints:
+    """`count` random points on a mesh, as `SurfacePoints`, distributed as density × area: linear inside triangles too.
+
+    mesh: a checked `TriMesh`; density: (V,) per vertex, at least 0, or None for uniform. The same seed gives the same
+    points on every machine, and the points of a smaller count are a subset. Neighbours on the surface are
+    neighbours in memory (`TriMesh.surface_order`), for cache locality.
+    """
+    if count <= 0:
+        raise HairError(f"The number of roots must be positive, not {count}.")
+    masses = corner_masses(mesh, check_density(mesh, density)).ravel()
+    random = np.random.Generator(np.random.PCG64(seed)).random((count, 4))
+    # Eq. 6 draws and rejects; the running sum takes every draw, and takes it to a corner of a triangle.
+    running = np.cumsum(masses)
+    order = _rising(random[:, 0])
+    ends = np.searchsorted(random[order, 0] * running[-1], running)
+    ends[np.flatnonzero(masses)[-1] :] = count  # rounding must not step past the last that has mass
+    corner = np.repeat(np.arange(len(masses), dtype=np.int32), np.diff(ends, prepend=0))
+    along = _runs(ends[2::3], mesh.surface_order)
+    triangle, barycentric = np.empty(count, np.int32), np.empty((count, 3), np.float32)
+    parallel.launch(
+        _cut,
+        count,
+        inputs=[Rows(_there(along, int)), _there(order, int), _there(corner, int), _there(random, wp.vec4d)],
+        outputs=[_there(triangle, int), _there(barycentric, wp.vec3)],
+        device="cpu",
+    )
+    return SurfacePoints(triangle, barycentric)
+
+
+@wp.kernel
+def _cut(
+    along: wp.array[int],
+    order: wp.array[int],
+    corners: wp.array[int],
+    random: wp.array[wp.vec4d],
+    # outputs
+    out_triangles: wp.array[int],
+    out_barycentric: wp.array[wp.vec3],
+):
+    """A corner's share of a linear density falls from it to nothing at the opposite edge: Dirichlet(2, 1, 1).
+
+    That is how three cuts of a unit stick divide it, if two of the four pieces go to the corner [Devroye86, chapter V].
+    """
+    root = wp.tid()
+    corner = corners[along[root]]
+    cuts = random[order[along[root]]]
+    first = wp.min(wp.min(cuts[1], cuts[2]), cuts[3])
+    last = wp.max(wp.max(cuts[1], cuts[2]), cuts[3])
+    weights = wp.vec3()
+    weights[corner % 3] = wp.float32(last - first)
+    weights[(corner + 1) % 3] = wp.float32(first)
+    weights[(corner + 2) % 3] = wp.float32(wp.float64(1.0) - last)
+    out_triangles[root] = corner / 3
+    out_barycentric[root] = weights
+
+
+def _there(array, dtype):
+    return wp.array(array, dtype=dtype, device="cpu", copy=False)
+
+
+def _rising(numbers):
+    """The order in which numbers (N,) in [0, 1) rise; sorted with their indices as one number each, which is faster."""
+    index_bits = len(numbers).bit_length()
+    keys = (numbers * 2.0 ** (64 - index_bits)).astype(np.uint64) << np.uint64(index_bits)
+    keys |= np.arange(len(numbers), dtype=np.uint64)
+    keys.sort()
+    return (keys & np.uint64((1 << index_bits) - 1)).astype(np.int32)
+
+
+def _runs(ends, order):
+    """Indices of all items, run after run; ends: of runs that are side by side; order: in which they shall be."""
+    counts = np.diff(ends, prepend=0)[order]
+    return np.repeat((ends[order] - np.cumsum(counts)).astype(np.int32), counts) + np.arange(ends[-1], dtype=np.int32)

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Deformation of strands with their surface, by rotations that are continuous over the surface.
+
+A face's deformation gradient takes two of its edges and its unit normal to where they are now. The mean over the faces
+around a vertex has a nearest rotation, its polar factor U V^T of the singular value decomposition [Higham86]; between
+vertices two of its columns are interpolated and made orthonormal again. So rigid motion is reproduced exactly, shear
+and stretch rotate no more than necessary, and neighbouring roots do not separate, as they do with the frames of single
+triangles or of a UV map. blender/data/follow_nodes.py implements the same in geometry nodes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ..kernels import kernel_cache
+from ..kernels.checks import require_count, require_indices
+from .mesh import Faces, require_finite
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+
+@dataclass(frozen=True)
+class SurfaceMotion:
+    """Positions of a mesh's vertices before and after, (V, 3) float32, and the rotation of the surface there.
+
+    axes: (V, 2, 3) float32, where the rotation at each vertex takes the x and the y axis.
+    """
+
+    before: np.ndarray
+    after: np.ndarray
+    axes: np.ndarray
+
+
+def motion(before: np.ndarray, after: np.ndarray, faces: Faces, vertices: np.ndarray | None = None) -> SurfaceMotion:
+    """The `SurfaceMotion` of vertices (V, 3) that went from `before` to `after`; faces: the mesh's `Faces`.
+
+    vertices: indices, in any shape, of those whose rotation matters, of a large mesh perhaps few; None for all.
+    Raises `HairError` where vertices are not finite numbers: no rotation could be found for them.
+    """
+    require_finite(before)
+    require_finite(after)
+    faces = faces if vertices is None else _around(faces, vertices, len(before))
+    return SurfaceMotion(before, after, vertex_axes(before, after, faces))
+
+
+def _around(faces, vertices, vertex_count):
+    """The `Faces` that some vertices are corners of."""
+    is_asked = np.zeros(vertex_count, bool)
+    is_asked[vertices] = True
+    chosen = np.logical_or.reduceat(is_asked[faces.corner_vertices], faces.starts[:-1])
+    sizes = np.diff(faces.starts)
+    starts = np.append(0, np.cumsum(sizes[chosen]))
+    return Faces(faces.corner_vertices[np.repeat(chosen, sizes)], starts)
+
+
+def vertex_axes(before: np.ndarray, after: np.ndarray, faces: Faces) -> np.ndarray:
+    """(V, 2, 3) float32: where the rotation at each vertex takes the x and the y axis; unturned where no face is."""
+    starts = faces.starts[:-1]
+    corners = np.stack(
+        [faces.corner_vertices[starts], faces.corner_vertices[starts + 1], faces.corner_vertices[faces.starts[1:] - 1]]
+    )
+    was, is_now = _bases(before, corners), _bases(after, corners)
+    has_area = abs(np.linalg.det(was)) > 1e-30
+    gradients = np.zeros_like(was)
+    gradients[has_area] = is_now[has_area] @ np.linalg.inv(was[has_area])
+    of_corners = np.repeat(gradients.reshape(-1, 9), np.diff(faces.starts), axis=0)
+    sums = np.stack(
+        [np.bincount(faces.corner_vertices, of_corners[:, i], minlength=len(before)) for i in range(9)], axis=1
+    )
+    # The mean without normalisation, which the nearest rotation ignores; zero where nothing moves.
+    is_moved = _has_moving_face(before, after, faces) & sums.any(axis=1)
+    left, _stretches, right = np.linalg.svd(sums[is_moved].reshape(-1, 3, 3))
+    axes = np.tile(np.eye(3, dtype=np.float32)[:2], (len(before), 1, 1))
+    axes[is_moved] = np.swapaxes(left @ right, 1, 2)[:, :2]
+    return axes
+
+
+def _has_moving_face(before, after, faces):
+    """(V,) bool: whether any corner of a vertex' faces moves."""
+    corners_move = (before != after).any(axis=1)[faces.corner_vertices]
+    faces_move = np.logical_or.reduceat(corners_move, faces.starts[:-1]) if len(corners_move) else corners_move
+    is_moved = np.zeros(len(before), bool)
+    is_moved[faces.corner_vertices[np.repeat(faces_move, np.diff(faces.starts))]] = True
+    return is_moved
+
+
+def _bases(vertices, corners):
+    """(F, 3, 3): columns are the edges from each face's first corner to the next and to the last, and its normal."""
+    first, following, last = vertices.astype(np.float64)[corners]
+    along, across = following - first, last - first
+    normals = np.cross(along, across)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    return np.stack([along, across, normals / np.where(lengths > 0.0, lengths, 1.0)], axis=-1)
+
+
+def carry(
+    points: np.ndarray,
+    surface_motion: SurfaceMotion,
+    root_vertices: np.ndarray,
+    barycentric: np.ndarray,
+    is_back: bool = False,
+) -> np.ndarray:
+    """(N, P, 3) float32 points of strands → float32, each strand moved rigidly with the surface at its root.
+
+    root_vertices: (N, 3) int32 corners of the triangles that roots lie in; barycentric: (N, 3) float32 in their order;
+    is_back: the inverse, from where the surface went to where it was. Raises `HairError` where these are not of the
+    same strands, or of another surface.
+    """
+    vertex_count = len(surface_motion.before)
+    require_count("vertices", len(surface_motion.after), vertex_count)
+    require_count("vertices", len(surface_motion.axes), vertex_count)
+    require_count("roots", len(root_vertices), len(points))
+    require_count("barycentric coordinates", len(barycentric), len(points))
+    require_indices("vertices", root_vertices, vertex_count)
+    carried = wp.empty(points.shape[:2], dtype=wp.vec3, device="cpu")
+
+    def shared(array, kind):
+        return wp.array(np.ascontiguousarray(array), dtype=kind, device="cpu", copy=False)
+
+    kernel_cache.launch(
+        _carry,
+        dim=len(points),
+        inputs=[
+            shared(points, wp.vec3),
+            shared(surface_motion.before, wp.vec3),
+            shared(surface_motion.after, wp.vec3),
+            shared(surface_motion.axes, wp.vec3),
+            shared(root_vertices, wp.vec3i),
+            shared(barycentric, wp.vec3),
+            is_back,
+        ],
+        outputs=[carried],
+        device="cpu",
+    )
+    return carried.numpy()
+
+
+@wp.func
+def _unit(vector: wp.vec3, otherwise: wp.vec3):
+    length = wp.length(vector)
+    return wp.where(length > 0.0, vector / wp.max(length, 1.0e-37), otherwise)
+
+
+@wp.kernel
+def _carry(
+    points: wp.array2d[wp.vec3],
+    before: wp.array[wp.vec3],
+    after: wp.array[wp.vec3],
+    axes: wp.array2d[wp.vec3],
+    root_vertices: wp.array[wp.vec3i],
+    barycentric: wp.array[wp.vec3],
+    is_back: bool,
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    strand = wp.tid()
+    from_root = wp.vec3()
+    to_root = wp.vec3()
+    x_axis = wp.vec3()
+    y_axis = wp.vec3()
+    change = float(0.0)
+    for corner in range(3):
+        vertex = root_vertices[strand][corner]
+        weight = barycentric[strand][corner]
+        from_root += weight * before[vertex]
+        to_root += weight * after[vertex]
+        x_axis += weight * axes[vertex, 0]
+        y_axis += weight * axes[vertex, 1]
+        change += wp.length_sq(after[vertex] - before[vertex])
+        change += wp.length_sq(axes[vertex, 0] - wp.vec3(1.0, 0.0, 0.0))
+        change += wp.length_sq(axes[vertex, 1] - wp.vec3(0.0, 1.0, 0.0))
+    if change == 0.0:
+        for point in range(points.shape[1]):  # undeformed parts do not change, bit for bit
+            out_points[strand, point] = points[strand, point]
+        return
+    x_axis = _unit(x_axis, wp.vec3(1.0, 0.0, 0.0))
+    z_axis = _unit(wp.cross(x_axis, y_axis), wp.vec3(0.0, 0.0, 1.0))
+    rotation = wp.matrix_from_cols(x_axis, wp.cross(z_axis, x_axis), z_axis)
+    if is_back:
+        rotation = wp.transpose(rotation)
+        root = to_root
+        to_root = from_root
+        from_root = root
+    for point in range(points.shape[1]):
+        out_points[strand, point] = to_root + rotation * (points[strand, point] - from_root)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An image mapped onto a surface by UVs."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .mesh import SurfacePoints
+
+
+@dataclass(frozen=True)
+class Texture:
+    """values (height, width) float32, the lowest row first; corner_uvs (F, 3, 2): where each triangle's corners are."""
+
+    values: np.ndarray
+    corner_uvs: np.ndarray
+
+    def at(self, points: SurfacePoints) -> np.ndarray:
+        """(N,) float64 at `SurfacePoints`: linear between the middles of pixels, repeated beyond the picture."""
+        uvs = np.einsum("nc,ncu->nu", points.barycentric, self.corner_uvs[points.triangle].astype(np.float64))
+        height, width = self.values.shape
+        x, y = uvs[:, 0] * width - 0.5, uvs[:, 1] * height - 0.5
+        column, row = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+        right, up = x - column, y - row
+        lower = (1.0 - right) * self._pixel(row, column) + right * self._pixel(row, column + 1)
+        upper = (1.0 - right) * self._pixel(row + 1, column) + right * self._pixel(row + 1, column + 1)
+        return (1.0 - up) * lower + up * upper
+
+    def _pixel(self, row, column):
+        height, width = self.values.shape
+        return self.values[row % height, column % width].astype(np.float64)

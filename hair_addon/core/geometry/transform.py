@@ -1,0 +1,43 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Coordinate transforms of strands."""
+
+import numpy as np
+import warp as wp
+
+from ..kernels import parallel
+from ..kernels.checks import require_count
+from ..kernels.parallel import Rows
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+
+@wp.kernel
+def _transform(
+    points: wp.array2d[wp.vec3],
+    matrix: wp.mat33,
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    strand = wp.tid()
+    for point in range(points.shape[1]):
+        out_points[strand, point] = matrix * points[strand, point]
+
+
+def transformed(points: np.ndarray, matrix: np.ndarray, out: np.ndarray | None = None) -> np.ndarray:
+    """(S, P, 3) float32 points, each multiplied by a (3, 3) matrix; by the identity they are themselves.
+
+    out: array to put them in, which may be that of the points; None for a new one.
+    """
+    points = np.ascontiguousarray(points, np.float32)
+    if not len(points) or np.array_equal(matrix, np.eye(3)):
+        return points
+    there = wp.array(points, dtype=wp.vec3, device="cpu", copy=False)
+    if out is None:
+        moved = parallel.empty_vectors(there.shape, "cpu")
+    else:
+        require_count("points", out.size, points.size)
+        moved = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
+    matrix = wp.mat33(*np.asarray(matrix, np.float32).ravel().tolist())
+    parallel.launch(_transform, len(points), inputs=[Rows(there), matrix], outputs=[moved], device="cpu")
+    return moved.numpy()

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The pipeline as functions of arrays: guide distribution and growth, hair generation."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import cost, following, groom, groom_defaults, guide_growth, rooted_curves
+else:
+    __getattr__ = submodules(__name__)

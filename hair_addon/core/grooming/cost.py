@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Estimates of the time and memory of guides and hair, from counts.
+
+Times are those of two plain cores, measured (tests/benchmarks/test_estimates.py); other computers take half to twice as
+long.
+"""
+
+from .groom import POINT_COUNT, GuideSettings, HairSettings
+
+# Bytes of Blender's Curves. A point: position (12), radius (4). A curve: offset (4), type (1),
+# UV (8), normal (12), the strand that stands for its guide, id, random number (4 each); the
+# root: triangle (4), its corners and barycentric coordinates (12 each).
+_POINT_BYTES, _CURVE_BYTES = 16, 65
+_SLOT_BYTES = 8  # which guide, and its weight
+_TEXEL_BYTES = 16  # RGBA, single precision
+
+# While it is worked on. A triangle of the surface, a guide, a strand.
+_FACE_WORK_BYTES, _GUIDE_WORK_BYTES, _STRAND_WORK_BYTES = 760, 3300, 680
+
+# Placing: a triangle of the surface and a guide, once, and once in each round.
+_FACE_SECONDS, _FACE_ROUND_SECONDS = 5e-6, 2e-7
+_GUIDE_SECONDS, _GUIDE_ROUND_SECONDS = 4e-5, 9e-6
+_SPREAD_SECONDS = 2e-4  # a guide that few coarse ones became, from level to level
+_MOST_ROUNDS = 60  # that it takes until guides rest
+
+# Growing strands: a triangle, whose normals it takes, and a strand.
+_HAIR_FACE_SECONDS, _STRAND_SECONDS = 2.5e-6, 3e-6
+
+_TEXEL_SECONDS = 1.5e-6  # of all of the Marschner tables together
+
+
+def curves_bytes(strand_count: int, point_count: int = POINT_COUNT, slot_count: int = 0) -> int:
+    """Memory of strands as a Curves datablock [bytes]; slot_count: guides of each strand that are stored with it."""
+    return strand_count * (point_count * _POINT_BYTES + _CURVE_BYTES + slot_count * _SLOT_BYTES)
+
+
+def gpu_bytes(strand_count: int, point_count: int = POINT_COUNT) -> int:
+    """Memory of strands on the GPU [bytes], but for the end of the texture's last row."""
+    return strand_count * point_count * _TEXEL_BYTES
+
+
+def guide_work_bytes(settings: GuideSettings, face_count: int) -> int:
+    """Memory that distributing guides takes while it runs [bytes]; arguments as for `guide_seconds`."""
+    return face_count * _FACE_WORK_BYTES + settings.guide_count * _GUIDE_WORK_BYTES
+
+
+def hair_work_bytes(settings: HairSettings, face_count: int) -> int:
+    """Memory that growing strands takes while it runs [bytes]; arguments as for `hair_seconds`."""
+    return face_count * _FACE_WORK_BYTES // 3 + settings.strand_count * _STRAND_WORK_BYTES
+
+
+def guide_seconds(settings: GuideSettings, face_count: int) -> float:
+    """How long distributing guides takes [s]; settings: `GuideSettings`; face_count: triangles of the surface."""
+    rounds = min(settings.relax_iterations, _MOST_ROUNDS)
+    guide = _GUIDE_SECONDS + rounds * _GUIDE_ROUND_SECONDS + (_SPREAD_SECONDS if rounds else 0.0)
+    return settings.guide_count * guide + face_count * (_FACE_SECONDS + rounds * _FACE_ROUND_SECONDS)
+
+
+def hair_seconds(settings: HairSettings, face_count: int) -> float:
+    """How long growing strands between guides takes [s]; settings: `HairSettings`; face_count as above."""
+    return settings.strand_count * _STRAND_SECONDS + face_count * _HAIR_FACE_SECONDS
+
+
+def table_seconds(size: int) -> float:
+    """How long baking the Marschner tables takes [s]; size: of each, in texels along a side."""
+    return size**2 * _TEXEL_SECONDS

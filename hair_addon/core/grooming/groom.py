@@ -1,0 +1,378 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Section 2 of [Report12] as two functions: `distribute_guides` and `bind_hair`, with their settings.
+
+`bind_hair` is all that depends on where guides are rooted: roots, neighbours, weights. `following.follow_guides` makes
+strands of it, and is what combing repeats. The stages need Warp, which takes long to import, so they are imported late.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import geometry, grooming, interpolation, placement
+from ..errors import HairError
+from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, positions
+from ..geometry.strands import Strands
+from ..geometry.texture import Texture
+from ..interpolation import hair_binding
+from ..interpolation.hair_binding import HairBinding
+from ..interpolation.regions import Regions
+from ..kernels import kernel_setup
+from ..long_work import Progress, no_progress, part_of
+from ..params import Settings, param, param_from_surface
+from . import groom_defaults
+
+CONTROL_POINT_COUNT = 6  # [Report12] section 5
+POINT_COUNT = 41  # [Report12] section 2.2
+
+
+@dataclass(frozen=True)
+class GuideSettings(Settings):
+    """Distribution and growth of guides."""
+
+    guide_count: int = param(
+        400,
+        "Number of guides; more guides give finer control and take longer to place",
+        label="Guide count",
+        low=1,
+        high=1_000_000,
+        soft_high=4000,
+    )
+    seed: int = param(1, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
+    density_group: str = param(
+        "",
+        "Vertex group that controls guide density; higher weights place more guides, zero places none",
+        label="Guide mask",
+    )
+    density_image: str = param(
+        "", "Image that controls guide density through the UV map; brighter pixels place more guides, black places none"
+    )
+    curvature: float = param(
+        0.0,
+        "Increase guide density in curved areas; higher values move more guides there",
+        label="Follow Curvature",
+        low=0.0,
+        high=100.0,
+        soft_high=4.0,
+    )
+    symmetric: bool = param(False, "Mirror the guide roots across the object's X axis")
+    relax_iterations: int = param(
+        12,
+        "Relaxation steps; higher values space the guides more evenly and take longer",
+        label="Even spacing",
+        low=0,
+        high=1000,
+        soft_high=100,
+    )
+    length: float | None = param_from_surface(
+        0.12,
+        "Guide length from root to tip",
+        above=0.0,
+        high=1e6,
+        soft_high=1.0,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+    length_variation: float = param(
+        0.2,
+        "Random variation of the guide length; at 0 all guides are equally long",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    tilt: float = param(
+        math.radians(15.0),
+        "Maximum random angle between a guide and the surface normal; higher values look messier",
+        label="Random tilt",
+        low=0.0,
+        high=math.radians(90.0),
+        unit="ROTATION",
+        subtype="ANGLE",
+    )
+    gravity: float | None = param_from_surface(
+        0.75, "Bend the guides toward the ground; higher values bend them more", low=0.0, high=1.0, subtype="FACTOR"
+    )
+
+
+@dataclass(frozen=True)
+class HairSettings(Settings):
+    """Number of strands between the guides, and their interpolation."""
+
+    strand_count: int = param(
+        60_000,
+        "Number of strands; more strands look denser and use more memory",
+        label="Strand count",
+        low=1,
+        high=10_000_000,
+        soft_high=100_000,
+    )
+    seed: int = param(1, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
+    density_group: str = param(
+        "",
+        "Vertex group that controls strand density. Leave empty to use the guide mask",
+        label="Strand mask",
+    )
+    automatic_influence: bool = param(True, "Set the influence distance from the guide spacing around each root")
+    influence_distance: float | None = param_from_surface(
+        0.03,
+        "Distance within which guides affect a strand; higher values blend more guides",
+        above=0.0,
+        high=1e6,
+        soft_high=1.0,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+    neighbour_limit: int = param(
+        8,
+        "Maximum number of guides that a strand blends; higher values give smoother hair",
+        label="Max guides per strand",
+        low=1,
+        high=32,
+    )
+    keep_length: float = param(
+        1.0,
+        "Preserve the average length of the guides; at 0, strands between diverging guides become shorter",
+        label="Preserve length",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    angle_limit: float = param(
+        math.radians(60.0),
+        "Maximum angle to a strand's nearest guide; guides beyond it do not affect the strand",
+        label="Parting angle",
+        low=0.0,
+        high=math.pi,
+        unit="ROTATION",
+        subtype="ANGLE",
+    )
+    length_limit: float = param(
+        3.0,
+        "Maximum length ratio to a strand's nearest guide; guides beyond it do not affect the strand",
+        label="Parting length ratio",
+        low=1.0,
+        high=1e6,
+        soft_high=10.0,
+    )
+    region_group: str = param(
+        "", "Vertex group that separates hair; strands do not blend guides inside and outside of it"
+    )
+    region_attribute: str = param(
+        "",
+        "Integer attribute of surface or guides that separates hair; strands blend guides of one value",
+    )
+    part_lines: str = param(
+        "", "Curve object on the surface that parts the hair; strands do not blend guides across its curves"
+    )
+    guide_map: bool = param(
+        True, "Store the guides of each strand and their weights as curve attributes", label="Store guide weights"
+    )
+    radius: float | None = param_from_surface(
+        0.00004,
+        "Radius of a strand at its root",
+        above=0.0,
+        high=1e3,
+        soft_high=0.01,
+        unit="LENGTH",
+        precision=6,
+        diameter=("thickness", "Diameter of a strand at its root"),
+    )
+    tip_taper: float = param(
+        0.2,
+        "Thickness at the tip as a fraction of the thickness at the root",
+        label="Tip thickness",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+
+
+def distribute_guides(
+    mesh: TriMesh,
+    settings: GuideSettings,
+    *,
+    density: np.ndarray | None = None,
+    texture: Texture | None = None,
+    mirror_normal: ArrayLike = (1.0, 0.0, 0.0),
+    shape: TriMesh | None = None,
+    roots: SurfacePoints | None = None,
+    device: str = "cpu",
+    progress: Progress = no_progress,
+) -> Strands:
+    """Guides, evenly placed and grown: (guide_count, POINT_COUNT) strands.
+
+    mesh: `TriMesh` [m]; settings: `GuideSettings`; those that are None follow from the mesh (groom_defaults.py);
+    density: (V,) per vertex, at least 0, or None for uniform; texture: `Texture` that multiplies it, or None;
+    mirror_normal: of the plane through the origin that symmetric guides mirror; shape: `TriMesh` that was turned and
+    scaled evenly to be `mesh`, its mirror across the X axis: guides are placed on it, and so in the same places however
+    it was turned and scaled; None where there is none; roots: `SurfacePoints` that guides have already, None to place
+    them; progress(step, part): told how far the work is, and may raise to stop it.
+    """
+    check_mesh(mesh)
+    load_kernels(device, part_of(progress, 0.0, 0.1))
+
+    settings = groom_defaults.complete(settings, mesh, density, texture)
+    relaxing = part_of(progress, 0.1, 0.9)
+    mirror = placement.domain.Mirror(np.asarray(mirror_normal, np.float64)) if settings.symmetric else None
+    if roots is None:
+        placed_on = mesh if shape is None else shape
+        if settings.curvature:
+            bend = geometry.curvature.bend_density(placed_on, settings.curvature)
+            density = bend if density is None else bend * density
+        roots = placement.cvt.place(
+            placed_on,
+            settings.guide_count,
+            settings.seed,
+            settings.relax_iterations,
+            density=density,
+            texture=texture,
+            mirror=mirror if mirror is None or shape is None else placement.domain.Mirror(np.array([1.0, 0.0, 0.0])),
+            device=device,
+            progress=lambda part: relaxing("Spreading guides", part),
+        )
+    progress("Growing guides", 0.9)
+    controls = grooming.guide_growth.grow(
+        mesh,
+        roots,
+        length=_known(settings.length),
+        length_variation=settings.length_variation,
+        tilt=settings.tilt,
+        gravity=_known(settings.gravity),
+        seed=settings.seed,
+        control_point_count=CONTROL_POINT_COUNT,
+        device=device,
+    )
+    if mirror is not None:
+        controls = _symmetric(controls, positions(mesh, roots), mirror)
+    return Strands(geometry.bspline.evaluate(controls, POINT_COUNT, device), roots)
+
+
+def _symmetric(controls, places, mirror):
+    """Controls (G, n, 3) of which the second half are grown as images of the first, where their roots (G, 3) are."""
+    count = len(places) // 2
+    images = mirror.image(places[:count])
+    reach = 5e-3 * np.ptp(places, axis=0).max()
+    is_image = np.linalg.norm(images - places[len(places) - count :], axis=1) <= reach
+    arms = controls[:count] - controls[:count, :1]
+    mirrored = mirror.image(arms.reshape(-1, 3)).reshape(arms.shape) + places[len(places) - count :, None]
+    controls[len(places) - count :][is_image] = mirrored[is_image]
+    return controls
+
+
+def bind_hair(
+    mesh: TriMesh,
+    guides: Strands,
+    settings: HairSettings,
+    *,
+    density: np.ndarray | None = None,
+    texture: Texture | None = None,
+    regions: Sequence[Regions] = (),
+    lines: np.ndarray | None = None,
+    drawn_on: np.ndarray | None = None,
+    shape: TriMesh | None = None,
+    roots: SurfacePoints | None = None,
+    is_mirrored: bool = False,
+    device: str = "cpu",
+    progress: Progress = no_progress,
+) -> HairBinding:
+    """Roots of the strands and the guides that each follows; depends on the guides' roots, not on their shape.
+
+    mesh: `TriMesh` [m] with the guides' roots on it; settings: `HairSettings`; density and texture as in
+    `distribute_guides`, and of the strands alone: those that the guides were placed by are not known here;
+    regions: tuple of `Regions` that no strand mixes guides of; lines: (L, 2, 3) segments [m] near the surface that no
+    strand mixes guides across, one that begins where the last ended going on, or None; drawn_on: (V, 3) vertices that
+    the part lines are near to, if not the mesh's own; shape as in `distribute_guides`; roots: `SurfacePoints` that
+    strands have already, None to place them; is_mirrored: whether the mesh's triangles are wound the other way than
+    where roots are stored, by which strands are known.
+    """
+    check_mesh(mesh)
+    check_points(mesh, guides.roots)
+    load_kernels(device, part_of(progress, 0.0, 0.1))
+
+    laid = None
+    if lines is not None:
+        _load_kernels(device, [interpolation.part_lines], part_of(progress, 0.0, 0.1))
+        laid = interpolation.part_lines.lay(mesh, lines, device, drawn_on)
+    progress("Placing strands", 0.1)
+    settings = groom_defaults.complete(settings, mesh, density, texture, len(guides.roots))
+    if roots is None:
+        placed_on = mesh if shape is None else shape
+        where = placed_on, settings.strand_count, settings.seed, density
+        if texture is None:
+            roots = geometry.sampling.sample_surface(*where)
+        else:
+            roots = placement.textured_roots.sample_textured(*where, texture)
+
+    guide_positions, guide_normals = geometry.root_frames.rooted(mesh, guides.roots, device)
+    root_positions, root_normals = geometry.root_frames.rooted(mesh, roots, device)
+    progress("Finding guides", 0.4)
+    candidates = interpolation.guide_weights.find_candidates(
+        root_positions,
+        root_normals,
+        guide_positions,
+        guide_normals,
+        settings.neighbour_limit,
+        regions=interpolation.regions.kept_apart(regions, roots, guides.roots),
+        lines=laid,
+    )
+    at_roots, at_guides = (root_positions, root_normals), (positions(mesh, guides.roots), guide_normals)
+    return hair_binding.weighed(roots, at_roots, at_guides, candidates, settings, is_mirrored)
+
+
+def load_kernels(device: str, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS) -> None:
+    """Load the kernels of guides and of hair, which are compiled where they never were: those that come next as well.
+
+    device, progress: as in `distribute_guides`; most_threads: that compile at once. Microseconds once they are loaded.
+    """
+    progress(kernel_setup.LOADING, 0.0)
+
+    on_device = [
+        geometry.bspline,
+        placement.exact_cells,
+        interpolation.guide_weights,
+        grooming.guide_growth,
+        geometry.hash_grid,
+        geometry.root_frames,
+        placement.sampled_cells,
+        placement.preconditioner,
+        geometry.closest_point,
+    ]
+    on_device += [
+        placement.voronoi,
+        interpolation.cpu_interpolation if device == "cpu" else interpolation.gpu_interpolation,
+    ]
+    on_processor = [
+        placement.farthest,
+        geometry.fingerprint,
+        geometry.connected_components,
+        interpolation.clump_centers,
+        geometry.sampling,
+        geometry.transform,
+    ]
+    if device == "cpu":
+        _load_kernels(device, on_device + on_processor, progress, most_threads)
+    else:
+        _load_kernels(device, on_device, part_of(progress, 0.0, 0.8), most_threads)
+        _load_kernels("cpu", on_processor, part_of(progress, 0.8, 1.0), most_threads)
+
+
+def _load_kernels(device, modules, progress, most_threads=kernel_setup.MOST_THREADS):
+    import warp as wp
+
+    kernel_setup.load([wp.get_module(module.__name__) for module in modules], device, progress, most_threads)
+
+
+def strand_radii(settings: HairSettings, point_count: int = POINT_COUNT) -> np.ndarray:
+    """(point_count,) float32 [m]: radius along every strand, from `radius` at the root to its `tip_taper` part."""
+    radius = _known(settings.radius)
+    return np.linspace(radius, radius * settings.tip_taper, point_count, dtype=np.float32)
+
+
+def _known(value: float | None) -> float:
+    """A setting that `groom_defaults.complete` has found by the surface. Raises `HairError` where it has yet to."""
+    if value is None:
+        raise HairError("Length, gravity or radius is not set: call groom_defaults.complete first.")
+    return value

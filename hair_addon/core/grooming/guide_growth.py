@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Growth of guides from roots: control points of a smooth arc that starts along the normal and bends with gravity."""
+
+import numpy as np
+import warp as wp
+
+from ..geometry.bspline import basis, greville_abscissae
+from ..geometry.closest_point import SurfaceQuery
+from ..geometry.mesh import SurfacePoints, TriMesh, normals, positions
+from ..kernels import kernel_cache
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+STEP_COUNT = 48  # straight steps that a guide's arc is made of
+TURNING = 10.0  # how far full gravity bends a guide: the angle to the ground, as tan(angle / 2), shrinks by exp(-10)
+CLEARANCE = 0.03  # how far above the surface a guide slides, by its length
+DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
+
+
+def grow(
+    mesh: TriMesh,
+    roots: SurfacePoints,
+    *,
+    length: float,
+    length_variation: float,
+    tilt: float,
+    gravity: float,
+    seed: int,
+    control_point_count: int,
+    device: wp.DeviceLike = "cpu",
+) -> np.ndarray:
+    """Control points (G, control_point_count, 3) float32 [m] of guides on a checked mesh.
+
+    length [m]; length_variation: each guide's length is multiplied by a random number within 1 ± this; tilt [rad]:
+    largest random angle to the smooth normal; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z).
+    A guide keeps its length while it bends, and slides over the surface where it would sink into it.
+    """
+    random = np.random.Generator(np.random.PCG64(seed)).random((len(roots), 3))
+    root_normals = normals(mesh, roots)
+    lengths = length * (1.0 + length_variation * (2.0 * random[:, 0] - 1.0))
+    directions = _tilted(root_normals, tilt, random[:, 1], random[:, 2])
+    surface = SurfaceQuery(mesh, device=device).mesh
+    path = wp.empty((len(roots), STEP_COUNT + 1), dtype=wp.vec3, device=device)
+    kernel_cache.launch(
+        _march,
+        dim=len(roots),
+        inputs=[
+            surface.id,
+            wp.array(mesh.vertex_normals, dtype=wp.vec3, device=device),
+            wp.array(positions(mesh, roots), dtype=wp.vec3, device=device),
+            wp.array(directions, dtype=wp.vec3, device=device),
+            wp.array(lengths, dtype=float, device=device),
+            gravity,
+        ],
+        outputs=[path],
+        device=device,
+    )
+    # Controls whose curve runs through the arc itself, so that it is neither shorter nor nearer to the surface.
+    abscissae = greville_abscissae(control_point_count)
+    return np.linalg.inv(basis(abscissae, control_point_count)).astype(np.float32) @ _along(path.numpy(), abscissae)
+
+
+def _tilted(directions, largest, random_angle, random_turn):
+    """Unit (G, 3) turned away by up to an angle [rad], evenly over the spherical cap."""
+    cosine = 1.0 - random_angle * (1.0 - np.cos(largest))
+    sine, turn = np.sqrt(1.0 - cosine**2), 2.0 * np.pi * random_turn
+    # Any two directions across will do, so take the axis farthest from each one to start from.
+    across = np.cross(directions, np.eye(3)[np.abs(directions).argmin(axis=1)])
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    along = np.cross(directions, across)
+    sideways = np.cos(turn)[:, None] * across + np.sin(turn)[:, None] * along
+    return cosine[:, None] * directions + sine[:, None] * sideways
+
+
+def _along(path, fractions):
+    """Points of paths (G, steps + 1, 3), made of equal steps, at fractions (n,) of their lengths → (G, n, 3)."""
+    places = fractions * (path.shape[1] - 1)
+    before = np.minimum(places.astype(int), path.shape[1] - 2)
+    share = (places - before)[:, None].astype(np.float32)
+    return (1.0 - share) * path[:, before] + share * path[:, before + 1]
+
+
+@wp.kernel
+def _march(
+    surface: wp.uint64,
+    vertex_normals: wp.array[wp.vec3],
+    roots: wp.array[wp.vec3],
+    directions: wp.array[wp.vec3],
+    lengths: wp.array[float],
+    gravity: float,
+    # outputs
+    out_path: wp.array2d[wp.vec3],
+):
+    guide = wp.tid()
+    steps = out_path.shape[1] - 1
+    step = lengths[guide] / float(steps)
+    clearance = CLEARANCE * lengths[guide]
+    indices = wp.mesh_get(surface).indices
+    position = roots[guide]
+    direction = directions[guide]
+    out_path[guide, 0] = position
+    for i in range(steps):
+        # The quickest turn downwards, as strong as gravity's lever: d(angle)/ds = -k sin(angle).
+        bend = TURNING * gravity / float(steps)
+        direction = wp.normalize(direction + bend * (DOWN - wp.dot(direction, DOWN) * direction))
+        ahead = position + step * direction
+        # A guide may first leave the surface, and later keeps a distance that grows with it.
+        wanted = wp.min(clearance, float(i + 1) * step * 0.5)
+        query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * clearance + step)
+        if query.result:
+            face = query.face
+            u = query.u
+            v = query.v
+            w = 1.0 - u - v
+            normal = wp.normalize(
+                u * vertex_normals[indices[3 * face]]
+                + v * vertex_normals[indices[3 * face + 1]]
+                + w * vertex_normals[indices[3 * face + 2]]
+            )
+            away = ahead - wp.mesh_eval_position(surface, face, u, v)
+            height = wp.dot(away, normal)
+            # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
+            if height < wanted and wp.length(away - height * normal) < 0.5 * wanted:
+                direction = wp.normalize(ahead + (wanted - height) * normal - position)
+        position += step * direction
+        out_path[guide, i + 1] = position

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Conversion of arbitrary curves to guides: validity, roots and direction."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .. import geometry
+from ..errors import HairError
+from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, positions
+from ..geometry.strands import curve_offsets
+
+# If the ends' distances to the surface differ by less than this part of the curve's size, its direction is ambiguous.
+_CLEAR = 0.1
+# Of the surface's size: a root further away than this is probably on the wrong surface, or in the wrong units.
+_FAR = 0.02
+
+
+@dataclass(frozen=True)
+class RootedCurves:
+    """The curves that are guides, G of C.
+
+    kept: (G,) indices in rising order; is_reversed: (G,) bool, which ran from tip to root; roots: G `SurfacePoints`
+    nearest to the root ends; distances: (G,) [m] to those; is_far: (G,) bool, which of them are suspiciously far.
+    """
+
+    kept: np.ndarray
+    is_reversed: np.ndarray
+    roots: SurfacePoints
+    distances: np.ndarray
+    is_far: np.ndarray
+    left_out_count: int  # of zero length or with non-finite points
+
+    @property
+    def reversed_count(self) -> int:
+        """Number of curves that ran from tip to root."""
+        return int(np.count_nonzero(self.is_reversed))
+
+    @property
+    def far_count(self) -> int:
+        """Number of curves that begin suspiciously far from the surface."""
+        return int(np.count_nonzero(self.is_far))
+
+    def point_order(self, starts: np.ndarray) -> np.ndarray:
+        """(M,) indices: the points of the kept curves, each from root to tip; starts (C+1,) as given to `root`."""
+        counts = np.diff(starts)
+        is_kept = np.zeros(len(counts), bool)
+        is_kept[self.kept] = True
+        return np.flatnonzero(np.repeat(is_kept, counts))[reversal(counts[self.kept], self.is_reversed)]
+
+
+def reversal(counts: np.ndarray, is_reversed: np.ndarray) -> np.ndarray:
+    """(N,) indices of the points of curves of (C,) counts, those of some curves, (C,) bool, in the opposite order."""
+    starts = curve_offsets(counts)[:-1]
+    place = np.arange(counts.sum()) - np.repeat(starts, counts)
+    backwards = np.repeat(counts, counts) - 1 - place
+    return np.repeat(starts, counts) + np.where(np.repeat(is_reversed, counts), backwards, place)
+
+
+def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) -> RootedCurves:
+    """`RootedCurves` of points (N, 3) [m], curve after curve, on a `TriMesh` as it is now.
+
+    starts (C+1,): where each curve begins, the last entry being N; every: keep every n-th of the usable curves. Raises
+    `HairError` where the mesh cannot carry hair or no curve can be a guide.
+    """
+    check_mesh(mesh)
+    if every < 1:
+        raise HairError(f"Keep Every must be at least 1, not {every}.")
+    points, starts = np.asarray(points, np.float32), np.asarray(starts, np.int64)
+    usable = _usable(points, starts)
+    if not len(usable):
+        raise HairError("All curves have zero length: there is nothing to use as guides.")
+    kept = usable[::every]
+
+    ends = points[np.concatenate([starts[:-1][kept], starts[1:][kept] - 1])]
+    reach = float(np.abs(ends).max())
+    if reach > 0.1 * geometry.closest_point.FARTHEST:
+        raise HairError(f"The curves extend {reach:g} m from the origin: check their units.")
+    found = geometry.closest_point.SurfaceQuery(mesh).nearest(ends)
+    distances = np.linalg.norm(positions(mesh, found) - ends, axis=1)
+    at_first, at_last = distances[: len(kept)], distances[len(kept) :]
+    is_reversed = _run_backwards(at_first, at_last, _sizes(points, starts)[kept])
+    chosen = np.arange(len(kept)) + np.where(is_reversed, len(kept), 0)
+    distances = distances[chosen]
+    is_far = distances > _FAR * float(np.ptp(mesh.vertices, axis=0).max())
+    return RootedCurves(kept, is_reversed, found[chosen], distances, is_far, len(starts) - 1 - len(usable))
+
+
+def _usable(points, starts):
+    """Indices of the curves that have a length and finite points."""
+    counts = np.diff(starts)
+    is_usable = counts >= 2
+    if not is_usable.any():
+        return np.flatnonzero(is_usable)
+    is_finite = np.isfinite(points).all(axis=1)
+    bad = np.zeros(len(counts), np.int64)
+    np.add.at(bad, np.repeat(np.arange(len(counts)), counts)[~is_finite], 1)
+    is_usable &= bad == 0
+    is_usable[is_usable] = _sizes(points, starts)[is_usable] > 0.0
+    return np.flatnonzero(is_usable)
+
+
+def _sizes(points, starts):
+    """(C,) [m]: the longest side of the box around each curve; NaN where points are, 0 for a curve without points."""
+    sizes = np.zeros(len(starts) - 1, np.float32)
+    has_points = np.diff(starts) > 0
+    first = starts[:-1][has_points]
+    with np.errstate(invalid="ignore"):
+        high, low = (extreme.reduceat(points, first, axis=0) for extreme in (np.maximum, np.minimum))
+        sizes[has_points] = (high - low).max(axis=1)
+    return sizes
+
+
+def _run_backwards(at_first, at_last, sizes):
+    """(G,) bool: whether the last point is the root: it is clearly nearer, or both are near and most others run so."""
+    margin = _CLEAR * sizes
+    is_backwards, is_forwards = at_last < at_first - margin, at_first < at_last - margin
+    backwards_count, forwards_count = np.count_nonzero(is_backwards), np.count_nonzero(is_forwards)
+    if backwards_count > forwards_count:
+        return ~is_forwards
+    return is_backwards
+
+
+def polylines(curves: Iterable[ArrayLike]) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) float32 points and (C+1,) starts of a sequence of (P, 3) arrays. Raises `HairError`."""
+    try:
+        lines: list[np.ndarray] = [np.asarray(line, np.float32) for line in curves]
+    except (TypeError, ValueError):
+        lines = [np.empty(0)]
+    if not lines or any(line.ndim != 2 or line.shape[1] != 3 for line in lines):
+        raise HairError("Curves must be a non-empty sequence of arrays (P, 3), one per curve.")
+    return np.concatenate(lines), curve_offsets([len(line) for line in lines])

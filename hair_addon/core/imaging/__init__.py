@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Images: pixel sampling, environment lighting, detection of truncated files."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import ambient_cube, environment, picture_checks, pixel_sampling
+else:
+    __getattr__ = submodules(__name__)

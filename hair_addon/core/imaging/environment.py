@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Decomposition of environment light: a few bright lobes with shadows and highlights, and an ambient cube for the rest.
+
+An environment image (H, W, 3) has the azimuth in its columns, u = (k + 0.5) / W, from pi to -pi, and the
+height in its rows, v = (j + 0.5) / H, from -pi/2 to pi/2; x is at azimuth 0, z at the top.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from . import ambient_cube
+
+_LOBE_LIMIT = 4
+_LEAST_PART = 0.08  # of all light: dimmer lobes are left in the ambient cube
+_WINDOW, _RING = np.cos(np.radians([30.0, 45.0]))  # maximum width of a lobe, and the ring where its background is read
+_SHARPNESS = 20.0  # of the kernel that the brightest place is found with
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+@dataclass(frozen=True)
+class Lobe:
+    """A bright part of the surroundings: unit direction towards it, irradiance (3,) of a plane that faces it [W/m²].
+
+    variance: of its light about the direction, along each of two axes [rad²].
+    """
+
+    direction: np.ndarray
+    irradiance: np.ndarray
+    variance: float
+
+
+def split(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
+    """([`Lobe`, ...], (6, 3) mean radiance of the sides without them) of a picture of the surroundings."""
+    directions, solid_angles = _texels(*radiance.shape[:2])
+    left = np.maximum(radiance.reshape(-1, 3), 0.0).astype(float)
+    least = _LEAST_PART * float((left @ _LUMINANCE) @ solid_angles)
+    lobes = []
+    for _ in range(_LOBE_LIMIT):
+        window, excess = _brightest(left, directions, solid_angles)
+        moments = np.einsum("nc,nd,n->cd", excess, directions[window], solid_angles[window])
+        power = excess.T @ solid_angles[window]
+        if not power @ _LUMINANCE > least:
+            break
+        moment = _LUMINANCE @ moments
+        closeness = np.linalg.norm(moment) / (power @ _LUMINANCE)
+        direction = moment / np.linalg.norm(moment)
+        lobes.append(Lobe(direction, np.maximum(moments @ direction, 0.0), 1.0 - float(closeness)))
+        left[window] -= excess
+    return lobes, ambient_cube.side_means(left, directions, solid_angles / (4.0 * np.pi))
+
+
+def _brightest(radiance, directions, solid_angles):
+    """Indices (M,) of the texels around the brightest point, and their radiance (M, 3) above the surroundings."""
+    centres = _spread_out(400)
+    kernel = np.exp(_SHARPNESS * (centres @ directions.T - 1.0))
+    peak = centres[np.argmax(kernel @ ((radiance @ _LUMINANCE) * solid_angles))]
+    cosines = directions @ peak
+    ring = (cosines < _WINDOW) & (cosines > _RING)
+    window = np.flatnonzero(cosines >= _WINDOW)
+    return window, np.maximum(radiance[window] - np.median(radiance[ring], axis=0), 0.0)
+
+
+def _texels(height, width):
+    """Unit directions (H W, 3) of a picture's texels, and their solid angles (H W,)."""
+    edges = np.sin(np.pi * (np.arange(height + 1) / height - 0.5))
+    theta = np.pi * ((np.arange(height) + 0.5) / height - 0.5)[:, None]
+    phi = np.pi * (1.0 - 2.0 * (np.arange(width) + 0.5) / width)[None]
+    directions = np.stack(np.broadcast_arrays(np.cos(theta) * np.cos(phi), np.cos(theta) * np.sin(phi), np.sin(theta)))
+    solid_angles = np.repeat(np.diff(edges) * (2.0 * np.pi / width), width)
+    return directions.reshape(3, -1).T, solid_angles
+
+
+def _spread_out(count):
+    """(N, 3) unit vectors all around, evenly: a spiral turned by the golden angle [Vogel79]."""
+    heights = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    turns = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    across = np.sqrt(1.0 - heights**2)
+    return np.stack([across * np.cos(turns), across * np.sin(turns), heights], axis=-1)

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sampling of images: pixel samples, motion samples, tiles."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..params import Settings, param, param_of
+
+FIRST_FRAME, LAST_FRAME = -1_048_574, 1_048_574  # Blender's MINAFRAME and MAXFRAME
+
+_MOST_PER_SIDE = 4
+
+
+@dataclass(frozen=True)
+class RenderSettings(Settings):
+    """Render settings of a scene."""
+
+    sample_count: int = param(
+        64,
+        "Samples per pixel; higher values reduce noise and take longer",
+        label="Samples",
+        low=1,
+        high=65536,
+        soft_high=1024,
+    )
+    motion_steps: int = param(
+        16,
+        "Number of points in time that motion blur averages; higher values give smoother blur",
+        low=1,
+        high=1024,
+        soft_high=64,
+    )
+
+
+@dataclass(frozen=True)
+class FrameSettings(Settings):
+    """Of a frame that is rendered into a file."""
+
+    width: int = param(1920, "Width of the image in pixels", low=1, high=65536)
+    height: int = param(1080, "Height of the image in pixels", low=1, high=65536)
+    sample_count: int = param(0, "Samples per pixel; 0 uses the scene's setting", low=0, high=65536)
+    is_transparent: bool = param(
+        False, "Leave the background transparent instead of filling it with the world color", label="Transparent"
+    )
+    has_passes: bool = param(False, "Write all passes as layers of a multilayer EXR")
+
+
+@dataclass(frozen=True)
+class PictureSettings(Settings):
+    """Of a picture that is drawn at once, in the memory of the graphics card."""
+
+    width: int = param_of(FrameSettings, "width", 1280, high=16384)
+    height: int = param_of(FrameSettings, "height", 720, high=16384)
+    samples_per_side: int = param(
+        4, "Samples along each side of a pixel; 4 gives 16 samples per pixel", label="Samples per side", low=1, high=8
+    )
+    is_transparent: bool = param_of(FrameSettings, "is_transparent")
+
+
+@dataclass(frozen=True)
+class PassSettings(Settings):
+    """Passes of a view layer in addition to Blender's."""
+
+    has_hair_mask: bool = param(False, "Coverage of each pixel by hair", label="Hair Mask")
+    has_lobes: bool = param(
+        False,
+        "Lighting of hair as passes that add up to it: reflection (R), transmission (TT), internal reflection (TRT), "
+        "multiple scattering, and world light",
+        label="Hair Lobes",
+    )
+
+
+def samples_per_side(sample_count: int) -> int:
+    """Along each side of a pixel in each pass over a picture: as many as make up the samples in whole passes."""
+    return next(side for side in range(_MOST_PER_SIDE, 0, -1) if sample_count % side**2 == 0)
+
+
+def filter_margin(side: int, width: float) -> int:
+    """Samples around a pixel of side × side that `filter_weights` takes into account."""
+    return 0 if width <= 1.0 else math.ceil((0.5 * width - 0.5) * side + 0.5)
+
+
+def filter_weights(side: int, width: float, shift: float) -> np.ndarray:
+    """(side + 2 `filter_margin`,) weights of samples along an axis for a pixel: a Blackman-Harris window [Harris78].
+
+    side: samples along the pixel's side; width: of the window [pixels], up to one a box of a pixel; shift: by which the
+    picture is moved against the samples [samples], up to half of one.
+    """
+    margin = filter_margin(side, width)
+    if margin == 0:
+        return np.ones(side)
+    places = (np.arange(side + 2 * margin) - margin + 0.5 - shift) / side - 0.5
+    turn = 2.0 * np.pi * np.clip(places / width, -0.5, 0.5)
+    terms = ((0.35875, 0.0), (0.48829, 1.0), (0.14128, 2.0), (0.01168, 3.0))
+    return sum((weight * np.cos(order * turn) for weight, order in terms), np.zeros(len(turn)))
+
+
+def moments(shutter: float, position: str, count: int) -> np.ndarray:
+    """(count,) times [frames] from a frame, in the middles of equal parts of its exposure.
+
+    shutter: how long it is open [frames]; position: START, CENTER or END: which moment of the exposure the frame is.
+    """
+    before = {"START": 0.0, "CENTER": 0.5, "END": 1.0}[position]
+    return shutter * ((np.arange(count) + 0.5) / count - before)
+
+
+def tiles(window: tuple[int, int, int, int], side: int) -> list[tuple[int, int, int, int]]:
+    """[(left, bottom, width, height)] that a window of such numbers [pixels] falls into, `side` long at most."""
+    left, bottom, width, height = window
+    return [
+        (left + x, bottom + y, min(side, width - x), min(side, height - y))
+        for y in range(0, height, side)
+        for x in range(0, width, side)
+    ]

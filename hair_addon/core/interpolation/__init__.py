@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands between guides: neighbours, weights and weighted sums  ([Report12] section 2.4)."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        clump_centers,
+        cpu_interpolation,
+        cpu_weights,
+        gpu_interpolation,
+        guide_weights,
+        hair_binding,
+        interpolation,
+        part_lines,
+        regions,
+    )
+else:
+    __getattr__ = submodules(__name__)

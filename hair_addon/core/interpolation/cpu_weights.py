@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weights of guide_weights.py for eight guides at once, in the CPU's vector registers.
+
+weigh.cpp and limit.cpp hold them, written once for both kinds of device in the vectors of lanes.h: on a GPU, whose
+threads are lanes already, a vector is one number.
+"""
+
+import warp as wp
+
+from ..kernels import native_code
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+NUMBERS = 8  # that are known of a guide
+
+
+@wp.func_native(native_code.body(__file__, "weigh.cpp"))
+def weigh(
+    strand: int,
+    nearest: float,
+    reach: float,
+    fall_off: float,
+    tangent: wp.vec3,
+    bitangent: wp.vec3,
+    normal: wp.vec3,
+    candidates: wp.array2d[int],
+    ways: wp.array2d[float],
+    frames: wp.array2d[float],
+    out_indices: wp.array2d[int],
+    out_weights: wp.array2d[float],
+    out_turns: wp.array2d[wp.vec2],
+):
+    """Guides, weights and turns of a strand. frames: (G, 8), the tangent and the normal of each guide."""
+
+
+@wp.func_native(native_code.body(__file__, "limit.cpp"))
+def limit(
+    strand: int,
+    indices: wp.array2d[int],
+    weights: wp.array2d[float],
+    turns: wp.array2d[wp.vec2],
+    shapes: wp.array2d[float],
+    cosine_none: float,
+    per_cosine: float,
+    length_limit: float,
+    per_length: float,
+    out_weights: wp.array2d[float],
+):
+    """Weights of a strand without guides that differ too much. shapes: (G, 8) of `guide_weights.shapes`."""

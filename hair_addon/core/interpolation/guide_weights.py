@@ -1,0 +1,391 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Neighbouring guides of each strand and their weights  ([Report12] section 2.4, Eq. 8-9).
+
+A strand with its root at q blends the k guides nearest to it. With r_j the distance from q to guide j's root and r'
+that to the nearest excluded guide, the weight is the Gaussian of Eq. 9, reduced to zero by a second factor:
+
+    w_j = exp(-r_j² / 2σ²) (1 - r_j² / ρ²)²    where r_j < ρ,    ρ = min(d, r'),    σ = d / 2
+
+Both r_j and r' are continuous in q, so the weights are: a guide enters or leaves at ρ, where its weight is zero,
+whether it passes the influence distance d or swaps ranks with another one. Automatic: d = r', the guide spacing around
+each root. If no guide is within d / STRETCH, d is STRETCH times the distance to the nearest one.
+
+Then the weights of guides whose shape differs from the nearest one's are reduced: `limited`, which depends on the
+guides' shape and not on roots. It needs no search, and is repeated while combing.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+
+from ..geometry import hash_grid
+from ..kernels import kernel_cache, parallel
+from ..kernels.checks import require_count
+from ..kernels.parallel import Rows
+from . import cpu_weights, part_lines
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+STRETCH = 1.25
+EVERYWHERE = 1e18  # [m]: a distance to search that leaves nothing out
+SURPLUS = 3  # times the guides wanted are looked at where a part line may be in the way of some
+
+UNLIMITED = 200.0  # in logarithms of lengths: more than any two floats differ by
+FADE = math.radians(30.0)  # of the angle limit, over which a guide's weight fades
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """The guides nearest to each strand, nearest first, and those that are left out: (S, k + 1) arrays on one device.
+
+    indices int32, -1 where there are no more; ways float32 [m] to them along the surface or through space, inf then;
+    guide_count: how many guides there were, which all indices are below.
+    """
+
+    indices: "wp.array2d[int]"
+    ways: "wp.array2d[float]"
+    guide_count: int
+
+
+@dataclass(frozen=True)
+class GuideWeights:
+    """The guides that each strand follows, nearest first: (S, k) arrays on one device.
+
+    indices int32, -1 in unused slots; weights float32, adding up to one in every row, 0 in unused slots; turns vec2:
+    cosine and sine of the angle about the normal from the guide's frame to the strand's; guide_count: how many guides
+    there are, which all indices are below.
+    """
+
+    indices: "wp.array2d[int]"
+    weights: "wp.array2d[float]"
+    turns: "wp.array2d[wp.vec2]"
+    guide_count: int
+
+    def of(self, chosen: wp.array[int]) -> "GuideWeights":
+        """The same for some strands; chosen: int32 Warp array on the device."""
+        indices, weights, turns = (rows(array, chosen) for array in (self.indices, self.weights, self.turns))
+        return GuideWeights(indices, weights, turns, self.guide_count)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of the difference between a guide and the nearest one.
+
+    angle [rad]: between their directions relative to the surface; pi: no limit. length: ratio of their lengths.
+    """
+
+    angle: float = math.pi
+    length: float = math.inf
+
+
+@dataclass(frozen=True)
+class Reach:
+    """The strands that follow each guide, as compressed rows: guide g's are strands[starts[g]:starts[g + 1]]."""
+
+    starts: np.ndarray  # (G+1,) int64
+    strands: np.ndarray  # int32
+
+    def of(self, guides: np.ndarray) -> np.ndarray:
+        """Indices, rising, of the strands that follow any of some guides."""
+        strand_count = int(self.strands.max(initial=-1)) + 1
+        if len(guides) == len(self.starts) - 1:  # every strand follows some
+            return np.arange(strand_count)
+        is_reached = np.zeros(strand_count, bool)
+        for guide in guides:
+            is_reached[self.strands[self.starts[guide] : self.starts[guide + 1]]] = True
+        return np.flatnonzero(is_reached)
+
+
+def reach(guide_weights: GuideWeights, guide_count: int) -> Reach:
+    """The `Reach` of guides, from the `GuideWeights` of the strands that follow them."""
+    indices = guide_weights.indices.numpy()
+    # Sorted as one number each, guide and then strand: four times as fast as by an order of indices.
+    pairs = (indices.astype(np.int64) << 32) | np.arange(len(indices))[:, None]
+    pairs = np.sort(pairs[indices >= 0])
+    starts = np.searchsorted(pairs, np.arange(guide_count + 1) << 32)
+    return Reach(starts, pairs.astype(np.int32))
+
+
+def rows(array: wp.array, chosen: wp.array[int]) -> wp.array:
+    """Some rows of a Warp array, in an array of their own; chosen: int32 Warp array on its device."""
+    return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()
+
+
+def find_candidates(
+    roots: wp.array[wp.vec3],
+    normals: wp.array[wp.vec3],
+    guide_roots: wp.array[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    neighbour_limit: int,
+    *,
+    regions: tuple[np.ndarray, np.ndarray] | None = None,
+    lines: part_lines.PartLines | None = None,
+) -> Candidates:
+    """`Candidates` of strands at roots (S,) [m] with unit normals (S,), for guides (G,) likewise; all vec3 arrays.
+
+    neighbour_limit: k; regions: (S,) and (G,) int32, no strand blends guides of two regions, nor of another
+    than its own if that has any; lines: `PartLines` that paths to guides must not cross.
+    """
+    require_count("normals", len(normals), len(roots))
+    require_count("guide normals", len(guide_normals), len(guide_roots))
+    candidates, ways = _nearest_guides(guide_roots, roots, neighbour_limit + 1, regions)
+    if lines is not None:
+        candidates, ways = _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions)
+    return Candidates(candidates, ways, len(guide_roots))
+
+
+def weigh(
+    candidates: Candidates,
+    normals: wp.array[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    influence_distance: float | None,
+    neighbour_limit: int,
+) -> GuideWeights:
+    """`GuideWeights` (S, k) of `Candidates`, k + 1 of whom or more were looked for; normals (S,), guide_normals (G,).
+
+    influence_distance: d [m], None for automatic; neighbour_limit: k.
+    """
+    require_count("guide normals", len(guide_normals), candidates.guide_count)
+    if not neighbour_limit < min(candidates.indices.shape[1], hash_grid.LIMIT + 1):
+        raise ValueError(f"{neighbour_limit} guides a strand of {candidates.indices.shape[1]} candidates")
+    device, strand_count = normals.device, len(normals)
+    indices = wp.empty((strand_count, neighbour_limit), dtype=int, device=device)
+    weights = wp.empty(indices.shape, dtype=float, device=device)
+    turns = wp.empty(indices.shape, dtype=wp.vec2, device=device)
+    frames = wp.empty((len(guide_normals), cpu_weights.NUMBERS), dtype=float, device=device)
+    kernel_cache.launch(_frames, len(guide_normals), inputs=[guide_normals], outputs=[frames], device=device)
+    parallel.launch(
+        _weigh,
+        strand_count,
+        inputs=[
+            Rows(candidates.indices),
+            Rows(candidates.ways),
+            Rows(normals),
+            frames,
+            influence_distance or 0.0,
+        ],
+        outputs=[indices, weights, turns],
+        device=device,
+    )
+    return GuideWeights(indices, weights, turns, candidates.guide_count)
+
+
+def _nearest_guides(guide_roots, roots, count, regions):
+    """Indices and distances (S, count) as `hash_grid.neighbours` gives them, of guides in each root's own region."""
+    if regions is None:
+        return hash_grid.neighbours(guide_roots, roots, EVERYWHERE, count)
+    strand_regions, guide_regions = regions
+    require_count("regions of strands", len(strand_regions), len(roots))
+    require_count("regions of guides", len(guide_regions), len(guide_roots))
+    device = roots.device
+    strays = np.flatnonzero(~np.isin(strand_regions, guide_regions))
+    if len(strays):  # in a region without guides: use that of the nearest guide
+        found, _distances = hash_grid.neighbours(guide_roots, _some(roots, strays), EVERYWHERE, 1)
+        strand_regions = strand_regions.copy()
+        strand_regions[strays] = guide_regions[found.numpy()[:, 0]]
+    indices = np.full((len(roots), count), -1, np.int32)
+    distances = np.full((len(roots), count), np.inf, np.float32)
+    for region in np.unique(strand_regions):
+        own, its = np.flatnonzero(guide_regions == region), np.flatnonzero(strand_regions == region)
+        found, apart = hash_grid.neighbours(_some(guide_roots, own), _some(roots, its), EVERYWHERE, count)
+        found = found.numpy()
+        indices[its] = np.where(found >= 0, own[found], -1)
+        distances[its] = apart.numpy()
+    return wp.array(indices, device=device), wp.array(distances, device=device)
+
+
+def _parted(lines, roots, normals, guide_roots, guide_normals, candidates, ways, regions):
+    """Candidates and ways (S, k + 1) as they are around part lines.
+
+    More guides are looked at where a line is near: those behind it make room. The last way is no longer than to a guide
+    that was not looked at.
+    """
+    near = part_lines.near(lines, roots, ways)
+    if not len(near):
+        return candidates, ways
+    count = candidates.shape[1]
+    its_regions = None if regions is None else (regions[0][near], regions[1])
+    its_roots = _some(roots, near)
+    most = min(SURPLUS * count, hash_grid.LIMIT)
+    found, lengths = _nearest_guides(guide_roots, its_roots, most, its_regions)
+    unseen = lengths.numpy()[:, -1].copy()
+    part_lines.go_round(lines, its_roots, _some(normals, near), guide_roots, guide_normals, found, lengths)
+    lengths = lengths.numpy()[:, :count].copy()
+    lengths[:, -1] = np.minimum(lengths[:, -1], unseen)
+    candidates, ways = candidates.numpy().copy(), ways.numpy().copy()
+    candidates[near], ways[near] = found.numpy()[:, :count], lengths
+    return wp.array(candidates, device=roots.device), wp.array(ways, device=roots.device)
+
+
+def _some(array, chosen):
+    return rows(array, wp.array(chosen, dtype=int, device=array.device))
+
+
+def limited(
+    guide_weights: GuideWeights, guide_points: wp.array2d[wp.vec3], guide_normals: wp.array[wp.vec3], limits: Limits
+) -> GuideWeights:
+    """`GuideWeights` without the guides that differ too much from the nearest, as combed now; (G, P) [m], normals (G,).
+
+    A guide's share fades over the last `FADE` of the angle limit, and from the square root of the length limit on.
+    """
+    require_count("guides", len(guide_points), guide_weights.guide_count)
+    device = guide_points.device
+    shapes = wp.empty((len(guide_points), cpu_weights.NUMBERS), dtype=float, device=device)
+    parallel.launch(
+        _shapes,
+        len(guide_points),
+        inputs=[Rows(guide_points), Rows(guide_normals)],
+        outputs=[shapes],
+        device=device,
+        least_rows=256,
+    )
+    cosine_none, cosine_all = _fade_of_cosine(limits.angle)
+    length_limit = min(math.log(limits.length), UNLIMITED)
+    weights = wp.empty_like(guide_weights.weights)
+    parallel.launch(
+        _limit,
+        len(weights),
+        inputs=[
+            Rows(guide_weights.indices),
+            Rows(guide_weights.weights),
+            Rows(guide_weights.turns),
+            shapes,
+            cosine_none,
+            1.0 / max(cosine_all - cosine_none, 1e-6),
+            length_limit,
+            1.0 / max(0.5 * length_limit, 1e-6),
+        ],
+        outputs=[weights],
+        device=device,
+    )
+    return replace(guide_weights, weights=weights)
+
+
+def _fade_of_cosine(angle):
+    """(none, all): the cosines at which a guide has no share any more, and at which it begins to lose it."""
+    if angle >= math.pi:
+        return -3.0, -2.0
+    return math.cos(angle), math.cos(max(angle - FADE, 0.0))
+
+
+@wp.func
+def frame(normal: wp.vec3):
+    """Tangent and bitangent of a unit normal, without a branch or a pole [Duff17]."""
+    sign = wp.where(normal[2] >= 0.0, 1.0, -1.0)
+    a = -1.0 / (sign + normal[2])
+    b = normal[0] * normal[1] * a
+    tangent = wp.vec3(1.0 + sign * normal[0] * normal[0] * a, sign * b, -sign * normal[0])
+    return tangent, wp.vec3(b, sign + normal[1] * normal[1] * a, -normal[1])
+
+
+@wp.kernel
+def _frames(
+    normals: wp.array[wp.vec3],
+    # outputs
+    out_frames: wp.array2d[float],
+):
+    guide = wp.tid()
+    normal = normals[guide]
+    tangent, _bitangent = frame(normal)
+    for axis in range(3):
+        out_frames[guide, axis] = tangent[axis]
+        out_frames[guide, 3 + axis] = normal[axis]
+    out_frames[guide, 6] = 0.0
+    out_frames[guide, 7] = 0.0
+
+
+@wp.kernel
+def _weigh(
+    candidates: wp.array2d[int],
+    ways: wp.array2d[float],
+    normals: wp.array[wp.vec3],
+    frames: wp.array2d[float],
+    influence_distance: float,
+    # outputs
+    out_indices: wp.array2d[int],
+    out_weights: wp.array2d[float],
+    out_turns: wp.array2d[wp.vec2],
+):
+    strand = wp.tid()
+    limit = out_indices.shape[1]
+    nearest = ways[strand, 0]
+    left_out = ways[strand, limit]
+    distance = influence_distance
+    if distance == 0.0:
+        distance = left_out
+        for slot in range(limit):
+            # There are at most k: none is excluded, and the farthest is well within range.
+            if left_out == wp.inf and ways[strand, slot] < wp.inf:
+                distance = STRETCH * ways[strand, slot]
+    distance = wp.max(distance, STRETCH * nearest)
+    reach = wp.min(distance, left_out)
+    sigma = wp.max(0.5 * distance, 1.0e-15)  # Eq. 9
+    fall_off = 1.0 / (2.0 * sigma * sigma)
+    normal = normals[strand]
+    tangent, bitangent = frame(normal)
+    cpu_weights.weigh(
+        strand,
+        nearest,
+        reach,
+        fall_off,
+        tangent,
+        bitangent,
+        normal,
+        candidates,
+        ways,
+        frames,
+        out_indices,
+        out_weights,
+        out_turns,
+    )
+
+
+@wp.kernel
+def _shapes(
+    guide_points: wp.array2d[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    # outputs
+    out_shapes: wp.array2d[float],
+):
+    """Unit directions in the guide's frame, of its lower half and from root to tip, and the logarithm of its length."""
+    guide = wp.tid()
+    normal = guide_normals[guide]
+    tangent, bitangent = frame(normal)
+    root = guide_points[guide, 0]
+    last = guide_points.shape[1] - 1
+    half = (last + 1) / 2
+    lower = wp.vec3()
+    length = float(0.0)
+    for point in range(1, last + 1):
+        length += wp.length(guide_points[guide, point] - guide_points[guide, point - 1])
+        if point <= half:
+            lower += wp.normalize(guide_points[guide, point] - root)
+    tip = guide_points[guide, last] - root
+    lower = wp.normalize(wp.vec3(wp.dot(tangent, lower), wp.dot(bitangent, lower), wp.dot(normal, lower)))
+    tip = wp.normalize(wp.vec3(wp.dot(tangent, tip), wp.dot(bitangent, tip), wp.dot(normal, tip)))
+    for axis in range(3):
+        out_shapes[guide, axis] = lower[axis]
+        out_shapes[guide, 3 + axis] = tip[axis]
+    out_shapes[guide, 6] = wp.log(wp.clamp(length, 1.0e-30, 1.0e30))
+    out_shapes[guide, 7] = 0.0
+
+
+@wp.kernel
+def _limit(
+    indices: wp.array2d[int],
+    weights: wp.array2d[float],
+    turns: wp.array2d[wp.vec2],
+    shapes: wp.array2d[float],
+    cosine_none: float,
+    per_cosine: float,
+    length_limit: float,
+    per_length: float,
+    # outputs
+    out_weights: wp.array2d[float],
+):
+    cpu_weights.limit(
+        wp.tid(), indices, weights, turns, shapes, cosine_none, per_cosine, length_limit, per_length, out_weights
+    )

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands between guides: weighted means of guides' offsets  ([Report12] section 2.4, Eq. 10).
+
+With weights w_j that sum to one, o_j,i the offsets of guide j (Eq. 7) and R_j the rotation from the surface at its root
+to the surface at the strand's, the strand is p'_0 = q and
+
+    p'_i = p'_(i-1) + λ_i m_i,    m_i = sum_j w_j R_j o_j,i,    l_i = sum_j w_j |o_j,i|,    λ_i = l_i / |m_i|
+
+Eq. 10 is λ_i = 1, which makes a strand shorter than its guides if these diverge, down to zero if they are opposite.
+With λ_i as above each segment has the average length of its guides' segments. Weights do not depend on the point
+(guide_weights.py): combing repeats only `interpolate`.
+
+R_j is the minimal rotation from the guide's normal to the strand's: it needs no UV map and is continuous wherever
+normals are. With a frame F (tangent, bitangent, normal) at either root it is F_strand Z F_guide^T, Z being a rotation
+about the normal. So guides are transformed to their frames once, a neighbour costs five multiplications per point
+instead of nine, and the strand's frame is applied to the sum.
+"""
+
+import warp as wp
+
+from ..geometry.hash_grid import LIMIT
+from ..kernels.checks import require_count
+from .cpu_interpolation import by_vectors
+from .gpu_interpolation import by_lanes
+from .guide_weights import GuideWeights
+
+
+def interpolate(
+    roots: wp.array[wp.vec3],
+    normals: wp.array[wp.vec3],
+    guide_points: wp.array2d[wp.vec3],
+    guide_normals: wp.array[wp.vec3],
+    guide_weights: GuideWeights,
+    keep_length: float = 1.0,
+    out: wp.array2d[wp.vec3] | None = None,
+) -> wp.array2d[wp.vec3]:
+    """(S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,) that follow guides (G, P) [m], normals (G,).
+
+    keep_length: how much of the way from Eq. 10 to segments as long as the guides' on average, 0 to 1; out: array to
+    fill and return, None for a new one. Raises `HairError` where counts do not match.
+    """
+    require_count("normals", len(normals), len(roots))
+    require_count("guide normals", len(guide_normals), len(guide_points))
+    require_count("guides", len(guide_points), guide_weights.guide_count)
+    for array in (guide_weights.indices, guide_weights.weights, guide_weights.turns):
+        require_count("guide weights", len(array), len(roots))
+        require_count("guide weights of a strand", array.shape[1], guide_weights.indices.shape[1])
+    if guide_weights.indices.shape[1] > LIMIT:
+        raise ValueError(f"at most {LIMIT} guides a strand, not {guide_weights.indices.shape[1]}")
+    if out is not None:
+        require_count("strands to fill", len(out), len(roots))
+        require_count("points to fill", out.shape[1], guide_points.shape[1])
+    by = by_vectors if roots.device.is_cpu else by_lanes
+    return by(roots, normals, guide_points, guide_normals, guide_weights, keep_length, out)

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kernels: compilation, caching, and launches on CPU or GPU with checked counts and indices."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import checks, compiled_kernels, kernel_cache, kernel_setup, native_code, parallel
+else:
+    __getattr__ = submodules(__name__)

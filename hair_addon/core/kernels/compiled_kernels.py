@@ -1,0 +1,100 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Precompiled kernels of the extension; if none fit, Warp compiles them on first use as usual.
+
+`tools/compile_kernels.py` writes the folder: an index, and an object file for each Warp module and kind of processor. A
+module is loaded from it only if Warp and its compiler have the same version, the processor has every feature that the
+file was compiled for, and Warp's hash of the module's sources and options is the same. Nothing is written.
+"""
+
+import hashlib
+import json
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import warp as wp
+
+FOLDER = Path(__file__).resolve().parents[3] / "kernels"
+INDEX = "index.json"
+
+_PACKAGE = __name__.removesuffix("core.kernels.compiled_kernels")  # prefix of Warp's names of our modules
+
+
+def load(module: "wp.Module", device: "wp.Device") -> bool:
+    """Load a Warp module's compiled kernels on the processor; whether there were any that fit."""
+    if not device.is_cpu:
+        return False
+    processor, modules = _fitting(FOLDER)
+    entry = modules.get(short_name(module))
+    if entry is None or entry["hash"] != module.get_module_hash(1).hex():
+        return False
+    binary, meta = (FOLDER / path for path in file_names(short_name(module), processor))
+    if entry["files"].get(processor) != digest(binary, meta):
+        return False
+    # One thread is a block on the processor.
+    module.load(device, block_dim=1, binary_path=binary, meta_path=meta)
+    return True
+
+
+def short_name(module: "wp.Module") -> str:
+    """Return the name of a Warp module relative to the add-on, such as core.geometry.bspline."""
+    return module.name.removeprefix(_PACKAGE)
+
+
+def file_names(module_name: str, processor: str) -> tuple[str, str]:
+    """Paths in the folder of a module's object file and of its metadata."""
+    return f"{processor}/{module_name}.o", f"{module_name}.meta"
+
+
+def digest(binary: Path, meta: Path) -> str | None:
+    """SHA-256 of a module's two files in hexadecimal digits, or None where one of them is missing."""
+    try:
+        return hashlib.sha256(binary.read_bytes() + meta.read_bytes()).hexdigest()
+    except OSError:
+        return None
+
+
+def compiler() -> dict[str, Any]:
+    """What must be the same where kernels are compiled and where they are loaded."""
+    import warp as wp
+
+    context = _warp_context()
+    return {
+        "warp": wp.config.version,
+        "llvm": context._get_cpu_toolchain_version(),
+        "triple": context._get_cpu_target_triple(),
+    }
+
+
+def processor_features() -> set[str]:
+    """Names of the features of this machine's processor, as LLVM calls them."""
+    return _warp_context()._get_cpu_feature_set()
+
+
+def _warp_context():
+    # Not public, and without a public alternative. The bundled version is pinned, and `_fitting` asks
+    # for it before anything else.
+    import warp as wp
+    from warp._src import context
+
+    wp.init()  # neither is known before
+    return context
+
+
+@cache
+def _fitting(folder):
+    """(name of the best kind of processor that this one is, {module name: entry of the index}); ("", {}) for none."""
+    import warp as wp
+
+    try:
+        index = json.loads((folder / INDEX).read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return "", {}
+    if index["compiler"]["warp"] != wp.config.version or index["compiler"] != compiler():
+        return "", {}
+    features = processor_features()
+    for processor in index["processors"]:
+        if features.issuperset(processor["features"]):
+            return processor["name"], index["modules"]
+    return "", {}

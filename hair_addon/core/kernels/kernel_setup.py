@@ -1,0 +1,160 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Loading of several Warp modules: compiled on several threads if needed, each module once.
+
+Warp's compiler releases the GIL. Callers on different threads share the work: they wait for modules that another
+thread is compiling, after all others.
+"""
+
+import atexit
+import os
+import threading
+from collections import deque
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from .. import kernels
+from ..long_work import Progress, Stopped, no_progress
+
+if TYPE_CHECKING:
+    import warp as wp
+
+LOADING = "Loading kernels"
+COMPILING = "First-time setup (once)"
+
+# Each compiling thread first reads Warp's headers, which takes as long as the kernels of eight modules.
+MOST_THREADS = 4
+
+_PATIENCE = 0.05  # [s] between progress updates
+
+_under_way = set()
+
+
+def load(
+    modules: Iterable["wp.Module"],
+    device: "wp.DeviceLike",
+    progress: Progress = no_progress,
+    most_threads: int = MOST_THREADS,
+) -> None:
+    """Load Warp modules on a device: seconds where they must be compiled, microseconds where they are loaded already.
+
+    progress(step, part): told which part of the modules is loaded; may raise to stop, which ends the threads after the
+    module that each of them has begun. Raises `HairError` as `kernel_cache.load` does, and `Stopped` where Python ends
+    meanwhile.
+    """
+    import warp as wp
+
+    device = wp.get_device(device)
+    missing = [module for module in modules if not kernels.kernel_cache.is_loaded(device, module)]
+    if not missing:
+        return
+    if not device.is_cpu:  # NVIDIA's compiler, on this thread, whose context it needs
+        progress(
+            LOADING if all(kernels.kernel_cache.is_compiled(device, module) for module in missing) else COMPILING, 0.0
+        )
+        kernels.kernel_cache.load(device, *missing)
+        return
+    loading = _Loading(missing, device)
+    loading.begin(_thread_count(min(most_threads, len(missing))))
+    try:
+        while loading.is_running(_PATIENCE):
+            progress(COMPILING if loading.is_compiling else LOADING, loading.part)
+    finally:
+        loading.end()
+    if loading.errors:
+        raise loading.errors[0]
+    if loading.part < 1.0:  # Python ends
+        raise Stopped
+
+
+def is_under_way() -> bool:
+    """Whether modules are being loaded."""
+    return bool(_under_way)
+
+
+def _thread_count(most):
+    """Number of threads to start: as many as CPUs, minus those already loading; at least one."""
+    others = sum(loading.thread_count for loading in tuple(_under_way))
+    return max(1, min(most, (os.process_cpu_count() or 1) - others))
+
+
+class _Loading:
+    """Modules that are being loaded by some threads."""
+
+    def __init__(self, modules, device):
+        self.errors = []
+        self.is_compiling = False
+        self._device = device
+        self._pending = deque(modules)
+        self._count, self._done = len(modules), []
+        self._is_stopped = threading.Event()
+        self._threads = []
+
+    @property
+    def part(self):
+        """The part of the modules that is loaded."""
+        return len(self._done) / self._count
+
+    @property
+    def thread_count(self):
+        """Number of threads started."""
+        return len(self._threads)
+
+    def begin(self, thread_count):
+        _under_way.add(self)
+        # Daemons: Blender does not wait for them before it asks them to end.
+        for _ in range(thread_count):
+            thread = threading.Thread(target=self._run, name="vellus", daemon=True)
+            thread.start()
+            self._threads.append(thread)
+
+    def is_running(self, seconds):
+        """Wait for the threads with a timeout [s]; returns whether any is still running."""
+        running = next((thread for thread in self._threads if thread.is_alive()), None)
+        if running is not None:
+            running.join(seconds)
+        return running is not None
+
+    def end(self):
+        """Start no other module, and wait for the threads."""
+        self._is_stopped.set()
+        for thread in self._threads:
+            thread.join()
+        _under_way.discard(self)
+
+    def _run(self):
+        try:
+            for module, lock in self._free_ones_first():
+                with lock:
+                    if self._is_stopped.is_set():  # while this thread waited for the one that has the module
+                        return
+                    kernels.kernel_cache.load_locked(self._device, module, self._say_compiling)
+                self._done.append(module)
+        except Exception as error:  # re-raised in the caller of `load`
+            self.errors.append(error)
+            self._is_stopped.set()
+
+    def _free_ones_first(self):
+        """Modules that no thread has begun, each with its lock; those that others are loading come last."""
+
+        busy = []
+        while self._pending and not self._is_stopped.is_set():
+            try:
+                module = self._pending.popleft()
+            except IndexError:  # another thread took the last one
+                break
+            lock = kernels.kernel_cache.lock_of(self._device, module)
+            if lock.locked():
+                busy.append((module, lock))
+            else:
+                yield module, lock
+        yield from busy
+
+    def _say_compiling(self):
+        self.is_compiling = True
+
+
+@atexit.register
+def _end_all():
+    """Stop before Python exits: the compiler must not run when its library is unloaded."""
+    for loading in tuple(_under_way):
+        loading.end()

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kernels on all cores of the processor, and memory that is quick to fill.
+
+A launch of Warp on the processor is a loop on one core, during which Python's other threads may run. So rows are shared
+among threads, each with a launch of its own. `launch` is for rows that do not depend on each other, `launch_shares` for
+sums over rows. On a GPU either is one launch.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from . import kernel_cache
+from .checks import require_count
+
+PARTS_PER_CORE = 2  # for load balancing, as one core may have other work
+LEAST_ROWS = 4096  # fewer are not worth a thread
+MOST_SHARES = 8  # of sums, each in memory of its own
+
+
+@dataclass(frozen=True)
+class Rows:
+    """An array of which thread i of a kernel touches row i alone."""
+
+    array: wp.array
+
+    def part(self, first: int, end: int) -> wp.array:
+        """Some of the rows."""
+        return self.array if end - first == len(self.array) else self.array[first:end]
+
+
+def launch(
+    kernel: wp.Kernel,
+    row_count: int,
+    inputs: list[Any],
+    outputs: list[wp.array],
+    device: wp.DeviceLike,
+    least_rows: int = LEAST_ROWS,
+) -> None:
+    """Run a kernel, one thread per row. inputs: `Rows`, and arguments shared by all threads; outputs: arrays of rows.
+
+    least_rows: fewer are not worth a thread of the processor. Raises `HairError` where an array has another number of
+    rows.
+    """
+    device = wp.get_device(device)
+    given = [*inputs, *map(Rows, outputs)]
+    for rows in given:
+        if isinstance(rows, Rows):
+            require_count("rows", len(rows.array), row_count)
+    if row_count == 0:
+        return
+    core_count = _core_count(device)
+    part_count = min(core_count * PARTS_PER_CORE, row_count // least_rows) if core_count > 1 else 1
+
+    def arguments(_part, first, end):
+        return [value.part(first, end) if isinstance(value, Rows) else value for value in given]
+
+    _launch_parts(kernel, arguments, row_count, max(1, part_count), device)
+
+
+def share_count(row_count: int, device: wp.DeviceLike, least_rows: int = LEAST_ROWS) -> int:
+    """How many shares `launch_shares` should be given outputs for."""
+    return max(1, min(_core_count(wp.get_device(device)), MOST_SHARES, row_count // least_rows))
+
+
+def launch_shares(
+    kernel: wp.Kernel, row_count: int, inputs: list[Any], outputs: list[list[Any]], device: wp.DeviceLike
+) -> None:
+    """Run a kernel that adds to its outputs, on as many shares of rows as there are lists of output arrays.
+
+    The kernel's last input is the first row of its share; its thread i is row i of the share.
+    """
+
+    def arguments(share, first, _end):
+        return [*inputs, first, *outputs[share]]
+
+    _launch_parts(kernel, arguments, row_count, len(outputs), wp.get_device(device))
+
+
+def _core_count(device):
+    """How many launches run at once on a device."""
+    return (os.process_cpu_count() or 1) if device.is_cpu else 1
+
+
+def _launch_parts(kernel, arguments, row_count, part_count, device):
+    """Launch a kernel on parts of the rows, on as many threads as cores; arguments(part, first, end) are a part's."""
+    bounds = np.linspace(0, row_count, part_count + 1).astype(int).tolist()
+
+    def launch_part(part):
+        first, end = bounds[part : part + 2]
+        kernel_cache.launch(kernel, dim=end - first, inputs=arguments(part, first, end), device=device)
+
+    if part_count == 1:
+        launch_part(0)
+        return
+    kernel_cache.load(device, kernel.module)  # once, not by each thread
+    with ThreadPoolExecutor(min(_core_count(device), part_count)) as pool:
+        list(pool.map(launch_part, range(part_count)))  # where the first exception is raised again
+
+
+def empty_vectors(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
+    """`wp.empty` of vec3; on the processor in NumPy's memory, which comes in large pages: filling it takes a third."""
+    device = wp.get_device(device)
+    if not device.is_cpu:
+        return wp.empty(shape, dtype=wp.vec3, device=device)
+    return wp.array(np.empty((*shape, 3), np.float32), dtype=wp.vec3, device=device, copy=False)
+
+
+def empty_for_results(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:
+    """An array of vec3 in the processor's memory for a device's results: pinned, which a GPU fills faster."""
+    if wp.get_device(device).is_cpu:
+        return empty_vectors(shape, "cpu")
+    return wp.empty(shape, dtype=wp.vec3, device="cpu", pinned=True)

@@ -1,0 +1,277 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The domain of roots: the surface with density, divided into pieces small enough for sums over cells."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..geometry.closest_point import SurfaceQuery
+from ..geometry.connected_components import connected_components
+from ..geometry.mesh import SurfacePoints, TriMesh, interpolate, positions
+from ..geometry.sampling import check_density, corner_masses
+from ..geometry.texture import Texture
+
+GRID_SIZE = 32  # cells along each axis of the grid that sites are found by; farther ones wrap around
+LONGEST_EDGE = 2.5  # of a piece, by the spacing of sites: a piece is shared among few cells
+LONGEST_GRADED_EDGE = 1.5  # where the density varies: it is constant in a piece
+LEAST_COSINE = -1.0 / 3.0  # between normals of one side of a surface
+LEAST_PIECES = 2000  # minimum site count for the cutting: the density is constant in a piece
+PLASTIC = 0.7548776662466927, 0.5698402909980532  # steps of the evenest sequence in a square [Roberts18]
+
+
+@dataclass(frozen=True)
+class Mirror:
+    """A plane through the origin [m]; normal (3,), unit."""
+
+    normal: np.ndarray
+
+    def image(self, vectors: np.ndarray) -> np.ndarray:
+        """(N, 3) positions or directions, mirrored."""
+        return vectors - 2.0 * (vectors @ self.normal)[:, None] * self.normal
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Triangles cut out of a mesh's triangles, of triangle (Q,).
+
+    barycentric (Q, 3, 3) and corners (Q, 3, 3) at unit size: where their corners are; areas (Q,).
+    """
+
+    triangle: np.ndarray
+    barycentric: np.ndarray
+    corners: np.ndarray
+    areas: np.ndarray
+
+    def chosen(self, selection: np.ndarray) -> "Parts":
+        """The parts of a mask or an index array."""
+        if selection.dtype == bool and selection.all():
+            return self
+        return Parts(*(getattr(self, field.name)[selection] for field in fields(self)))
+
+    def joined(self, *others: "Parts") -> "Parts":
+        """These parts and others, one after another."""
+        if not others:
+            return self
+        every = (self, *others)
+        return Parts(*(np.concatenate([getattr(part, field.name) for part in every]) for field in fields(self)))
+
+    def centres(self) -> SurfacePoints:
+        """`SurfacePoints`."""
+        centres = self.barycentric[:, 0] + self.barycentric[:, 1] + self.barycentric[:, 2]
+        return SurfacePoints(self.triangle.astype(np.int32), (centres / 3.0).astype(np.float32))
+
+
+class Domain:
+    """A checked `TriMesh` at unit size with a density D, normalised by `densest`, cut for a number of sites.
+
+    mesh: scaled, `size` [m] being its own; normals: (F, 3), unit; islands: (F,); parts: `Parts` that have density, of
+    one side of a mirror if there is one; densities (Q,): D, mean; amounts (Q,): ∫ D dA; mass: ∫ D² dA; query
+    and grid: what finds places on it, and sites that are near.
+    """
+
+    def __init__(
+        self,
+        mesh: TriMesh,
+        site_count: int,
+        density: np.ndarray | None = None,
+        texture: Texture | None = None,
+        mirror: Mirror | None = None,
+        device: wp.DeviceLike = "cpu",
+    ) -> None:
+        has_area = mesh.areas > 0.0
+        is_used = np.zeros(len(mesh.vertices), bool)
+        is_used[mesh.triangles[has_area]] = True
+        used = mesh.vertices[is_used]
+        lowest, highest = used.min(axis=0), used.max(axis=0)
+        self.size = float((highest - lowest).max())
+        self.origin = lowest.astype(np.float64)
+        # Unused vertices may be far away, and would reduce the precision of the others.
+        inside = np.clip(mesh.vertices, lowest, highest)
+        self.mesh = TriMesh(((inside - lowest) / np.float32(self.size)).astype(np.float32), mesh.triangles)
+        values = check_density(self.mesh, density)
+        self.densest = float(values.max())
+        self._values, self._texture = values / self.densest, texture
+        lengths = np.linalg.norm(self.mesh.scaled_normals, axis=1, keepdims=True)
+        self.normals = self.mesh.scaled_normals / np.where(lengths > 0.0, lengths, 1.0)
+        self.islands = connected_components(self.mesh)
+        self._mirror = mirror
+        grown = np.flatnonzero(has_area & corner_masses(self.mesh, self._values).any(axis=1))
+        self.query = SurfaceQuery(self.mesh, grown, device)
+        self.grid = wp.HashGrid(GRID_SIZE, GRID_SIZE, GRID_SIZE, device=device)
+        corners = np.broadcast_to(np.eye(3), (len(grown), 3, 3))
+        whole = Parts(grown, corners, self.mesh.corners[grown], self.mesh.areas[grown])
+        if mirror is not None:
+            whole = self._heavier_side(whole)
+        if texture is not None:  # which is finer than triangles
+            spacing = _spacing(whole.areas.sum(), LEAST_PIECES)
+            whole = cut(whole, LONGEST_GRADED_EDGE * spacing, lambda parts: 1.0)
+        # Where the density is high sites are close, and pieces small.
+        amount = (whole.areas * self.density_at(whole.centres())).sum()
+        if not amount > 0.0:
+            raise HairError("The density is zero everywhere: paint weight where hair should grow.")
+        spacing = _spacing(amount, max(site_count, LEAST_PIECES))
+        if texture is None and np.ptp(self._values) == 0.0:
+            self.parts = cut(whole, LONGEST_EDGE * spacing, lambda parts: 1.0)
+        else:
+            self.parts = cut(whole, LONGEST_GRADED_EDGE * spacing, self._least_density)
+        self.densities = self.density_at(self.parts.centres())
+        self.parts, self.densities = self.parts.chosen(self.densities > 0.0), self.densities[self.densities > 0.0]
+        self.amounts = self.parts.areas * self.densities
+        self.mass = float((self.amounts * self.densities).sum())
+
+    def density_at(self, points: SurfacePoints) -> np.ndarray:
+        """(N,) float64: D at `SurfacePoints`, one where the given density is highest."""
+        density = interpolate(self._values, self.mesh, points).astype(np.float64)
+        return density if self._texture is None else density * self._texture.at(points)
+
+    def _least_density(self, parts):
+        """(Q,): D, and no less than a thousandth, where pieces are as large as may be."""
+        return np.maximum(self.density_at(parts.centres()), 1e-3)
+
+    def moved(self, points: SurfacePoints, places: np.ndarray) -> SurfacePoints:
+        """`SurfacePoints` moved to the domain nearest to places (N, 3).
+
+        One that would change sides or islands, find no density, or cross the mirror, stays where it is.
+        """
+        if self._mirror is not None:
+            places = places - np.minimum(self._heights(places), 0.0)[:, None] * self._mirror.normal
+        # Where they come from is no farther; a part more than that for rounding.
+        farthest = 1.01 * np.linalg.norm(places - positions(self.mesh, points), axis=1) + 1e-5
+        found = self.query.nearest(places, farthest)
+        before, after = self.normals[points.triangle], self.normals[found.triangle]
+        is_good = (np.einsum("ni,ni->n", before, after) > LEAST_COSINE) & (self.density_at(found) > 0.0)
+        is_good &= self.islands[found.triangle] == self.islands[points.triangle]
+        if self._mirror is not None:
+            is_good &= self._heights(positions(self.mesh, found)) >= -1e-5
+        return SurfacePoints(
+            np.where(is_good, found.triangle, points.triangle),
+            np.where(is_good[:, None], found.barycentric, points.barycentric),
+        )
+
+    def samples(self, count: int, random: np.random.Generator | None = None) -> tuple[SurfacePoints, np.ndarray]:
+        """`count` points, as `SurfacePoints`, each of which stands for the same amount, and their parts (count,).
+
+        They are taken island by island at even steps, so each island has its share; random: where within each step, a
+        generator, or None for the evenest.
+        """
+        order = np.argsort(self.islands[self.parts.triangle], kind="stable")
+        running = np.cumsum(self.amounts[order])
+        number = np.arange(count)
+        if random is None:
+            within, first, second = 0.5, *((0.5 + number * step) % 1.0 for step in PLASTIC)
+        else:
+            within, first, second = random.random((3, count))
+        part = order[np.searchsorted(running, (number + within) / count * running[-1]).clip(0, len(order) - 1)]
+        folded = first + second > 1.0
+        first, second = np.where(folded, 1.0 - first, first), np.where(folded, 1.0 - second, second)
+        weights = np.stack([first, second, 1.0 - first - second], axis=1)
+        barycentric = np.einsum("nc,nck->nk", weights, self.parts.barycentric[part])
+        return SurfacePoints(self.parts.triangle[part].astype(np.int32), barycentric.astype(np.float32)), part
+
+    def symmetric(self, half: SurfacePoints, count: int) -> SurfacePoints:
+        """`count` `SurfacePoints`: one half, (count + 1) // 2 of them, and their images at the nearest place of all.
+
+        Of an odd number the one that is nearest to the mirror goes there, and is its own image.
+        """
+        places = positions(self.mesh, half).astype(np.float64)
+        heights = self._heights(places)
+        if count % 2:
+            order = np.append(np.delete(np.arange(len(half)), np.argmin(heights)), np.argmin(heights))
+            half, places, heights = half[order], places[order], heights[order]
+            between = self.moved(half[-1:], places[-1:] - heights[-1] * self._normal)
+            half = half[:-1].joined(between)
+        images = (places - 2.0 * heights[:, None] * self._normal)[: count // 2]
+        found = self.query.nearest(images) if len(images) else half[:0]
+        # Where only one side has density, guides grow on that side alone: an image there stays on its original.
+        is_bare = self.density_at(found) <= 0.0
+        triangle = np.where(is_bare, half.triangle[: count // 2], found.triangle)
+        barycentric = np.where(is_bare[:, None], half.barycentric[: count // 2], found.barycentric)
+        return half.joined(SurfacePoints(triangle, barycentric))
+
+    @property
+    def _normal(self):
+        """(3,) of the mirror, towards the side that sites are on."""
+        if self._mirror is None:
+            raise ValueError("This domain has no mirror.")
+        return self._mirror.normal
+
+    def _heights(self, places):
+        """(N,) heights of places above the mirror, at unit size."""
+        return (places + self.origin / self.size) @ self._normal
+
+    def _heavier_side(self, parts):
+        """The parts above the mirror, cut along it; the mirror is flipped if its lower side has more."""
+        above, below = (self._cut_at_mirror(parts, sign) for sign in (1.0, -1.0))
+        above_amount, below_amount = ((side.areas * self.density_at(side.centres())).sum() for side in (above, below))
+        if below_amount > above_amount * (1.0 + 1e-6):
+            self._mirror = Mirror(-self._normal)
+            return below
+        return above
+
+    def _cut_at_mirror(self, parts, sign):
+        heights = sign * self._heights(parts.corners.reshape(-1, 3)).reshape(-1, 3)
+        heights[np.abs(heights) < 1e-6] = 0.0
+        lowest = heights.min(axis=1)
+        pieces = [parts.chosen((lowest >= 0.0) & (heights.max(axis=1) > 0.0))]
+        # The corner that is alone on its side comes first; the plane crosses the two edges that meet there.
+        above_count = np.count_nonzero(heights > 0.0, axis=1)
+        for alone, count in ((1.0, 1), (-1.0, 2)):
+            crossed = np.flatnonzero((above_count == count) & (lowest < 0.0))
+            first = np.argmax(alone * heights[crossed], axis=1)
+            turn = (first[:, None] + np.arange(3)) % 3
+            h = np.take_along_axis(heights[crossed], turn, axis=1)
+            b = np.take_along_axis(parts.barycentric[crossed], turn[:, :, None], axis=1)
+            shares = [h[:, 0] / (h[:, 0] - h[:, k]) for k in (1, 2)]
+            cuts = [b[:, 0] + shares[k - 1][:, None] * (b[:, k] - b[:, 0]) for k in (1, 2)]
+            area = parts.areas[crossed]
+            tip = area * shares[0] * shares[1]
+            if alone > 0.0:
+                corners = [(np.stack([b[:, 0], *cuts], axis=1), tip)]
+            else:
+                near = area * (1.0 - shares[0])
+                corners = [
+                    (np.stack([cuts[0], b[:, 1], b[:, 2]], axis=1), near),
+                    (np.stack([cuts[0], b[:, 2], cuts[1]], axis=1), area - tip - near),
+                ]
+            triangle = parts.triangle[crossed]
+            pieces += [
+                Parts(triangle, barycentric, barycentric @ self.mesh.corners[triangle], areas)
+                for barycentric, areas in corners
+            ]
+        return pieces[0].joined(*pieces[1:])
+
+
+def _spacing(amount, count):
+    """Of so many sites on an area, at unit size; no less than leaves a sliver's pieces to a dozen sites in a row.
+
+    Else slivers alone would be cut to bits of their width, millions of them.
+    """
+    return max(np.sqrt(amount / count), 8.0 / count)
+
+
+def cut(parts: Parts, longest: float, density_of: Callable[[Parts], np.ndarray | float]) -> Parts:
+    """Parts halved across their longest edges until none is longer than `longest`, where the density is one."""
+    done = []
+    while len(parts.areas):
+        edges = parts.corners - parts.corners[:, (1, 2, 0)]
+        squares = np.einsum("qcx,qcx->qc", edges, edges)
+        is_long = squares.max(axis=1) > longest**2 / density_of(parts)
+        done.append(parts.chosen(~is_long))
+        parts = _halved(parts.chosen(is_long), squares[is_long].argmax(axis=1))
+    return done[0].joined(*done[1:])
+
+
+def _halved(parts, edge):
+    """Each part as two, cut from the middle of its edge that begins at corner `edge` (Q,)."""
+    rows = np.arange(len(edge))
+    first, second = [], []
+    for corners in (parts.barycentric, parts.corners):
+        one, other, across = (corners[rows, (edge + turn) % 3] for turn in range(3))
+        middle = 0.5 * (one + other)
+        first.append(np.stack([one, middle, across], axis=1))
+        second.append(np.stack([middle, other, across], axis=1))
+    one, other = (Parts(parts.triangle, half[0], half[1], 0.5 * parts.areas) for half in (first, second))
+    return one.joined(other)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Marschner's angles about a fibre [Marschner03], from directions and back.
+
+The tangent points from root to tip, `to_light` and `to_view` away from the fibre; all three are unit vectors (..., 3).
+An inclination theta is measured from the normal plane, positive towards the tip. The azimuth phi is turned about the
+tangent from the light to the viewer: 0 looks back at the light, pi looks straight through. Radians everywhere.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+Values = float | np.ndarray  # (...): one number, or an array of any shape
+
+
+class FibreAngles(NamedTuple):
+    """Arrays of one shape (...), radians."""
+
+    theta_i: np.ndarray  # inclination of the light, [-pi/2, pi/2]
+    theta_o: np.ndarray  # inclination of the viewer, [-pi/2, pi/2]
+    phi: np.ndarray  # relative azimuth, (-pi, pi]
+
+    @property
+    def theta_h(self) -> np.ndarray:
+        """Half angle: zero on the mirror cone."""
+        return 0.5 * (self.theta_o + self.theta_i)
+
+    @property
+    def theta_d(self) -> np.ndarray:
+        """Difference angle: the inclination inside which the azimuthal scattering happens."""
+        return 0.5 * (self.theta_o - self.theta_i)
+
+
+def fibre_angles(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray) -> FibreAngles:
+    """Unit vectors (..., 3) → `FibreAngles` (...)."""
+    theta_i = inclination(np.sum(tangent * to_light, axis=-1))
+    theta_o = inclination(np.sum(tangent * to_view, axis=-1))
+    return FibreAngles(theta_i, theta_o, relative_azimuth(tangent, to_light, to_view))
+
+
+def relative_azimuth(tangent: np.ndarray, to_light: np.ndarray, to_view: np.ndarray) -> np.ndarray:
+    """phi (...) in (-pi, pi]. A direction along the tangent has no azimuth: phi is then 0.
+
+    Scattering is even in phi, so the shader's twin gives |phi|.
+    """
+    light = to_light - np.sum(tangent * to_light, axis=-1)[..., None] * tangent
+    view = to_view - np.sum(tangent * to_view, axis=-1)[..., None] * tangent
+    # The arc tangent keeps its precision at phi = 0 and pi, where an arc cosine of the dot product loses half of it.
+    return np.arctan2(np.sum(tangent * np.cross(light, view), axis=-1), np.sum(light * view, axis=-1))
+
+
+def inclination(sin_theta: Values) -> np.ndarray:
+    """Dot product with the tangent (...) → theta (...); rounding may have carried it past ±1."""
+    return np.arcsin(np.clip(sin_theta, -1.0, 1.0))
+
+
+def direction(tangent: np.ndarray, normal: np.ndarray, theta: Values, phi: Values) -> np.ndarray:
+    """Inclinations and azimuths (...) → unit vectors (..., 3), with phi counted from `normal` about `tangent`.
+
+    `normal` (..., 3) is a unit vector perpendicular to `tangent` (..., 3).
+    """
+    theta = np.asarray(theta)[..., None]
+    phi = np.asarray(phi)[..., None]
+    binormal = np.cross(tangent, normal)
+    return np.sin(theta) * tangent + np.cos(theta) * (np.cos(phi) * normal + np.sin(phi) * binormal)
+
+
+def cos_theta_d(sin_theta_i: Values, sin_theta_o: Values) -> np.ndarray:
+    """cos((theta_o - theta_i) / 2) from the two dot products, exact by the half-angle formula; in [0, 1]."""
+    cosines = sin_from_cos(sin_theta_i) * sin_from_cos(sin_theta_o)
+    return np.sqrt(np.maximum(0.0, 0.5 * (1.0 + cosines + sin_theta_i * sin_theta_o)))
+
+
+def sin_from_cos(cosine: Values) -> np.ndarray:
+    """Sine of an angle in [0, pi], or cosine of an inclination from its sine; rounding may exceed ±1."""
+    return np.sqrt(np.maximum(0.0, 1.0 - np.square(cosine)))

@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Azimuthal roughness: the trimmed logistic of [Chiang16], and its convolution with tables.
+
+A rough fibre's N_p is a smooth one's, convolved over the circle of phi. So tables of rough fibres come from those of
+smooth ones, whose texels are exact means, by one matrix: no energy is lost, and roughness 0 is the smooth table.
+"""
+
+import numpy as np
+
+from .angles import Values
+
+
+def trimmed_logistic(phi: Values, scale: Values) -> np.ndarray:
+    """Density D_s (...) [1/rad] of the deflection phi in [-pi, pi]; scale s [rad]."""
+    # The logistic density is 1 / (4 s cosh²(x / 2s)); this form has nothing that overflows.
+    decay = np.exp(-np.abs(phi) / scale)
+    return decay / (scale * np.square(1.0 + decay) * np.tanh(0.5 * np.pi / scale))
+
+
+def roughening(edges: np.ndarray, scale: Values) -> np.ndarray:
+    """(W, W) matrix that turns the cell means of a smooth N over phi (..., W) into those of a rough one.
+
+    edges: W + 1 monotone values of phi from 0 to pi or back; scale s [rad].
+    """
+    return _spreading(edges, lambda x: _logistic_antiderivative(x, scale))
+
+
+def half_circle_mean(edges: np.ndarray) -> np.ndarray:
+    """(W, W) matrix that averages N over the half circle around each phi: N^G of [Zinke08], light from all in front."""
+    return _spreading(edges, lambda x: np.where(x < 0.5 * np.pi, 0.5 * x * x, 0.5 * np.pi * (x - 0.25 * np.pi)) / np.pi)
+
+
+def _spreading(edges, second_antiderivative):
+    """The matrix of a convolution over the circle with an even density D on [-pi, pi], for means over cells.
+
+    N is even in phi, so light comes from both sides. Each element is the exact mean of D over two cells, and each
+    column spreads exactly what it was given. second_antiderivative: G on [0, pi] with G'' = D, G(0) = G'(0) = 0.
+    """
+    # D(x - y) over the cell of y is D(x + y) over its mirror image.
+    spread = sum(_cell_integrals(edges, image, second_antiderivative) for image in (-edges, edges))
+    spread = np.maximum(spread, 0.0)  # rounding of the second differences
+    widths = np.abs(np.diff(edges))
+    return spread * (widths / spread.sum(axis=0)) / widths[:, None]
+
+
+def _cell_integrals(x_edges, y_edges, second_antiderivative):
+    """Integrals (W, W) of D(x + y) over pairs of cells: second differences of G, continued around the circle."""
+    x = np.abs(x_edges[:, None] + y_edges[None, :])  # up to 2 pi
+    beyond = np.maximum(x - np.pi, 0.0)
+    # From pi on D is its mirror image, so G is the area under 1 - C where C, the integral of D, was.
+    values = beyond + second_antiderivative(np.where(x > np.pi, np.pi - beyond, x))
+    return np.abs(np.diff(np.diff(values, axis=0), axis=1))
+
+
+def _logistic_antiderivative(x, scale):
+    """Integral of C(x) = tanh(x / 2s) / (2 tanh(pi / 2s)), itself the integral of D_s, from 0 to x in [0, pi]."""
+    half = 0.5 * x / scale
+    log_cosh = half + np.log1p(np.exp(-2.0 * half)) - np.log(2.0)
+    return scale * log_cosh / np.tanh(0.5 * np.pi / scale)

@@ -1,0 +1,45 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Elliptic fibres: the internal reflection of a circular fibre with an effective index that depends on the azimuth
+[Marschner03].
+
+The index eta* is that of a circle that would bend light as the ellipse does where light and viewer are, on average, at
+the azimuth phi_h from the major axis. It goes from eta*_1 there to eta*_2 across, linear in cos(2 phi_h).
+"""
+
+import numpy as np
+
+from .angles import Values
+
+LAYER_COUNT = 4  # indices that are baked, from eta*_1 to eta*_2
+
+
+def layer_etas(eta: float, eccentricity: float) -> np.ndarray:
+    """eta* of each layer, (4,); eccentricity: the minor axis, of the major."""
+    squared = eccentricity**2
+    low, high = (2.0 * (eta - 1.0) * ratio - eta + 2.0 for ratio in (squared, 1.0 / squared))
+    return np.linspace(low, high, LAYER_COUNT)
+
+
+def layer_weights(cosine: np.ndarray) -> np.ndarray:
+    """How much of each layer, (..., 4), a fibre shows at cos(2 phi_h) (...)."""
+    place = 0.5 * (LAYER_COUNT - 1) * (1.0 - np.asarray(cosine)[..., None])
+    return np.maximum(0.0, 1.0 - np.abs(place - np.arange(LAYER_COUNT)))
+
+
+def major_axis(tangent: np.ndarray, random: Values) -> np.ndarray:
+    """Unit vector (..., 3) of the section's major axis: a direction of the strand's own, across its tangent (..., 3).
+
+    It turns with the fibre, and has a seam only where a strand runs along that one direction.
+    """
+    z, turn = 2.0 * random - 1.0, 2.0 * np.pi * ((random * 1021.0) % 1.0)
+    radius = np.sqrt(1.0 - z * z)
+    own = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=-1)
+    across = own - np.sum(own * tangent, axis=-1, keepdims=True) * tangent
+    return across / np.linalg.norm(across, axis=-1, keepdims=True)
+
+
+def cos_twice_phi_h(tangent: np.ndarray, axis: np.ndarray, to_light: np.ndarray, to_view: np.ndarray) -> np.ndarray:
+    """cos(2 phi_h) = cos(phi_i + phi_o), (...), of azimuths measured from the major axis."""
+    other = np.cross(tangent, axis)
+    light, view = ([np.sum(direction * base, axis=-1) for base in (axis, other)] for direction in (to_light, to_view))
+    return (light[0] * view[0] - light[1] * view[1]) / (np.hypot(*light) * np.hypot(*view))

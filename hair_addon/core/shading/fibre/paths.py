@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rays through a smooth cylinder, flattened into its normal plane by the Bravais indices [Marschner03].
+
+A path p crosses the inside p times: R, TT, TRT; RESIDUAL stands for all the longer ones together. A ray is named by
+gamma, its angle of incidence in the normal plane; h = sin(gamma) is its offset from the axis. Lengths are in fibre
+radii. cos_theta_d (...) in (0, 1].
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .angles import Values
+from .fresnel import bravais_indices, bravais_reflectance
+
+R, TT, TRT, RESIDUAL = 0, 1, 2, 3
+
+
+def exit_angle(p: int, gamma: Values, eta_prime: Values) -> np.ndarray:
+    """phi (...) at which a ray with the angle of incidence gamma leaves: R and TRT in (-pi, pi), TT in (0, 2 pi)."""
+    gamma_t = np.arcsin(np.sin(gamma) / eta_prime)
+    return 2.0 * p * gamma_t - 2.0 * gamma + (p % 2) * np.pi
+
+
+def exit_angle_slope(p: int, gamma: Values, eta_prime: Values) -> np.ndarray:
+    """d(phi) / d(gamma), finite at the fibre's rim where d(phi) / d(h) is not."""
+    return 2.0 * p * np.cos(gamma) / np.sqrt(np.square(eta_prime) - np.square(np.sin(gamma))) - 2.0
+
+
+def tt_gamma(phi: Values, eta_prime: Values) -> np.ndarray:
+    """The one gamma in [0, pi/2] of a TT path that leaves at phi in [0, pi]; pi/2 where no path does.
+
+    From sin(gamma) = eta' sin(gamma - delta), where delta = gamma - gamma_t turns the ray at each of two crossings.
+    """
+    delta = 0.5 * (np.pi - phi)
+    return np.minimum(np.arctan2(eta_prime * np.sin(delta), eta_prime * np.cos(delta) - 1.0), 0.5 * np.pi)
+
+
+def caustic_gamma(eta_prime: Values) -> np.ndarray:
+    """gamma_c (...), where TRT's exit angle turns back; pi/2 from eta' = 2 on, where it never does."""
+    sin_squared = (4.0 - np.square(eta_prime)) / 3.0
+    return np.where(sin_squared > 0.0, np.arcsin(np.sqrt(np.maximum(sin_squared, 0.0))), 0.5 * np.pi)
+
+
+def trt_segments(eta_prime: Values) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """[(low, high, slope sign)], each (...): the intervals of gamma in which TRT's exit angle is monotone.
+
+    From eta' = 2 on it is monotone throughout: the middle interval is all and the others are empty.
+    """
+    gamma_c = caustic_gamma(eta_prime)
+    rim = np.full_like(gamma_c, 0.5 * np.pi)
+    falling = np.full_like(gamma_c, -1.0)
+    return [
+        (-rim, -gamma_c, falling),
+        (-gamma_c, gamma_c, np.where(np.asarray(eta_prime) < 2.0, 1.0, -1.0)),
+        (gamma_c, rim, falling),
+    ]
+
+
+def trt_gamma(
+    phi: Values,
+    low: np.ndarray,
+    high: np.ndarray,
+    slope_sign: np.ndarray,
+    eta_prime: Values,
+    bisections: int = 16,
+    newton_steps: int = 2,
+) -> np.ndarray:
+    """gamma (...) in one monotone segment at which TRT leaves at phi; the nearer end where none does.
+
+    Newton's steps square the error that bisection has left, and stay between its ends, as beside the caustic the slope
+    is nothing to divide by.
+    """
+    for _ in range(bisections):
+        middle = 0.5 * (low + high)
+        below = slope_sign * (exit_angle(TRT, middle, eta_prime) - phi) < 0.0
+        low = np.where(below, middle, low)
+        high = np.where(below, high, middle)
+    gamma = 0.5 * (low + high)
+    for _ in range(newton_steps):
+        slope = slope_sign * np.maximum(np.abs(exit_angle_slope(TRT, gamma, eta_prime)), 1e-12)
+        gamma = np.clip(gamma - (exit_angle(TRT, gamma, eta_prime) - phi) / slope, low, high)
+    return gamma
+
+
+def attenuation(fresnel: np.ndarray, transmittance: Values) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(A_R, A_TT, A_TRT) from the reflectance and the transmittance of one crossing, broadcast. Eq. 17.
+
+    The reflectance inside, F(1/eta', 1/eta'', gamma_t), is that outside.
+    """
+    through = np.square(1.0 - fresnel) * transmittance
+    return fresnel, through, through * fresnel * transmittance
+
+
+def residual_attenuation(fresnel: Values, transmittance: Values) -> np.ndarray:
+    """Attenuation of all longer paths together: the geometric series after TRT, for fresnel < 1 [Chiang16]."""
+    turned = fresnel * transmittance
+    return np.square((1.0 - fresnel) * turned) * transmittance / (1.0 - turned)
+
+
+def crossing_transmittance(gamma: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> np.ndarray:
+    """T (..., C): transmittance of one internal crossing; sigma_a (C,) per radius.
+
+    The report's exponent, 1 + cos(2 gamma_t), is half the square of the chord; this is the chord.
+    """
+    eta_prime, _ = bravais_indices(cos_theta_d, eta)
+    cos_gamma_t = np.sqrt(1.0 - np.square(np.sin(gamma) / eta_prime))
+    cos_theta_t = np.sqrt(np.square(eta) - 1.0 + np.square(cos_theta_d)) / eta
+    length = 2.0 * cos_gamma_t / cos_theta_t
+    return np.exp(-np.asarray(sigma_a) * length[..., None])
+
+
+def path_attenuation(p: int, gamma: Values, cos_theta_d: Values, eta: Values, sigma_a: ArrayLike) -> np.ndarray:
+    """A_p (..., C), or (..., 1) for R: the part of a ray's light that is left at its exit."""
+    eta_prime, eta_double_prime = bravais_indices(cos_theta_d, eta)
+    cos_gamma_t = np.sqrt(1.0 - np.square(np.sin(gamma) / eta_prime))
+    fresnel = bravais_reflectance(np.cos(gamma), cos_gamma_t, eta_prime, eta_double_prime)[..., None]
+    transmittance = 1.0 if p == R else crossing_transmittance(gamma, cos_theta_d, eta, sigma_a)
+    if p == RESIDUAL:
+        return residual_attenuation(fresnel, transmittance)
+    return attenuation(fresnel, transmittance)[p]

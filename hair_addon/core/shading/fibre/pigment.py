@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Absorption per fibre radius from pigment or from the overall colour of hair.
+
+The constants are those of Blender's Principled Hair, so that viewport and Cycles agree.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .angles import Values
+
+# Absorption of unit concentrations for red, green and blue [DEon11], in the scale of Cycles.
+_EUMELANIN = np.array([0.506, 0.841, 1.653])
+_PHEOMELANIN = np.array([0.343, 0.733, 1.924])
+
+# Transmittance of full melanin, as its absorption is finite.
+LEAST_LIGHT = 1e-4
+
+# Colours are limited to below 1 and above 0: black would need infinite absorption, and white fibres scatter forever.
+_DARKEST = 1e-4
+_BRIGHTEST = 0.9999
+
+
+def sigma_a_from_melanin(melanin: Values, redness: Values) -> np.ndarray:
+    """Amount of pigment and its red share, both (...) in [0, 1] → sigma_a (..., 3) per fibre radius."""
+    concentration = -np.log(np.maximum(1.0 - np.asarray(melanin, float), LEAST_LIGHT))[..., None]
+    redness = np.asarray(redness, float)[..., None]
+    return concentration * ((1.0 - redness) * _EUMELANIN + redness * _PHEOMELANIN)
+
+
+def sigma_a_from_color(color: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
+    """Colour of a groom, linear RGB (..., 3) → the sigma_a (..., 3) of its fibres [Chiang16]."""
+    color = np.clip(color, _DARKEST, _BRIGHTEST)
+    return np.square(np.log(color) / color_falloff(azimuthal_roughness))
+
+
+def color_from_sigma_a(sigma_a: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
+    """The colour, linear RGB (..., 3), that light takes on among many fibres of sigma_a (..., 3) [Chiang16]."""
+    return color_from_falloff(sigma_a, color_falloff(azimuthal_roughness))
+
+
+def color_from_falloff(sigma_a: ArrayLike, falloff: Values) -> np.ndarray:
+    """The same from the `color_falloff` of that roughness."""
+    return np.exp(-falloff * np.sqrt(sigma_a))
+
+
+def color_falloff(roughness: Values) -> np.ndarray:
+    """Fit of [Chiang16] to path traced grooms: how fast ln(colour) falls with sqrt(sigma_a)."""
+    return np.polynomial.polynomial.polyval(roughness, [5.969, -0.215, 2.532, -10.73, 5.574, 0.245])

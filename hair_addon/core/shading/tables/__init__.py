@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lookup tables of shaders, for one fibre and for many."""
+
+from typing import TYPE_CHECKING
+
+from ...lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        absorption_slices,
+        albedo,
+        cell_means,
+        dual_scattering,
+        lookup_tables,
+        strand_tables,
+        table_axes,
+        texel_kernels,
+    )
+else:
+    __getattr__ = submodules(__name__)

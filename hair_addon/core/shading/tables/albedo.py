@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Reflection and transmission of a fibre under uniform light."""
+
+import numpy as np
+
+from . import dual_scattering, lookup_tables
+
+_INCLINATIONS = 181
+
+# First moment of backscattered light: the integral of (1 - |phi| / pi) / pi × cos(phi).
+BACK_TOWARDS = 4.0 / np.pi**2
+
+
+def mean_albedo(tables: lookup_tables.Tables) -> np.ndarray:
+    """Radiance of a fibre in a uniform surrounding of radiance one, RGB (3,), the mean over all directions of view."""
+    forward, backward = mean_parts(tables.lobes, tables.settings)
+    return forward + backward
+
+
+def mean_forward(tables: lookup_tables.Tables) -> np.ndarray:
+    """The forward part of `mean_albedo`, into the half space behind the fibre, RGB (3,): a_f of [Zinke08]."""
+    return mean_parts(tables.lobes, tables.settings)[0]
+
+
+def mean_parts(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> list[np.ndarray]:
+    """Forward and backward scattering, (C,) each: means over all directions; lobes as `azimuthal_lobes` bakes them."""
+    theta = dual_scattering.light_inclinations(_INCLINATIONS)
+    parts = dual_scattering.lobe_parts(lobes, settings, theta)
+    return [np.average(part.sum(axis=0), axis=0, weights=np.cos(theta)) for part in parts]
+
+
+def azimuthal_moments(tables: lookup_tables.Tables, dual: dual_scattering.DualTables | None = None) -> np.ndarray:
+    """(2, K, 3) float32: of light from everywhere, the radiance that leaves towards theta_o, and its moment over phi.
+
+    The second row is the same integral with the weight cos(phi), phi the light's azimuth from the viewer: positive if
+    a strand sends light back. Held to half of the first, so that light from one side never takes some away. Columns are
+    those of `DualTables.theta`. dual: adds what the strands behind send back.
+    """
+    moments = fibre_moments(tables.lobes, tables.settings)
+    if dual is not None:
+        back = dual_scattering.BACK_GAIN * dual.at("back", dual_scattering.light_inclinations())
+        moments += np.stack([back, BACK_TOWARDS * back])
+    half = 0.5 * moments[0]
+    moments[1] = np.clip(moments[1], -half, half)
+    return moments.astype(np.float32)
+
+
+def fibre_moments(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> np.ndarray:
+    """`azimuthal_moments` (2, K, C) of one fibre, as they are; lobes as `azimuthal_lobes` bakes them."""
+    rows = dual_scattering.row_weights(settings, dual_scattering.light_inclinations())
+    edges = lookup_tables.phi_edges(settings)
+    # The cells' integrals of 1 and of cos(phi), twice: N is even in phi.
+    weights = [2.0 * np.diff(values) * np.sign(edges[-1] - edges[0]) for values in (edges, np.sin(edges))]
+    return np.stack([dual_scattering.lobe_albedos(lobes, weight, rows).sum(axis=0) for weight in weights])

@@ -1,0 +1,244 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Multiple scattering: the tables of dual scattering [Zinke08], from those of one fibre.
+
+Light that reaches a strand through n others is a_f^n of what it was, spread by n beta_f²; what the strands behind send
+back is A_b, shifted by Delta_b and spread by sigma_b. All are per colour channel, over the inclination of the light.
+Front and back are the two halves of the circle of phi; the light's azimuth may be anywhere in its half, so of light
+scattered by phi the share |phi| / pi goes forward.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..fibre import energy_conserving, marschner
+from ..fibre.angles import FibreAngles, Values
+from ..fibre.azimuthal import half_circle_mean
+from ..fibre.longitudinal import d_eon_lobe
+from . import lookup_tables
+
+SAMPLE_COUNT = 128  # over theta
+
+# Rows of `DualTables.theta`, in order.
+QUANTITIES = ("a_f", "a_b", "alpha_f", "alpha_b", "beta_f", "beta_b", "back", "back_shift", "back_width")
+
+BACK_GAIN = 1.35  # gain of backscattered light: fitted to Cycles by blend_samples/calibrate.py
+
+_WHITEST = 0.99  # the series over scattering events must end
+
+
+@dataclass(frozen=True, eq=False)
+class DualTables:
+    """Float32 arrays, and the settings that they belong to.
+
+    theta: rows as in `QUANTITIES`, column k of K at theta = ((k + 0.5) / K - 0.5) pi, the light's inclination; angles
+    are of theta_h. n_g, n_g_trt: means of N over the half circle around phi, with the axes and channels of n, n_trt.
+    """
+
+    theta: np.ndarray  # (9, K, 3)
+    n_g: np.ndarray  # (H, W, 4)
+    n_g_trt: np.ndarray  # (H, W, 3)
+    settings: lookup_tables.Settings
+
+    def at(self, quantity: str, theta: Values) -> np.ndarray:
+        """A quantity (..., 3) at inclinations (...), as a texture unit reads it."""
+        row = self.theta[QUANTITIES.index(quantity)][None]
+        u = np.asarray(theta) / np.pi + 0.5
+        return lookup_tables.sample(row, u, np.full_like(u, 0.5))
+
+
+def light_inclinations(count: int = SAMPLE_COUNT) -> np.ndarray:
+    """theta (count,) of the tables' columns."""
+    return np.pi * ((np.arange(count) + 0.5) / count - 0.5)
+
+
+def bake(tables: lookup_tables.Tables) -> DualTables:
+    """`lookup_tables.Tables` → `DualTables`."""
+    forward, backward = scattered_parts(tables, light_inclinations())
+    rows = quantities(forward, backward, tables.settings)
+    mean = half_circle_mean(lookup_tables.phi_edges(tables.settings)).astype(np.float32)
+    n_g, n_g_trt = lookup_tables.spread_columns((tables.n, tables.n_trt), mean)
+    return DualTables(rows, n_g, n_g_trt, tables.settings)
+
+
+def quantities(forward: np.ndarray, backward: np.ndarray, settings: lookup_tables.Settings) -> np.ndarray:
+    """The rows of `DualTables.theta`, (9, T, C) float32, of what `scattered_parts` finds, (4, T, C) each."""
+    a_f, a_b = (np.minimum(parts.sum(axis=0), _WHITEST) for parts in (forward, backward))
+    alpha, beta = _centres_and_widths(settings)
+    alpha_f, alpha_b = (_weighted(alpha, parts) for parts in (forward, backward))
+    beta_f, beta_b = (np.sqrt(_weighted(np.square(beta), parts)) for parts in (forward, backward))
+    back = back_scattering(a_f, a_b, alpha_f, alpha_b, beta_f, beta_b)
+    return np.stack([a_f, a_b, alpha_f, alpha_b, beta_f, beta_b, *back]).astype(np.float32)
+
+
+def scattered_parts(tables: lookup_tables.Tables, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(forward, backward), each (4, T, 3): scattering by R, TT, TRT and the residual; theta: (T,), of the light."""
+    return lobe_parts(tables.lobes, tables.settings, theta)
+
+
+def lobe_parts(
+    lobes: lookup_tables.Lobes, settings: lookup_tables.Settings, theta: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """`scattered_parts`, (4, T, C) each, of N_R, N_TT, N_TRT and N of the residual as `azimuthal_lobes` bakes them."""
+    edges = lookup_tables.phi_edges(settings)
+    widths = 2.0 * np.abs(np.diff(edges))  # twice: N is even in phi
+    ahead = 0.5 * (edges[1:] + edges[:-1]) / np.pi
+    rows = row_weights(settings, theta)
+    return lobe_albedos(lobes, widths * ahead, rows), lobe_albedos(lobes, widths * (1.0 - ahead), rows)
+
+
+def lobe_albedos(lobes: lookup_tables.Lobes, weights: np.ndarray, rows: list[np.ndarray]) -> np.ndarray:
+    """(4, T, C): the integral of each lobe over phi, with weights (W,) of the columns, and over the other inclination.
+
+    rows: the `row_weights` of theta (T,), the viewer's in the energy-conserving mode; the classic one does not know
+    light from viewer.
+    """
+    *narrow, n_res = lobes
+    n_r, n_tt, n_trt = (np.einsum("hwc,w->hc", lobe, weights) for lobe in narrow)
+    around = [np.repeat(n_r, n_tt.shape[1], axis=1), n_tt, n_trt]
+    around.append(np.zeros_like(n_tt) if n_res is None else n_res[:, 0] * weights.sum())
+    return np.stack([weights_of_rows @ lobe for weights_of_rows, lobe in zip(rows, around, strict=True)])
+
+
+def row_weights(settings: lookup_tables.Settings, theta: np.ndarray) -> list[np.ndarray]:
+    """For each lobe, (T, H): weights of the rows of N in the scattering of light inclined by theta (T,)."""
+    rows = lookup_tables.row_cosines(settings)
+    if settings.mode == "energy":
+        # M is of unit area, whatever its width.
+        return [_interpolation(np.cos(theta)[:, None], rows, 1.0)] * 4
+    out = np.pi * ((np.arange(361) + 0.5) / 361 - 0.5)
+    theta_h, theta_d = 0.5 * (theta[:, None] + out), 0.5 * (theta[:, None] - out)
+    cosine = np.maximum(np.cos(theta_d), marschner.LEAST_COS_THETA_D)
+    measure = np.square(np.cos(out) / cosine) * np.pi / 361
+    m = marschner.gaussian_lobes(theta_h, settings)
+    weights = [_interpolation(cosine, rows, m[..., lobe] * measure) for lobe in range(3)]
+    return [*weights, np.zeros_like(weights[0])]
+
+
+def _interpolation(cosines, rows, weights):
+    """(T, H) that sums values at rows (H,), interpolated to cosines (T, O), with weights (T, O)."""
+    place = np.clip(np.interp(cosines, rows, np.arange(len(rows))), 0.0, len(rows) - 1.0)
+    below = np.minimum(place.astype(int), len(rows) - 2)
+    first = below + len(rows) * np.arange(len(cosines))[:, None]
+    above = weights * (place - below)
+    flat = np.bincount(first.ravel(), (weights - above).ravel(), len(cosines) * len(rows))
+    flat += np.bincount(first.ravel() + 1, above.ravel(), len(flat))
+    return flat.reshape(len(cosines), len(rows))
+
+
+def _centres_and_widths(settings):
+    """alpha and beta of the four lobes, (4,), in theta_h."""
+    if settings.mode == "energy":
+        shift, v = np.array(energy_conserving.lobes(settings)).T
+        return 0.5 * shift, 0.5 * np.sqrt(v)
+    alpha, beta = np.array(marschner.longitudinal_lobes(settings)).T
+    return np.append(alpha, 0.0), np.append(beta, 0.0)
+
+
+def _weighted(values, parts):
+    """Mean (T, 3) of one value a lobe (4,), weighted by what each scatters (4, T, 3)."""
+    return np.einsum("p,ptc->tc", values, parts) / np.maximum(parts.sum(axis=0), 1e-12)
+
+
+def back_scattering(
+    a_f: Values, a_b: Values, alpha_f: Values, alpha_b: Values, beta_f: Values, beta_b: Values
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(A_b, Delta_b, sigma_b) (...): light sent back after one or three backward events and any number forward.
+
+    The moments are summed exactly over the numbers of events; [Zinke08] expands them for small a_b.
+    """
+    x = np.square(a_f)
+    once, thrice = a_b * x / (1.0 - x), np.power(a_b, 3) * x / np.power(1.0 - x, 3)
+    # Mean numbers of forward events in each.
+    events_once, events_thrice = 2.0 / (1.0 - x), 2.0 * (1.0 + 2.0 * x) / (1.0 - x)
+    total = once + thrice
+    shift = once * (alpha_b + events_once * alpha_f) + thrice * (3.0 * alpha_b + events_thrice * alpha_f)
+    variance = once * (beta_b**2 + events_once * beta_f**2) + thrice * (3.0 * beta_b**2 + events_thrice * beta_f**2)
+    least = np.maximum(total, 1e-30)
+    return total, shift / least, np.sqrt(variance / least)
+
+
+def back_azimuth(phi: Values) -> np.ndarray:
+    """Azimuthal distribution of backscattered light over phi (...), 1 at the light, with the integral pi."""
+    return 1.0 - np.abs(phi) / np.pi
+
+
+def spread_back_azimuth(phi: Values) -> np.ndarray:
+    """The same for light from a half circle: the mean of `back_azimuth` over the half circle around phi (...)."""
+    phi = np.abs(phi)
+    return np.where(phi < 0.5 * np.pi, 0.75 - (phi / np.pi) ** 2, 0.25 + (1.0 - phi / np.pi) ** 2)
+
+
+def direct_part(count: Values) -> np.ndarray:
+    """Unscattered part (...) of light behind a mean of `count` (...) strands, Poisson distributed."""
+    return np.exp(-np.asarray(count, float))
+
+
+def scattered_part(count: Values, a_f: np.ndarray) -> np.ndarray:
+    """Part (..., 3) that arrives through one strand or more, each passing on a_f (..., 3): the mean of a_f^k, k > 0."""
+    count = np.asarray(count, float)[..., None]
+    return np.exp(-count * (1.0 - a_f)) - np.exp(-count)
+
+
+def sample_radiance(
+    tables: lookup_tables.Tables,
+    dual: DualTables,
+    angles: FibreAngles,
+    strand_count: Values,
+    *,
+    gain: float = BACK_GAIN,
+) -> np.ndarray:
+    """Radiance per irradiance (..., 3) of a strand behind a mean of `strand_count` (...) others.
+
+    Energy-conserving mode; what the shader computes from the tables.
+    """
+    settings = tables.settings
+    if tables.n_res is None:
+        raise ValueError("Dual scattering needs tables of the energy-conserving mode.")
+    u, v = lookup_tables.n_coordinates(angles.phi, np.cos(angles.theta_o), settings.axes)
+    n_res = lookup_tables.sample(tables.n_res, np.full_like(v, 0.5), v)
+    n, n_trt, n_g, n_g_trt = (
+        lookup_tables.sample(table, u, v) for table in (tables.n, tables.n_trt, dual.n_g, dual.n_g_trt)
+    )
+    quantity = {name: dual.at(name, angles.theta_i) for name in QUANTITIES}
+    return radiance(angles, settings, quantity, (n, n_trt, n_res), (n_g, n_g_trt, n_res), strand_count, gain=gain)
+
+
+def radiance(
+    angles: FibreAngles,
+    settings: lookup_tables.Settings,
+    quantity: dict[str, np.ndarray],
+    n: tuple[np.ndarray, ...],
+    n_g: tuple[np.ndarray, ...],
+    strand_count: Values,
+    *,
+    roughness: Values | None = None,
+    gain: float = BACK_GAIN,
+) -> np.ndarray:
+    """Radiance per irradiance (..., 3) of a strand behind a mean of `strand_count` (...) others.
+
+    The irradiance is that outside the hair. quantity: {name: (..., 3)} of the strands around, at theta_i; n, n_g: what
+    `energy_conserving.lobe_sum` takes beside M, for light from one direction and from a half circle; roughness: (...)
+    of strands that differ in it; gain: of what comes back from behind. Shifts and widths are the mean over the
+    channels, which differ little in them.
+    """
+    back = quantity["back"] * gain / np.pi
+    beta_f, back_shift, back_width = (quantity[name].mean(axis=-1) for name in ("beta_f", "back_shift", "back_width"))
+    spread = np.asarray(strand_count, float) * np.square(beta_f)
+
+    def back_lobe(variance):
+        turned = angles.theta_o - 2.0 * back_shift
+        return d_eon_lobe(
+            np.sin(angles.theta_i), np.cos(angles.theta_i), np.sin(turned), np.abs(np.cos(turned)), variance
+        )
+
+    # Variances of theta_h are quarters of those of theta_i + theta_o.
+    m = [
+        energy_conserving.m_lobes(angles.theta_i, angles.theta_o, settings, roughness, widening)
+        for widening in (0.0, 4.0 * spread)
+    ]
+    back_direct = back_azimuth(angles.phi) * back_lobe(4.0 * back_width**2)
+    back_spread = spread_back_azimuth(angles.phi) * back_lobe(4.0 * (back_width**2 + spread))
+    direct = energy_conserving.lobe_sum(m[0], *n) + back * back_direct[..., None]
+    indirect = energy_conserving.lobe_sum(m[1], *n_g) + back * back_spread[..., None]
+    return direct_part(strand_count)[..., None] * direct + scattered_part(strand_count, quantity["a_f"]) * indirect

@@ -1,0 +1,148 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tables of varied strands: N for any absorption, and multiple scattering among all strands.
+
+A strand scatters with its own absorption; what light has met before it and what lies behind it are other strands, which
+grow there with any random number but have turned from root to tip as far as it has. So dual scattering takes the means
+over the random numbers, at each part of the way from the root's colour to the tip's.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..fibre import strand_variation
+from ..fibre.angles import FibreAngles, Values
+from ..fibre.principled import varied_roughness
+from . import absorption_slices, albedo, dual_scattering, lookup_tables
+
+GREATEST_SIZE = 128  # of slices: leaves 0.3 % of a peak; see DECISIONS.md
+
+_BLACK = 16.0  # sigma_a whose transmittance is below half floats; the upper limit of slices
+
+_GRADIENT_STEPS = 9  # from the root's colour to the tip's
+_RANDOM_STEPS = 12  # number of random samples
+_RETURN_STEPS = 32  # rows of `StrandTables.returned`
+
+
+@dataclass(frozen=True, eq=False)
+class StrandTables:
+    """Tables of hair with the variation of `strand_variation.Settings`.
+
+    dual: rows as in `dual_scattering.QUANTITIES`, means over strands; its slices go from the root's colour to the
+    tip's, the first and the last at either. returned: `albedo.fibre_moments` side by side, over theta_o and, first and
+    last row at either end of the slices' range, over sqrt(sigma_a).
+    """
+
+    slices: absorption_slices.Slices
+    variation: strand_variation.Settings
+    dual: np.ndarray | None  # (G, 9, T, 3), of the energy-conserving mode
+    returned: np.ndarray  # (32, T, 2)
+    forward: np.ndarray  # (3,): passed on of even light, the mean over all strands
+
+    @property
+    def settings(self) -> lookup_tables.Settings:
+        """The fibre's settings, less its absorption."""
+        return self.slices.settings
+
+
+def bake(settings: lookup_tables.Settings, variation: strand_variation.Settings, device: str = "cpu") -> StrandTables:
+    """`lookup_tables.Settings` and `strand_variation.Settings` → `StrandTables`; the former's sigma_a is not used."""
+    settings = replace(settings, size=min(settings.size, GREATEST_SIZE))
+    least, greatest = np.minimum(strand_variation.absorption_range(variation), _BLACK)
+    slice_count = 2 if least == greatest else absorption_slices.SLICE_COUNT
+    slices = absorption_slices.bake(settings, (least, greatest), slice_count, device)
+
+    random = (np.arange(_RANDOM_STEPS) + 0.5) / _RANDOM_STEPS if variation.random_color > 0.0 else np.array([0.5])
+    gradient = np.linspace(0.0, 1.0, _GRADIENT_STEPS if variation.has_gradient else 1)
+    around = strand_variation.sigma_a_along(variation, random, gradient[:, None])  # (G, R, 3)
+    dual = _dual(slices, around) if settings.mode == "energy" else None
+    ahead, _behind = albedo.mean_parts(slices.lobes, settings)  # (K,)
+    weights = _part_of_length(variation, gradient)
+    forward = np.einsum("grc,g->c", _at_absorptions(ahead, slices, around), weights) / len(random)
+    return StrandTables(slices, variation, dual, _returned(slices), forward)
+
+
+def _dual(slices, around):
+    """`StrandTables.dual` among strands of sigma_a (G, R, 3)."""
+    theta = dual_scattering.light_inclinations()
+    parts = np.stack(dual_scattering.lobe_parts(slices.lobes, slices.settings, theta))  # (2, 4, T, K)
+    means = _at_absorptions(parts, slices, around).mean(axis=-2)  # (2, 4, T, G, 3)
+    return np.stack(
+        [dual_scattering.quantities(ahead, behind, slices.settings) for ahead, behind in means.transpose(3, 0, 1, 2, 4)]
+    )
+
+
+def _returned(slices):
+    """`StrandTables.returned`."""
+    moments = albedo.fibre_moments(slices.lobes, slices.settings)  # (2, T, K)
+    roots = np.linspace(slices.range.low, slices.range.high, _RETURN_STEPS)
+    below, fraction = absorption_slices.slice_of(np.square(roots), slices.range.low, slices.range.high, len(slices.n))
+    # The second may be negative, which no geometric mean takes; slices are close enough for a plain one.
+    mixed = moments[..., below] * (1.0 - fraction) + moments[..., below + 1] * fraction
+    return np.ascontiguousarray(mixed.transpose(2, 1, 0), np.float32)
+
+
+def _at_absorptions(values, slices, sigma_a):
+    """Values (..., K) of the slices at sigma_a (...), appended."""
+    below, fraction = absorption_slices.slice_of(sigma_a, slices.range.low, slices.range.high, len(slices.n))
+    return absorption_slices.geometric_mix(values[..., below], values[..., below + 1], fraction)
+
+
+def _part_of_length(variation, gradient):
+    """How much of the strands' length each step of the gradient stands for, (G,), in all 1."""
+    if len(gradient) == 1:
+        return np.ones(1)
+    positions = (np.arange(256) + 0.5) / 256
+    reached = strand_variation.tip_gradient(variation.gradient_start, variation.gradient_end, positions)
+    place = reached * (len(gradient) - 1)
+    return np.maximum(0.0, 1.0 - np.abs(place - np.arange(len(gradient))[:, None])).mean(axis=1)
+
+
+def hair_return(
+    tables: StrandTables, theta_o: Values, random: Values, position: Values
+) -> tuple[np.ndarray, np.ndarray]:
+    """`albedo.azimuthal_moments`, (..., 3) each, of strands seen from theta_o (...): the shader's function."""
+    variation, covered = tables.variation, tables.slices.range
+    roots = np.sqrt(strand_variation.strand_sigma_a(variation, random, position))
+    along = np.clip((roots - covered.low) / max(covered.high - covered.low, 1e-6), 0.0, 1.0)
+    v = (along * (_RETURN_STEPS - 1) + 0.5) / _RETURN_STEPS
+    u = np.broadcast_to((np.asarray(theta_o) / np.pi + 0.5)[..., None], v.shape)
+    returned, towards = np.moveaxis(lookup_tables.sample(tables.returned, u, v), -1, 0)
+    if tables.dual is not None:
+        gradient = strand_variation.tip_gradient(variation.gradient_start, variation.gradient_end, position)
+        back = dual_scattering.BACK_GAIN * _quantity(tables, "back", theta_o, gradient)
+        returned, towards = returned + back, towards + albedo.BACK_TOWARDS * back
+    return returned, np.clip(towards, -0.5 * returned, 0.5 * returned)
+
+
+def sample_radiance(
+    tables: StrandTables,
+    angles: FibreAngles,
+    random: Values,
+    position: Values,
+    strand_count: Values,
+    *,
+    gain: float = dual_scattering.BACK_GAIN,
+) -> np.ndarray:
+    """Radiance per irradiance (..., 3) at `FibreAngles` (...) of strands behind a mean of `strand_count` (...).
+
+    random, position (...): of the strands. Energy-conserving mode; what the shader computes from the tables.
+    """
+    settings, variation, slices = tables.settings, tables.variation, tables.slices
+    if slices.n_g is None:
+        raise ValueError("Dual scattering needs tables of the energy-conserving mode.")
+    sigma_a = strand_variation.strand_sigma_a(variation, random, position)
+    roughness = varied_roughness(settings.roughness, variation.random_roughness, random)
+    at = lookup_tables.n_coordinates(angles.phi, np.cos(angles.theta_o), settings.axes)
+    n, n_g = (absorption_slices.sample_lobes(texels, slices.range, *at, sigma_a) for texels in (slices.n, slices.n_g))
+    gradient = strand_variation.tip_gradient(variation.gradient_start, variation.gradient_end, position)
+    quantity = {name: _quantity(tables, name, angles.theta_i, gradient) for name in dual_scattering.QUANTITIES}
+    return dual_scattering.radiance(angles, settings, quantity, n, n_g, strand_count, roughness=roughness, gain=gain)
+
+
+def _quantity(tables, name, theta, gradient):
+    """A quantity (..., 3) of the strands around, at inclinations and parts of the gradient (...)."""
+    table = tables.dual[:, dual_scattering.QUANTITIES.index(name)]  # (G, T, 3)
+    step_count = len(table)
+    v = (gradient * (step_count - 1) + 0.5) / step_count
+    return lookup_tables.sample(table, np.asarray(theta) / np.pi + 0.5, v)

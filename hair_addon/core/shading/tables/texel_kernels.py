@@ -1,0 +1,276 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The texels of `cell_means`, `azimuthal` and the M table, one thread each: for GPUs, where a bake takes milliseconds.
+
+In double precision, as beside a caustic the width of a cell in gamma is a small difference. This file imports Warp;
+`lookup_tables` imports it only when it is asked for another device than the processor's NumPy.
+"""
+
+import numpy as np
+import warp as wp
+
+from ...kernels import kernel_cache
+from ..fibre import energy_conserving
+from ..fibre.longitudinal import BESSEL_FAR, BESSEL_NEAR
+from ..fibre.marschner import Caustic, longitudinal_lobes
+from .cell_means import NODES, WEIGHTS, Absorptions
+from .lookup_tables import Settings
+
+wp.set_module_options({"enable_backward": False})  # no gradients: half as long to compile
+
+F = wp.float64
+
+_PI = wp.constant(wp.float64(np.pi))
+_HALF_PI = wp.constant(wp.float64(0.5 * np.pi))
+_NODES = wp.constant(wp.types.vector(4, wp.float64)(*NODES))
+_WEIGHTS = wp.constant(wp.types.vector(4, wp.float64)(*WEIGHTS))
+_NEAR = wp.constant(wp.types.vector(7, wp.float64)(*BESSEL_NEAR))
+_FAR = wp.constant(wp.types.vector(9, wp.float64)(*BESSEL_FAR))
+_BISECTIONS = wp.constant(50)
+
+
+@wp.func
+def _gaussian(x: F, sigma: F):
+    return wp.exp(F(-0.5) * x * x / (sigma * sigma)) / (sigma * wp.sqrt(F(2.0) * _PI))
+
+
+@wp.func
+def _tt_gamma(phi: F, eta_prime: F):
+    delta = F(0.5) * (_PI - phi)
+    return wp.min(wp.atan2(eta_prime * wp.sin(delta), eta_prime * wp.cos(delta) - F(1.0)), _HALF_PI)
+
+
+@wp.func
+def _trt_exit(gamma: F, eta_prime: F):
+    return F(4.0) * wp.asin(wp.sin(gamma) / eta_prime) - F(2.0) * gamma
+
+
+@wp.func
+def _trt_gamma(phi: F, low: F, high: F, slope_sign: F, eta_prime: F):
+    """gamma of the ray that leaves at phi, within one monotone segment; its nearer end where none does."""
+    if slope_sign * (phi - _trt_exit(low, eta_prime)) <= F(0.0):
+        return low
+    if slope_sign * (phi - _trt_exit(high, eta_prime)) >= F(0.0):
+        return high
+    below = low
+    above = high
+    for _step in range(_BISECTIONS):
+        middle = F(0.5) * (below + above)
+        if slope_sign * (_trt_exit(middle, eta_prime) - phi) < F(0.0):
+            below = middle
+        else:
+            above = middle
+    return F(0.5) * (below + above)
+
+
+@wp.func
+def _kept(phi: F, phi_c: F, fade: F, width: F):
+    """What the caustic treatment keeps of N_TRT: `Caustic.kept`."""
+    peak = _gaussian(F(0.0), width)
+    left = F(1.0) - fade * _gaussian(phi - phi_c, width) / peak
+    return left * (F(1.0) - fade * _gaussian(phi + phi_c, width) / peak)
+
+
+@wp.func
+def _send(
+    crossings: int,
+    low: F,
+    high: F,
+    cell_width: F,
+    cosine: F,
+    eta: F,
+    sigma_a: wp.array[F],
+    caustic: wp.vec3d,
+    row: int,
+    column: int,
+    # outputs
+    out_n: wp.array3d[float],
+):
+    """Send the light A dh of the rays between two gamma into a cell, for each channel."""
+    half_width = F(0.5) * (high - low)
+    root = wp.sqrt(eta * eta - F(1.0) + cosine * cosine)
+    eta_prime = root / cosine
+    eta_double_prime = eta * eta * cosine / root
+    for node in range(4):
+        gamma = low + half_width * (F(1.0) + _NODES[node])
+        sin_t = wp.sin(gamma) / eta_prime
+        cos_t = wp.sqrt(F(1.0) - sin_t * sin_t)
+        cos_i = wp.cos(gamma)
+        perpendicular = (cos_i - eta_prime * cos_t) / (cos_i + eta_prime * cos_t)
+        parallel = (eta_double_prime * cos_i - cos_t) / (eta_double_prime * cos_i + cos_t)
+        fresnel = F(0.5) * (perpendicular * perpendicular + parallel * parallel)
+        light = F(0.5) * cos_i * wp.abs(half_width) * _WEIGHTS[node] / cell_width
+        if crossings == 0:
+            out_n[row, column, 0] = out_n[row, column, 0] + float(light * fresnel)
+        else:
+            light = light * (F(1.0) - fresnel) * (F(1.0) - fresnel)
+            if crossings == 2:
+                light = light * fresnel
+                if caustic[2] > F(0.0):
+                    light = light * _kept(_trt_exit(gamma, eta_prime), caustic[0], caustic[1], caustic[2])
+            length = F(crossings) * F(2.0) * cos_t * eta / root
+            for channel in range(sigma_a.shape[0]):
+                left = float(light * wp.exp(-sigma_a[channel] * length))
+                out_n[row, column, channel] = out_n[row, column, channel] + left
+
+
+@wp.kernel
+def _smooth_texels(
+    edges: wp.array[F],
+    cosines: wp.array[F],
+    eta: F,
+    sigma_a: wp.array[F],
+    phi_c: wp.array[F],
+    fade: wp.array[F],
+    glint_area: wp.array2d[F],
+    glint_width: F,  # 0: no caustic treatment
+    # outputs
+    out_n_r: wp.array3d[float],
+    out_n_tt: wp.array3d[float],
+    out_n_trt: wp.array3d[float],
+):
+    row, column = wp.tid()
+    cosine = cosines[row]
+    first = edges[column]
+    last = edges[column + 1]
+    width = wp.abs(last - first)
+    eta_prime = wp.sqrt(eta * eta - F(1.0) + cosine * cosine) / cosine
+    caustic = wp.vec3d(phi_c[row], fade[row], glint_width)
+
+    _send(0, F(-0.5) * first, F(-0.5) * last, width, cosine, eta, sigma_a, caustic, row, column, out_n_r)
+    low = _tt_gamma(first, eta_prime)
+    high = _tt_gamma(last, eta_prime)
+    if low != high:
+        _send(1, low, high, width, cosine, eta, sigma_a, caustic, row, column, out_n_tt)
+
+    sin_squared = (F(4.0) - eta_prime * eta_prime) / F(3.0)
+    gamma_c = _HALF_PI
+    middle_slope = F(-1.0)
+    if sin_squared > F(0.0):
+        gamma_c = wp.asin(wp.sqrt(sin_squared))
+        middle_slope = F(1.0)
+    for segment in range(3):
+        start = -_HALF_PI
+        end = -gamma_c
+        slope_sign = F(-1.0)
+        if segment == 1:
+            start = -gamma_c
+            end = gamma_c
+            slope_sign = middle_slope
+        if segment == 2:
+            start = gamma_c
+            end = _HALF_PI
+        low = _trt_gamma(first, start, end, slope_sign, eta_prime)
+        high = _trt_gamma(last, start, end, slope_sign, eta_prime)
+        if low != high:
+            _send(2, low, high, width, cosine, eta, sigma_a, caustic, row, column, out_n_trt)
+
+    if glint_width > F(0.0):
+        glint = F(0.0)
+        for node in range(4):
+            phi = F(0.5) * (first + last) + F(0.5) * (last - first) * _NODES[node]
+            both = _gaussian(phi - phi_c[row], glint_width) + _gaussian(phi + phi_c[row], glint_width)
+            glint += F(0.5) * _WEIGHTS[node] * both
+        for channel in range(sigma_a.shape[0]):
+            added = float(glint * glint_area[row, channel])
+            out_n_trt[row, column, channel] = out_n_trt[row, column, channel] + added
+
+
+@wp.kernel
+def _spread_texels(
+    spread: wp.array2d[float],
+    n: wp.array3d[float],
+    # outputs
+    out_n: wp.array3d[float],
+):
+    row, column, channel = wp.tid()
+    total = float(0.0)
+    for source in range(n.shape[1]):
+        total += spread[column, source] * n[row, source, channel]
+    out_n[row, column, channel] = total
+
+
+@wp.func
+def _i0e(x: F):
+    t = x / F(3.75)
+    total = F(0.0)
+    if t <= F(1.0):
+        for power in range(7):
+            total = total * t * t + _NEAR[6 - power]
+        return total * wp.exp(-x)
+    for power in range(9):
+        total = total / t + _FAR[8 - power]
+    return total / wp.sqrt(x)
+
+
+@wp.kernel
+def _d_eon_texels(
+    theta: wp.array[F],
+    lobes: wp.array2d[F],  # shift and variance of each
+    # outputs
+    out_m: wp.array3d[float],
+):
+    row, column, lobe = wp.tid()
+    v = lobes[lobe, 1]
+    theta_o = theta[row] - lobes[lobe, 0]
+    cos_i = wp.cos(theta[column])
+    cos_o = wp.abs(wp.cos(theta_o))
+    along = wp.sin(theta[column]) + wp.sin(theta_o)
+    across = cos_i - cos_o
+    beside_cone = F(-0.5) * (along * along + across * across)
+    value = _i0e(cos_i * cos_o / v) * wp.exp(beside_cone / v) / (v * (F(1.0) - wp.exp(F(-2.0) / v)))
+    out_m[row, column, lobe] = float(value)
+
+
+@wp.kernel
+def _gaussian_texels(
+    theta: wp.array[F],
+    lobes: wp.array2d[F],  # alpha and beta of each
+    # outputs
+    out_m: wp.array3d[float],
+):
+    row, column, lobe = wp.tid()
+    if lobe == 3:
+        out_m[row, column, lobe] = float(wp.cos(F(0.5) * (theta[row] - theta[column])))
+    else:
+        theta_h = F(0.5) * (theta[row] + theta[column])
+        out_m[row, column, lobe] = float(F(0.5) * _gaussian(theta_h - lobes[lobe, 0], lobes[lobe, 1]))
+
+
+def azimuthal_means(
+    edges: np.ndarray,
+    cosines: np.ndarray,
+    settings: Settings,
+    sigma_a: Absorptions,
+    spread: np.ndarray | None,
+    device: str,
+) -> list[np.ndarray]:
+    """N_R (H, W, 1), N_TT and N_TRT (H, W, C), NumPy float32, baked on a Warp device.
+
+    Arguments as for `cell_means.smooth_means`; spread: the matrix (W, W) of `azimuthal.roughening`, or None.
+    """
+    is_treated = settings.mode == "classic" and settings.caustic == "published"
+    caustic = Caustic.at(cosines, settings, sigma_a)
+    rows = (caustic.phi_c, caustic.fade, caustic.area)
+    shape = (len(cosines), len(edges) - 1)
+    with wp.ScopedDevice(device):
+        sent = [wp.array(np.ascontiguousarray(values), dtype=F) for values in (edges, cosines, sigma_a, *rows)]
+        lobes = [wp.zeros((*shape, count), dtype=float) for count in (1, len(sigma_a), len(sigma_a))]
+        inputs = [*sent[:2], F(settings.eta), *sent[2:], F(settings.glint_width if is_treated else 0.0)]
+        kernel_cache.launch(_smooth_texels, dim=shape, inputs=inputs, outputs=lobes)
+        if spread is not None:
+            smooth, matrix = lobes, wp.array(spread, dtype=float)
+            lobes = [wp.empty_like(lobe) for lobe in smooth]
+            for source, target in zip(smooth, lobes, strict=True):
+                kernel_cache.launch(_spread_texels, dim=target.shape, inputs=[matrix, source], outputs=[target])
+        return [lobe.numpy() for lobe in lobes]
+
+
+def longitudinal_texels(theta: np.ndarray, settings: Settings, device: str) -> np.ndarray:
+    """M (H, W, 4), NumPy float32, baked on a Warp device; theta (W,): inclinations of columns and rows."""
+    is_energy = settings.mode == "energy"
+    lobes = energy_conserving.lobes(settings) if is_energy else longitudinal_lobes(settings)
+    with wp.ScopedDevice(device):
+        m = wp.empty((len(theta), len(theta), 4), dtype=float)
+        inputs = [wp.array(theta, dtype=F), wp.array(np.array(lobes, float), dtype=F)]
+        kernel_cache.launch(_d_eon_texels if is_energy else _gaussian_texels, dim=m.shape, inputs=inputs, outputs=[m])
+        return m.numpy()
