@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vellus: hair for Blender. `hair_addon.core` is the mathematics, `hair_addon.blender` everything Blender."""
+"""Vellus: hair for Blender. `hair_addon.core` is the mathematics, `hair_addon.blender` the Blender integration."""
 
 
 def register():
-    """Make the add-on known to Blender."""
+    """Register the add-on."""
     from . import blender
-    from .blender import cli_command
+    from .blender.host import cli_command
 
     blender.register()
     cli_command.register(_command)
 
 
 def unregister():
-    """Take the add-on out of Blender; hair that was made stays in the file."""
+    """Unregister the add-on; existing hair stays in the file."""
     from . import blender
-    from .blender import cli_command
+    from .blender.host import cli_command
 
     cli_command.unregister()
     blender.unregister()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Vellus for scripts: what the panel does, as functions of Blender's objects or of plain arrays.
+"""Python interface of Vellus: the panel's operations as functions of Blender objects or plain arrays.
 
 Plain arrays need no Blender:
 
@@ -12,28 +12,45 @@ Plain arrays need no Blender:
 >>> api.points(hair).shape
 (500, 41, 3)
 
-In Blender a surface is a mesh object, and guides and hair are Curves datablocks; wherever one of these is taken, its
-object is too. Settings are given by name, as changes of a `Settings`, or of the defaults without one. What the user can
-mend is a `HairError` of one sentence, raised before anything in the scene is changed.
+A path that begins with // is relative to the open .blend file, as everywhere in Blender.
+
+In Blender a surface is a mesh object, and guides and hair are Curves datablocks; functions also accept their objects.
+Settings are keyword arguments, which override those of a `Settings` object, or the defaults. Errors that the user can
+fix raise `HairError`, a message of one sentence, before anything in the scene is changed.
 
 In the installed extension this is bl_ext.user_default.vellus.hair_addon.api.
 """
 
+import os
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from .core import groom, hair_binding, settings_file
+from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .core import geometry, grooming, imaging, lazy
 from .core.errors import HairError
-from .core.groom import GuideSettings, HairSettings
-from .core.long_work import run_now, unheard
-from .core.mesh import TriMesh
-from .core.params import declared
-from .core.settings_file import GroomSettings
-from .core.shading import appearance, lookup_tables, presets
+from .core.files import settings_file
+from .core.files.settings_file import GroomSettings
+from .core.geometry.mesh import TriMesh
+from .core.geometry.strands import Strands, check_strands, curve_offsets, from_numpy
+from .core.grooming import following, groom
+from .core.grooming.groom import GuideSettings, HairSettings
+from .core.long_work import Progress, no_progress, run_now
+from .core.params import Param, plain_value, require_class
+from .core.shading import appearance, presets
 from .core.shading.appearance import Appearance
-from .core.strands import Strands
+from .core.shading.tables import lookup_tables
+
+blender = lazy.Package(".blender", __package__)
+
+# Blender has no types outside of Blender. Wherever Curves are taken their object is too.
+Curves = Any
+MeshObject = Any
+Arrays = TriMesh | tuple[ArrayLike, ArrayLike]  # vertices (V, 3) [m] and triangles (F, 3)
 
 __all__ = [
     "Appearance",
@@ -54,263 +71,318 @@ __all__ = [
     "settings_of",
     "shade",
     "table_settings",
+    "use_as_guides",
 ]
 
-# Settings that name things in a .blend.
-_OF_BLENDER = ("density_group", "density_image", "region_group", "region_attribute", "part_lines")
+
+_ANY = Param("")
+_FRAMES = Param("")  # availability in this Blender is checked later
 
 
 # Growing.
 
 
-def distribute_guides(surface, settings=None, *, progress=unheard, **changes):
-    """Guides on a surface, evenly placed.
+def distribute_guides(
+    surface: MeshObject | Arrays,
+    settings: GuideSettings | None = None,
+    *,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> Curves | Strands:
+    """Distribute guides evenly on a surface.
 
     surface: a mesh object, whose new guide Curves are returned; or (vertices (V, 3) [m], triangles (F, 3)), whose
-    `Strands` are. settings: `GuideSettings`; changes: its fields by name; progress(step, part): told how far it is.
+    `Strands` are. settings: `GuideSettings`; changes: its fields by name; progress(step, part): callback.
+    The length is computed from the surface unless it is given.
 
     >>> surface = bpy.data.objects["Scalp"]
     >>> guides = api.distribute_guides(surface, guide_count=50, length=0.3)
     >>> guides.name, len(guides.curves)
     ('Guides', 50)
     """
-    settings = _changed(GuideSettings, settings, changes)
-    if _are_arrays(surface):
-        _require_no_names(settings)
-        return groom.distribute_guides(_mesh(surface), settings, progress=progress)
-    from .blender import pipeline
+    settings, progress = changed(GuideSettings, settings, changes), heard(progress)
+    if are_arrays(surface):
+        require_no_names(settings)
+        return groom.distribute_guides(mesh_of(surface), settings, progress=progress)
 
-    return run_now(pipeline.distributing_guides(_surface_object(surface), settings, _depsgraph()), progress)
+    return run_now(
+        blender.groom.pipeline.distributing_guides(_surface_object(surface), settings, _depsgraph()), progress
+    )
 
 
-def interpolate_hair(guides, settings=None, *, mesh=None, progress=unheard, **changes):
-    """Strands between guides.
+def use_as_guides(
+    curves: Curves | Iterable[ArrayLike],
+    surface: MeshObject | Arrays | None = None,
+    *,
+    every: int = 1,
+    applies_modifiers: bool = True,
+    progress: Progress = no_progress,
+) -> Curves | Strands:
+    """Use curves not created by Vellus as guides; every n-th of them is kept.
+
+    curves: a curves object, which becomes guide Curves in place and is returned: with its modifiers applied, or the
+    original curves; surface: the mesh object that they grow on, None for their own. Or arrays (P, 3) [m], one per
+    curve, with surface (vertices, triangles): their `Strands`. The root is the end nearer to the surface; curves with
+    zero length or non-finite points are removed. Points do not move.
+
+    >>> bpy.ops.object.curves_random_add()
+    {'FINISHED'}
+    >>> guides = api.use_as_guides(bpy.context.object, bpy.data.objects["Scalp"], every=10)
+    >>> len(guides.curves)
+    50
+    >>> mesh = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
+    >>> lines = [[(0.2, 0.2, 0.0), (0.2, 0.2, 0.1)], [(0.3, 0.2, 0.0), (0.3, 0.3, 0.1), (0.4, 0.3, 0.1)]]
+    >>> api.use_as_guides(lines, mesh).numpy().shape
+    (2, 41, 3)
+    """
+    if are_arrays(surface):
+        return _guides_of_arrays(curves, mesh_of(surface), every)
+
+    curves_object = _curves_object(curves)
+    if surface is None:
+        surface = blender.groom.hand_made_guides.find_surface(curves_object, _depsgraph().view_layer)
+    work = blender.groom.hand_made_guides.using_as_guides(
+        curves_object, _surface_object(surface), _depsgraph(), every=every, applies_modifiers=applies_modifiers
+    )
+    return run_now(work, progress).guides
+
+
+def _guides_of_arrays(curves, mesh, every):
+    points, starts = grooming.rooted_curves.polylines(curves)
+    rooted = grooming.rooted_curves.root(mesh, points, starts, every)
+    points = points[rooted.point_order(starts)]
+    starts = curve_offsets(np.diff(starts)[rooted.kept])
+    return from_numpy(geometry.resampling.resample(points, starts, groom.POINT_COUNT), rooted.roots)
+
+
+def interpolate_hair(
+    guides: Curves | Strands,
+    settings: HairSettings | None = None,
+    *,
+    mesh: Arrays | None = None,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> Curves | Strands:
+    """Interpolate strands between guides.
 
     guides: guide Curves, whose new hair Curves are returned; or the `Strands` of guides on a `mesh` of arrays, whose
-    `Strands` are. settings: `HairSettings`; changes and progress as above.
+    `Strands` are. settings: `HairSettings`; changes and progress as above. Radius and influence distance are computed
+    from the surface unless they are given. Strands use the mask of their guides, unless `density_group` names another
+    group; with plain arrays, they cover the whole mesh.
 
     >>> hair = api.interpolate_hair(bpy.data.objects["Guides"], strand_count=2000, radius=0.001)
     >>> hair.vellus.hair.strand_count
     2000
     """
-    settings = _changed(HairSettings, settings, changes)
+    settings, progress = changed(HairSettings, settings, changes), heard(progress)
     if isinstance(guides, Strands):
+        check_strands(guides)
         if mesh is None:
-            raise HairError("Guides of arrays need the mesh that they grow on: give its arrays as mesh=.")
-        _require_no_names(settings)
-        binding = groom.bind_hair(_mesh(mesh), guides, settings, progress=progress)
-        return hair_binding.follow_guides(binding, guides)
-    from .blender import pipeline
+            raise HairError("Guides given as arrays need their surface: pass its arrays as mesh=.")
+        require_no_names(settings)
+        binding = groom.bind_hair(mesh_of(mesh), guides, settings, progress=progress)
+        return following.follow_guides(binding, guides)
 
-    return run_now(pipeline.interpolating_hair(_curves(guides, "GUIDES"), settings, _depsgraph()), progress)
+    return run_now(blender.groom.pipeline.interpolating_hair(_guides(guides), settings, _depsgraph()), progress)
 
 
-def add_hair(surface, settings=None, *, progress=unheard):
-    """Guides on a mesh object, hair between them, and its look; returns the Curves of both. settings: `GroomSettings`.
+def add_hair(
+    surface: MeshObject, settings: GroomSettings | None = None, *, progress: Progress = no_progress
+) -> tuple[Curves, Curves]:
+    """Add guides and hair to a mesh object and set its look; returns the Curves of both. settings: `GroomSettings`.
 
     >>> settings = api.GroomSettings(api.GuideSettings(guide_count=30), api.HairSettings(strand_count=900))
     >>> guides, hair = api.add_hair(bpy.data.objects["Scalp"], settings)
     >>> len(guides.curves), len(hair.curves)
     (30, 900)
     """
-    from .blender import groom_settings
 
-    work = groom_settings.adding_hair(_surface_object(surface), settings or GroomSettings(), _depsgraph())
-    return run_now(work, progress)
+    settings = GroomSettings() if settings is None else settings
+    require_class(settings, GroomSettings, "settings")
+    work = blender.groom.groom_settings.adding_hair(_surface_object(surface), settings, _depsgraph())
+    return run_now(work, heard(progress))
 
 
-def points(strands):
+def points(strands: Curves | Strands) -> np.ndarray:
     """(S, P, 3) float32 [m] of guides or hair.
 
-    Of Curves in the world, with Z up, where their surface carries them now; of `Strands` as they are.
+    Those of Curves are in world space, with Z up, deformed with their surface; those of `Strands` are unchanged.
 
     >>> api.points(bpy.data.objects["Hair"]).shape
     (2000, 41, 3)
     """
     if isinstance(strands, Strands):
+        check_strands(strands)
         return strands.numpy()
-    from .blender import strand_arrays
 
-    return strand_arrays.world_points(_curves(strands))
+    return blender.io.strand_arrays.world_points(_curves(strands))
 
 
 # Shading.
 
 
-def shade(hair, look=None, *, model=None, **changes):
+def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | None = None, **changes: Any) -> None:
     """Give hair a look, for the viewport and for Cycles.
 
-    look: an `Appearance`, the name of a preset such as "BLOND", or None for the one it has; changes: fields of
-    `Appearance`; model: "MARSCHNER" or "KAJIYA_KAY", None for the one it has.
+    look: an `Appearance`, the name of a preset such as "BLOND", or None for the current one; changes: fields of
+    `Appearance`; model: "MARSCHNER" or "KAJIYA_KAY", None for the current one.
 
     >>> api.shade(bpy.data.objects["Hair"], "AUBURN", roughness=0.25)
     >>> api.settings_of(bpy.data.objects["Hair"]).appearance.roughness
     0.25
     """
-    from .blender import groom_settings, properties
 
     target = _curves(hair, "HAIR")
-    if isinstance(look, str) and look not in presets.PRESETS:
-        raise HairError(f'There is no preset "{look}": there are {", ".join(presets.PRESETS)}.')
-    present = properties.look_of(target.vellus)
+    present = blender.settings.properties.look_of(target.vellus)
     if isinstance(look, str):
-        look = replace(presets.PRESETS[look][1], mode=present.mode)  # how to draw is no part of a preset
-    wanted = _changed(Appearance, look or present, changes)
+        preset = presets.PRESETS[choice(look, "preset", presets.PRESETS)]
+        look = replace(preset[1], mode=present.mode)  # the mode is not part of a preset
+    wanted = changed(Appearance, present if look is None else look, changes)
     if model is not None:
-        known = [identifier for identifier, _label, _description in properties.MODELS]
-        if model not in known:
-            raise HairError(f'There is no model "{model}": there are {", ".join(known)}.')
+        choice(model, "model", [identifier for identifier, _label, _description in blender.settings.properties.MODELS])
+    blender.groom.groom_settings.assign_look(target, wanted)
+    if model is not None:
         target.vellus.model = model
-    groom_settings.assign_look(target, wanted)
 
 
-def table_settings(settings, **changes):
-    """`lookup_tables.Settings` of the tables that hair of some `GroomSettings` is drawn with.
+def table_settings(settings: GroomSettings, **changes: Any) -> lookup_tables.Settings:
+    """Return the `lookup_tables.Settings` of the tables for hair with these `GroomSettings`.
 
     >>> settings = api.GroomSettings(appearance=api.Appearance(roughness=0.2))
     >>> api.table_settings(settings, size=64).roughness
     0.2
     """
+    require_class(settings, GroomSettings, "settings")
     found = appearance.table_settings(settings.appearance, settings.tables)
-    return _changed(lookup_tables.Settings, found, changes)
+    return changed(lookup_tables.Settings, found, changes)
 
 
-def bake_tables(folder, settings=None, *, has_plots=False, progress=unheard, **changes):
-    """Bake the Marschner model's tables and dual scattering's to OpenEXR in a folder; returns the paths of the files.
+def bake_tables(
+    folder: str | os.PathLike,
+    settings: lookup_tables.Settings | None = None,
+    *,
+    has_plots: bool = False,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> list[Path]:
+    """Bake the tables of the Marschner model and of dual scattering to OpenEXR in a folder; returns the file paths.
 
-    settings: `lookup_tables.Settings`; has_plots: whether a picture of each is written beside it.
+    settings: `lookup_tables.Settings`; has_plots: whether to write a plot of each table.
 
     >>> [path.name for path in api.bake_tables("tables", size=32)][:3]
     ['m.exr', 'n.exr', 'n_trt.exr']
     """
-    from .blender import table_files
 
-    settings = _changed(lookup_tables.Settings, settings, changes)
-    return run_now(table_files.baking_tables(settings, Path(folder), has_plots), progress)
+    settings = changed(lookup_tables.Settings, settings, changes)
+    has_plots = plain_value("has_plots", has_plots, False, _ANY)
+    return run_now(blender.io.table_files.baking_tables(settings, path_of(folder), has_plots), heard(progress))
 
 
 # Pictures.
 
 
-def draw(*, progress=unheard, **settings):
-    """(height, width, 4) float32: the scene's hair and meshes as Vellus draws them, seen by the scene's camera.
+def draw(*, progress: Progress = no_progress, **settings: Any) -> np.ndarray:
+    """Draw the scene's hair and meshes from its camera: (height, width, 4) float32.
 
-    Scene-linear and premultiplied, the first row at the bottom; settings: fields of `render.PictureSettings`.
+    Scene-linear and premultiplied, the first row at the bottom; settings: fields of `PictureSettings`.
 
     >>> api.draw(width=64, height=48).shape
     (48, 64, 4)
     """
-    from .blender import render as offscreen
 
-    return run_now(offscreen.drawing_picture(_changed(offscreen.PictureSettings, None, settings)), progress)
+    wanted = changed(imaging.pixel_sampling.PictureSettings, None, settings)
+    return run_now(blender.render.offscreen.drawing_picture(wanted), heard(progress))
 
 
-def render(path, *, frame=None, engine="vellus", progress=unheard, **settings):
-    """Make a frame of the scene, the present one for None, and write it as .png or .exr, whole or not at all.
+def render(
+    path: str | os.PathLike,
+    *,
+    frame: int | None = None,
+    engine: str = "vellus",
+    progress: Progress = no_progress,
+    **settings: Any,
+) -> Path:
+    """Render a frame of the scene, the current one for None, and write it atomically as .png or .exr.
 
-    engine: "vellus", "cycles" or "eevee"; settings: fields of `core.picture.FrameSettings`, width and height the
-    scene's unless given. Returns the path. In that, ### becomes the number of the frame.
+    engine: "vellus", "cycles" or "eevee"; settings: fields of `FrameSettings`, width and height
+    default to the scene's. Returns the path, in which ### is replaced with the frame number.
 
     >>> api.render("frame_####.png", frame=3, width=64, height=48).name
     'frame_0003.png'
     """
-    from .blender import frames
-    from .core.picture import FrameSettings
 
-    if engine not in frames.ENGINES:
-        raise HairError(f'There is no engine "{engine}": there are {", ".join(frames.ENGINES)}.')
-    settings = _changed(FrameSettings, None, frames.scene_size() | settings)
-    frame = frames.present_frame() if frame is None else frame
-    frames.require_pattern(path, 1)
-    target = frames.path_of(path, frame)
-    frames.write_frame(target, frame, engine, settings, progress=progress)
+    path, engine, progress = path_of(path), choice(engine, "engine", blender.io.frames.ENGINES), heard(progress)
+    wanted = changed(imaging.pixel_sampling.FrameSettings, None, blender.io.frames.scene_size() | settings)
+    frame = plain_value("frame", blender.host.scene_time.present_frame() if frame is None else frame, 1, _FRAMES)
+    blender.io.frames.require_pattern(path, 1)
+    target = blender.io.frames.path_of(path, frame)
+    blender.io.frames.write_frame(target, frame, engine, wanted, progress=progress)
     return target
 
 
 # Settings.
 
 
-def settings_of(hair):
-    """The `GroomSettings` that hair Curves and their guides were made with."""
-    from .blender import groom_settings
+def settings_of(hair: Curves) -> GroomSettings:
+    """Return the `GroomSettings` of hair Curves and their guides."""
 
-    return groom_settings.settings_of(_curves(hair, "HAIR"))
+    return blender.groom.groom_settings.settings_of(_curves(hair, "HAIR"))
 
 
-def save_settings(path, settings):
+def save_settings(path: str | os.PathLike, settings: GroomSettings) -> None:
     """Write `GroomSettings` as JSON.
 
     >>> api.save_settings("groom.json", api.settings_of(bpy.data.objects["Hair"]))
     """
-    settings_file.write(path, settings)
+    require_class(settings, GroomSettings, "settings")
+    settings_file.write(path_of(path), settings)
 
 
-def load_settings(path):
-    """The `GroomSettings` of a JSON file; what it leaves out is at its default.
+def load_settings(path: str | os.PathLike) -> GroomSettings:
+    """Read `GroomSettings` from a JSON file; omitted settings have their defaults.
 
     >>> api.load_settings("groom.json").hair.strand_count
     2000
     """
-    return settings_file.read(path)
+    return settings_file.read(path_of(path))
 
 
-def apply_settings(hair, settings):
-    """Give hair Curves and their guides other `GroomSettings`; what was combed stays as it is.
+def apply_settings(hair: Curves, settings: GroomSettings) -> None:
+    """Apply `GroomSettings` to hair Curves and their guides; combed guides are not changed.
 
     >>> settings = api.load_settings("groom.json")
     >>> api.apply_settings(bpy.data.objects["Hair"], settings)
     >>> bpy.context.view_layer.update()  # the strands are made here
     """
-    from .blender import groom_settings
 
-    groom_settings.apply_settings(_curves(hair, "HAIR"), settings)
-
-
-def _changed(settings_class, settings, changes):
-    """`Settings` with some fields changed, of the defaults where there are none. Raises `HairError`."""
-    known = [name for name, _default, _details in declared(settings_class)]
-    unknown = next((name for name in changes if name not in known), None)
-    if unknown is not None:
-        raise HairError(f'There is no setting "{unknown}": there are {", ".join(known)}.')
-    return replace(settings or settings_class(), **changes)
+    require_class(settings, GroomSettings, "settings")
+    blender.groom.groom_settings.apply_settings(_curves(hair, "HAIR"), settings)
 
 
-def _are_arrays(surface):
-    return isinstance(surface, TriMesh | tuple | list)
-
-
-def _mesh(arrays):
-    if isinstance(arrays, TriMesh):
-        return arrays
-    vertices, triangles = (np.asarray(part) for part in arrays)
-    if vertices.ndim != 2 or vertices.shape[1] != 3 or triangles.ndim != 2 or triangles.shape[1] != 3:
-        raise HairError(f"A mesh is vertices (V, 3) and triangles (F, 3), not {vertices.shape} and {triangles.shape}.")
-    return TriMesh(np.ascontiguousarray(vertices, np.float32), np.ascontiguousarray(triangles, np.int32))
-
-
-def _require_no_names(settings):
-    named = next((name for name in _OF_BLENDER if getattr(settings, name, "")), None)
-    if named is not None:
-        raise HairError(f'"{named}" names something in a .blend, which plain arrays have not: use core.groom.')
+# What is given.
 
 
 def _curves(given, kind=None):
-    """The Curves datablock that is given, or whose object is. Raises `HairError` for another kind than asked for."""
-    curves = getattr(given, "data", given)
-    state = getattr(curves, "vellus", None)
-    if state is None or (kind is not None and state.kind != kind):
-        wanted = {"GUIDES": "guides", "HAIR": "hair", None: "guides or hair"}[kind]
-        raise HairError(f"{getattr(given, 'name', given)!r} is no {wanted} of Vellus.")
-    return curves
+    return blender.data.arguments.curves_of(given, kind)
+
+
+def _guides(given):
+    return blender.data.arguments.guides_of(given)
+
+
+def _curves_object(given):
+    """Return a curves object, given as such or as its Curves datablock. Raises `HairError`."""
+
+    view_layer = _depsgraph().view_layer
+    curves_object = given if hasattr(given, "matrix_world") else blender.groom.selection.object_of(given, view_layer)
+    if not blender.groom.foreign_curves.is_foreign(curves_object):
+        raise HairError(f"{getattr(given, 'name', given)!r} is not a curves object, or is already guides or hair.")
+    return curves_object
 
 
 def _surface_object(given):
-    if getattr(given, "type", None) != "MESH":
-        raise HairError(f"{getattr(given, 'name', given)!r} is no mesh object, nor the arrays of a mesh.")
-    return given
+    return blender.data.arguments.surface_object(given)
 
 
 def _depsgraph():
-    from .blender import scene
-
-    return scene.present_depsgraph()
+    return blender.data.scene.present_depsgraph()

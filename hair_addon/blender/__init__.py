@@ -1,69 +1,69 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Everything Blender: classes in the order they need each other."""
+"""Registration of all Blender classes, in order of dependence."""
 
 import atexit
 
 import bpy
 
-from . import (
-    engine,
-    engine_panels,
-    handlers,
-    keymap,
-    menus,
-    operators,
-    panels,
-    preferences,
-    properties,
-    rendered_view,
-    running,
-    shaders,
-    translations,
-    viewport,
-)
+from . import manual
+from .groom import hair_systems
+from .host import running
+from .live import first_setup, handlers, invalidation
+from .render import engine, viewport
+from .settings import preferences, properties, translations
+from .ui import engine_panels, keymap, look_previews, menus, operators, panels
 
 CLASSES = (
     preferences.VellusPreferences,
     *properties.CLASSES,
+    *hair_systems.CLASSES,
     engine.VellusRenderEngine,
     *operators.CLASSES,
+    *panels.LISTS,
     *panels.CLASSES,
     *menus.CLASSES,
 )
 
 
+def require_registered():
+    """Register the add-on if the command line runs from a checkout."""
+    if not hasattr(bpy.types.Curves, "vellus"):
+        register()
+
+
 def register():
-    """Register classes, then listen and draw."""
+    """Register classes, then handlers and drawing."""
     for cls in CLASSES:
         bpy.utils.register_class(cls)
     translations.register()
     properties.register()
+    hair_systems.register()
     menus.register()
     engine_panels.register()
     keymap.register()
+    manual.register()
     handlers.register()
     viewport.register()
-    atexit.unregister(_release)
-    atexit.register(_release)
-
-
-def _release():
-    """Python ends: what is on the GPU is freed while there is one. Blender's own handler of its exit comes too late."""
-    rendered_view.clear()
-    viewport.release()
-    shaders.forget()
+    first_setup.register()
+    # Blender's own handler of its exit comes too late.
+    atexit.unregister(invalidation.end)
+    atexit.register(invalidation.end)
 
 
 def unregister():
     """Undo `register` in reverse."""
     running.end(bpy.context)
-    rendered_view.clear()
+    first_setup.unregister()
     viewport.unregister()
     handlers.unregister()
+    invalidation.clear()
+    manual.unregister()
     keymap.unregister()
     engine_panels.unregister()
     menus.unregister()
+    hair_systems.unregister()
     properties.unregister()
+    look_previews.unregister()
     translations.unregister()
     for cls in reversed(CLASSES):
         bpy.utils.unregister_class(cls)

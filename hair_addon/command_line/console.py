@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What a command says, and where: results on standard output; all else on standard error."""
+"""Output of a command: results on standard output, everything else on standard error."""
 
 import contextlib
 import json
@@ -8,6 +8,7 @@ import sys
 from dataclasses import dataclass
 from typing import TextIO
 
+from ..core.errors import HairError
 from ..core.long_work import Stopped
 from .interruption import Interruption
 
@@ -16,7 +17,7 @@ PROGRAM = "vellus"
 
 @dataclass
 class Console:
-    """The two streams of a command, and how much is said on them."""
+    """The two streams of a command, and its verbosity."""
 
     out: TextIO
     errors: TextIO
@@ -26,25 +27,33 @@ class Console:
     _shown: str = ""
 
     def result(self, values, sentence):
-        """Tell what was made: {name: value} for programs, a sentence for people."""
+        """Report a result: {name: value} for --json, otherwise a sentence.
+
+        Raises `HairError` if standard output is closed or full, BrokenPipeError if its reader has gone.
+        """
         self._clear()
-        if self.is_json:
-            print(json.dumps(values), file=self.out, flush=True)
-        elif not self.is_quiet:
-            print(sentence, file=self.out, flush=True)
+        if self.is_quiet and not self.is_json:
+            return
+        try:
+            print(json.dumps(values) if self.is_json else sentence, file=self.out, flush=True)
+        except OSError as error:
+            discard(self.out)
+            if isinstance(error, BrokenPipeError):
+                raise
+            raise HairError(f"Results were lost: standard output cannot be written ({error.strerror}).") from error
 
     def warn(self, sentence):
-        """Tell what may surprise, though it does not end the command."""
+        """Print a warning."""
         if not self.is_quiet:
             self.fail(f"warning: {sentence}")
 
     def fail(self, sentence):
-        """Tell why the command ends."""
+        """Print the error that ends the command."""
         self._clear()
-        print(f"{PROGRAM}: {sentence}", file=self.errors, flush=True)
+        _print_error(f"{PROGRAM}: {sentence}\n", self.errors)
 
     def progress(self, step, part):
-        """Show on a terminal how far long work is; raises `Stopped` where somebody has asked to stop it."""
+        """Show progress on a terminal; raises `Stopped` if an interruption was requested."""
         if self.interruption.is_asked:
             raise Stopped
         if self.is_quiet or not self.errors.isatty():
@@ -52,28 +61,56 @@ class Console:
         shown = f"{step}: {round(100 * part)} %"
         if shown != self._shown:
             self._clear()
-            print(shown, end="", file=self.errors, flush=True)
+            _print_error(shown, self.errors)
             self._shown = shown
 
     def _clear(self):
         if self._shown:
-            print("\r\x1b[K", end="", file=self.errors, flush=True)
+            _print_error("\r\x1b[K", self.errors)
             self._shown = ""
+
+
+def _print_error(text, stream):
+    """Write to standard error; if it is closed or full, the exit status is enough."""
+    try:
+        print(text, end="", file=stream, flush=True)
+    except OSError:
+        discard(stream)
+
+
+def discard(stream):
+    """Discard further output to a broken stream; otherwise Python reports an error when flushing it on exit."""
+    nowhere = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, stream.fileno())
+    os.close(nowhere)
+
+
+def occupy_closed_streams():
+    """Open the null device for closed standard streams, before another file gets their descriptors.
+
+    Reads return nothing, and writes fail.
+    """
+    for number in range(3):
+        try:
+            os.fstat(number)
+        except OSError:
+            os.open(os.devnull, os.O_RDONLY)
 
 
 @contextlib.contextmanager
 def own_streams(is_verbose):
-    """(out, errors) for a command alone. What Blender, drivers and other add-ons print goes nowhere, or to errors.
+    """Return (out, errors) for the command only. Other output of the process is discarded, or goes to errors.
 
-    It stays so to the end of the process, when what libraries still hold back is written.
+    This lasts until the process exits, when libraries flush their buffers.
     """
-    sys.stdout.flush()
-    sys.stderr.flush()
+    for stream in filter(None, (sys.stdout, sys.stderr)):  # None where it is closed
+        with contextlib.suppress(OSError):
+            stream.flush()
     out, errors = (os.fdopen(os.dup(number), "w", encoding="utf-8", errors="backslashreplace") for number in (1, 2))
     chatter = os.dup(2) if is_verbose else os.open(os.devnull, os.O_WRONLY)
     os.dup2(chatter, 1)
     os.dup2(chatter, 2)
     os.close(chatter)
-    sys.stderr = errors  # a defect's traceback is no chatter
+    sys.stderr = errors  # show the traceback of a bug
     yield out, errors
     out.flush()

@@ -3,21 +3,34 @@
 
 import time
 from dataclasses import replace
-from pathlib import Path
 
 from .. import api
+from ..core import lazy
+from ..core.errors import HairError
+from ..core.grooming.groom import GuideSettings, HairSettings
+from ..core.long_work import run_now
+from ..core.params import declared
 from ..core.shading.presets import PRESETS
 from . import opening, options
 
+blender = lazy.Package("..blender", __package__)
+
+# Settings that only guides have.
+_OF_GUIDES = {name for name, *_ in declared(GuideSettings)} - {name for name, *_ in declared(HairSettings)}
+
 
 def add(verbs):
-    """The verb's options."""
+    """Add the command's options."""
     parser = verbs.add_parser("groom", help="grow guides and hair on a mesh")
-    parser.add_argument("input", type=Path, help="file with the mesh: .blend .obj .ply .stl .glb .gltf .usd* .abc")
-    parser.add_argument("--out", type=Path, required=True, help=".blend, .usd*, .abc, or .npz with the arrays")
-    parser.add_argument("--surface", default="", metavar="NAME", help="the mesh object; not needed where there is one")
+    parser.add_argument("input", help="file with the mesh: .blend .obj .ply .stl .glb .gltf .usd* .abc")
+    parser.add_argument("--out", required=True, help=".blend, .usd*, .abc, or .npz with the arrays")
+    parser.add_argument("--surface", default="", metavar="NAME", help="mesh object; needed if the file has several")
     parser.add_argument("--up", choices=("Y", "Z"), default="Z", help="axis that points up in an .obj, .ply, .stl [Z]")
     parser.add_argument("--preset", choices=PRESETS, metavar="NAME", help=f"a look: {', '.join(PRESETS)}")
+    parser.add_argument(
+        "--guides-from", metavar="FILE", help="use the curves of a .blend, .usd*, .abc or .npz as guides"
+    )
+    parser.add_argument("--guides-object", default="", metavar="NAME", help="curves object in that file")
     options.add_scripts(parser)
     options.add_groom_settings(parser)
     options.add_common(parser)
@@ -30,19 +43,42 @@ def run(given, console):
     if given.preset:
         look = replace(PRESETS[given.preset][1], mode=settings.appearance.mode)
         settings = options.changed_groom(replace(settings, appearance=look), given)
-    from ..blender import groom_files, mesh_files
 
-    mesh_files.require_readable(given.input)
-    groom_files.require_writable(given.out)
+    if given.guides_object and not given.guides_from:
+        raise HairError("--guides-object needs --guides-from.")
+    if given.guides_from:
+        blender.io.curve_files.require_readable(given.guides_from)
+    blender.io.mesh_files.require_readable(given.input)
+    blender.io.groom_files.require_writable(given.out)
     file_axes = opening.open_file(given, console)
-    surface = mesh_files.find_surface(given.surface)
+    surface = blender.io.mesh_files.find_surface(given.surface)
     started = time.perf_counter()
-    guides, hair = api.add_hair(surface, settings, progress=console.progress)
+    if given.guides_from:
+        guides, hair = _follow_curves(given, surface, settings, file_axes, console)
+    else:
+        guides, hair = api.add_hair(surface, settings, progress=console.progress)
     seconds = time.perf_counter() - started
     console.progress("Writing", 1.0)
-    groom_files.write(given.out, guides, hair, file_axes)
+    blender.io.groom_files.write(given.out, guides, hair, file_axes)
     counts = {"guides": len(guides.curves), "strands": len(hair.curves)}
     values = {"verb": "groom", "input": str(given.input), "surface": surface.name, "out": str(given.out), **counts}
     values |= {"points": len(hair.points), "seconds": round(seconds, 3), "bytes": given.out.stat().st_size}
     made = f"{counts['guides']} guides, {counts['strands']} strands on {surface.name}"
     console.result(values, f"{made} in {seconds:.2f} s: {given.out}")
+
+
+def _follow_curves(given, surface, settings, file_axes, console):
+    """Return (guides, hair) from the curves in another file, or in the open one."""
+
+    useless = [name for name in vars(given) if name in _OF_GUIDES]
+    if useless:
+        console.warn(f"Guides come from {given.guides_from}: {', '.join(sorted(useless))} have no effect.")
+    is_open = given.guides_from.resolve() == given.input.resolve()
+    with blender.io.curve_files.curves_of(given.guides_from, given.guides_object, file_axes, is_open) as curves_object:
+        work = blender.groom.groom_settings.using_as_guides(
+            curves_object, surface, settings, blender.data.scene.present_depsgraph()
+        )
+        made = run_now(work, console.progress)
+    for sentence, values in made.notes():
+        console.warn(sentence.format(**values))
+    return made.guides, made.hair

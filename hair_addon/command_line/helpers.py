@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Several processes of one command on this machine."""
+"""Worker processes of one command on this machine."""
 
 import json
 import queue
@@ -10,14 +10,14 @@ import threading
 from ..core.errors import HairError
 from .console import PROGRAM
 
-_LOOK = 0.2  # [s] between looks at whether somebody has asked to stop
+_LOOK = 0.2  # [s] between checks for an interruption
 _PATIENCE = 30.0  # [s] for a process to end that was asked to
 
 
 def run(commands, console, said_as):
-    """Run commands side by side until all have ended; raises `HairError` where one fails, when the others are done.
+    """Run commands in parallel until all have ended; raises `HairError` if one failed, when the others are done.
 
-    commands: lists of words, each of which gives lines of JSON; said_as(values): the sentence of a line.
+    commands: argument lists of processes that print lines of JSON; said_as(values): the sentence for a line.
     """
     heard = queue.Queue()
     helpers = []
@@ -39,7 +39,7 @@ def run(commands, console, said_as):
 
 
 class _Helper:
-    """A process, and threads that listen to it."""
+    """A process, and the threads that read its output."""
 
     def __init__(self, words, heard):
         pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "stdin": subprocess.DEVNULL}
@@ -51,7 +51,7 @@ class _Helper:
 
     def _hear(self):
         for line in self._process.stdout:
-            if line.startswith("{"):  # Blender tells of itself before the command begins
+            if line.startswith("{"):  # Blender prints messages before the command starts
                 self._heard.put(json.loads(line))
 
     def _hear_errors(self):
@@ -61,12 +61,12 @@ class _Helper:
 
     @property
     def is_at_work(self):
-        """Whether it runs, or more may be heard of it."""
+        """Whether it runs, or has unread output."""
         return self._process.poll() is None or any(thread.is_alive() for thread in self._threads)
 
     @property
     def status(self):
-        """The exit status of what is no longer at work."""
+        """The exit status of the ended process."""
         return self._process.returncode
 
     @property
@@ -74,10 +74,10 @@ class _Helper:
         """Why it failed."""
         if self._complaints:
             return self._complaints[-1]
-        return f"A process that was to help ended with status {self.status}, and did not say why."
+        return f"A worker process ended with status {self.status} and without an error message."
 
     def stop(self):
-        """End it, if it has not ended: at its next step, or at once where that takes too long."""
+        """Terminate the process: at its next step, or at once if that takes too long."""
         if self._process.poll() is None:
             self._process.send_signal(signal.SIGTERM)
             try:

@@ -1,35 +1,35 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""info: what hair, settings or tables a file holds."""
+"""info: show the hair, settings or tables in a file."""
 
 import zipfile
 from dataclasses import asdict
-from pathlib import Path
 
 import numpy as np
 
-from ..core import exr, settings_file
+from ..core import lazy
 from ..core.errors import HairError
-from ..core.shading import table_axes
+from ..core.files import settings_file, table_exr
+from ..core.shading.tables import table_axes
 from . import opening, options
+
+blender = lazy.Package("..blender", __package__)
 
 
 def add(verbs):
-    """The verb's options."""
-    parser = verbs.add_parser("info", help="tell what hair, settings or tables a file holds")
-    parser.add_argument("input", type=Path, help=".blend, a mesh, .npz, groom settings (.json) or a table (.exr)")
+    """Add the command's options."""
+    parser = verbs.add_parser("info", help="show the hair, settings or tables in a file")
+    parser.add_argument("input", help=".blend, a mesh, .npz, groom settings (.json) or a table (.exr)")
     options.add_scripts(parser)
     options.add_common(parser)
     parser.set_defaults(run=run)
 
 
 def run(given, console):
-    """Read and tell."""
+    """Read and print."""
     describe = {".npz": _arrays, ".json": _settings, ".exr": _tables}.get(given.input.suffix.lower())
     if describe is None:
-        from ..blender import inspection
-
         opening.open_file(given, console)
-        values = inspection.open_file()
+        values = blender.io.inspection.open_file()
     else:
         values = describe(given.input)
     values = {"verb": "info", "input": str(given.input), **values}
@@ -41,14 +41,16 @@ def _settings(path):
 
 
 def _tables(path):
-    """The whole set is read that a table belongs to, and found to be whole."""
+    """Read the complete set that a table belongs to, which validates it."""
     if path.stem in table_axes.DUAL_TABLES:
-        return {"tables": "dual scattering", "settings": asdict(exr.read_dual_tables(path.parent).settings)}
-    return {"tables": "Marschner", "settings": asdict(exr.read_tables(path.parent).settings)}
+        return {"tables": "dual scattering", "settings": asdict(table_exr.read_dual_tables(path.parent).settings)}
+    return {"tables": "Marschner", "settings": asdict(table_exr.read_tables(path.parent).settings)}
 
 
 def _arrays(path):
-    """Shapes and types, of which the headers tell."""
+    """Return shapes and types from the headers."""
+    if path.exists() and not path.is_file():  # opening a pipe without a writer would block
+        raise HairError(f"{path} cannot be read: it is not a file.")
     try:
         with zipfile.ZipFile(path) as archive:
             return {"arrays": {name.removesuffix(".npy"): _array(archive, name) for name in archive.namelist()}}
@@ -65,7 +67,7 @@ def _array(archive, name):
 
 
 def _in_lines(values, indent=""):
-    """{name: value}, nested or not, as lines for people."""
+    """Format {name: value}, nested or not, as lines of text."""
     for name, value in values.items():
         rows = value if isinstance(value, list) and value and isinstance(value[0], dict) else [value]
         for row in rows:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Ctrl-C, and a request to end: the command stops at its next step, a second one stops it at once.
+"""Ctrl-C and SIGTERM: the command stops at its next step, a second signal stops it at once.
 
-Raised in the middle of anything, as Python does by itself, it would be lost in the callbacks that Blender calls.
+Python's own KeyboardInterrupt can be raised anywhere, and would be lost in Blender's callbacks.
 """
 
 import signal
@@ -11,7 +11,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class Interruption:
-    """Whether somebody has asked a command to stop, from entering this to leaving it."""
+    """A context manager that records whether the command was asked to stop."""
 
     def __init__(self):
         self._number = None
@@ -24,7 +24,7 @@ class Interruption:
 
     def __exit__(self, *_error):
         for number, handler in self._before.items():
-            # Blender's own handler, which Python knows nothing of, is None: the process is about to end.
+            # Blender's own handler, not set by Python, is None: the process is about to exit.
             signal.signal(number, signal.SIG_DFL if handler is None else handler)
 
     def _ask(self, number, _frame):
@@ -40,5 +40,5 @@ class Interruption:
 
     @property
     def status(self):
-        """The exit status of a command that was stopped, as shells have it: 130 after Ctrl-C, 143 after SIGTERM."""
+        """The exit status of a stopped command, as in shells: 130 after Ctrl-C, 143 after SIGTERM."""
         return 128 + (self._number or signal.SIGINT)

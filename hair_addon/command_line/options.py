@@ -3,11 +3,12 @@
 
 import argparse
 import re
+import sys
 from dataclasses import replace
-from pathlib import Path
 
-from ..core import settings_file
-from ..core.params import label_of, unit_of
+from ..core.files import settings_file
+from ..core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME
+from ..core.params import is_text, label_of, unit_of
 from .console import PROGRAM
 
 # Settings that a shorter word names better on a command line.
@@ -15,10 +16,23 @@ _OPTIONS = {"guide_count": "--guides", "strand_count": "--strands", "eta": "--io
 
 
 class Parser(argparse.ArgumentParser):
-    """What is not understood is told in one sentence."""
+    """An argument parser that reports errors in one sentence."""
 
     def __init__(self, **details):
         super().__init__(allow_abbrev=False, **details)
+
+    def parse_known_args(self, args=None, namespace=None):
+        """Reject arguments that are not valid UTF-8, which Blender accepts neither as names nor as paths."""
+        for word in args or ():
+            if not is_text(word):
+                self.error(f"{word!a} is not valid UTF-8")
+        return super().parse_known_args(args, namespace)
+
+    def print_help(self, file=None):
+        """Write the help; unlike argparse's method this raises OSError if writing fails."""
+        file = file or sys.stdout or sys.stderr
+        file.write(self.format_help())
+        file.flush()
 
     def error(self, message):
         """End with status 2."""
@@ -26,30 +40,30 @@ class Parser(argparse.ArgumentParser):
 
 
 def add_common(parser):
-    """What every verb takes."""
-    parser.add_argument("--json", action="store_true", help="one line of JSON on standard output for each result")
-    parser.add_argument("--quiet", action="store_true", help="no progress, no warnings, no sentences about results")
+    """Add the options of all commands."""
+    parser.add_argument("--json", action="store_true", help="print each result as a line of JSON on standard output")
+    parser.add_argument("--quiet", action="store_true", help="print errors only")
     parser.add_argument("--verbose", action="store_true", help="show what Blender prints, on standard error")
 
 
 def add_scripts(parser):
-    """For verbs that open a .blend."""
-    parser.add_argument("--enable-scripts", action="store_true", help="let a .blend run scripts and drivers of its own")
+    """Add the option of commands that open a .blend file."""
+    parser.add_argument("--enable-scripts", action="store_true", help="run the scripts and drivers of the .blend file")
 
 
 def add_settings_file(parser):
-    """For verbs that take settings."""
-    parser.add_argument("--settings", type=Path, metavar="FILE", help="groom settings (JSON); options come before it")
+    """Add the option of commands with settings."""
+    parser.add_argument("--settings", metavar="FILE", help="groom settings (JSON); options override it")
 
 
 def add_settings(parser, declarations):
-    """An option for each declared setting, each name once; one that is not given leaves no trace."""
+    """Add an option for each declared setting, each name once; options that are not given have no attribute."""
     for name, default, details in {setting[0]: setting for setting in declarations}.values():
         _add_setting(parser, name, default, details)
 
 
 def add_groom_settings(parser):
-    """--settings, and an option for each setting that such a file may hold."""
+    """Add --settings, and an option for each setting of such a file."""
     add_settings_file(parser)
     add_settings(
         parser, [setting for section in settings_file.SECTIONS for setting in settings_file.declared_in(section)]
@@ -58,7 +72,9 @@ def add_groom_settings(parser):
 
 def _add_setting(parser, name, default, details):
     option = _OPTIONS.get(name, "--" + name.replace("_", "-"))
-    shown = f"{label_of(name, details)}: {details.description}{_in_words(default, unit_of(details))}"
+    follows = details.typical is not None
+    at_first = " [from the surface]" if follows else _in_words(default, unit_of(details))
+    shown = f"{label_of(name, details)}: {details.description}{at_first}"
     described = {"dest": name, "default": argparse.SUPPRESS, "help": shown.replace("%", "%%")}
     if isinstance(default, bool):
         parser.add_argument(option, action=argparse.BooleanOptionalAction, **described)
@@ -77,19 +93,19 @@ def _in_words(default, unit):
 
 
 def changed(settings, options, declarations):
-    """`Settings` with those of the declared fields changed that options name. Raises `HairError`."""
+    """Return `Settings` with the declared fields that options override. Raises `HairError`."""
     given = {name: getattr(options, name) for name, *_ in declarations if hasattr(options, name)}
     return replace(settings, **{name: tuple(v) if isinstance(v, list) else v for name, v in given.items()})
 
 
 def groom_settings(options):
-    """The `GroomSettings` of --settings, or the defaults, with what single options change. Raises `HairError`."""
+    """Return the `GroomSettings` of --settings, or the defaults, with options applied. Raises `HairError`."""
     settings = settings_file.read(options.settings) if options.settings else settings_file.GroomSettings()
     return changed_groom(settings, options)
 
 
 def changed_groom(settings, options):
-    """`GroomSettings` with what single options change. Raises `HairError`."""
+    """Return `GroomSettings` with options applied. Raises `HairError`."""
     sections = {
         name: changed(getattr(settings, name), options, settings_file.declared_in(name))
         for name in settings_file.SECTIONS
@@ -98,20 +114,22 @@ def changed_groom(settings, options):
 
 
 def frame_range(text):
-    """A-B, or A alone, as a range of frames; "all" for the scene's."""
+    """Parse A-B, or A, as a range of frames; "all" stands for the scene's."""
     if text == "all":
         return text
     match = re.fullmatch(r"(-?\d{1,7})(?:-(-?\d{1,7}))?", text)
     if match is None:
-        raise argparse.ArgumentTypeError(f"{text!r} is no range of frames such as 1-24, nor a frame, nor all")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a frame, a range such as 1-24, or all")
     first, last = int(match[1]), int(match[2] or match[1])
+    if not FIRST_FRAME <= min(first, last) <= max(first, last) <= LAST_FRAME:
+        raise argparse.ArgumentTypeError(f"{text} is outside Blender's frame range, {FIRST_FRAME} to {LAST_FRAME}")
     if last < first:
-        raise argparse.ArgumentTypeError(f"{text} holds no frame: the first is after the last")
+        raise argparse.ArgumentTypeError(f"{text} is an empty range: the first frame is after the last")
     return range(first, last + 1)
 
 
 def count(text):
     """A whole number from 1 to 256."""
     if re.fullmatch(r"\d{1,3}", text) is None or not 1 <= int(text) <= 256:
-        raise argparse.ArgumentTypeError(f"{text!r} is no whole number from 1 to 256")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from 1 to 256")
     return int(text)

@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""settings: groom settings as a file to begin with, or what editors check such a file by."""
+"""settings: write groom settings, or the JSON Schema of such files."""
 
-from pathlib import Path
-
-from ..core import settings_file
+from ..core.files import settings_file
 from . import options
 
 
 def add(verbs):
-    """The verb's options."""
-    parser = verbs.add_parser("settings", help="write groom settings: the defaults, with what options change")
-    parser.add_argument("--out", type=Path, metavar="FILE", help=".json; without it they are printed")
-    parser.add_argument("--schema", action="store_true", help="the JSON Schema of such files instead")
+    """Add the command's options."""
+    parser = verbs.add_parser("settings", help="write groom settings: defaults and the given options")
+    parser.add_argument("--out", metavar="FILE", help=".json file [printed]")
+    parser.add_argument("--schema", action="store_true", help="write the JSON Schema of settings files instead")
     options.add_groom_settings(parser)
     options.add_common(parser)
     parser.set_defaults(run=run)

@@ -2,20 +2,19 @@
 """bake-tables: Marschner settings → tables as OpenEXR."""
 
 import time
-from pathlib import Path
 
 from .. import api
-from ..core import settings_file
+from ..core.files import settings_file
 from ..core.params import declared
-from ..core.shading import lookup_tables
+from ..core.shading.tables import lookup_tables
 from . import options
 
 
 def add(verbs):
-    """The verb's options."""
+    """Add the command's options."""
     parser = verbs.add_parser("bake-tables", help="bake the Marschner model's tables to OpenEXR")
-    parser.add_argument("--out", type=Path, required=True, help="folder for the tables: m.exr, n.exr, n_trt.exr, …")
-    parser.add_argument("--plot", action="store_true", help="write a picture of each table too, with labelled axes")
+    parser.add_argument("--out", required=True, help="folder for the tables: m.exr, n.exr, n_trt.exr, …")
+    parser.add_argument("--plot", action="store_true", help="also write a picture of each table, with labelled axes")
     options.add_settings_file(parser)
     options.add_settings(parser, declared(lookup_tables.Settings))
     options.add_common(parser)

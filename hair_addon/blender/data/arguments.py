@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Validation of surfaces, guides and hair passed by scripts."""
+
+import bpy
+
+from ...core.errors import HairError
+from ...core.params import described
+from ..host.notices import name_of
+
+_KINDS = {"GUIDES": "Vellus guides", "HAIR": "Vellus hair", None: "Vellus guides or hair"}
+
+
+def curves_of(given, kind=None):
+    """Return a Curves datablock, given as such or as its object; for an evaluated copy, the original.
+
+    Raises `HairError` unless it is hair or guides, or the one that `kind` names.
+    """
+    found = _original(given)
+    if isinstance(found, bpy.types.Object):
+        found = found.data
+    # The result of modifiers on Curves is not in the file, and its original is unknown.
+    is_of_file = isinstance(found, bpy.types.Curves) and found in {*bpy.data.hair_curves}
+    if not is_of_file or found.vellus.kind == "NONE" or kind not in {None, found.vellus.kind}:
+        raise HairError(f"{_called(given)} is not {_KINDS[kind]}.")
+    return found
+
+
+def guides_of(given):
+    """Return guide Curves as `curves_of` does, if their surface is evaluated."""
+    guides = curves_of(given, "GUIDES")
+    if guides.surface is not None:
+        _require_evaluated(guides.surface)
+    return guides
+
+
+def surface_object(given):
+    """Return a mesh object; for an evaluated copy, the original. Raises `HairError`."""
+    found = _original(given)
+    if not isinstance(found, bpy.types.Object) or found.type != "MESH":
+        raise HairError(f"{_called(given)} is neither a mesh object nor the arrays of a mesh.")
+    _require_evaluated(found)
+    return found
+
+
+def _original(given):
+    """Return the original of a datablock, other values unchanged. Raises `HairError` for a removed datablock."""
+    if not isinstance(given, bpy.types.ID):
+        return given
+    try:
+        return given.original if given.is_evaluated else given
+    except ReferenceError as error:
+        kind = type(given).__name__
+        raise HairError(f"The {kind} was removed from the file or replaced by an undo: look it up again.") from error
+
+
+def _require_evaluated(surface):
+    """Raise `HairError` for a mesh object of another scene or hidden in viewports: its modifiers are not evaluated."""
+    if not surface.evaluated_get(bpy.context.evaluated_depsgraph_get()).is_evaluated:
+        raise HairError(f"{_called(surface)} is hidden in viewports or is not in this scene: unhide it or link it.")
+
+
+def _called(given):
+    return repr(name_of(given)) if isinstance(given, bpy.types.ID) else described(given)

@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes as they are drawn around hair: triangles, normals and colors of all that a viewport or a render shows."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..host.notices import can_be_drawn, name_of
+from . import scene
+
+
+@dataclass(frozen=True)
+class DrawnMesh:
+    """Triangles as they are drawn: (3 F, 3) float32 corner positions [m] and unit normals in world space, colour.
+
+    A holdout has none: where it is nearest the picture is empty. owner: `owner_of` it.
+    """
+
+    positions: np.ndarray
+    normals: np.ndarray
+    color: tuple | None
+    owner: tuple = ()
+
+
+def read_drawn_meshes(depsgraph, viewport=None):
+    """A `DrawnMesh` for every mesh that a 3-D viewport shows as a surface, or without one a render; instances too."""
+    meshes = []
+    for instance in depsgraph.object_instances:
+        if instance.object.type == "MESH" and instance.show_self and _is_surface_seen(instance, viewport):
+            is_holdout = viewport is None and instance.object.original.holdout_get(view_layer=depsgraph.view_layer)
+            matrix = np.array(instance.matrix_world, np.float64)
+            if not can_be_drawn(instance.object, matrix):
+                continue
+            meshes.append(replace(_read_drawn_mesh(instance.object, matrix, is_holdout), owner=owner_of(instance)))
+    return [mesh for mesh in meshes if len(mesh.positions)]
+
+
+def owner_of(instance):
+    """A key of a depsgraph instance, the same in every frame."""
+    parent = instance.parent.original.session_uid if instance.is_instance else 0
+    return instance.object.original.session_uid, parent, tuple(instance.persistent_id)
+
+
+def _is_surface_seen(instance, viewport):
+    if viewport is None:
+        return not instance.object.hide_render
+    placed = instance.parent if instance.is_instance else instance.object
+    return placed.original.visible_in_viewport_get(viewport) and instance.object.display_type in {"TEXTURED", "SOLID"}
+
+
+def _read_drawn_mesh(mesh_object, to_world, is_holdout):
+    mesh = mesh_object.to_mesh()
+    try:
+        vertices = scene.vertex_positions(mesh)
+        faces = scene.faces_of(mesh)
+        loops = scene.triangle_corners(mesh, faces, name_of(mesh_object)).ravel()
+        corners = faces.corner_vertices[loops]
+        loop_normals = np.empty((len(mesh.loops), 3), np.float32)
+        mesh.corner_normals.foreach_get("vector", loop_normals.ravel())
+    finally:
+        mesh_object.to_mesh_clear()
+    positions = vertices[corners] @ to_world[:3, :3].T + to_world[:3, 3]
+    normals = loop_normals[loops] @ np.linalg.pinv(to_world[:3, :3])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    color = None if is_holdout else surface_color(mesh_object)
+    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), color)
+
+
+def surface_color(mesh_object):
+    """Linear RGB: base colour of the first material's Principled BSDF, or its colour in the viewport; black of None."""
+    if mesh_object is None:
+        return (0.0, 0.0, 0.0)
+    material = next((slot.material for slot in mesh_object.material_slots if slot.material), None)
+    if material is None:
+        return (0.8, 0.8, 0.8)
+    nodes = material.node_tree.nodes if material.node_tree else ()
+    principled = next((node for node in nodes if node.type == "BSDF_PRINCIPLED"), None)
+    color = principled.inputs["Base Color"].default_value if principled else material.diffuse_color
+    return tuple(color[:3])

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Visibility of the world from strands and surfaces, as ambient cubes.
+
+Opacity maps are drawn from 14 directions; each point sums their transmittances. The result changes with the
+geometry, not with the light or the view.
+"""
+
+import gpu
+import numpy as np
+
+from ...core.imaging import ambient_cube
+from . import drawing, shaders, shadows, uniforms
+from .strand_textures import seen_points
+
+# Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as a map can resolve.
+_SIZE = 256
+_STEPS = drawing.Steps(point_count=11, strand_count=10_000)
+_DIRECTIONS_AT_ONCE = 7
+
+
+def measure(hair, surfaces, opacities):
+    """Visibility textures {sampler: texture} of each strands and of each surface: two lists.
+
+    hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU]; opacities: of each hair's strands, for which its
+    visibility holds; the surfaces' is for the first.
+    """
+    views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
+    views += [_view_of_surface(surface) for surface in surfaces]
+    for view, opacity in zip(views, opacities + [(opacities or [1.0])[0]] * len(surfaces), strict=True):
+        view["seen_opacity"] = opacity
+    places = [strands.texture for strands, _ in hair] + [surface.places for surface in surfaces]
+    targets = [_Target(view, texture) for view, texture in zip(views, places, strict=True)]
+    maps = shadows.ShadowMaps(_SIZE, _DIRECTIONS_AT_ONCE)
+    for first in range(0, len(ambient_cube.DIRECTIONS), _DIRECTIONS_AT_ONCE):
+        chosen = slice(first, first + _DIRECTIONS_AT_ONCE)
+        lights = _suns(ambient_cube.DIRECTIONS[chosen], ambient_cube.WEIGHTS[chosen])
+        maps.draw(lights, hair, [surface.batch for surface in surfaces], _STEPS)
+        for target in targets:
+            target.add(lights, maps.samplers)
+    textures = [target.textures for target in targets]
+    return textures[: len(hair)], textures[len(hair) :]
+
+
+def _suns(directions, weights):
+    lights = uniforms.LIGHTS.record()
+    lights["count"] = len(directions)
+    chosen = lights["light"][: len(directions)]
+    chosen["kind"], chosen["casts_shadow"] = shadows.SUN, True
+    chosen["axis"][:, :3] = -directions
+    # Each side is open to a sixth of the sphere.
+    chosen["power"][:, 0] = 6.0 * weights
+    return lights
+
+
+def _view_of_strands(strands, to_world):
+    view = uniforms.VIEW.record()
+    view["object_to_world"] = to_world.T
+    view["point_count"], view["row_strands"] = strands.point_count, strands.row_strands
+    view["seen_points"] = seen_points(strands.point_count)
+    return view
+
+
+def _view_of_surface(surface):
+    view = uniforms.VIEW.record()
+    view["object_to_world"] = np.eye(4)
+    view["point_count"], view["row_strands"] = 1, surface.row_corners
+    view["seen_points"] = 1
+    return view
+
+
+class _Target:
+    """Textures that visibility is added up in, a texel for each place."""
+
+    def __init__(self, view, places):
+        self.view, self.places = view, places
+        size = int(view["row_strands"] * view["seen_points"]), places.height
+        self.textures = {name: _texture(size) for name in shaders.VISIBILITY_SAMPLERS}
+        self.framebuffer = gpu.types.GPUFrameBuffer(color_slots=tuple(self.textures.values()))
+        with self.framebuffer.bind():
+            self.framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0))
+
+    def add(self, lights, maps):
+        with self.framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"):
+            blocks = {"view": self.view, "lights": lights}
+            drawing.draw_cover(shaders.visibility_program(), blocks, {"places": self.places, **maps})
+
+
+def _texture(size):
+    texture = gpu.types.GPUTexture(size, format="RGBA16F")
+    texture.filter_mode(True)
+    texture.extend_mode("EXTEND")
+    return texture

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene's colour management, with view transform, look and gamma, as a table of display colours.
+
+Draw handlers draw onto the viewport after its view transform, so they have to apply it themselves. The shader applies
+the exposure: changing it needs no new table.
+"""
+
+import os
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+# Texels per side. With 64, the error of interpolation is at most one step of an 8-bit display, see the tests.
+SIZE = 64
+
+# Scene-linear values up to MOST have a place in the table, spaced by their logarithm but for the least ones.
+MOST = 512.0
+_KNEE = 1.0 / 1024.0
+
+
+@dataclass(frozen=True)
+class DisplayTransform:
+    """The part of a scene's colour management that is in the table."""
+
+    display: str
+    view: str
+    look: str
+    gamma: float
+    working_space: str  # what scene-linear colours are in
+
+    @classmethod
+    def of(cls, scene):
+        """As a scene has it set."""
+        view = scene.view_settings
+        look = "" if view.look == "None" else view.look
+        space = bpy.data.colorspace.working_space
+        return cls(scene.display_settings.display_device, view.view_transform, look, view.gamma, space)
+
+    def table(self):
+        """(SIZE, SIZE, SIZE, 3) float32 display colours in [0, 1], red running fastest."""
+        axis = linear_at(np.linspace(0.0, 1.0, SIZE)).astype(np.float32)
+        blue, green, red = np.meshgrid(axis, axis, axis, indexing="ij")
+        colors = np.ascontiguousarray(np.stack([red, green, blue], axis=-1).reshape(-1, 3))
+        return np.clip(apply(self, colors), 0.0, 1.0).reshape(SIZE, SIZE, SIZE, 3)
+
+
+def display_place(linear):
+    """Table coordinates of scene-linear values, in [0, 1]."""
+    return np.log2(np.clip(linear, 0.0, MOST) / _KNEE + 1.0) / np.log2(MOST / _KNEE + 1.0)
+
+
+def linear_at(places):
+    """Scene-linear values at places in [0, 1]: the inverse of `display_place`."""
+    return (np.exp2(places * np.log2(MOST / _KNEE + 1.0)) - 1.0) * _KNEE
+
+
+def apply(transform, colors):
+    """(N, 3) scene-linear float32 → (N, 3) display colours, by Blender's OpenColorIO configuration.
+
+    If OpenColorIO is missing or lacks the transform, Blender's Standard, sRGB, with a message on the console.
+    """
+    bpy.utils.expose_bundled_modules()
+    try:
+        import PyOpenColorIO as ocio
+    except ImportError:
+        print("Vellus: no PyOpenColorIO in this Blender, so hair is shown in the Standard view.", file=sys.stderr)
+        return _srgb(colors, transform.gamma)
+    try:
+        processor = _processor(ocio, transform)
+    except ocio.Exception as error:
+        print(f"Vellus: hair is shown in the Standard view: {error}", file=sys.stderr)
+        return _srgb(colors, transform.gamma)
+    colors = np.array(colors, np.float32, order="C")
+    processor.applyRGB(colors)
+    return colors
+
+
+def _processor(ocio, transform):
+    """As Blender builds it: the look in scene-linear colours, the view, and the scene's gamma over all."""
+    path = os.environ.get("OCIO") or Path(bpy.utils.system_resource("DATAFILES", path="colormanagement"), "config.ocio")
+    config = ocio.Config.CreateFromFile(str(path))
+    steps = ocio.GroupTransform()
+    if transform.look:
+        steps.appendTransform(ocio.LookTransform(transform.working_space, transform.working_space, transform.look))
+    view = ocio.DisplayViewTransform(transform.working_space, transform.display, transform.view)
+    view.setLooksBypass(bool(transform.look))
+    steps.appendTransform(view)
+    if transform.gamma != 1.0:
+        steps.appendTransform(ocio.ExponentTransform([*[1.0 / max(transform.gamma, 1e-6)] * 3, 1.0]))
+    return config.getProcessor(steps).getDefaultCPUProcessor()
+
+
+def _srgb(linear, gamma):
+    low = np.clip(linear, 0.0, 1.0)
+    encoded = np.where(low <= 0.0031308, 12.92 * low, 1.055 * np.maximum(low, 0.0031308) ** (1.0 / 2.4) - 0.055)
+    return (encoded ** (1.0 / max(gamma, 1e-6))).astype(np.float32)

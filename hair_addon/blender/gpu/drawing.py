@@ -1,0 +1,272 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Drawing of strands as strips, and of surfaces, into the bound framebuffer.
+
+Strands are camera-facing strips without vertex attributes: the vertex shader fetches points from a texture.
+"""
+
+import functools
+import math
+import threading
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import gpu
+import numpy as np
+
+from . import shaders, uniforms
+from .strand_textures import TEXTURE_WIDTH, bare_vertices, places_texture, vertex_count
+
+
+@dataclass(frozen=True)
+class SurfaceOnGPU:
+    """Triangles of a surface: their batch, and their corners' places in a texture as `StrandsOnGPU` has them."""
+
+    batch: gpu.types.GPUBatch
+    places: gpu.types.GPUTexture
+    row_corners: int
+    corner_count: int
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Level of detail: the points drawn of each strand, the number of strands drawn, and the first index."""
+
+    point_count: int | None = None
+    strand_count: int | None = None
+    first_strand: int = 0
+
+
+_ALL = Steps()
+
+# A render runs beside the window, and both share programs and their uniforms: a lock serialises drawing.
+ALONE = threading.RLock()
+
+
+def view_record(world_to_view, view_to_clip, height, least_width=0.0):
+    """A `uniforms.VIEW` record of a camera.
+
+    world_to_view, view_to_clip: (4, 4); height: of the picture [pixels]; least_width: strands thinner than this many
+    pixels are drawn that wide.
+    """
+    record = uniforms.VIEW.record()
+    view_to_world = np.linalg.inv(world_to_view)
+    record["world_to_clip"] = (view_to_clip @ world_to_view).T
+    record["is_perspective"] = view_to_clip[3, 3] == 0.0
+    record["eye"][:3] = view_to_world[:3, 3] if record["is_perspective"] else view_to_world[:3, 2]
+    record["pixels_per_unit"] = 0.5 * height * view_to_clip[1, 1]
+    record["least_half_width"] = 0.5 * least_width / record["pixels_per_unit"]
+    record["seen_opacity"] = 1.0  # the visibility of the world is computed without hair
+    return record
+
+
+def pass_shift(turn):
+    """(2,) [samples] sub-sample jitter of a pass, up to one half: a low-discrepancy sequence [Roberts18]."""
+    return np.modf(turn * np.array([0.75487767, 0.56984029]) + 0.5)[0] - 0.5
+
+
+def pass_record(world_to_view, view_to_clip, size, turn=0, tile=None):
+    """The `view_record` of a pass over a picture, each of which takes other places of its samples.
+
+    size: (width, height) of the picture [samples]; turn: which pass, the first one as it is and the others moved by
+    `pass_shift`; tile: (left, bottom, width, height) [samples] of what is drawn.
+    """
+    left, bottom, width, height = tile or (0, 0, *size)
+    shift, window = np.eye(4), np.eye(4)
+    shift[:2, 3] = pass_shift(turn) * 2.0 / size
+    window[0, 0], window[1, 1] = size[0] / width, size[1] / height
+    window[0, 3] = (size[0] - 2.0 * left) / width - 1.0
+    window[1, 3] = (size[1] - 2.0 * bottom) / height - 1.0
+    # No strand is thinner than a sample: it would break into dots.
+    record = view_record(world_to_view, window @ shift @ view_to_clip, height, least_width=1.0)
+    record["coverage_turn"] = turn * 0.61803399 % 1.0
+    record["first_column"], record["first_row"] = left, bottom
+    return record
+
+
+def scale_of(object_to_world):
+    """Return the mean scale of a (4, 4) matrix, for radii."""
+    return abs(np.linalg.det(object_to_world[:3, :3])) ** (1.0 / 3.0)
+
+
+def bounding_sphere(hair):
+    """Centre (3,) and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)]."""
+    corners = []
+    for strands, to_world in hair:
+        box = np.array(np.meshgrid(*strands.bounds.T)).reshape(3, -1).T
+        corners.append(box @ to_world[:3, :3].T + to_world[:3, 3])
+    corners = np.concatenate(corners)
+    centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    return centre, float(np.linalg.norm(corners - centre, axis=1).max())
+
+
+def strand_record(strands, view, object_to_world, steps=_ALL):
+    """A `uniforms.VIEW` record, completed for `StrandsOnGPU` at a place (4, 4)."""
+    record = view.copy()
+    record["object_to_world"] = object_to_world.T
+    record["object_to_clip"] = object_to_world.T @ view["world_to_clip"]  # both transposed
+    record["object_scale"] = scale_of(object_to_world)
+    record["strand_count"], record["point_count"] = strands.strand_count, strands.point_count
+    record["drawn_strands"] = min(strands.strand_count, steps.strand_count or strands.strand_count)
+    record["drawn_points"] = min(strands.point_count, steps.point_count or strands.point_count)
+    record["first_strand"] = steps.first_strand
+    record["part_size"], record["part_stride"] = _parts(strands.strand_count)
+    record["thickness"] = strands.strand_count / record["drawn_strands"]
+    record["row_strands"] = strands.row_strands
+    return record
+
+
+# Strands in a part: with their stride they are multiplied in a shader, whose integers have 32 bits.
+_LARGEST_PART = 32_768
+
+
+@functools.cache
+def _parts(strand_count):
+    """Strands in each of as few equal parts as may be, and a stride near the golden ratio of it that meets them all."""
+    size = strand_count // -(-strand_count // _LARGEST_PART)
+    stride = round(0.61803399 * size)
+    while math.gcd(stride, size) != 1:
+        stride += 1
+    return size, stride
+
+
+def draw_strands(strands, program, view, lights, object_to_world, samplers=None, steps=_ALL):
+    """Draw `StrandsOnGPU` as strips into the bound framebuffer, by a program of `shaders.strip_program`.
+
+    view, lights: records of `uniforms`; samplers: {sampler: texture} that the program reads beside the strands; steps:
+    for pictures too coarse to show all.
+    """
+    record = strand_record(strands, view, object_to_world, steps)
+    draw_strip(strands, program, record, uniforms.uniform_buffer(lights), samplers)
+
+
+def draw_strip(strands, program, record, lights, samplers=None):
+    """The same with a record of `strand_record` and lights on the GPU."""
+    count = vertex_count(int(record["drawn_strands"]), int(record["drawn_points"]))
+    _draw(strands.batch, program, record, lights, {"strands": strands.texture, **(samplers or {})}, count)
+
+
+# Work groups along an axis: every driver takes as many.
+_MOST_GROUPS = 65535
+
+
+def walk_strands(strands, program, record, lights, samplers, images, constants):
+    """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
+
+    lights: on the GPU; samplers, images: {name: texture} that it reads and writes; constants: {name: int}.
+    """
+    runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
+    groups = -(-int(record["drawn_strands"]) * runs // shaders.RUN_GROUP_SIZE)
+    rows = -(-groups // _MOST_GROUPS)
+    blocks = {"view": uniforms.uniform_buffer(record), "lights": lights}
+    with bound(program, blocks, {"strands": strands.texture, **samplers}):
+        for name, texture in images.items():
+            program.image(name, texture)
+        for name, value in constants.items():
+            program.uniform_int(name, value)
+        gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+
+
+def dispatch_over(program, size):
+    """Run a bound compute program once for every texel of a picture of this size."""
+    width, height = (-(-length // shaders.PICTURE_GROUP_SIZE) for length in size)
+    gpu.compute.dispatch(program, width, height, 1)
+
+
+def draw_surface(surface, color, view, lights, scene_samplers):
+    """Draw a matt `SurfaceOnGPU`; color: linear RGB."""
+    program = shaders.surface_program()
+    program.bind()
+    program.uniform_float("surface_color", color)
+    record = view.copy()
+    record["row_strands"] = surface.row_corners
+    _draw(surface.batch, program, record, uniforms.uniform_buffer(lights), scene_samplers)
+
+
+def draw_surface_depth(surface, view, lights, fragment="shadow_surface.frag"):
+    """Draw a surface into a shadow map's first pass, or where it only hides: surface_hides.frag."""
+    _draw(surface, shaders.surface_depth_program(fragment), view, uniforms.uniform_buffer(lights), {})
+
+
+def draw_triangles(surface, program, view, lights, samplers):
+    """Draw a surface's batch with a program."""
+    _draw(surface, program, view, uniforms.uniform_buffer(lights), samplers)
+
+
+def _draw(batch, program, view, lights, samplers, count=0):
+    with bound(program, {"view": uniforms.uniform_buffer(view), "lights": lights}, samplers):
+        batch.draw_range(program, elem_count=count)  # zero: all there are
+
+
+@contextmanager
+def bound(program, blocks, samplers):
+    """Bind a program with its blocks {instance: GPUUniformBuf} and textures {sampler: GPUTexture}.
+
+    The program does not own them: they must live until the context exits. A bound program must not be freed: Blender
+    mistakes another one at the same address for bound, and draws with the old one.
+    """
+    program.bind()
+    for name, block in blocks.items():
+        program.uniform_block(name, block)
+    for name, texture in samplers.items():
+        program.uniform_sampler(name, texture)
+    yield
+    gpu.shader.unbind()
+
+
+def upload_surface(positions, normals):
+    """(3 F, 3) float32 corner positions and unit normals in world space → `SurfaceOnGPU`."""
+    layout = gpu.types.GPUVertFormat()
+    layout.attr_add(id="position", comp_type="F32", len=3, fetch_mode="FLOAT")
+    layout.attr_add(id="normal", comp_type="F32", len=3, fetch_mode="FLOAT")
+    vertices = gpu.types.GPUVertBuf(layout, len(positions))
+    # Other types than contiguous float32 would be accepted silently and drawn incorrectly.
+    vertices.attr_fill("position", np.ascontiguousarray(positions, np.float32))
+    vertices.attr_fill("normal", np.ascontiguousarray(normals, np.float32))
+    row_corners = min(len(positions), TEXTURE_WIDTH)
+    places = places_texture(positions[:, None], np.zeros((len(positions), 1), np.float32), row_corners)
+    return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners, len(positions))
+
+
+def draw_cover(program, blocks, samplers):
+    """Run a program once for every pixel of the bound framebuffer; blocks: {instance: record}."""
+    with bound(program, {name: uniforms.uniform_buffer(record) for name, record in blocks.items()}, samplers):
+        cover(program)
+
+
+def resolve(picture, samples_per_side):
+    """Fill the bound framebuffer with the mean of each block of samples_per_side² texels of a texture."""
+    program = shaders.resolve_program()
+    program.bind()
+    program.uniform_int("samples_per_side", samples_per_side)
+    program.uniform_sampler("picture", picture)
+    with gpu_state("NONE", depth_writes=False):
+        cover(program)
+
+
+def cover(program):
+    """Run a bound program whose vertex shader is cover.vert over the whole framebuffer."""
+    bare_vertices(3, "TRIS").draw(program)
+
+
+@contextmanager
+def gpu_state(depth_test, depth_writes, blend="NONE"):
+    """Set GPU state in a context, and restore it on exit."""
+    before = gpu.state.depth_test_get(), gpu.state.depth_mask_get(), gpu.state.blend_get()
+    gpu.state.face_culling_set("NONE")
+    try:
+        gpu.state.depth_test_set(depth_test)
+        gpu.state.depth_mask_set(depth_writes)
+        gpu.state.blend_set(blend)
+        yield
+    finally:
+        gpu.state.depth_test_set(before[0])
+        gpu.state.depth_mask_set(before[1])
+        gpu.state.blend_set(before[2])
+
+
+@contextmanager
+def cleared(framebuffer, color, depth=1.0):
+    """Bind a framebuffer, all of it one colour and depth."""
+    with framebuffer.bind():
+        framebuffer.clear(color=color, depth=depth)
+        yield framebuffer

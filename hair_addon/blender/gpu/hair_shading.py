@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A model's settings and tables → the shader program of strands and its inputs."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+import gpu
+import numpy as np
+
+from ...core.shading.fibre import kajiya_kay, strand_variation
+from ...core.shading.tables import albedo, dual_scattering
+from . import shaders, uniforms
+
+# What the two modes of the Marschner model read; in the energy-conserving one M is evaluated.
+_TABLES = {
+    "classic": ("marschner.comp", ("m", "n", "n_trt")),
+    "energy": ("energy_conserving.comp", ("n", "n_trt", "n_res")),
+}
+_VARIED = {"classic": "marschner_varied.comp", "energy": "energy_conserving_varied.comp"}
+
+
+@dataclass(frozen=True)
+class Shading:
+    """Inputs of a strand shader, apart from the scene."""
+
+    program: gpu.types.GPUShader
+    parts_program: Callable[[], gpu.types.GPUShader]  # the same for a part of the light; compiled where it is asked for
+    blocks: dict = field(default_factory=dict)  # {instance: GPUUniformBuf}
+    samplers: dict = field(default_factory=dict)
+    forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # passed on to strands behind
+    is_varied: bool = False  # whether strands differ by their random numbers
+
+    @property
+    def opacity(self):
+        """Opacity of a strand, the mean over the channels."""
+        return max(1.0 - float(np.mean(self.forward)), 0.05)
+
+
+def kajiya_kay_shading(settings):
+    """The Kajiya-Kay model, ready to draw. The cylinder is opaque: half of its scattering is forward."""
+    forward = 0.5 * kajiya_kay.mean_albedo(settings)
+    return _shading("kajiya_kay.comp", {"settings": settings}, {}, forward)
+
+
+def kajiya_kay_strand_shading(settings, variation):
+    """The same for varied strands: `kajiya_kay.StrandSettings` and `strand_variation.Settings`."""
+    forward = 0.5 * kajiya_kay.mean_albedo_of_strands(settings, strand_variation.sample_sigma_a(variation))
+    blocks = {"settings": settings, "variation": variation}
+    return _shading("kajiya_kay_varied.comp", blocks, {}, forward, is_varied=True)
+
+
+def marschner_shading(tables):
+    """The Marschner model from baked `lookup_tables.Tables`, ready to draw."""
+    file, names = _TABLES[tables.settings.mode]
+    arrays = {f"{name}_table": getattr(tables, name) for name in names}
+    dual = None
+    if tables.settings.mode == "energy":
+        dual = dual_scattering.bake(tables)
+        arrays |= {"dual_table": dual.theta, "n_g_table": dual.n_g, "n_g_trt_table": dual.n_g_trt}
+    arrays["return_table"] = albedo.azimuthal_moments(tables, dual)
+    return _shading(file, {"settings": tables.settings}, arrays, albedo.mean_forward(tables))
+
+
+def marschner_strand_shading(tables):
+    """The Marschner model for strands that differ, from `strand_tables.StrandTables`."""
+    slices = tables.slices
+    blocks = {"settings": tables.settings, "variation": tables.variation, "slices": slices.range}
+    arrays = {"return_slices": tables.returned, "n_slices": slices.n}
+    if tables.settings.mode == "energy":
+        arrays |= {"n_g_slices": slices.n_g, "dual_table": tables.dual}
+    file = _VARIED[tables.settings.mode]
+    if slices.n_trt is not None:
+        file, arrays["n_trt_slices"] = "marschner_elliptic.comp", slices.n_trt
+    return _shading(file, blocks, arrays, tables.forward, is_varied=True)
+
+
+def _shading(file, blocks, arrays, forward, is_varied=False):
+    """`Shading` of a .comp with blocks {instance: settings} and tables {sampler: (H, W, C) or (D, H, W, C)}."""
+    kinds = [(name, "FLOAT_2D" if array.ndim == 3 else "FLOAT_3D") for name, array in arrays.items()]
+    if is_varied:
+        kinds.append(("strand_randoms", "FLOAT_2D"))
+    classes = tuple((instance, type(settings)) for instance, settings in blocks.items())
+    wanted = file, classes, tuple(kinds)
+    program = shaders.shading_program(*wanted)
+    parts_program = partial(shaders.shading_program, *wanted, in_parts=True)
+    buffers = {instance: uniforms.uniform_buffer(uniforms.fill(settings)) for instance, settings in blocks.items()}
+    textures = {name: _table_texture(array) for name, array in arrays.items()}
+    return Shading(program, parts_program, buffers, textures, forward, is_varied)
+
+
+def _table_texture(array):
+    *size, channel_count = array.shape  # (H, W) or (D, H, W)
+    texels = np.zeros((*size, 4), np.float32)
+    texels[..., :channel_count] = array
+    texture = gpu.types.GPUTexture(
+        tuple(size[::-1]), format="RGBA16F", data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    )
+    texture.filter_mode(True)
+    texture.extend_mode("EXTEND")
+    return texture

@@ -1,0 +1,200 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lights: Blender's lights and world → arrays."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from mathutils import Euler, Matrix
+
+from ..host import scene_time
+from ..host.caches import Cache
+from ..host.notices import can_be_drawn
+from . import uniforms
+
+KINDS = {"SUN": 0, "POINT": 1, "SPOT": 2, "AREA": 3}  # as in shaders/include/lights.glsl
+
+frame_cache = Cache()  # session_uid of a sequence or movie → the frame that is loaded
+
+# Ray types that a light may be invisible to. A light invisible to all of them has no effect.
+_RAYS = ("visible_diffuse", "visible_glossy", "visible_transmission")
+
+
+def read_lights(depsgraph, for_render):
+    """A `uniforms.LIGHT` record of every visible light, or of every one that is rendered: (N,).
+
+    Lights with non-finite values are skipped with a message.
+    """
+    lights = []
+    for instance in depsgraph.object_instances:
+        if instance.object.type == "LIGHT" and _shines(instance.object, for_render):
+            with np.errstate(all="ignore"):  # such values are checked below
+                light = _read_light(instance.object.data, np.array(instance.matrix_world))
+            if can_be_drawn(instance.object, *(light[name] for name in light.dtype.names)):
+                lights.append(light)
+    return np.array(lights, uniforms.LIGHT.dtype)
+
+
+def _shines(light_object, for_render):
+    return not (for_render and light_object.hide_render) and any(getattr(light_object, rays) for rays in _RAYS)
+
+
+def _read_light(light, matrix):
+    record = uniforms.LIGHT.record()
+    record["kind"] = KINDS[light.type]
+    record["position"][:3] = matrix[:3, 3]
+    if light.type != "POINT":
+        axis = -matrix[:3, 2]  # a light shines along its own -Z
+        record["axis"][:3] = axis / np.linalg.norm(axis)
+    record["power"][:3] = _color(light) * light.energy * 2.0**light.exposure
+    if not light.normalize:
+        record["power"][:3] *= _emitting_area(light, matrix)
+    record["casts_shadow"] = light.use_shadow
+    if light.type == "SUN":
+        record["radius"] = np.tan(0.5 * min(light.angle, 3.0))
+    elif light.type == "AREA":
+        record["cos_cone"] = np.cos(0.5 * light.spread)
+        record["radius"] = np.sqrt(_area(light, matrix) / np.pi)
+    else:
+        record["radius"] = light.shadow_soft_size
+    if light.type == "SPOT":
+        record["cos_cone"] = np.cos(0.5 * light.spot_size)
+        record["blend"] = light.spot_blend
+    return record
+
+
+def _color(light):
+    """RGB: the light's colour times the emission of its nodes."""
+    color = np.array(light.color)
+    if light.use_temperature:
+        color = color * light.temperature_color
+    nodes = light.node_tree.nodes if light.node_tree else ()
+    emission = next((node for node in nodes if node.type == "EMISSION"), None)
+    if emission is None:
+        return color
+    return color * emission.inputs["Color"].default_value[:3] * emission.inputs["Strength"].default_value
+
+
+def _emitting_area(light, matrix):
+    """Return the factor of a light without normalisation: its area [m²], or the sun's solid angle.
+
+    As Cycles does it, which takes the disk of a point without size for one.
+    """
+    if light.type == "AREA":
+        return _area(light, matrix)
+    if light.type == "SUN":
+        return np.pi * np.sin(0.5 * light.angle) ** 2 or 1.0
+    return 4.0 * (np.pi * light.shadow_soft_size**2 or 1.0)
+
+
+def _area(light, matrix):
+    """Of an area light [m²]."""
+    width, height = light.size, light.size_y if light.shape in {"RECTANGLE", "ELLIPSE"} else light.size
+    x_scale, y_scale = np.linalg.norm(matrix[:3, :2], axis=0)
+    part = 0.25 * np.pi if light.shape in {"DISK", "ELLIPSE"} else 1.0
+    return part * width * x_scale * height * y_scale
+
+
+@dataclass(frozen=True)
+class World:
+    """Environment lighting: radiance color (3,), a factor of the image if there is one.
+
+    to_image: (4, 4), from world directions to those that the image is looked up in; is_mirror_ball: how it is unrolled;
+    frame: of the image, where it is a sequence or a movie.
+    """
+
+    color: np.ndarray
+    image: bpy.types.Image | None = None
+    to_image: np.ndarray | None = None
+    is_mirror_ball: bool = False
+    frame: int = 0
+
+    @property
+    def key(self):
+        """A key that is equal for worlds with the same light, given the same pixels of their image."""
+        if self.image is None:
+            return tuple(self.color)
+        image = self.image
+        read_as = image.colorspace_settings.name, image.alpha_mode, *image.size
+        return (*self.color, image.session_uid, self.frame, *read_as, self.to_image.tobytes(), self.is_mirror_ball)
+
+
+def read_world(scene):
+    """The `World` of a scene. Nodes that are not understood count as the world's colour in the viewport.
+
+    A world with non-finite values is black, with a message.
+    """
+    world = scene.world
+    if world is None:
+        return World(np.zeros(3))
+    with np.errstate(all="ignore"):
+        found = _read_world(world, scene_time.frame_of(scene))
+    is_finite = can_be_drawn(world, found.color, () if found.to_image is None else found.to_image)
+    return found if is_finite else World(np.zeros(3))
+
+
+def _read_world(world, scene_frame):
+    background = _background(world.node_tree)
+    if background is None:
+        return World(np.array(world.color))
+    strength = background.inputs["Strength"].default_value
+    color = background.inputs["Color"]
+    if not color.is_linked:
+        return World(strength * np.array(color.default_value[:3]))
+    source = color.links[0].from_node
+    if source.type == "RGB":
+        return World(strength * np.array(source.outputs[0].default_value[:3]))
+    to_image = _mapping(source) if source.type == "TEX_ENVIRONMENT" else None
+    if to_image is None or source.image is None:
+        return World(strength * np.array(world.color))
+    frame = _load_frame(source.image, source.image_user, scene_frame)
+    if not all(source.image.size):  # the access loads the file if necessary
+        return World(strength * np.array(world.color))
+    return World(np.full(3, strength), source.image, to_image, source.projection == "MIRROR_BALL", frame)
+
+
+def _load_frame(image, user, scene_frame):
+    """Load the frame of a sequence or a movie that a node shows in a frame of the scene; returns its number."""
+    if image.source not in {"SEQUENCE", "MOVIE"}:
+        return 0
+    frame = scene_frame - user.frame_start + 1
+    if user.use_cyclic and user.frame_duration:
+        frame = (frame - 1) % user.frame_duration + 1
+    frame = min(max(frame, 0), user.frame_duration) + user.frame_offset
+    if frame_cache.get(image.session_uid) != frame or not image.has_data:
+        # Only without a texture does Blender load another frame.
+        image.gl_free()
+        image.gl_load(frame=frame)
+        frame_cache.keep(image.session_uid, frame)
+    return frame
+
+
+def _background(tree):
+    """The Background node that the world shows, or the only one."""
+    if tree is None:
+        return None
+    output = tree.get_output_node("ALL")
+    surface = output.inputs["Surface"].links if output else ()
+    if surface and surface[0].from_node.type == "BACKGROUND":
+        return surface[0].from_node
+    return next((node for node in tree.nodes if node.type == "BACKGROUND"), None)
+
+
+def _mapping(node):
+    """(4, 4) from world directions to a texture node's, None where it is not given by a Mapping node."""
+    vector = node.inputs["Vector"]
+    if not vector.is_linked:
+        return np.eye(4)
+    source = vector.links[0].from_node
+    if source.type == "TEX_COORD":
+        return np.eye(4) if vector.links[0].from_socket.name in {"Generated", "Normal"} else None
+    if source.type != "MAPPING" or any(socket.is_linked for socket in source.inputs if socket.name != "Vector"):
+        return None
+    # Vectors and normals are not translated: their node hides the location, which is found only by identifier.
+    values = {socket.identifier: socket.default_value for socket in source.inputs}
+    location = values["Location"] if source.vector_type in {"POINT", "TEXTURE"} else (0.0, 0.0, 0.0)
+    scale = np.array(values["Scale"])
+    if source.vector_type == "NORMAL":
+        scale = 1.0 / np.where(scale == 0.0, 1.0, scale)
+    matrix = np.array(Matrix.LocRotScale(location, Euler(values["Rotation"]), scale.tolist()), np.float64)
+    return np.linalg.pinv(matrix) if source.vector_type == "TEXTURE" else matrix

@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""GLSL files → GPU programs of the render engine."""
+
+import gpu
+
+from . import shaders, uniforms
+
+FILM_FORMAT = "RGBA32F"  # of sums of samples
+
+
+@shaders.kept
+def film_program():
+    """The compute program that adds the samples of `picture` to a film: see film.comp."""
+    return _film("film.comp", (("picture", "FLOAT_2D"),))
+
+
+@shaders.kept
+def film_depth_program():
+    """The same for data passes: see film_depth.comp."""
+    samplers = (("segments", "UINT_2D"), ("depths", "UINT_2D"), ("surface_depth", "FLOAT_2D"))
+    return _film("film_depth.comp", samplers, (("VEC4", "view_to_clip"),))
+
+
+def _film(file, samplers, constants=()):
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
+    for slot, (name, kind) in enumerate((("filter_weights", "FLOAT_2D"), *samplers)):
+        info.sampler(slot, kind, name)
+    for kind, name in (("INT", "samples_per_side"), ("INT", "margin"), *constants):
+        info.push_constant(kind, name)
+    info.image(0, FILM_FORMAT, "FLOAT_2D", "sums", qualifiers={"READ", "WRITE"})
+    return shaders.compile_compute(info, file)
+
+
+@shaders.kept
+def strand_arrival_program():
+    """The compute program of light visibility from strands: see strand_arrival.comp."""
+    return shaders.compile_compute(shaders.strand_samples_info(), "strand_arrival.comp")
+
+
+@shaders.kept
+def surface_arrival_program():
+    """The same for surfaces: see surface_arrival.frag."""
+    info, varying = shaders.surface_info()
+    shaders.declare_scene(info, is_lit=False)
+    info.vertex_out(varying)
+    return shaders.compile_drawing(info, "surface.vert", "surface_arrival.frag")
+
+
+MOTION_FORMAT = "RGBA32F"  # of how far things move
+
+
+@shaders.kept
+def strand_motion_program():
+    """The compute program of motion vectors of strands: see strand_motion.comp."""
+    samplers = (("strands_before", "FLOAT_2D"), ("strands_after", "FLOAT_2D"))
+    info = shaders.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT)
+    info.uniform_buf(2, "Motion", "motion")
+    return shaders.compile_compute(info, "strand_motion.comp")
+
+
+@shaders.kept
+def surface_motion_program():
+    """The same for surfaces: see surface_motion.vert."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.vertex_in(0, "VEC3", "position")
+    info.typedef_source(uniforms.VIEW.source + uniforms.MOTION.source)
+    info.uniform_buf(0, "View", "view")
+    info.uniform_buf(1, "Motion", "motion")
+    for slot, name in enumerate(("places_before", "places_after")):
+        info.sampler(slot, "FLOAT_2D", name)
+    varying = gpu.types.GPUStageInterfaceInfo("motion_varying")
+    for name in ("place_now", "place_before", "place_after"):
+        varying.smooth("VEC4", name)
+    info.vertex_out(varying)
+    return shaders.compile_drawing(info, "surface_motion.vert", "surface_motion.frag")
+
+
+@shaders.kept
+def film_view_program():
+    """The program that shows the mean of a film: see film_view.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("VEC2", "origin")  # [pixels] of the film in the framebuffer
+    info.push_constant("FLOAT", "weight_sum")
+    info.sampler(0, "FLOAT_2D", "sums")
+    return shaders.compile_drawing(info, "cover.vert", "film_view.frag")

@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""GLSL files → GPU programs: #include expansion and a cache of compiled programs."""
+
+import os
+import re
+import tempfile
+from contextlib import suppress
+from functools import wraps
+from pathlib import Path
+
+import gpu
+
+from ...core.errors import HairError
+from ..host.caches import Cache
+from . import uniforms
+
+FOLDER = Path(__file__).resolve().parents[3] / "shaders"
+
+_INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
+
+
+def expand(name, skipped=()):
+    """(text, lines): the file with every #include but those of `skipped` put in its place once.
+
+    lines: each line's (file, number).
+    """
+    text, lines, seen = [], [], set(skipped)
+
+    def add(file):
+        if file in seen:
+            return
+        seen.add(file)
+        path = FOLDER / file
+        if not path.is_file():
+            raise HairError(f"The shader file {file} is missing: reinstall Vellus.")
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), start=1):
+            include = _INCLUDE.match(line)
+            if include:
+                add(include.group(1))
+            else:
+                text.append(line)
+                lines.append((file, number))
+
+    add(name)
+    return "\n".join(text) + "\n", lines
+
+
+program_cache = Cache()  # (function decorated by `kept`, its arguments) → program
+
+
+def kept(make):
+    """Decorate what makes a program: it is compiled once, and kept until Python ends."""
+
+    @wraps(make)
+    def program(*arguments, **options):
+        return program_cache.get((make, arguments, *options.items()), lambda: make(*arguments, **options))
+
+    return program
+
+
+SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
+VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z")  # see shaders/world_visibility.frag
+VISIBILITY_TARGETS = ("seen_x_y", "seen_z")
+
+
+def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
+    """Declare the inputs of all scene shaders: camera, lights, shadow maps, world lighting."""
+    info.typedef_source(uniforms.VIEW.source + uniforms.LIGHT.source + uniforms.LIGHTS.source + structs)
+    info.uniform_buf(0, "View", "view")
+    info.uniform_buf(1, "Lights", "lights")
+    for slot, name in enumerate(shadow_samplers):
+        info.sampler(slot, "FLOAT_2D_ARRAY", name)
+    if is_lit:
+        for slot, name in enumerate(VISIBILITY_SAMPLERS, start=len(SHADOW_SAMPLERS)):
+            info.sampler(slot, "FLOAT_2D", name)
+
+
+def has_image_atomics():
+    """Whether image atomics are available: Metal has none that Python can declare."""
+    return gpu.platform.backend_type_get() in {"OPENGL", "VULKAN"}
+
+
+_COLOR = (("color", "VEC4"),)
+
+
+@kept
+def strip_program(fragment, shadow_samplers=(), targets=_COLOR):
+    """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it."""
+    info = gpu.types.GPUShaderCreateInfo()
+    _strip(info, shadow_samplers)
+    return compile_drawing(info, "strand.vert", fragment, targets)
+
+
+@kept
+def strip_segments_program():
+    """The program that draws strips of strands as samples of a picture: see strand_segments.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    _strip(info, ())
+    info.push_constant("INT", "first_segment")
+    return compile_drawing(info, "strand.vert", "strand_segments.frag", (("segment", "UINT"), ("depth", "UINT")))
+
+
+def _strip(info, shadow_samplers):
+    declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
+    info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "strands")
+    varying = gpu.types.GPUStageInterfaceInfo("strand_varying")
+    varying.smooth("VEC3", "drawn_position")
+    varying.smooth("FLOAT", "strand_coverage")
+    varying.smooth("FLOAT", "strand_place")  # in points that are drawn
+    varying.flat("INT", "strand_index")
+    info.vertex_out(varying)
+
+
+RUN_GROUP_SIZE = 64  # runs of segments that one work group of a program that walks along strands takes
+RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.glsl
+
+
+@kept
+def segments_program():
+    """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
+    return _walk("strand_segments.comp", ("depths", "segments"), ("first_segment", "is_depth"))
+
+
+@kept
+def strand_shadow_program():
+    """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
+    return _walk("strand_shadow.comp", ("fronts", "counts"), ("is_front",), shadow_samplers=("hair_front",))
+
+
+def _walk(file, images, constants, shadow_samplers=()):
+    info = gpu.types.GPUShaderCreateInfo()
+    declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
+    info.local_group_size(RUN_GROUP_SIZE)
+    info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "strands")
+    for slot, name in enumerate(images):
+        info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
+    for name in constants:
+        info.push_constant("INT", name)
+    return compile_compute(info, file)
+
+
+PICTURE_GROUP_SIZE = 8  # samples along each side of what one work group of a picture's programs fills
+
+
+@kept
+def surface_depths_program():
+    """The compute program that converts depth to integers: see surface_depths.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
+    info.sampler(0, "FLOAT_2D", "surface_depth")
+    info.image(0, "R32UI", "UINT_2D", "depths", qualifiers={"WRITE"})
+    return compile_compute(info, "surface_depths.comp")
+
+
+PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
+
+
+@kept
+def shading_program(file, blocks=(), tables=(), in_parts=False):
+    """The compute program that shades strands: a model's .comp, its blocks and its samplers of tables.
+
+    blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: whether just a part of the light
+    is drawn, by the constants of include/drawn_light.glsl.
+    """
+    structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
+    info = strand_samples_info("".join(block.source for block in structs), tables)
+    for slot, ((instance, _class), block) in enumerate(zip(blocks, structs, strict=True), start=2):
+        info.uniform_buf(slot, block.type_name, instance)
+    if not in_parts:
+        return compile_compute(info, file)
+    info.push_constant("VEC4", "drawn_lobes")
+    info.push_constant("FLOAT", "drawn_world")
+    return compile_compute(info, file, skipped=("include/drawn_light.glsl",))
+
+
+def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT):
+    """Info of a program that includes strand_samples.glsl.
+
+    samplers: (name, type), ... beside the scene's; texture_format: of what it fills.
+    """
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
+    declare_scene(info, structs)
+    first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
+    for slot, (name, kind) in enumerate((("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *samplers), start=first):
+        info.sampler(slot, kind, name)
+    info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    for name in ("first_segment", "segment_count"):
+        info.push_constant("INT", name)
+    return info
+
+
+@kept
+def surface_program():
+    """The program that draws a matt surface: attributes position, normal; uniform surface_color."""
+    info, varying = surface_info()
+    declare_scene(info)
+    info.push_constant("VEC3", "surface_color")
+    varying.smooth("VEC4", "corner_seen_x_y")
+    varying.smooth("VEC2", "corner_seen_z")
+    info.vertex_out(varying)
+    return compile_drawing(info, "lit_surface.vert", "surface.frag")
+
+
+@kept
+def surface_depth_program(fragment="shadow_surface.frag"):
+    """The program that draws a surface into a shadow map, or one that only hides."""
+    info, varying = surface_info()
+    declare_scene(info, shadow_samplers=(), is_lit=False)
+    info.vertex_out(varying)
+    return compile_drawing(info, "surface.vert", fragment)
+
+
+def surface_info():
+    """(info, varying) of a program that draws triangles with the attributes position and normal."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.vertex_in(0, "VEC3", "position")
+    info.vertex_in(1, "VEC3", "normal")
+    varying = gpu.types.GPUStageInterfaceInfo("surface_varying")
+    varying.smooth("VEC3", "drawn_position")
+    varying.smooth("VEC3", "surface_normal")
+    return info, varying
+
+
+@kept
+def visibility_program():
+    """The program that adds up how much of the world the texels of `places` see, in two targets."""
+    info = gpu.types.GPUShaderCreateInfo()
+    declare_scene(info, is_lit=False)
+    info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "places")
+    return compile_drawing(info, "cover.vert", "world_visibility.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
+
+
+@kept
+def shadow_fill_program():
+    """The program that fills gaps of `fronts`, a deep opacity map's first pass."""
+    return _shadow_filter("shadow_fill.frag", "UINT_2D", "fronts")
+
+
+@kept
+def shadow_counts_program():
+    """The program that makes layers of `counts`, a deep opacity map's second pass where it is computed."""
+    return _shadow_filter("shadow_counts.frag", "UINT_2D", "counts")
+
+
+@kept
+def shadow_moments_program():
+    """The program that blurs `surface_depth` along an axis: depths if is_depth, else its first result."""
+    constants = (("IVEC2", "along"), ("INT", "taps"), ("INT", "is_depth"), ("FLOAT", "deviation"))
+    return _shadow_filter("shadow_moments.frag", "FLOAT_2D", "surface_depth", constants)
+
+
+def _shadow_filter(fragment, kind, sampler, constants=()):
+    info = gpu.types.GPUShaderCreateInfo()
+    info.typedef_source(uniforms.LIGHT.source)
+    for constant in constants:
+        info.push_constant(*constant)
+    info.sampler(0, kind, sampler)
+    return compile_drawing(info, "cover.vert", fragment)
+
+
+@kept
+def environment_program(fragment):
+    """The program that draws a picture of the surroundings."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.typedef_source(uniforms.ENVIRONMENT.source)
+    info.uniform_buf(0, "Environment", "environment")
+    info.sampler(0, "FLOAT_2D", "surroundings")
+    return compile_drawing(info, "cover.vert", fragment)
+
+
+@kept
+def resolve_program():
+    """The program that averages blocks of samples_per_side² texels of `picture`."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("INT", "samples_per_side")
+    info.sampler(0, "FLOAT_2D", "picture")
+    return compile_drawing(info, "cover.vert", "resolve.frag")
+
+
+MOVE_GROUP_SIZE = 64  # points that one work group of `move_program` brings to their places
+
+
+@kept
+def move_program():
+    """The compute program that writes the points of some strands into the texture of all."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(MOVE_GROUP_SIZE)
+    info.sampler(0, "FLOAT_2D", "moved_strands")
+    info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
+    for name in ("moved_count", "point_count", "row_strands", "moved_row_strands"):
+        info.push_constant("INT", name)
+    return compile_compute(info, "move_strands.comp")
+
+
+@kept
+def accumulate_program():
+    """The program that adds a pass to the picture of a viewport: see accumulate.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("INT", "samples_per_side")
+    info.push_constant("FLOAT", "weight")
+    info.sampler(0, "FLOAT_2D", "picture")
+    info.sampler(1, "UINT_2D", "depths")
+    info.depth_write("ANY")
+    return compile_drawing(info, "cover.vert", "accumulate.frag")
+
+
+@kept
+def display_program():
+    """The program that shows hair over a viewport: see display.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("VEC2", "origin")  # [pixels] of the picture in the framebuffer
+    info.push_constant("FLOAT", "exposure")
+    info.push_constant("FLOAT", "opacity")
+    info.push_constant("INT", "pass_count")
+    info.sampler(0, "FLOAT_2D", "passes")
+    info.sampler(1, "FLOAT_2D", "depths")
+    info.sampler(2, "FLOAT_3D", "display_table")
+    info.depth_write("ANY")
+    return compile_drawing(info, "cover.vert", "display.frag")
+
+
+complaint_cache = Cache()  # files of a program → their compile error
+
+
+def compile_drawing(info, vertex, fragment, targets=_COLOR):
+    """The program of a vertex and a fragment shader; targets: (output, type), ... of the latter. Raises `HairError`."""
+    vertex_text, vertex_lines = expand(vertex)
+    fragment_text, fragment_lines = expand(fragment)
+    info.vertex_source(vertex_text)
+    info.fragment_source(fragment_text)
+    for slot, (target, kind) in enumerate(targets):
+        info.fragment_out(slot, kind, target)
+    return _create(info, (vertex, fragment), vertex_lines, fragment_lines)
+
+
+def compile_compute(info, file, skipped=()):
+    """The compute program of a file, without the includes of `skipped`. Raises `HairError`."""
+    text, lines = expand(file, skipped)
+    info.compute_source(text)
+    return _create(info, (file,), [], lines)
+
+
+def _create(info, files, vertex_lines, lines):
+    """Raises `HairError`, the first time with the driver's log, later at once."""
+    known = complaint_cache.get(files)
+    if known is not None:
+        raise HairError(known)
+    try:
+        return gpu.shader.create_from_info(info)
+    except Exception as error:
+        where = complaint(_console_of(gpu.shader.create_from_info, info), vertex_lines, lines) or str(error)
+        said = f"The shader {files[-1]} does not compile on this graphics driver: {where}"
+        raise HairError(complaint_cache.keep(files, said)) from error
+
+
+def _console_of(failing, *arguments):
+    """Capture the console output of a failing call: Blender prints compiler errors only there."""
+    with tempfile.TemporaryFile() as file:
+        kept = {descriptor: os.dup(descriptor) for descriptor in (1, 2)}
+        try:
+            for descriptor in kept:
+                os.dup2(file.fileno(), descriptor)
+            with suppress(Exception):  # raised once already, and explained now
+                failing(*arguments)
+        finally:
+            for descriptor, console in kept.items():
+                os.dup2(console, descriptor)
+                os.close(console)
+        file.seek(0)
+        return file.read().decode(errors="replace")
+
+
+# "VertShader:" or "vertex:", by the backend; then "python_shader.glsl:12:3: Error: …", in lines of our text.
+_STAGE = re.compile(r"ERROR\s+\S+\s+(vert|frag)", re.IGNORECASE)
+_COMPLAINT = re.compile(r"python_shader\.glsl:(\d+)(?::\d+)?:\s*(.*)")
+
+
+def complaint(log, vertex_lines, fragment_lines):
+    """The first complaint of a compiler's log, as "file:line: what": the author's file and line. None if there is none.
+
+    vertex_lines, fragment_lines: as `expand` returns them.
+    """
+    lines = fragment_lines
+    for line in log.splitlines():
+        stage, found = _STAGE.search(line), _COMPLAINT.search(line)
+        if stage:
+            lines = vertex_lines if stage[1].lower() == "vert" else fragment_lines
+        if found and 0 < int(found[1]) <= len(lines):
+            file, number = lines[int(found[1]) - 1]
+            return f"{file}:{number}: {found[2]}"
+    return None

@@ -1,0 +1,191 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Deep opacity maps [Yuksel08]: for each light, the front depth of hair, its layers, and the depth of surfaces."""
+
+import gpu
+import numpy as np
+
+from . import drawing, shaders, uniforms
+
+SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
+
+_NEAREST = 0.01  # minimum distance of a light, as a part of the hair's diameter
+_FAR = 2.0  # FAR of shaders/include/opacity.glsl
+_NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it
+
+# Texels by which shadows of surfaces are blurred, at least and as a part of a map at most; and how far, as a part of
+# the hair's diameter, a surface is taken to be from the hair that it shades.
+_LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
+_SHADE_DISTANCE = 0.15
+_ALL = drawing.Steps()
+
+
+class ShadowMaps:
+    """Shadow textures of the first lights, reused until something moves.
+
+    size: texels along a side of each map; layer_count: of lights that have one; in_compute: whether compute programs
+    draw the strands, None: where they can.
+    """
+
+    def __init__(self, size, layer_count, in_compute=None):
+        self._size, self._layer_count = size, layer_count
+        self._hair_front = _array(size, layer_count, "R32F")
+        self._hair_layers = _array(size, layer_count, "RGBA16F")
+        self._surface_moments = _array(size, layer_count, "RGBA32F")
+        self._in_compute = shaders.has_image_atomics() if in_compute is None else in_compute
+        # Target of the drawing before it is filtered into a map.
+        self._surface_depth = gpu.types.GPUTexture((size, size), format="R32F")
+        self._half_blurred = gpu.types.GPUTexture((size, size), format="RGBA32F")
+        self._fronts = gpu.types.GPUTexture((size, size), format="R32UI")
+        self._counts = gpu.types.GPUTexture((4 * size, size), format="R32UI") if self._in_compute else None
+        self._depth = gpu.types.GPUTexture((size, size), format="DEPTH_COMPONENT32F")
+
+    @property
+    def samplers(self):
+        """{sampler: texture} for the shaders that receive shadows."""
+        textures = (self._hair_front, self._hair_layers, self._surface_moments)
+        return dict(zip(shaders.SHADOW_SAMPLERS, textures, strict=True))
+
+    def draw(self, lights, hair, surfaces, steps=_ALL):
+        """Draw the maps and write each light's part in them into its record.
+
+        lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: batches;
+        steps: what is drawn of each hair for all of it.
+        """
+        lights["light"]["shadow_layer"] = -1
+        if not hair:
+            return
+        centre, radius = drawing.bounding_sphere(hair)
+        for index in range(min(int(lights["count"]), self._layer_count)):
+            view = _aim(lights["light"][index], centre, radius, self._size)
+            if view is not None and lights["light"][index]["casts_shadow"]:
+                lights["light"][index]["shadow_layer"] = index
+                view["light_index"] = index
+                self._draw_light(index, view, lights, hair, surfaces, steps)
+
+    def _draw_light(self, layer, view, lights, hair, surfaces, steps):
+        with self._target(self._surface_depth), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+            for surface in surfaces:
+                drawing.draw_surface_depth(surface, view, lights)
+        self._blur(layer, _blur_of(lights["light"][layer], self._size))
+        self._fronts.clear(format="UINT", value=(_NOTHING,))
+        light_block = uniforms.uniform_buffer(lights)
+        placed = [(strands, drawing.strand_record(strands, view, to_world, steps)) for strands, to_world in hair]
+        if self._in_compute:
+            self._walk(layer, placed, light_block)
+        else:
+            self._draw_strips(layer, placed, light_block)
+
+    def _walk(self, layer, placed, lights):
+        """Draw a map of strands by compute programs: integer sums are independent of the order."""
+        program, samplers = shaders.strand_shadow_program(), {"hair_front": self._hair_front}
+        images = {"fronts": self._fronts, "counts": self._counts}
+        for strands, record in placed:
+            drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 1})
+        self._fill_fronts(layer)
+        self._counts.clear(format="UINT", value=(0,))
+        for strands, record in placed:
+            drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 0})
+        with self._target(self._hair_layers, layer):
+            self._filter(shaders.shadow_counts_program(), "counts", self._counts)
+
+    def _draw_strips(self, layer, placed, lights):
+        """Draw the same map with triangle strips."""
+        front = shaders.strip_program("shadow_front.frag", targets=(("front", "UINT"),))
+        layers = shaders.strip_program("shadow_layers.frag", shadow_samplers=("hair_front",))
+        nearest = gpu.types.GPUFrameBuffer(color_slots=self._fronts, depth_slot=self._depth)
+        with nearest.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+            nearest.clear(depth=1.0)
+            for strands, record in placed:
+                drawing.draw_strip(strands, front, record, lights)
+        self._fill_fronts(layer)
+        with (
+            self._target(self._hair_layers, layer, value=0.0),
+            drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"),
+        ):
+            for strands, record in placed:
+                drawing.draw_strip(strands, layers, record, lights, {"hair_front": self._hair_front})
+
+    def _fill_fronts(self, layer):
+        with self._target(self._hair_front, layer):
+            self._filter(shaders.shadow_fill_program(), "fronts", self._fronts)
+
+    def _blur(self, layer, deviation):
+        """Fill a layer of the surfaces' moments from their raw depth, blurred by a deviation in texels."""
+        program = shaders.shadow_moments_program()
+        passes = (
+            (self._target(self._half_blurred), self._surface_depth, (1, 0)),
+            (self._target(self._surface_moments, layer), self._half_blurred, (0, 1)),
+        )
+        for target, source, along in passes:
+            with target:
+                program.bind()
+                program.uniform_int("along", along)
+                program.uniform_int("taps", int(np.ceil(2.0 * deviation)))
+                program.uniform_int("is_depth", int(source is self._surface_depth))
+                program.uniform_float("deviation", deviation)
+                self._filter(program, "surface_depth", source)
+
+    def _filter(self, program, sampler, source):
+        with drawing.gpu_state("NONE", depth_writes=False):
+            drawing.draw_cover(program, {}, {sampler: source})
+
+    def _target(self, texture, layer=None, value=_FAR):
+        slot = texture if layer is None else {"texture": texture, "layer": layer}
+        return drawing.cleared(gpu.types.GPUFrameBuffer(color_slots=slot, depth_slot=self._depth), (value,) * 4)
+
+
+def _array(size, layer_count, texture_format):
+    texture = gpu.types.GPUTexture((size, size), layers=layer_count, format=texture_format)
+    texture.filter_mode(True)
+    texture.extend_mode("EXTEND")
+    return texture
+
+
+def _aim(light, centre, radius, size):
+    """The view of a light that holds the sphere of the hair, also written into the light; None from inside it."""
+    position = light["position"][:3].astype(np.float64)
+    is_sun = light["kind"] == SUN
+    axis = light["axis"][:3].astype(np.float64) if is_sun else centre - position
+    distance = float(np.linalg.norm(axis))
+    if not is_sun and distance < 1.01 * radius:
+        return None
+    eye = centre - axis * (2.0 * radius) if is_sun else position
+    world_to_view = _look_at(eye, axis / distance)
+    view_to_clip = _orthographic(radius) if is_sun else _perspective(radius, distance)
+    view = drawing.view_record(world_to_view, view_to_clip, size, least_width=1.0)
+    light["world_to_shadow"] = view["world_to_clip"]
+    light["extent"] = 2.0 * radius
+    light["near"] = (centre @ axis / distance if is_sun else distance) - radius
+    return view
+
+
+def _blur_of(light, size):
+    """Standard deviation [texels] of the blur of surface shadows by a light's size."""
+    is_sun = light["kind"] == SUN
+    angle = light["radius"] / (1.0 if is_sun else light["near"] + 0.5 * light["extent"])
+    # A disk's deviation along an axis is half its radius.
+    return float(np.clip(0.5 * angle * _SHADE_DISTANCE * size, _LEAST_BLUR, _MOST_BLUR * size))
+
+
+def _look_at(eye, forward):
+    """(4, 4) world to view of a camera at `eye` that looks along a unit vector, -Z of the view."""
+    helper = np.array([0.0, 0.0, 1.0]) if abs(forward[2]) < 0.9 else np.array([1.0, 0.0, 0.0])
+    right = np.cross(forward, helper)
+    right /= np.linalg.norm(right)
+    matrix = np.eye(4)
+    matrix[:3, :3] = right, np.cross(right, forward), -forward
+    matrix[:3, 3] = -matrix[:3, :3] @ eye
+    return matrix
+
+
+def _orthographic(radius):
+    """(4, 4) view to clip of a cube around a sphere two radii ahead; objects in front of it still cast shadows."""
+    return np.array([[1 / radius, 0, 0, 0], [0, 1 / radius, 0, 0], [0, 0, -0.1 / radius, -0.8], [0, 0, 0, 1.0]])
+
+
+def _perspective(radius, distance):
+    """(4, 4) view to clip of a cone around a sphere; objects in front of it still cast shadows."""
+    cotangent = np.sqrt(distance**2 - radius**2) / radius
+    near, far = _NEAREST * 2.0 * radius, distance + 4.0 * radius
+    depth_scale, depth_offset = (far + near) / (near - far), 2.0 * far * near / (near - far)
+    return np.array([[cotangent, 0, 0, 0], [0, cotangent, 0, 0], [0, 0, depth_scale, depth_offset], [0, 0, -1.0, 0]])

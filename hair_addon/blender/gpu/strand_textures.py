@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands on the GPU: points, radii and random numbers in textures.
+
+A change costs one upload, or only that of the moved strands; a redraw costs none.
+"""
+
+from dataclasses import dataclass
+
+import gpu
+import numpy as np
+
+from . import shaders
+
+# Widest row of the strand texture; every driver takes 16384 texels.
+TEXTURE_WIDTH = 16384
+
+_AT_ONCE = 400  # strands that are brought into the order of texels
+
+
+@dataclass(frozen=True)
+class StrandsOnGPU:
+    """Points and radii of strands in a texture, with the strip that draws them."""
+
+    texture: gpu.types.GPUTexture
+    batch: gpu.types.GPUBatch
+    strand_count: int
+    point_count: int
+    row_strands: int
+    randoms: gpu.types.GPUTexture  # a number in [0, 1] a strand, `row_strands` a row
+    points: np.ndarray  # (S, P, 3) as uploaded, for computations on the CPU
+    radii: np.ndarray  # (S, P)
+    bounds: np.ndarray  # (2, 3): least and greatest coordinates
+    mean_length: float  # of strands, in the coordinate system of the points
+    mean_radius: float
+
+
+def upload_strands(points, radii, randoms=None):
+    """(S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
+
+    randoms: (S,) numbers in [0, 1] by which strands may differ; without them all are average.
+    """
+    strand_count, point_count, _xyz = points.shape
+    row_strands = TEXTURE_WIDTH // point_count
+    texture = places_texture(points, radii, row_strands)
+    random_texture = _randoms_texture(strand_count, row_strands, randoms)
+    strip = bare_vertices(vertex_count(strand_count, point_count))
+    # Strand by strand first: NumPy is ten times faster along the long axis of a flat array.
+    flat = points.reshape(strand_count, -1)
+    bounds = np.stack([flat.min(axis=0).reshape(-1, 3).min(axis=0), flat.max(axis=0).reshape(-1, 3).max(axis=0)])
+    # A sample of the strands is enough for the level of detail.
+    some = slice(None, None, -(-strand_count // 1000))
+    mean_length = float(np.linalg.norm(np.diff(points[some], axis=1), axis=2).sum(axis=1).mean())
+    return StrandsOnGPU(
+        texture,
+        strip,
+        strand_count,
+        point_count,
+        row_strands,
+        random_texture,
+        points,
+        radii,
+        bounds,
+        mean_length,
+        float(radii[some].mean()),
+    )
+
+
+def _randoms_texture(strand_count, row_strands, randoms):
+    """A number a strand, `row_strands` a row."""
+    numbers = np.full((-(-strand_count // row_strands), row_strands), 0.5, np.float32)
+    if randoms is not None:
+        numbers.ravel()[:strand_count] = randoms
+    data = gpu.types.Buffer("FLOAT", numbers.size, numbers.ravel())
+    texture = gpu.types.GPUTexture(numbers.shape[::-1], format="R32F", data=data)
+    texture.filter_mode(False)
+    return texture
+
+
+def places_texture(points, radii, row_strands):
+    """(S, P, 3) places and (S, P) radii in a texture, each row of it `row_strands` whole strands."""
+    strand_count, point_count, _xyz = points.shape
+    row_count = -(-strand_count // row_strands)
+    texels = np.empty((row_count * row_strands, point_count, 4), np.float32)
+    texels[strand_count:] = 0.0
+    # Number by number, of as many strands as the processor's caches hold: half the time of all at once.
+    for first in range(0, strand_count, _AT_ONCE):
+        some = slice(first, min(first + _AT_ONCE, strand_count))
+        for axis in range(3):
+            texels[some, :, axis] = points[some, :, axis]
+        texels[some, :, 3] = radii[some]
+    texture = gpu.types.GPUTexture(
+        (row_strands * point_count, row_count),
+        format="RGBA32F",
+        data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel()),
+    )
+    texture.filter_mode(False)
+    return texture
+
+
+def seen_points(point_count):
+    """Texels of a strand in the visibility textures: SEEN_STEP of shaders/include/strand.glsl, and the tip."""
+    return -(-(point_count - 1) // 4) + 1
+
+
+def move_strands(strands, moved, points):
+    """Move some of the strands on the GPU; uploads no others. Their arrays on this side are moved too.
+
+    strands: `StrandsOnGPU`; moved: (M,) distinct indices; points: (M, P, 3) float32. Bounds only grow: they are exact
+    again after the next `upload_strands`.
+    """
+    strands.points[moved] = points
+    flat = points.reshape(-1, 3)
+    strands.bounds[0] = np.minimum(strands.bounds[0], flat.min(axis=0))
+    strands.bounds[1] = np.maximum(strands.bounds[1], flat.max(axis=0))
+    heads = np.zeros((len(moved), 1, 3), np.float32)
+    heads[:, 0, 0] = moved  # exact in single precision up to 16 million
+    row_strands = TEXTURE_WIDTH // (strands.point_count + 1)
+    texture = places_texture(
+        np.concatenate([heads, points], axis=1), np.pad(strands.radii[moved], ((0, 0), (1, 0))), row_strands
+    )
+    program = shaders.move_program()
+    program.bind()
+    program.image("strands", strands.texture)
+    program.uniform_sampler("moved_strands", texture)
+    program.uniform_int("moved_count", len(moved))
+    program.uniform_int("point_count", strands.point_count)
+    program.uniform_int("row_strands", strands.row_strands)
+    program.uniform_int("moved_row_strands", row_strands)
+    gpu.compute.dispatch(program, -(-len(moved) * strands.point_count // shaders.MOVE_GROUP_SIZE), 1, 1)
+
+
+def vertex_count(strand_count, drawn_points):
+    """Vertices of a strip through strands: two a point, and one repeated at either end so that strands do not join."""
+    return strand_count * (2 * drawn_points + 2)
+
+
+def bare_vertices(count, primitive="TRI_STRIP"):
+    """A batch of vertices without attributes."""
+    return gpu.types.GPUBatch(type=primitive, buf=gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), count))

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Uniform blocks: GLSL source and NumPy layout of a struct, both from one list of members.
+
+The layout is std140 [OpenGL46, 7.6.2.2]: int and float are aligned to 4 bytes, vec3, vec4 and mat4 to 16, a struct's
+size is a multiple of 16.
+"""
+
+from functools import cache
+
+import gpu
+import numpy as np
+
+from ...core.params import declared
+
+# GLSL type → (NumPy scalar, shape, alignment in bytes). A mat4 is column-major: it is filled with a transpose.
+_TYPES = {
+    "int": ("<i4", (), 4),
+    "float": ("<f4", (), 4),
+    "vec3": ("<f4", (3,), 16),
+    "vec4": ("<f4", (4,), 16),
+    "mat4": ("<f4", (4, 4), 16),
+}
+
+
+class Block:
+    """A GLSL struct: `source` declares it, `dtype` is the NumPy record of its std140 layout."""
+
+    def __init__(self, type_name, members):
+        """members: {name: GLSL type}, or {name: (Block, count)} and {name: ("vec4", count)} for arrays."""
+        offsets, formats, lines = [], [], []
+        end = 0
+        for name, kind in members.items():
+            if isinstance(kind, tuple):
+                element, count = kind
+                is_block = isinstance(element, Block)
+                form, alignment = np.dtype((element.dtype, (count,)) if is_block else ("<f4", (count, 4))), 16
+                lines.append(f"  {element.type_name if is_block else element} {name}[{count}];")
+            else:
+                scalar, shape, alignment = _TYPES[kind]
+                form = np.dtype((scalar, shape))
+                lines.append(f"  {kind} {name};")
+            end += -end % alignment
+            offsets.append(end)
+            formats.append(form)
+            end += form.itemsize
+        self.type_name = type_name
+        self.source = f"struct {type_name} {{\n" + "\n".join(lines) + "\n};\n"
+        self.dtype = np.dtype(
+            {"names": list(members), "formats": formats, "offsets": offsets, "itemsize": end + -end % 16}
+        )
+
+    def record(self):
+        """A zeroed record to be filled by member name."""
+        return np.zeros((), self.dtype)
+
+
+LIGHT_CAPACITY = 16
+
+VIEW = Block(
+    "View",
+    {
+        "world_to_clip": "mat4",
+        "object_to_world": "mat4",
+        "object_to_clip": "mat4",
+        "eye": "vec4",  # the viewer's place, or in a parallel projection the unit direction towards the viewer
+        "hair_forward": "vec4",  # what one strand passes on of the light that meets it
+        "surface_color": "vec4",  # of what the hair grows on
+        "is_perspective": "int",
+        "point_count": "int",
+        "drawn_points": "int",  # of each strand's points, evenly chosen: at least two
+        "strand_count": "int",
+        "drawn_strands": "int",  # of all, thickened in proportion
+        "first_strand": "int",  # of the turns in which strands are drawn
+        "part_size": "int",  # strands: turns go from one such part of the strands to the next
+        "part_stride": "int",  # and so much further in each when they come back to it
+        "thickness": "float",
+        "seen_points": "int",  # of each strand's points, those of the visibility textures
+        "seen_opacity": "float",  # of a strand, for which they hold
+        "row_strands": "int",
+        "object_scale": "float",
+        "pixels_per_unit": "float",  # at distance one, in a perspective
+        "least_half_width": "float",  # there as well
+        "back_gain": "float",  # of what comes back from behind a strand
+        "light_index": "int",  # the light that a shadow pass looks from
+        "coverage_turn": "float",  # by which a pass takes other samples of thin strands
+        "first_column": "int",  # of the picture's samples, where what is drawn is a tile of it
+        "first_row": "int",
+    },
+)
+LIGHT = Block(
+    "Light",
+    {
+        "world_to_shadow": "mat4",
+        "position": "vec4",
+        "axis": "vec4",
+        "power": "vec4",
+        "kind": "int",
+        "cos_cone": "float",
+        "blend": "float",
+        "shadow_layer": "int",  # of the shadow maps, -1 without
+        "casts_shadow": "int",
+        "radius": "float",  # [m]; of a sun, the tangent of its angular radius
+        "extent": "float",  # diameter of the hair [m], which the layers of a shadow are parts of
+        "near": "float",  # depth [m] of the hair's near side, which depths are counted from
+    },
+)
+LIGHTS = Block(
+    "Lights",
+    {
+        "light": (LIGHT, LIGHT_CAPACITY),
+        "world": ("vec4", 6),  # mean radiance of the world's sides, in the order of `sphere.SIDES`
+        "count": "int",
+    },
+)
+
+MOTION = Block(
+    "Motion",
+    {
+        "before_to_clip": "mat4",  # of what strands or surfaces have their places in, a frame before
+        "now_to_clip": "mat4",
+        "after_to_clip": "mat4",
+        "size": "vec4",  # width and height of the whole picture [pixels]
+    },
+)
+
+ENVIRONMENT = Block(
+    "Environment",
+    {
+        "to_image": "mat4",  # from world directions to the picture's
+        "clip_to_world": "mat4",
+        "color": "vec4",  # by which the picture is multiplied
+        "size": "vec4",  # width and height of what is drawn [pixels]
+        "is_mirror_ball": "int",
+        "taps": "int",  # samples along each side of a texel
+    },
+)
+
+
+def _glsl_type(default, details):
+    if isinstance(default, str):
+        return "int" if details.choices else None
+    if isinstance(default, bool | int):
+        return "int"
+    return "float" if isinstance(default, float) else "vec3"
+
+
+@cache
+def settings_block(settings_class, instance="settings"):
+    """The struct of a class of settings, called after its instance: `settings` is a `Settings`.
+
+    An enumeration is the index of its choice; free text has no place.
+    """
+    kinds = {name: _glsl_type(default, details) for name, default, details in declared(settings_class)}
+    return Block(instance.capitalize(), {name: kind for name, kind in kinds.items() if kind})
+
+
+def fill(settings):
+    """The record of `settings_block` that holds these settings."""
+    record = settings_block(type(settings)).record()
+    for name, _default, details in declared(type(settings)):
+        if name in record.dtype.names:
+            value = getattr(settings, name)
+            choices = [choice[0] for choice in details.choices]
+            record[name] = choices.index(value) if choices else value
+    return record
+
+
+def uniform_buffer(record):
+    """A GPUUniformBuf with the bytes of a record."""
+    data = record.tobytes()
+    # A Buffer has no raw kind; unsigned bytes are copied as they are.
+    return gpu.types.GPUUniformBuf(gpu.types.Buffer("UBYTE", len(data), data))

@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Visibility buffer of a picture: the nearest strand segment of each sample, its depth, and its light.
+
+The depth complexity of hair is high, so only visible samples are shaded, once each, by a compute program [Burns13].
+If the graphics driver supports it, a compute program also finds the nearest segments.
+"""
+
+from dataclasses import dataclass
+
+import gpu
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.shading.tables import dual_scattering
+from . import drawing, shaders, uniforms
+from .hair_shading import Shading
+from .strand_textures import StrandsOnGPU, seen_points
+
+_NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """One hair object in a picture, and its range of segments."""
+
+    strands: StrandsOnGPU
+    shading: Shading
+    record: np.ndarray  # uniforms.VIEW
+    samplers: dict
+    first: int
+
+    @property
+    def segment_count(self):
+        return self.strands.strand_count * (int(self.record["drawn_points"]) - 1)
+
+
+_NOTHING = (0.0, 0.0, 0.0, 0.0)
+
+
+class VisibilityBuffer:
+    """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
+
+    color: linear light, premultiplied; segments: of strands, what is nearest; surface_depth: of surfaces, from 0 to 1;
+    depths: of hair where there is any, the bits of floats from 0 to 1.
+    """
+
+    def __init__(self, width, height):
+        self.size = (width, height)
+        self.color = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
+        self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
+        self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
+        self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+        self._hair = []  # _Placed
+        self._lights = None
+        self._parts = {}  # format → (framebuffer, texture, depth) of additional passes
+        self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
+        self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
+
+    def surfaces(self, background=_NOTHING):
+        """The framebuffer that surfaces are drawn into, bound and cleared: a context manager."""
+        return drawing.cleared(self._surfaces, background)
+
+    def add_hair(self, hair, lights, view, in_compute=None):
+        """Find the hair in front of the surfaces and shade it: arguments as for `find_hair`."""
+        self.find_hair(hair, lights, view, in_compute)
+        for placed in self._hair:
+            self._shade(placed, placed.shading.program, self.color)
+
+    def find_hair(self, hair, lights, view, in_compute=None):
+        """Fill `segments` and `depths` with the hair that is nearest, in front of the surfaces. Raises `HairError`.
+
+        hair: [(StrandsOnGPU, Shading, object to world, surface colour, {sampler: texture} of the scene, Steps), ...];
+        lights, view: records of `uniforms`; in_compute: whether a compute program finds the nearest strands, None:
+        where it can.
+        """
+        self.segments.clear(format="UINT", value=(_NO_SEGMENT,))
+        draw = self._find if (shaders.has_image_atomics() if in_compute is None else in_compute) else self._draw_strips
+        self._hair, first = [], 0
+        for strands, shading, to_world, surface_color, samplers, steps in hair:
+            record = drawing.strand_record(strands, view, to_world, steps)
+            record["seen_points"] = seen_points(strands.point_count)
+            record["seen_opacity"] = shading.opacity
+            record["hair_forward"][:3] = shading.forward
+            record["surface_color"][:3] = surface_color
+            record["back_gain"] = dual_scattering.BACK_GAIN
+            self._hair.append(_Placed(strands, shading, record, samplers, first))
+            first += self._hair[-1].segment_count
+        if first > _NO_SEGMENT:
+            self._hair = []
+            raise HairError("Too many strands for one picture: hide some hair or some of its instances.")
+        self._lights = uniforms.uniform_buffer(lights)
+        draw()
+
+    @property
+    def segment_ranges(self):
+        """[(first, count)] of the segments of each hair that was found last."""
+        return [(placed.first, placed.segment_count) for placed in self._hair]
+
+    def surfaces_of_part(self, texture_format=shaders.PICTURE_FORMAT):
+        """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`."""
+        if texture_format not in self._parts:
+            # A framebuffer does not own its textures.
+            texture = gpu.types.GPUTexture(self.size, format=texture_format)
+            depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+            framebuffer = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
+            self._parts[texture_format] = framebuffer, texture, depth
+        return drawing.cleared(self._parts[texture_format][0], _NOTHING)
+
+    def part_by(self, program, texture_format=shaders.PICTURE_FORMAT, inputs=None):
+        """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.
+
+        inputs: of each hair ({instance: record}, {sampler: texture}) that the program reads beside the scene.
+        """
+        texture = self._parts[texture_format][1]
+        for placed, (records, textures) in zip(self._hair, inputs or [({}, {})] * len(self._hair), strict=True):
+            blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
+            self._fill(placed, program, texture, blocks, textures)
+        return texture
+
+    def part_of_light(self, lobes, world):
+        """A texture of a part of the light of the hair that was added last, premultiplied.
+
+        lobes: (4,) how much of R, TT, TRT and all else that comes from lights; world: how much of the world's.
+        """
+        with self.surfaces_of_part():
+            pass
+        texture = self._parts[shaders.PICTURE_FORMAT][1]
+        for placed in self._hair:
+            program = placed.shading.parts_program()
+            program.bind()
+            program.uniform_float("drawn_lobes", lobes)
+            program.uniform_float("drawn_world", world)
+            self._shade(placed, program, texture)
+        return texture
+
+    def hair_at(self, x, y):
+        """Which of the hair that was added last is nearest in a sample, counted from 0; None where there is none."""
+        with self._strips.bind():  # a framebuffer that was never bound has no size
+            segment = int(self._strips.read_color(x, y, 1, 1, 1, 0, "UINT")[0][0][0])
+        within = [placed.first <= segment < placed.first + placed.segment_count for placed in self._hair]
+        return within.index(True) if any(within) else None
+
+    def _find(self):
+        """Find the nearest segments by a compute program: first depths, then indices."""
+        program = shaders.surface_depths_program()
+        with drawing.bound(program, {}, {"surface_depth": self.surface_depth}):
+            program.image("depths", self.depths)
+            drawing.dispatch_over(program, self.size)
+        program = shaders.segments_program()
+        images = {"depths": self.depths, "segments": self.segments}
+        for is_depth in (1, 0):
+            for placed in self._hair:
+                constants = {"first_segment": placed.first, "is_depth": is_depth}
+                drawing.walk_strands(placed.strands, program, placed.record, self._lights, {}, images, constants)
+
+    def _draw_strips(self):
+        """The nearest segments, as strips of triangles that the graphics driver draws."""
+        program = shaders.strip_segments_program()
+        with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+            for placed in self._hair:
+                program.bind()
+                program.uniform_int("first_segment", placed.first)
+                drawing.draw_strip(placed.strands, program, placed.record, self._lights)
+
+    def _shade(self, placed, program, picture):
+        """Fill the samples in which a strand of a hair is nearest with its light."""
+        shading = placed.shading
+        textures = (
+            {**shading.samplers, "strand_randoms": placed.strands.randoms} if shading.is_varied else shading.samplers
+        )
+        self._fill(placed, program, picture, shading.blocks, textures)
+
+    def _fill(self, placed, program, picture, blocks, textures):
+        """Run a program on the samples in which a strand of a hair is nearest."""
+        blocks = {"view": uniforms.uniform_buffer(placed.record), "lights": self._lights, **blocks}
+        textures = {"segments": self.segments, "strands": placed.strands.texture, **placed.samplers, **textures}
+        with drawing.bound(program, blocks, textures):
+            program.image("picture", picture)
+            program.uniform_int("first_segment", placed.first)
+            program.uniform_int("segment_count", placed.segment_count)
+            drawing.dispatch_over(program, self.size)

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The world's image on the GPU: as background, and decomposed into lights."""
+
+from dataclasses import dataclass
+
+import gpu
+import numpy as np
+
+from ...core import geometry
+from ...core.errors import HairError
+from ...core.imaging import environment
+from ..host.caches import Cache
+from . import drawing, shaders, uniforms
+
+_HEIGHT = 64  # of the picture that is taken apart
+_MOST_TAPS = 32
+
+light_cache = Cache(capacity=1)  # World.key → _ImageLight
+
+
+@dataclass
+class _ImageLight:
+    """Light of a world's image, and of which pixels it was made."""
+
+    light: tuple  # what `environment.split` returns
+    pixels: str  # their fingerprint
+    is_checked: bool = True  # whether they are those of the image, as far as Blender has said
+
+
+def light_of(world):
+    """([`environment.Lobe`, ...], (6, 3) mean radiance of the sides) of a `lights.World`."""
+    if world.image is None:
+        return [], np.broadcast_to(world.color, (6, 3))
+    kept = light_cache.get(world.key)
+    # Blender does not report changes of an image by a script: until it is saved it may change at any time.
+    if kept is None or not kept.is_checked or world.image.is_dirty:
+        pixels = _pixel_fingerprint(world.image)
+        if kept is None or kept.pixels != pixels:
+            kept = light_cache.keep(world.key, _ImageLight(environment.split(_unrolled(world)), pixels))
+        kept.is_checked = True
+    return kept.light
+
+
+def check_image():
+    """Compare the pixels of the world's image on the next read: they may have changed."""
+    for kept in light_cache.values():
+        kept.is_checked = False
+
+
+def _pixel_fingerprint(image):
+    pixels = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(pixels)
+    return geometry.fingerprint.fingerprint(pixels)
+
+
+def draw_background(world, view, width, height):
+    """Fill the bound framebuffer with the world as a view of this size [pixels] sees it."""
+    record = _record(world, width, height)
+    record["clip_to_world"] = np.linalg.inv(view["world_to_clip"].astype(np.float64))
+    with drawing.gpu_state("NONE", depth_writes=False):
+        _draw("background.frag", world, record)
+
+
+def _unrolled(world):
+    """(H, W, 3) radiance, as `environment.split` takes it."""
+    width, height = 2 * _HEIGHT, _HEIGHT
+    record = _record(world, width, height)
+    record["taps"] = np.clip(-(-max(world.image.size) // width), 2, _MOST_TAPS)
+    target = gpu.types.GPUTexture((width, height), format="RGBA32F")
+    framebuffer = gpu.types.GPUFrameBuffer(color_slots=target)
+    with framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
+        _draw("environment.frag", world, record)
+        pixels = framebuffer.read_color(0, 0, width, height, 4, 0, "FLOAT")
+    return np.nan_to_num(np.array(pixels, np.float32).reshape(height, width, 4)[..., :3], posinf=0.0)
+
+
+def _record(world, width, height):
+    record = uniforms.ENVIRONMENT.record()
+    record["to_image"] = world.to_image.T
+    record["color"][:3] = world.color
+    record["size"][:2] = width, height
+    record["is_mirror_ball"] = world.is_mirror_ball
+    return record
+
+
+def _draw(fragment, world, record):
+    try:
+        picture = gpu.texture.from_image(world.image)
+    except RuntimeError as error:
+        raise HairError(f'The world\'s image "{world.image.name}" cannot be read: {error}.') from error
+    drawing.draw_cover(shaders.environment_program(fragment), {"environment": record}, {"surroundings": picture})

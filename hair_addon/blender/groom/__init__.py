@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Grooms in Blender: read geometry and settings, compute, write geometry; staleness, diagnostics and repairs."""
+
+from typing import TYPE_CHECKING
+
+from ...core.lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        bindings,
+        brushes,
+        diagnostics,
+        edited_surfaces,
+        edits,
+        foreign_curves,
+        groom_settings,
+        hair_systems,
+        hand_made_guides,
+        pipeline,
+        selection,
+        staleness,
+    )
+else:
+    __getattr__ = submodules(__name__)

@@ -1,0 +1,144 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cache of hair bindings during combing, by session UID of the hair, without references to Blender's data.
+
+Everything here is derived from the surface, the guides, the settings and the roots stored in the hair's Curves, and can
+be dropped at any time: the next change of a guide then searches again.
+"""
+
+from concurrent.futures import Future
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from bpy.types import Curves
+
+from ...core import interpolation
+from ...core.geometry.strands import Strands
+from ...core.grooming import following, groom
+from ...core.grooming.groom import HairSettings
+from ...core.interpolation.hair_binding import HairBinding
+from ..data.scene import Surface
+from ..host.caches import Cache
+
+if TYPE_CHECKING:
+    from ...core.interpolation.guide_weights import Reach
+
+
+@dataclass
+class BoundHair:
+    """The current state of hair, newer than its datablock while `is_written` is false."""
+
+    binding: HairBinding
+    settings: HairSettings
+    root_key: str  # of `staleness.root_key`
+    parting_key: str  # of `partings.Partings`
+    guides: Strands  # as they were when the hair followed them last
+    guide_uid: int | None  # session_uid of their Curves, None until these are made
+    surface: Surface
+    shares: np.ndarray | None = None  # (S, k) float32, the weights of each strand's guides as they are combed now
+    growing: Future | None = None  # of `points`
+    is_written: bool = False  # whether the datablock holds these points
+    has_moved_only: bool = False  # whether only points, and perhaps the guide map, are unwritten
+    is_map_written: bool = False  # whether the datablock holds this guide map
+    written_radii: np.ndarray | None = None  # (P,) in the datablock, None if they may have changed
+    is_report_due: bool = False  # whether Blender has not reported our write yet, which is to be ignored
+
+    @property
+    def points(self) -> np.ndarray:
+        """(S, P, 3) float32 at rest, in the surface's local coordinates; waits until they are computed."""
+        return _grown(self.growing).result()
+
+    @property
+    def radii(self) -> np.ndarray:
+        """(P,) float32 along every strand, in the surface's local units."""
+        return groom.strand_radii(self.settings, self.guides.point_count) / np.float32(self.surface.scale)
+
+    @property
+    def guide_map(self) -> tuple[np.ndarray, np.ndarray]:
+        """(S, k) int32 and float32: each strand's guides, -1 for none, and their current weights."""
+        shares = _grown(self.shares)
+        return np.where(shares > 0.0, self.binding.guide_weights.indices.numpy(), -1), shares
+
+    @cached_property
+    def reach(self) -> "Reach":
+        """The strands that follow each guide."""
+
+        return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.guides))
+
+    def follow(self, guides: Strands) -> np.ndarray | None:
+        """Bring strands up to guides as they are combed now; indices (M,) of those that moved.
+
+        None where that is not enough: guides came, went or slid over the surface, and the hair has to be bound again.
+        """
+        combed = following.combed(guides, self.guides)
+        if combed is None:
+            return None
+        self.guides = guides
+        strand_count = len(_grown(self.shares))
+        moved = np.arange(strand_count) if len(combed) == len(guides) else self.reach.of(combed)
+        if len(moved):
+            # Beyond a half, selecting the moved ones would take longer.
+            self.grow(moved if len(moved) <= strand_count // 2 else None)
+            self.has_moved_only = self.is_written or self.has_moved_only
+            self.is_written = False
+        return moved
+
+    def grow(self, chosen: np.ndarray | None = None) -> None:
+        """Compute strands for `guides`, in other threads or, where they are (M,) indices of some, at once."""
+        binding, guides, axes = self.binding, self.guides, self.surface.to_local_axes
+        weights = following.weights_now(binding, guides, chosen)
+        if chosen is None:
+            out = None if self.growing is None else self.points
+            self.growing = following.growing_points(binding, guides, weights, axes, out)
+            self._take_shares(weights.weights.numpy())
+        else:
+            self.points[chosen] = following.follow_some(binding, guides, chosen, weights, axes)
+            self._take_shares(weights.weights.numpy(), chosen)
+
+    def _take_shares(self, shares, moved=slice(None)):
+        """Bring the guide map up to guides that were combed: the weights of strands, or of (M,) indices of them."""
+        if self.shares is None:
+            self.shares = shares
+            return
+        self.is_map_written = self.is_map_written and np.array_equal(shares, self.shares[moved])
+        self.shares[moved] = shares
+
+
+def _grown[T](value: T | None) -> T:
+    """What strands have once they grow: `pipeline` sees to that before it hands on a `BoundHair`."""
+    if value is None:
+        raise ValueError("These strands have not begun to grow.")
+    return value
+
+
+binding_cache = Cache()  # session_uid of hair Curves → BoundHair
+
+
+def keep(datablock: Curves, bound: BoundHair) -> None:
+    """Store the binding of a hair Curves datablock."""
+    before = of(datablock)
+    if before is not None:
+        bound.written_radii = before.written_radii
+    binding_cache.keep(datablock.session_uid, bound)
+
+
+def of(datablock: Curves) -> BoundHair | None:
+    """The `BoundHair` of a hair Curves datablock, or None."""
+    return binding_cache.get(datablock.session_uid)
+
+
+def invalidate(datablock: Curves) -> None:
+    """Drop the cache of a datablock that was changed otherwise."""
+    binding_cache.invalidate(datablock.session_uid)
+
+
+def is_reported() -> None:
+    """Note that Blender has reported all our writes: the next report is of another change."""
+    for bound in binding_cache.values():
+        bound.is_report_due = False
+
+
+def has_unwritten() -> bool:
+    """Whether any hair is ahead of its datablock."""
+    return any(not bound.is_written for bound in binding_cache.values())

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Problems with a surface or its hair, each with the operator that fixes it.
+
+Panels call this with every redraw, so it reads no geometry.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import bpy
+from bpy.types import Curves, Object
+
+from ..data.curves import followers
+from ..settings.translations import interface_text
+
+
+@dataclass(frozen=True)
+class Warning:
+    """text: translated; operator: `bl_idname` of the operator that fixes it, empty if there is none."""
+
+    text: str
+    operator: str = ""
+
+
+def warnings_of(surface: Object | None, parts: Iterable[Curves]) -> list[Warning]:
+    """[Warning] about a mesh object, or None where it is missing, and the guide and hair Curves that grow on it."""
+    partings = [warning for part in parts if part.vellus.kind == "HAIR" for warning in parting_warnings(part)]
+    first = [*_of_library(surface, parts), *_of_surface(surface, parts), *_of_uv_map(surface, parts)]
+    return [*first, *_of_guides(parts), *dict.fromkeys(partings)]
+
+
+def parting_warnings(hair: Curves) -> list[Warning]:
+    """Return [Warning] about missing part lines and region groups of a hair Curves datablock."""
+    group, found = hair.vellus.hair, []
+    if group.part_lines and group.part_lines not in bpy.data.objects:
+        found.append(Warning(interface_text('No object "{name}": pick another part line.', name=group.part_lines)))
+    if hair.surface is not None and group.region_group and group.region_group not in hair.surface.vertex_groups:
+        text = 'No vertex group "{name}": pick another for regions.'
+        found.append(Warning(interface_text(text, name=group.region_group)))
+    return found
+
+
+def _of_library(surface, parts):
+    linked = next((block for block in (surface, *parts) if block is not None and block.library is not None), None)
+    if linked is not None:
+        yield Warning(interface_text('"{name}" is linked: make a library override.', name=linked.name))
+
+
+def _of_surface(surface, parts):
+    if surface is None:
+        if parts:
+            yield Warning(interface_text("The surface is missing: pick a mesh."), "vellus.attach_to_surface")
+        return
+    if any(abs(component - 1.0) > 1e-4 for component in surface.scale):
+        yield Warning(interface_text("The scale is not applied."), "vellus.apply_scale")
+    if surface.mode != "OBJECT" and any(part.vellus.is_stale for part in parts):
+        yield Warning(interface_text("Hair updates when you leave this mode."))
+
+
+def _of_uv_map(surface, parts):
+    if surface is None:
+        return
+    maps = surface.data.uv_layers
+    if not maps:
+        yield Warning(interface_text("No UV map: hair nodes need one."), "vellus.make_uv_map")
+        return
+    lost = next((name for name in map(_uv_map_of, parts) if name not in maps), None)
+    if lost is not None:
+        text = 'UV map "{name}" is missing.' if lost else "The hair has no UV coordinates."
+        yield Warning(interface_text(text, name=lost), "vellus.use_uv_map")
+    elif any(part.vellus.uv_status for part in parts):
+        yield Warning(interface_text("UVs overlap: hair nodes misplace strands."), "vellus.make_uv_map")
+
+
+def _uv_map_of(part):
+    try:
+        return part.surface_uv_map
+    except UnicodeDecodeError:  # of a damaged file
+        return ""
+
+
+def _of_guides(parts):
+    hair = [part.vellus for part in parts if part.vellus.kind == "HAIR"]
+    if any(state.guide_curves is None for state in hair):
+        yield Warning(interface_text("The hair has no guides: pick some."))
+    elif any(_is_without_object(state.guide_curves) for state in hair):
+        yield Warning(interface_text("The guides' object was deleted."), "vellus.restore_guides")
+
+
+def _is_without_object(guides):
+    """Whether nothing uses guides but the hair that follows them."""
+    return guides.users - guides.use_fake_user <= len(followers(guides))

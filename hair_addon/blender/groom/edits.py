@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operations on existing hair: deletion, attachment to a surface, UV maps, repairs."""
+
+from collections.abc import Iterable
+
+import bpy
+import numpy as np
+from bpy.types import Curves, Depsgraph, Object, ViewLayer
+
+from ...core.errors import HairError
+from ...core.geometry import mesh, uv_check
+from ..data import curves, curves_objects, scene
+from ..materials import materials
+from . import edited_surfaces
+from .selection import curves_on
+
+_UV_MAP = "Hair"
+
+# Roots on seams may be found on either side of them.
+_TOLERATED = 0.002
+
+
+def delete(parts: Iterable[Curves]) -> None:
+    """Remove guide or hair Curves with their objects, and materials and guides that nothing else uses then."""
+    for part in parts:
+        curves.require_editable(part)
+    guides = {part.vellus.guide_curves for part in parts} - {None, *parts}
+    made = {m for part in parts for m in part.materials if m is not None and materials.is_hair_material(m)}
+    for user in [o for o in bpy.data.objects if o.data in parts]:
+        bpy.data.objects.remove(user)
+    for part in parts:
+        bpy.data.hair_curves.remove(part)
+    for material in [m for m in made if m.users == 0]:
+        bpy.data.materials.remove(material)
+    for left in [g for g in guides if g.users == 0]:
+        bpy.data.hair_curves.remove(left)
+    bpy.context.view_layer.update()  # otherwise it still lists the objects, as None
+
+
+def restore_object(guides: Curves) -> Object:
+    """Create a new object for guides whose object was deleted while hair still follows them."""
+    curves.require_editable(guides)
+    if guides.surface is None:
+        raise HairError("The surface is missing: pick a mesh.")
+    return curves_objects.link_object(guides.name, guides, guides.surface, is_rendered=False)
+
+
+def attach(parts: Iterable[Curves], surface_object: Object) -> None:
+    """Attach guides and hair to a mesh object: as its children, in its coordinates."""
+    for part in parts:
+        curves.require_editable(part)
+    for part in parts:
+        part.surface = surface_object
+        for user in bpy.data.objects:
+            if user.data == part:
+                user.parent = surface_object
+                user.matrix_parent_inverse.identity()
+                user.matrix_basis.identity()
+        part.vellus.is_stale = True
+        part.update_tag()
+
+
+def make_uv_map(surface_object: Object, view_layer: ViewLayer) -> None:
+    """Unwrap a mesh object to an additional UV map, and update the hair on it."""
+    curves.require_editable(surface_object)
+    curves.require_editable(surface_object.data)
+    if not surface_object.data.polygons:
+        raise HairError("The surface has no faces to grow hair on.")
+    if not surface_object.visible_get(view_layer=view_layer):
+        raise HairError('"{name}" is hidden: show it first.', name=surface_object.name)
+    if surface_object.data.uv_layers.new(name=_UV_MAP) is None:
+        raise HairError('"{name}" has no room for another UV map: remove one.', name=surface_object.name)
+    surface_object.data.uv_layers.active_index = len(surface_object.data.uv_layers) - 1
+    active = view_layer.objects.active
+    view_layer.objects.active = surface_object
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.uv.smart_project(island_margin=0.005)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    view_layer.objects.active = active
+    view_layer.update()
+    renew_uvs(surface_object, bpy.context.evaluated_depsgraph_get())
+
+
+def renew_uvs(surface_object: Object, depsgraph: Depsgraph) -> None:
+    """Write the UV coordinates of roots, of all hair on a mesh object, by the UV map that is active now."""
+    surface = scene.read_surface(surface_object, depsgraph)
+    for part in curves_on(surface_object, "GUIDES") + curves_on(surface_object, "HAIR"):
+        curves.require_editable(part)
+        curves.write_uvs(part, surface)
+        part.vellus.uv_status = ""
+
+
+def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
+    """Return the misleading share of a mesh object's UVs, in [0, 1]; hair on it stores the problem."""
+    surface = scene.read_surface(surface_object, depsgraph)
+    mesh.check_mesh(surface.mesh)
+    if surface.corner_uvs is None:
+        raise HairError('"{name}" has no UV map: make one.', name=surface_object.name)
+    share = uv_check.misleading_fraction(surface.mesh, surface.corner_uvs)
+    for part in curves_on(surface_object, "GUIDES") + curves_on(surface_object, "HAIR"):
+        part.vellus.uv_status = "UVs overlap" if share > _TOLERATED else ""
+    return share
+
+
+def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
+    """Apply a mesh object's scale, and keep its hair in place."""
+    curves.require_editable(surface_object)
+    curves.require_editable(surface_object.data)
+    if surface_object.data.users > 1:
+        raise HairError('"{name}" shares its mesh with another object: make it single-user.', name=surface_object.name)
+    scale = tuple(surface_object.scale)
+    if not all(scale):
+        raise HairError('"{name}" has a scale of zero: change its scale.', name=surface_object.name)
+    axes_before = np.array(surface_object.matrix_world.to_3x3(), np.float64)
+    with bpy.context.temp_override(
+        active_object=surface_object,
+        object=surface_object,
+        selected_objects=[surface_object],
+        selected_editable_objects=[surface_object],
+    ):
+        bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
+    view_layer.update()
+    for guides in curves_on(surface_object, "GUIDES"):  # those too that are not live
+        edited_surfaces.follow_surface(guides, bpy.context.evaluated_depsgraph_get(), axes_before)

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The hair systems of a mesh: hair with the guides that it follows, or guides without hair, edited as one.
+
+A system is identified by its Curves datablock, of the hair or of guides without hair. Nothing is stored: the list and
+the edited system are computed from the objects of a view layer and the active object.
+"""
+
+import bpy
+from bpy.types import Curves, Object, ViewLayer
+
+from ..settings import properties
+from .selection import active_of_kind, make_active, object_of, surface_of
+
+
+def systems_of(surface: Object, view_layer: ViewLayer) -> list[Curves]:
+    """The Curves of the hair systems on a mesh object, as far as a view layer has objects of them; oldest first."""
+    if surface is None or not any(c.surface == surface for c in bpy.data.hair_curves):
+        return []  # panels ask with every redraw, and a view layer may have thousands of objects
+    curves = {o.data for o in view_layer.objects if o is not None and o.type == "CURVES"}
+    hair = {c for c in curves if c.vellus.kind == "HAIR"}
+    followed = {c.vellus.guide_curves for c in hair}
+    lone_guides = {c for c in curves - followed if c.vellus.kind == "GUIDES"}
+    found = [c for c in hair | lone_guides if c.surface == surface]
+    return sorted(found, key=lambda c: c.session_uid)
+
+
+def edited_system(view_layer: ViewLayer) -> Curves | None:
+    """The Curves of the system that is edited: of the active object, or the newest on the active mesh; None if none."""
+    active = view_layer.objects.active
+    systems = systems_of(surface_of(active), view_layer)
+    guides, hair = active_of_kind(active, "GUIDES"), active_of_kind(active, "HAIR")
+    if hair is not None:
+        return hair if hair in systems else None
+    if guides is not None:
+        followers = [c for c in systems if c.vellus.guide_curves == guides]
+        return followers[-1] if followers else (guides if guides in systems else None)
+    with_hair = [c for c in systems if c.vellus.kind == "HAIR"]
+    return (with_hair or systems or [None])[-1]
+
+
+def guides_of_system(system: Curves) -> Curves | None:
+    """The guide Curves of a system; None of hair that lost its guides."""
+    return system if system.vellus.kind == "GUIDES" else system.vellus.guide_curves
+
+
+def parts_of_system(system: Curves) -> list[Curves]:
+    """The Curves that are deleted with a system: its hair, and its guides unless other hair follows them."""
+    guides = guides_of_system(system)
+    others = [c for c in bpy.data.hair_curves if c != system and c.vellus.guide_curves == guides and c.users]
+    return [system] if guides in {None, system} or others else [system, guides]
+
+
+def edit(system: Curves, view_layer: ViewLayer) -> None:
+    """Make the hair of a system active; its guides, in the same mode, where guides are being edited."""
+    active = view_layer.objects.active
+    chosen, mode = object_of(system, view_layer), "OBJECT"
+    active_guides = active_of_kind(active, "GUIDES")
+    if active_guides is not None and (active.mode != "OBJECT" or edited_system(view_layer) != active_guides):
+        guides_object = object_of(guides_of_system(system), view_layer)
+        if guides_object is not None:
+            chosen, mode = guides_object, active.mode
+    if chosen is None or chosen == active:
+        return
+    if active is not None and active.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+    make_active(chosen, view_layer)
+    if mode != "OBJECT" and chosen.visible_get(view_layer=view_layer):
+        bpy.ops.object.mode_set(mode=mode)
+
+
+def rename(curves_object: Object, name: str) -> None:
+    """Give an object and its Curves a name; guides keep theirs, which other hair may follow too."""
+    if name.strip() and curves_object.library is None:
+        curves_object.name = name
+        curves_object.data.name = curves_object.name
+
+
+def _edited_index(view_layer):
+    system = edited_system(view_layer)
+    return next((index for index, curves in enumerate(bpy.data.hair_curves) if curves == system), -1)
+
+
+def _edit_at(view_layer, index):
+    if 0 <= index < len(bpy.data.hair_curves):
+        edit(bpy.data.hair_curves[index], view_layer)
+
+
+class VellusSystem(bpy.types.PropertyGroup):
+    """Properties of an object in the list of hair systems"""
+
+    __annotations__ = {
+        "title": properties.computed_text(
+            "Name",
+            "Name of the hair object and its curves",
+            lambda group: group.id_data.name,
+            lambda group, name: rename(group.id_data, name),
+        ),
+        "is_visible": properties.computed_flag(
+            "Show in Viewports",
+            "Show this hair in viewports of this view layer. Renders are not affected",
+            lambda group: not group.id_data.hide_get(),
+            lambda group, is_visible: group.id_data.hide_set(not is_visible),
+        ),
+    }
+
+
+CLASSES = (VellusSystem,)
+
+
+def register() -> None:
+    """Register the list's properties of objects, and its active row of view layers."""
+    bpy.types.Object.vellus_system = properties.group_of(VellusSystem)
+    bpy.types.ViewLayer.vellus_system = properties.computed_index(
+        "Edited System", "The hair system to edit", _edited_index, _edit_at
+    )
+
+
+def unregister() -> None:
+    """Take both away again; nothing is stored in files."""
+    del bpy.types.ViewLayer.vellus_system
+    del bpy.types.Object.vellus_system

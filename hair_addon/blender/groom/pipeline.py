@@ -1,0 +1,392 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The report's node graph in Blender: read geometry and settings, compute, write geometry.
+
+mesh object ─ distribute_guides ─▶ Guides Curves ─ interpolate_hair ─▶ Hair Curves. Curves store their settings
+and their inputs, so `evaluate` can regenerate them.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import Future
+
+import numpy as np
+from bpy.types import Curves, Depsgraph, Object
+
+from ...core.errors import HairError
+from ...core.geometry import strands
+from ...core.grooming import groom, groom_defaults
+from ...core.grooming.groom import GuideSettings, HairSettings
+from ...core.interpolation import hair_binding
+from ...core.long_work import Work, part_of, run_now
+from ..data import curves, curves_objects, masks, partings, scene
+from ..data.scene import Surface
+from ..host.datablocks import Remembered
+from ..materials import looks
+from ..settings import preferences, setting_properties
+from . import bindings, staleness
+from .bindings import BoundHair
+
+# Of the guides' own Curves, by their length: so they are seen on a surface of any size.
+_GUIDE_RADIUS = 1.0 / 300.0
+
+
+def distribute_guides(
+    surface_object: Object,
+    settings: GuideSettings,
+    depsgraph: Depsgraph,
+    target: Curves | None = None,
+    keeps_roots: bool = False,
+) -> Curves:
+    """Grow guides on a mesh object; returns their Curves object's data, a new object's unless `target` is given.
+
+    keeps_roots: guides of `target` stay where they are if what placed them is the same. Raises `HairError` before
+    anything in the scene changes.
+    """
+    return run_now(distributing_guides(surface_object, settings, depsgraph, target, keeps_roots))
+
+
+def distributing_guides(
+    surface_object: Object,
+    settings: GuideSettings,
+    depsgraph: Depsgraph,
+    target: Curves | None = None,
+    keeps_roots: bool = False,
+) -> Work[Curves]:
+    """`distribute_guides` as work in steps (core/long_work.py)."""
+    surface = _read_surface(surface_object, depsgraph)
+    density, texture = masks.of_guides(settings).read(surface_object, surface, depsgraph)
+    settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture)
+    key = staleness.root_key(settings, density, None if texture is None else texture.values)
+    roots = _kept_roots(target, surface, key, settings.guide_count) if keeps_roots else None
+    device, place, target = preferences.device(), Remembered(surface_object), Remembered(target)
+    guides = yield lambda progress: groom.distribute_guides(
+        surface.mesh,
+        settings,
+        density=density,
+        texture=texture,
+        mirror_normal=surface.mirror_normal,
+        shape=surface.shape,
+        roots=roots,
+        device=device,
+        progress=progress,
+    )
+    return _write_guides(target.find(), place.find(), surface, guides, settings, key)
+
+
+def interpolate_hair(
+    guide_curves: Curves, settings: HairSettings, depsgraph: Depsgraph, target: Curves | None = None
+) -> Curves:
+    """Grow strands between guides; returns their Curves data, a new object's unless `target` is given.
+
+    Raises `HairError` before anything in the scene changes.
+    """
+    return run_now(interpolating_hair(guide_curves, settings, depsgraph, target))
+
+
+def interpolating_hair(
+    guide_curves: Curves, settings: HairSettings, depsgraph: Depsgraph, target: Curves | None = None
+) -> Work[Curves]:
+    """`interpolate_hair` as work in steps."""
+    place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
+    bound = yield from _binding_hair(guide_curves, settings, depsgraph, target)
+    return _write_bound(its_target.find(), place.find(), its_guides.find(), bound)
+
+
+def bind_hair(
+    guide_curves: Curves, settings: HairSettings, depsgraph: Depsgraph, target: Curves | None = None
+) -> BoundHair:
+    """The `BoundHair` that grows between guides, written nowhere. Strands of `target` keep their roots if they may."""
+    return run_now(_binding_hair(guide_curves, settings, depsgraph, target))
+
+
+def _binding_hair(guide_curves, settings, depsgraph, target):
+    surface = _read_surface(guide_curves.surface, depsgraph, target)
+    guides = curves.read_guides(guide_curves, surface, preferences.device())
+    mask = masks.of_strands(settings, guide_curves.vellus.guides)
+    density, texture = mask.read(guide_curves.surface, surface, depsgraph)
+    settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture, len(guides.roots))
+    key = staleness.root_key(settings, density, None if texture is None else texture.values)
+    parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
+    found = _found_guides(target, settings, key, parting.key, guides, surface)
+    roots = _kept_roots(target, surface, key, settings.strand_count) if found is None else None
+    device, guide_uid = preferences.device(), guide_curves.session_uid
+
+    def compute(progress):
+        if found is None:
+            binding = _bind(surface, guides, settings, (density, texture), parting, roots, device, progress)
+        else:
+            binding = hair_binding.weigh_again(found, settings)
+        return _growing(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface), progress)
+
+    return (yield compute)
+
+
+def _found_guides(target, settings, key, parting_key, guides, surface):
+    """Return the `HairBinding` if a search would find the same guides; otherwise None.
+
+    So changes of weights, limits and widths need no search.
+    """
+    bound = None if target is None else bindings.of(target)
+    if bound is None or (bound.root_key, bound.parting_key) != (key, parting_key):
+        return None
+    most = bound.binding.candidates.indices.shape[1] - 1
+    is_same = bound.surface.is_at_rest_as(surface) and bound.guides.roots.is_same(guides.roots)
+    return bound.binding if is_same and settings.neighbour_limit <= most else None
+
+
+def complete(
+    surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings, depsgraph: Depsgraph
+) -> tuple[GuideSettings, HairSettings]:
+    """`GuideSettings` and `HairSettings` with open settings computed from a mesh object. Raises `HairError`."""
+    _check_surface(surface_object)
+    surface = scene.read_surface(surface_object, depsgraph)
+    completed, _masks = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
+    return completed
+
+
+def _completed(surface_object, surface, guide_settings, hair_settings, depsgraph):
+    """((`GuideSettings`, `HairSettings`), their masks): weights (V,) and `Texture` of guides, and of strands."""
+    guide_mask, hair_mask = masks.of_guides(guide_settings), masks.of_strands(hair_settings, guide_settings)
+    of_guides = guide_mask.read(surface_object, surface, depsgraph)
+    of_hair = of_guides if hair_mask == guide_mask else hair_mask.read(surface_object, surface, depsgraph)
+    mesh, count = surface.posed_mesh, guide_settings.guide_count
+    guide_settings = groom_defaults.complete(guide_settings, mesh, *of_guides)
+    hair_settings = groom_defaults.complete(hair_settings, mesh, *of_hair, guide_count=count)
+    return (guide_settings, hair_settings), (of_guides, of_hair)
+
+
+def adding_hair(
+    surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings, depsgraph: Depsgraph
+) -> Work[tuple[Curves, Curves]]:
+    """Guides on a mesh object and hair between them, as work in steps; returns the Curves of both.
+
+    No object is made before all of it is computed.
+    """
+    surface = _read_surface(surface_object, depsgraph)
+    completed, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
+    (guide_settings, hair_settings), ((density, texture), of_hair) = completed, read
+    parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
+    device, place = preferences.device(), Remembered(surface_object)
+    hair_key = staleness.root_key(hair_settings, of_hair[0], of_hair[1] and of_hair[1].values)
+
+    def compute(progress):
+        groom.load_kernels(device, progress)
+        grown = groom.distribute_guides(
+            surface.mesh,
+            guide_settings,
+            density=density,
+            texture=texture,
+            mirror_normal=surface.mirror_normal,
+            shape=surface.shape,
+            device=device,
+            progress=part_of(progress, 0.0, 0.5),
+        )
+        guides = _as_written(grown, surface, device)
+        progress = part_of(progress, 0.5, 1.0)
+        binding = _bind(surface, guides, hair_settings, of_hair, parting, None, device, progress)
+        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface)
+        return grown, _growing(bound, progress)
+
+    grown, bound = yield compute
+    key = staleness.root_key(guide_settings, density, None if texture is None else texture.values)
+    guide_curves = _write_guides(None, place.find(), surface, grown, guide_settings, key)
+    return guide_curves, write_between(guide_curves, bound)
+
+
+def hair_between(
+    surface_object: Object, surface: Surface, settings: HairSettings, depsgraph: Depsgraph
+) -> Callable[..., BoundHair]:
+    """A function of (guides, progress, density) that computes the `BoundHair` between `Strands` in no Curves yet.
+
+    density: (V,) where strands grow, None for the vertex group that settings name.
+    """
+    painted = scene.read_vertex_group(surface_object, depsgraph, settings.density_group)
+    parting = partings.read(surface_object, surface, None, settings, depsgraph)
+    device = preferences.device()
+
+    def compute(guides, progress, density=None):
+        density = painted if density is None else density
+        completed = groom_defaults.complete(settings, surface.posed_mesh, density, guide_count=len(guides))
+        key = staleness.root_key(completed, density)
+        binding = _bind(surface, guides, completed, (density, None), parting, None, device, progress)
+        return _growing(BoundHair(binding, completed, key, parting.key, guides, None, surface), progress)
+
+    return compute
+
+
+def write_between(guide_curves: Curves, bound: BoundHair) -> Curves:
+    """The Curves of new hair that `hair_between` computed, when its guides are written."""
+    bound.guide_uid = guide_curves.session_uid
+    return _write_bound(None, guide_curves.surface, guide_curves, bound)
+
+
+def _as_written(guides, surface, device):
+    """Guides as Curves will give them back, rounded in local coordinates: hair is the same as if they were there."""
+    points = surface.to_local(guides.numpy())
+    return strands.from_numpy(surface.from_local(points), guides.roots, device)
+
+
+def _bind(surface, guides, settings, mask, parting, roots, device, progress):
+    density, texture = mask
+    return groom.bind_hair(
+        surface.mesh,
+        guides,
+        settings,
+        density=density,
+        texture=texture,
+        regions=parting.regions,
+        lines=parting.lines,
+        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
+        shape=surface.shape,
+        roots=roots,
+        is_mirrored=surface.is_mirrored,
+        device=device,
+        progress=part_of(progress, 0.0, 0.8),
+    )
+
+
+def _growing(bound, progress):
+    """The `BoundHair` when all about its strands is known but where their points are: these grow on other threads."""
+    progress("Growing strands", 0.8)
+    _ = bound.binding.leaders, bound.binding.identities  # now, and not while other threads need the CPU
+    bound.grow()
+    return bound
+
+
+def _write_guides(target, surface_object, surface, guides, settings, key):
+    target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
+    _keep_settings(target, "GUIDES", target.vellus.guides, settings)
+    target.vellus.root_key = key
+    radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * settings.length / surface.scale, np.float32)
+    points = Future()
+    points.set_result(surface.to_local(guides.numpy()))
+    curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
+    curves.write_points(target, points)
+    curves.keep_surface(target, surface)
+    return target
+
+
+def _write_bound(target, surface_object, guide_curves, bound):
+    target = target or curves_objects.new_object("Hair", surface_object).data
+    curves.require_editable(target)
+    target.vellus.guide_curves = guide_curves
+    bindings.keep(target, bound)
+    write_hair(target)
+    looks.evaluate_shading(target)
+    looks.evaluate_guides(guide_curves)
+    return target
+
+
+def write_hair(target: Curves) -> None:
+    """Bring a hair Curves datablock up to what it is bound to, if it is: the one place where hair is written."""
+    bound, state = bindings.of(target), target.vellus
+    if bound is None:
+        return
+    if not bound.has_moved_only:
+        _keep_settings(target, "HAIR", state.hair, bound.settings)
+        state.root_key, state.parting_key = bound.root_key, bound.parting_key
+        binding, radii = bound.binding, bound.radii
+        normals = binding.normals.numpy()
+        curves.make_strands(
+            target,
+            bound.surface,
+            binding.roots,
+            radii,
+            binding.identities,
+            leaders=binding.leaders,
+            normals=normals,
+            written_radii=bound.written_radii,
+        )
+        bound.written_radii = radii
+    if not bound.is_map_written:
+        curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
+    curves.write_points(target, bound.growing)
+    state.is_stale = False  # as another choice of guides marks it
+    state.followed = staleness.guides_digest(state.guide_curves)
+    bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
+    _store_roots(state.guide_curves, bound)
+
+
+def _store_roots(guide_curves, bound):
+    """Store the roots of guides that were drawn or slid by a brush, so that they follow their surface."""
+    if guide_curves is None or guide_curves.library is not None or guide_curves.session_uid != bound.guide_uid:
+        return
+    roots, surface = bound.guides.roots, bound.surface
+    stored = curves.read_root_places(guide_curves, len(surface.rest))
+    if stored is None or not all(map(np.array_equal, stored, surface.places(roots))):
+        curves.write_roots(guide_curves, surface, roots)
+
+
+def _kept_roots(target, surface, key, count):
+    """The `SurfacePoints` that Curves store, if they were placed by this `root_key` on these triangles; else None.
+
+    count: how many are wanted. Somebody may have deleted some, or all.
+    """
+    if target is None or (target.vellus.root_key, target.vellus.topology) != (key, surface.topology):
+        return None
+    if len(target.curves) != count:
+        return None
+    return curves.stored_roots(target, surface, is_complete=True)
+
+
+def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
+    """Make Curves again from the settings and inputs they keep. What is wrong becomes their status.
+
+    Combed Curves are not changed: only an operator replaces them.
+    """
+    state = target.vellus
+    state.is_stale = False
+    try:
+        require_uncombed(target)
+        if state.kind == "GUIDES":
+            settings = setting_properties.to_settings(state.guides, groom.GuideSettings)
+            distribute_guides(target.surface, settings, depsgraph, target, keeps_roots=True)
+        elif state.kind == "HAIR":
+            interpolate_hair(*inputs_of(target), depsgraph, target)
+    except HairError as error:
+        state.status = str(error)
+
+
+def require_uncombed(target: Curves) -> None:
+    """Raise `HairError` for hand-edited Curves."""
+    if not curves.is_combed(target):
+        return
+    if target.vellus.kind == "HAIR":
+        raise HairError("Hand-edited: these settings no longer apply. Regenerate Strands discards the edits.")
+    if curves.is_hand_made(target):
+        raise HairError("Hand-made: these settings do not apply. Regenerate Guides replaces the guides.")
+    raise HairError("Hand-edited: these settings no longer apply. Regenerate Guides discards the edits.")
+
+
+def inputs_of(target: Curves) -> tuple[Curves, HairSettings]:
+    """(guide Curves, `HairSettings`) of a hair Curves datablock. Raises `HairError`."""
+    state = target.vellus
+    if state.guide_curves is None:
+        raise HairError(f'"{target.name}" has no guides: pick them in the Strands panel.')
+    return state.guide_curves, setting_properties.to_settings(state.hair, groom.HairSettings)
+
+
+def _read_surface(surface_object, depsgraph, target=None):
+    """The `Surface` of a mesh object that may be changed.
+
+    The surface that `target` is bound to, if that is the same: of which normals and areas are known.
+    """
+    _check_surface(surface_object)
+    curves_objects.keep_rest(surface_object)
+    surface, bound = scene.read_surface(surface_object, depsgraph), target and bindings.of(target)
+    if bound is not None and bound.surface.is_same(surface):
+        surface = bound.surface
+    return surface
+
+
+def _check_surface(surface_object):
+    if surface_object is None or surface_object.type != "MESH":
+        raise HairError("Hair needs a mesh object to grow on: select one.")
+    curves.require_editable(surface_object)
+
+
+def _keep_settings(target, kind, group, settings):
+    curves.require_editable(target)
+    setting_properties.assign(group, settings)
+    target.vellus.kind = kind
+    target.vellus.is_stale = False
+    target.vellus.status = ""

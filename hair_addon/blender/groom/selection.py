@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The targets of operators, from the active object: its surface, the guides on it, the hair that follows them."""
+
+import bpy
+from bpy.types import Context, Curves, Object, SpaceView3D, ViewLayer
+
+from ..data.curves import followers
+
+
+def active_of_kind(active: Object | None, kind: str) -> Curves | None:
+    """The Curves of the active object if they are ours and of this kind, GUIDES or HAIR; else None."""
+    if active is not None and active.type == "CURVES" and active.data.vellus.kind == kind:
+        return active.data
+    return None
+
+
+def surface_of(active: Object | None) -> Object | None:
+    """The mesh object that is active, or that the active guides or hair grow on; None if there is none."""
+    if active is None:
+        return None
+    if active.type == "MESH":
+        return active
+    return active.data.surface if active.type == "CURVES" else None
+
+
+def guides_again(active: Object | None) -> Curves | None:
+    """The guides that distributing again would replace: the active ones, or the active hair's; None on a mesh."""
+    hair = active_of_kind(active, "HAIR")
+    return active_of_kind(active, "GUIDES") if hair is None else hair.vellus.guide_curves
+
+
+def guides_of(active: Object | None) -> Curves | None:
+    """The active guides, the active hair's guides, or the newest guides on the active mesh; None if there are none."""
+    if active is None or active.type != "MESH":
+        return guides_again(active)
+    return _newest(curves_on(active, "GUIDES"))
+
+
+def hair_of(active: Object | None) -> Curves | None:
+    """The active hair, the newest that follows the active guides, or the newest on the active mesh; None if none."""
+    if active is None:
+        return None
+    if active.type == "MESH":
+        return _newest(curves_on(active, "HAIR"))
+    guides = active_of_kind(active, "GUIDES")
+    return active_of_kind(active, "HAIR") if guides is None else _newest(followers(guides))
+
+
+def curves_on(surface: Object, kind: str) -> list[Curves]:
+    """Every guide or hair Curves datablock on a mesh object."""
+    return [c for c in bpy.data.hair_curves if c.vellus.kind == kind and c.surface == surface]
+
+
+def parts_of(active: Object | None) -> list[Curves]:
+    """The Curves that are deleted together: the active guides and their hair, or the active hair and its guides if
+    no other hair follows those, or all on the active mesh."""
+    hair, guides = active_of_kind(active, "HAIR"), active_of_kind(active, "GUIDES")
+    if hair is not None:
+        its_guides = hair.vellus.guide_curves
+        return [hair] if its_guides is None or followers(its_guides) != [hair] else [hair, its_guides]
+    if guides is not None:
+        return [guides, *followers(guides)]
+    if active is None or active.type != "MESH":
+        return []
+    return curves_on(active, "GUIDES") + curves_on(active, "HAIR")
+
+
+def drawn_with(active: Object | None) -> list[Curves]:
+    """The hair that drawing is switched on and off for: the active one, or all in the file."""
+    hair = active_of_kind(active, "HAIR")
+    return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"] if hair is None else [hair]
+
+
+def mesh_to_attach_to(context: Context) -> Object | None:
+    """The mesh object to attach active guides or hair to: the one selected with them, or their surface."""
+    if not any(active_of_kind(context.object, kind) for kind in ("GUIDES", "HAIR")):
+        return None
+    selected = next((o for o in context.selected_objects if o.type == "MESH"), None)
+    return selected or context.object.data.surface
+
+
+def object_of(curves: Curves, view_layer: ViewLayer) -> Object | None:
+    """The first object of a view layer that shows Curves; None if there is none."""
+    return next((o for o in _there(view_layer) if o.data == curves), None)
+
+
+def make_active(chosen: Object, view_layer: ViewLayer) -> None:
+    """Select an object and nothing else."""
+    for other in _there(view_layer):
+        other.select_set(other == chosen)
+    view_layer.objects.active = chosen
+
+
+def reveal(hidden: Object, view_layer: ViewLayer, viewport: SpaceView3D | None) -> None:
+    """Show an object in its view layer, with its collections, and in the local view of a 3-D viewport, or None.
+
+    Objects hidden by a library or a driver stay hidden.
+    """
+    if not hidden.visible_get(view_layer=view_layer):
+        if hidden.library is None:
+            hidden.hide_viewport = False
+        hidden.hide_set(False, view_layer=view_layer)
+        for shown in _path_to(hidden, view_layer.layer_collection):
+            shown.hide_viewport = False
+            if shown.collection.library is None:
+                shown.collection.hide_viewport = False
+    if viewport is not None and viewport.local_view is not None:
+        hidden.local_view_set(viewport, True)
+
+
+def _path_to(contained, layer_collection):
+    """The layer collections from one down to the first below that holds an object; empty if none does."""
+    if layer_collection.exclude:
+        return []
+    if contained in {*layer_collection.collection.objects}:
+        return [layer_collection]
+    paths = (_path_to(contained, child) for child in layer_collection.children)
+    return next(([layer_collection, *path] for path in paths if path), [])
+
+
+def _there(view_layer):
+    """The objects of a view layer; those that a script has just removed are listed as None until the next update."""
+    return [o for o in view_layer.objects if o is not None]
+
+
+def _newest(candidates):
+    return max(candidates, key=lambda curves: curves.session_uid, default=None)

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Detection of outdated guides and hair: keys of roots, guides, masks and partings."""
+
+import hashlib
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ...core import geometry
+from ...core.grooming import groom
+from ...core.params import Settings
+from ..data import curves, masks, partings, scene
+from ..settings import setting_properties
+
+
+def root_key(settings: Settings, density: np.ndarray | None, image: np.ndarray | None = None) -> str:
+    """Key of the inputs of root placement, apart from the surface. image: its values, if there is one."""
+    names = (
+        *("seed", "guide_count", "relax_iterations", "density_image", "curvature", "symmetric"),
+        "strand_count",
+    )
+    placing = repr([getattr(settings, name, None) for name in names])
+    painted = b"".join(values.tobytes() for values in (density, image) if values is not None)
+    return hashlib.blake2b(placing.encode() + painted, digest_size=16).hexdigest()
+
+
+def guides_digest(guide_curves: Curves | None) -> str:
+    """Digest of guides, to detect hair written for other ones: undo may restore only one of them."""
+    if guide_curves is None:
+        return ""
+
+    return geometry.fingerprint.fingerprint(curves.read_points(guide_curves))
+
+
+def has_other_parting(target: Curves, depsgraph: Depsgraph) -> bool:
+    """Whether the regions or part lines of hair have changed. Raises `HairError`."""
+    group = target.vellus.hair
+    if not partings.is_wanted(group) or target.surface is None:
+        return False
+    surface = scene.read_surface(target.surface, depsgraph)
+    parting = partings.read(target.surface, surface, target.vellus.guide_curves, group, depsgraph)
+    return parting.key != target.vellus.parting_key
+
+
+def has_other_mask(target: Curves, depsgraph: Depsgraph) -> bool:
+    """Whether the mask has changed since roots were placed: other names, or painted. Raises `HairError`."""
+    state, mask = target.vellus, masks.of_curves(target)
+    group, settings_class = (
+        (state.guides, groom.GuideSettings) if state.kind == "GUIDES" else (state.hair, groom.HairSettings)
+    )
+    settings = setting_properties.to_settings(group, settings_class)
+    density = scene.read_vertex_group(target.surface, depsgraph, mask.group)
+    return state.root_key != root_key(settings, density, scene.read_image(mask.image))

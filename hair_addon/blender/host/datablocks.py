@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""References to datablocks by session UID, valid across undo and deletion."""
+
+import bpy
+
+from ...core.errors import HairError
+from .notices import name_of
+
+
+class Remembered:
+    """A reference to a datablock, or None, by session UID."""
+
+    def __init__(self, datablock):
+        self._uid = None if datablock is None else datablock.session_uid
+        self._name = None if datablock is None else name_of(datablock)
+        self._collection = "objects" if isinstance(datablock, bpy.types.Object) else "hair_curves"
+
+    def find(self):
+        """Return the datablock. Raises `HairError` if it was deleted."""
+        if self._uid is None:
+            return None
+        found = next((d for d in getattr(bpy.data, self._collection) if d.session_uid == self._uid), None)
+        if found is None:
+            raise HairError('"{name}" was deleted while hair was being computed.', name=self._name)
+        return found

@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Console messages about data, each printed once, as drawing would repeat them."""
+
+import sys
+
+import numpy as np
+
+from .caches import Cache
+
+_LARGEST = 1e15  # squares of single-precision numbers must stay finite
+
+
+said_cache = Cache()  # sentence → True
+
+
+def say(sentence):
+    """Print a message, unless it was printed before."""
+    if said_cache.get(sentence) is None:
+        said_cache.keep(sentence, True)
+        print(f"Vellus: {sentence}", file=sys.stderr)
+
+
+def name_of(owner):
+    """The name of a datablock; a readable replacement if it is not valid UTF-8, as in a damaged file."""
+    try:
+        return owner.name
+    except UnicodeDecodeError:
+        return "(unreadable name)"
+
+
+def can_be_drawn(datablock, *values):
+    """Whether numbers of a datablock are finite and not absurdly large; if not, say that it is left out."""
+    # Written so that NaN fails too: every comparison with it is false.
+    if all((np.abs(np.asarray(value, np.float64)) <= _LARGEST).all() for value in values):
+        return True
+    say(f"{name_of(datablock)!r} is skipped: it has infinite or NaN values.")
+    return False

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Paths that a .blend or a user names, operators that this Blender has, and the version that goes into file headers."""
+
+import tomllib
+from functools import cache
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import HairError
+
+
+def resolve(path):
+    """A path of Blender's, `//` and all, as an absolute `Path`. Raises `HairError` for one that leads nowhere."""
+    if not path.strip("/"):
+        raise HairError("No file or folder was given: pick one.")
+    if "\0" in path:
+        raise HairError("The path contains an invalid character: type it again.")
+    if path.startswith("//") and not bpy.data.filepath:
+        raise HairError(f"{path} is relative to the .blend file: save the file first.")
+    if path.startswith("\\\\"):
+        raise HairError(f"{path} is on another computer, to which Vellus does not write: pick a local folder.")
+    return Path(bpy.path.abspath(path)).resolve()
+
+
+def has_operator(name):
+    """Whether this Blender has an operator such as "wm.usd_import": some are built without, some are in add-ons."""
+    category, operator = name.split(".")
+    return operator in dir(getattr(bpy.ops, category))
+
+
+@cache
+def addon_version():
+    """The version in blender_manifest.toml."""
+    manifest = Path(__file__).resolve().parents[3] / "blender_manifest.toml"
+    return tomllib.loads(manifest.read_text(encoding="utf-8"))["version"]

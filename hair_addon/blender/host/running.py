@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The running long operation, if any: panels show it, handlers wait for it, unregistering ends it.
+
+There is at most one: its operator blocks all input except Esc and navigation until it has ended.
+"""
+
+_job = None
+_timer = None
+
+
+def job():
+    """The `Job` that runs now, or None."""
+    return _job
+
+
+def begin(context, started):
+    """Take note of a `Job`, and have its window send timer events for as long as it runs."""
+    global _job, _timer
+    _job = started
+    if _timer is None:
+        _timer = context.window_manager.event_timer_add(0.05, window=context.window)
+
+
+def end(context):
+    """Stop the job if it still runs, wait for it, and leave no timer behind."""
+    global _job, _timer
+    if _job is not None:
+        _job.stop()
+        _job.wait()
+        _job = None
+    if _timer is not None:
+        context.window_manager.event_timer_remove(_timer)
+        _timer = None

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scene time: the current frame, changing frames, sub-frames, and what a dependency graph is evaluated for.
+
+Code that depends on time uses these functions. A viewport's dependency graph is at the scene's current frame; a render
+has a dependency graph of its own. `live/handlers.py` reacts to frame changes.
+"""
+
+import math
+
+import bpy
+
+
+def frame_of(blender_scene):
+    """Return the current frame of a scene, original or evaluated."""
+    return blender_scene.frame_current
+
+
+def present_frame():
+    """Return the current frame of the active scene."""
+    return frame_of(bpy.context.scene)
+
+
+def scene_frames():
+    """Return the frame range of the active scene."""
+    return range(bpy.context.scene.frame_start, bpy.context.scene.frame_end + 1)
+
+
+def go_to(blender_scene, frame):
+    """Change a scene to a whole frame and evaluate it."""
+    blender_scene.frame_set(frame)
+
+
+def visit(blender_scene, offsets, set_frame):
+    """Change a scene to several times in turn, and back afterwards: a generator of the indices of `offsets`.
+
+    offsets: in frames, relative to the current time; set_frame: called with a whole frame and the fraction as
+    `subframe`, like a render engine's `frame_set`.
+    """
+
+    def go(moment):
+        whole = math.floor(moment)
+        set_frame(whole, subframe=moment - whole)
+
+    now = blender_scene.frame_current_final
+    try:
+        for index, offset in enumerate(offsets):
+            if offset != 0.0 or any(offsets[:index]):
+                go(now + offset)
+            yield index
+    finally:
+        if any(offsets):
+            go(now)
+
+
+def is_shown(depsgraph):
+    """Whether a depsgraph is evaluated for a viewport."""
+    return depsgraph.mode == "VIEWPORT"
+
+
+def is_rendered(depsgraph):
+    """Whether a depsgraph is evaluated for a render."""
+    return depsgraph.mode == "RENDER"
+
+
+def may_write(blender_scene, depsgraph):
+    """Whether data may be written now: a render runs in parallel to the interface unless that is locked."""
+    return is_shown(depsgraph) or bpy.app.background or blender_scene.render.use_lock_interface

@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of the open scene → image files, written atomically: rendered by Vellus, Cycles or EEVEE."""
+
+import contextlib
+import os
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import HairError, cause_of
+from ...core.files.whole_file import require_place, whole_file
+from ...core.imaging import picture_checks
+from ...core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME, PassSettings
+from ...core.long_work import no_progress
+from ...core.params import declared
+from ..host import scene_time
+from ..render import engine as render_engine
+from ..render import viewport
+
+# The user's names → Blender's names.
+ENGINES = {"vellus": viewport.ENGINE, "cycles": "CYCLES", "eevee": "BLENDER_EEVEE"}
+
+# Ending → (Blender's format, bits of a colour).
+_FORMATS = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32")}
+
+
+def scene_size():
+    """{"width", "height"} of the open scene's pictures [pixels]."""
+    settings = bpy.context.scene.render
+    part = settings.resolution_percentage / 100.0
+    return {"width": max(1, int(settings.resolution_x * part)), "height": max(1, int(settings.resolution_y * part))}
+
+
+def path_of(pattern, frame):
+    """The file of a frame: the last row of # in a pattern's name becomes the number, padded with zeros."""
+    pattern = Path(pattern)
+    width = _number_width(pattern)
+    if not width:
+        return pattern
+    before, _hashes, after = pattern.name.rpartition("#" * width)
+    return pattern.with_name(f"{before}{frame:0{width + (frame < 0)}d}{after}")
+
+
+def is_sequence(pattern):
+    """Whether a pattern names a file for each frame."""
+    return _number_width(Path(pattern)) > 0
+
+
+def require_pattern(pattern, frame_count):
+    """Raise `HairError` unless a number of frames can be written to a pattern."""
+    pattern = Path(pattern)
+    if pattern.suffix.lower() not in _FORMATS:
+        ending = pattern.suffix or "a file without an extension"
+        raise HairError(f"Pictures are saved as {' or '.join(_FORMATS)}, not as {ending}.")
+    if os.sep == "/" and "\\" in str(pattern.absolute()):
+        raise HairError(f"{pattern} has a backslash, which Blender treats as a path separator: choose another path.")
+    if frame_count > 1 and not _number_width(pattern):
+        raise HairError(f"{pattern} is a single file for {frame_count} frames: add #### for the frame number.")
+    try:
+        str(pattern.absolute()).encode()
+    except UnicodeEncodeError as error:
+        raise HairError(f"{str(pattern)!a} cannot be written: Blender accepts only UTF-8 paths.") from error
+    require_place(path_of(pattern, 1))
+
+
+def require_view_layer():
+    """Raise `HairError` if no view layer of the open scene is rendered: Blender would crash."""
+    if not any(layer.use for layer in bpy.context.scene.view_layers):
+        raise HairError("No view layer of the scene is rendered: turn on Use for Rendering in one of them.")
+
+
+def _number_width(pattern):
+    """Number of # in the last run of them in a name."""
+    name = pattern.name.rstrip("".join({*pattern.name} - {"#"}))
+    return len(name) - len(name.rstrip("#"))
+
+
+def write_frame(path, frame, engine, settings, partial=None, progress=no_progress):
+    """Render a frame of the open scene and write it; the file appears whole or not at all. Raises `HairError`.
+
+    engine: of `ENGINES`; settings: `FrameSettings`; partial: of `whole_file`; progress(step, part): told how far
+    it is, and may raise to stop it: Vellus after any pass, others before the file is written.
+    """
+    blender_scene = bpy.context.scene
+    if not FIRST_FRAME <= frame <= LAST_FRAME:
+        raise HairError(f"There is no frame {frame}: Blender's frames range from {FIRST_FRAME} to {LAST_FRAME}.")
+    require_view_layer()
+    if settings.has_passes and path.suffix.lower() != ".exr":
+        raise HairError(f"Passes are layers of an .exr file: change the extension of {path}.")
+    if blender_scene.camera is None:
+        raise HairError("The scene has no camera: add one.")
+    with whole_file(path, partial) as partial, _rendering(blender_scene, partial, engine, settings):
+        scene_time.go_to(blender_scene, frame)
+        progress(f"Frame {frame}", 0.0)
+        try:
+            with render_engine.listening(lambda _step, part: progress(f"Frame {frame}", part)):
+                ended = bpy.ops.render.render(write_still=True, scene=blender_scene.name)
+        except RuntimeError as error:
+            raise HairError(f"Frame {frame} was not rendered: {cause_of(error)}.") from error
+        if ended != {"FINISHED"}:
+            raise HairError(f"Frame {frame} was not rendered: {engine} stopped before it finished.")
+        picture_checks.require_whole(partial, path)
+        progress(f"Frame {frame}", 1.0)
+
+
+@contextlib.contextmanager
+def _rendering(blender_scene, path, engine, settings):
+    """The scene's own settings of renders are others for the time that it takes."""
+    wanted = [*_of_scene(blender_scene, path, engine, settings)]
+    if settings.has_passes:
+        wanted += [change for layer in blender_scene.view_layers for change in _of_layer(layer)]
+    before = [(owner, name, getattr(owner, name)) for owner, name, _value in wanted]
+    try:
+        _set(wanted)
+        yield
+    finally:
+        _set(before)
+
+
+def _of_scene(blender_scene, path, engine, settings):
+    render, image = blender_scene.render, blender_scene.render.image_settings
+    file_format, color_depth = _FORMATS[path.suffix.lower()]
+    yield render, "engine", ENGINES[engine]
+    # Braces are template variables in this path, and are escaped by doubling.
+    yield render, "filepath", str(path.absolute()).replace("{", "{{").replace("}", "}}")
+    yield render, "use_file_extension", False
+    yield render, "resolution_x", settings.width
+    yield render, "resolution_y", settings.height
+    yield render, "resolution_percentage", 100
+    yield render, "film_transparent", settings.is_transparent or render.film_transparent
+    yield image, "media_type", "MULTI_LAYER_IMAGE" if settings.has_passes else "IMAGE"
+    yield image, "file_format", "OPEN_EXR_MULTILAYER" if settings.has_passes else file_format
+    if not settings.has_passes:
+        yield image, "color_mode", "RGBA"
+    yield image, "color_depth", color_depth
+    if settings.sample_count:
+        owner, name = {
+            "vellus": (blender_scene.vellus, "sample_count"),
+            "cycles": (blender_scene.cycles, "samples"),
+            "eevee": (blender_scene.eevee, "taa_render_samples"),
+        }[engine]
+        yield owner, name, settings.sample_count
+
+
+def _of_layer(view_layer):
+    for name in ("use_pass_z", "use_pass_vector", "use_pass_shadow"):
+        yield view_layer, name, True
+    for name, _default, _details in declared(PassSettings):
+        yield view_layer.vellus, name, True
+
+
+def _set(values):
+    for owner, name, value in values:
+        setattr(owner, name, value)

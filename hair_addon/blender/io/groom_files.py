@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Grooms → files: a .blend, arrays, USD, Alembic."""
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.files.whole_file import require_place, require_room, whole_file
+from ..groom.selection import object_of
+from ..host import paths, scene_time
+from . import strand_arrays
+
+_USD = (".usd", ".usdc", ".usda", ".usdz")
+ENDINGS = (".blend", ".npz", *_USD, ".abc")
+
+_OPERATORS = {".abc": "wm.alembic_export"} | dict.fromkeys(_USD, "wm.usd_export")
+
+# Bytes of an Alembic file per vertex, face corner and strand point, with a margin.
+_VERTEX_BYTES, _CORNER_BYTES, _POINT_BYTES = 16, 48, 24
+
+
+def require_writable(path):
+    """Raise `HairError` unless `write` could write a groom there."""
+    ending = path.suffix.lower()
+    if ending not in ENDINGS:
+        raise HairError(f"Grooms are saved as {', '.join(ENDINGS)}, not as {ending or 'a file without an extension'}.")
+    if ending in _OPERATORS and not paths.has_operator(_OPERATORS[ending]):
+        raise HairError(f"{path} cannot be written: this build of Blender lacks its exporter, {_OPERATORS[ending]}.")
+    require_place(path)
+
+
+def write(path, guides, hair, file_axes):
+    """Write guide and hair Curves; a .blend holds all of the open file, the others these and their surface.
+
+    file_axes: (3, 3), Blender's axes → those that arrays are to be in. The file appears whole or not at all.
+    Raises `HairError`.
+    """
+    with whole_file(path) as partial:
+        ending = path.suffix.lower()
+        if ending == ".blend":
+            bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
+        elif ending == ".npz":
+            np.savez(partial, **arrays(guides, hair, file_axes))
+        else:
+            _select(guides, hair)
+            _export(partial, ending, guides, hair)
+
+
+def arrays(guides, hair, file_axes):
+    """{name: float32 [m]}: roots (S, 3), guide_points (G, P, 3) and strand_points (S, P, 3)."""
+    turned = {
+        name: np.ascontiguousarray(strand_arrays.world_points(curves) @ file_axes.T.astype(np.float32))
+        for name, curves in (("guide_points", guides), ("strand_points", hair))
+    }
+    return {"roots": turned["strand_points"][:, 0], **turned}
+
+
+def _select(guides, hair):
+    """Select only the objects of guides, hair and their surface, for exporters."""
+    layer = bpy.context.view_layer
+    layer.update()
+    wanted = [object_of(guides, layer), object_of(hair, layer), guides.surface]
+    for shown in layer.objects:
+        shown.select_set(shown in wanted)
+
+
+def _export(partial, ending, guides, hair):
+    scale = strand_arrays.metres_per_unit(bpy.context.scene)
+    if ending == ".abc":
+        # The exporter crashes on a full disk: reserve space for the file first.
+        require_room(partial, _alembic_bytes(guides, hair))
+        frame = scene_time.present_frame()
+        bpy.ops.wm.alembic_export(
+            filepath=str(partial), selected=True, start=frame, end=frame, global_scale=scale, as_background_job=False
+        )
+    else:
+        bpy.ops.wm.usd_export(
+            filepath=str(partial), selected_objects_only=True, export_hair=True, export_textures_mode="KEEP"
+        )
+        if scale != 1.0:
+            _say_unit(partial, scale)
+
+
+def _say_unit(path, scale):
+    """Set metersPerUnit of a USD file: Blender writes and reads one metre for any scene."""
+    if path.suffix.lower() == ".usdz":
+        raise HairError("Blender cannot store this scene's unit in a .usdz file: write a .usdc file.")
+    bpy.utils.expose_bundled_modules()
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(path))
+    UsdGeom.SetStageMetersPerUnit(stage, scale)
+    stage.Save()
+
+
+def _alembic_bytes(guides, hair):
+    mesh = guides.surface.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    strands = sum(len(curves.points) * _POINT_BYTES for curves in (guides, hair))
+    return 100_000 + len(mesh.vertices) * _VERTEX_BYTES + len(mesh.loops) * _CORNER_BYTES + strands

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Summary of the hair in the open file."""
+
+from dataclasses import asdict
+
+import bpy
+
+from ...core.errors import HairError
+from ...core.grooming import cost
+from ...core.grooming.groom import GuideSettings, HairSettings
+from ..data import curves, scene
+from ..data.curves import followers
+from ..groom import diagnostics
+from ..host.notices import name_of
+from ..settings import properties, setting_properties
+from . import strand_arrays
+
+
+def open_file():
+    """{name: value} of the open file's surfaces, guides and hair, and of other curves."""
+    shown = bpy.context.scene.objects
+    return {
+        "metres_per_unit": strand_arrays.metres_per_unit(bpy.context.scene),
+        "surfaces": [_surface(o) for o in shown if o.type == "MESH"],
+        "guides": [_guides(c) for c in bpy.data.hair_curves if c.vellus.kind == "GUIDES"],
+        "hair": [_hair(c) for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"],
+        "curves": [_counts(c) for c in bpy.data.hair_curves if c.vellus.kind == "NONE"],
+    }
+
+
+def _surface(surface_object):
+    mesh = surface_object.data
+    uv_map = name_of(mesh.uv_layers.active) if mesh.uv_layers.active else None
+    triangles = scene.triangle_count(surface_object, bpy.context.view_layer)
+    return {"name": name_of(surface_object), "vertices": len(mesh.vertices), "triangles": triangles, "uv_map": uv_map}
+
+
+def _counts(datablock):
+    return {"name": name_of(datablock), "strands": len(datablock.curves), "points": len(datablock.points)}
+
+
+def _guides(datablock):
+    return {
+        **_counts(datablock),
+        "surface": datablock.surface and name_of(datablock.surface),
+        "is_combed": curves.is_combed(datablock),
+        "hair": [name_of(hair) for hair in followers(datablock)],
+        "settings": _settings(lambda: setting_properties.to_settings(datablock.vellus.guides, GuideSettings)),
+        "warnings": _warnings(datablock),
+    }
+
+
+def _hair(datablock):
+    state = datablock.vellus
+    slots = state.hair.neighbour_limit if state.hair.guide_map else 0
+    points = len(datablock.points) // max(1, len(datablock.curves))
+    return {
+        **_counts(datablock),
+        "bytes": cost.curves_bytes(len(datablock.curves), points, slots),
+        "surface": datablock.surface and name_of(datablock.surface),
+        "guides": state.guide_curves and name_of(state.guide_curves),
+        "is_combed": curves.is_combed(datablock),
+        "model": state.model,
+        "settings": _settings(lambda: setting_properties.to_settings(state.hair, HairSettings)),
+        "appearance": _settings(lambda: properties.look_of(state)),
+        "warnings": _warnings(datablock),
+    }
+
+
+def _settings(read):
+    """Settings as {name: value}, or why they cannot be."""
+    try:
+        return asdict(read())
+    except HairError as error:
+        return {"error": str(error)}
+
+
+def _warnings(datablock):
+    """Warnings that the panel would show."""
+    state = datablock.vellus
+    said = [warning.text for warning in diagnostics.warnings_of(datablock.surface, [datablock])]
+    return said + [status for status in (state.status, state.shading_status, state.uv_status) if status]

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of a sequence, shared among all processes with the same command: none is rendered twice.
+
+A frame is done when its file exists and is complete: files are written atomically, but another program may have left
+an empty one with the same name. A file beside the frames identifies the sequence, so that another command does not
+continue it.
+"""
+
+import contextlib
+import hashlib
+import json
+import time
+from pathlib import Path
+
+from ...core.errors import HairError, cause_of
+from ...core.files.file_lock import claim, claim_of
+from ...core.files.whole_file import partial_of, require_place, whole_file
+from ...core.imaging import picture_checks
+from ...core.long_work import no_progress
+from ..host import paths
+from . import frames
+
+_VERSION = 1
+_PAUSE = 0.5  # [s] between checks of other processes' frames
+
+
+def description(input_path, engine, settings):
+    """Description of a sequence, equal for commands with the same result.
+
+    input_path: the .blend; engine: of `frames.ENGINES`; settings: {name: value}.
+    """
+    with open(input_path, "rb") as file:
+        digest = hashlib.file_digest(file, lambda: hashlib.blake2b(digest_size=16)).hexdigest()
+    program = f"Vellus {paths.addon_version()}"
+    return {"sequence": _VERSION, "program": program, "input": digest, "engine": engine, "settings": settings}
+
+
+def begin(pattern, numbers, described, replaces=False):
+    """Get ready for frames of a sequence; raises `HairError` where there are others than those described.
+
+    pattern: as `frames.path_of` takes it; numbers: of the frames; described: `description`; replaces: drop what is
+    there of these frames, and make them again.
+    """
+    record = record_of(pattern)
+    require_place(record)
+    folder = next((path for number in numbers if (path := frames.path_of(pattern, number)).is_dir()), None)
+    if folder is not None:
+        raise HairError(f"{folder} is a folder: move it, or choose another file name.")
+    while True:
+        with _claimed(record) as is_ours:
+            if is_ours:
+                _begin(pattern, numbers, record, described, replaces)
+                return
+        time.sleep(_PAUSE)
+
+
+@contextlib.contextmanager
+def _claimed(path):
+    """`claim`, with a sentence where the folder takes no further file. Raises `HairError`."""
+    try:
+        with claim(path) as is_ours:
+            yield is_ours
+    except OSError as error:
+        raise HairError(f"{path} cannot be written: {cause_of(error)}.") from error
+
+
+def record_of(pattern):
+    """The hidden file beside a sequence that identifies it."""
+    pattern = Path(pattern)
+    return pattern.with_name(f".{pattern.name}.json")
+
+
+def _begin(pattern, numbers, record, described, replaces):
+    if replaces:
+        for number in numbers:
+            frames.path_of(pattern, number).unlink(missing_ok=True)
+    elif record.exists():
+        _require_same(record, described)
+        return
+    else:
+        _require_none(pattern, numbers)
+    with whole_file(record) as partial:
+        partial.write_text(json.dumps(described, indent=1) + "\n", encoding="utf-8")
+
+
+def _require_same(record, described):
+    try:
+        found = json.loads(record.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as error:
+        raise HairError(f"{record} cannot be read: remove it, or use --overwrite to start over.") from error
+    other = [key for key, value in described.items() if not isinstance(found, dict) or found.get(key) != value]
+    if other:
+        what = ", ".join(other)
+        raise HairError(
+            f"{record} belongs to another sequence ({what}): choose another name, or use --overwrite to start over."
+        )
+
+
+def _require_none(pattern, numbers):
+    paths = (frames.path_of(pattern, number) for number in numbers)
+    there = next((path for path in paths if path.exists() and not picture_checks.is_broken(path)), None)
+    if there is not None:
+        raise HairError(f"{there} belongs to no known sequence: choose another name, or use --overwrite.")
+
+
+def make(pattern, numbers, write, told=no_progress):
+    """Render frames not yet rendered or claimed, and wait for claimed ones; yields (number, path) of each.
+
+    write(path, number): makes one, whole or not at all; told(step, part): told how far the sequence is, may raise to
+    stop.
+    """
+    left = list(numbers)
+    while left:
+        is_idle = True
+        for number in list(left):
+            told(f"Frame {number}", 1.0 - len(left) / len(numbers))
+            path = frames.path_of(pattern, number)
+            if not picture_checks.is_whole(path):
+                with _claimed(path) as is_ours:
+                    if not is_ours:
+                        continue
+                    if not picture_checks.is_whole(path):
+                        write(path, number)
+                        is_idle = False
+                        yield number, path
+            left.remove(number)
+        if left and is_idle:
+            time.sleep(_PAUSE)
+    _sweep(pattern, numbers)
+
+
+def _sweep(pattern, numbers):
+    """Remove partial files of killed processes, for frames that others have rendered since."""
+    for path in [frames.path_of(pattern, number) for number in numbers]:
+        if partial_of(path).exists() or claim_of(path).exists():
+            with _claimed(path) as is_ours:
+                if is_ours:
+                    partial_of(path).unlink(missing_ok=True)

@@ -1,0 +1,221 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""bpy.app.handlers: detection of outdated hair from depsgraph updates."""
+
+import bpy
+from bpy.app.handlers import persistent
+
+from ..data import curves_objects
+from ..groom import bindings, pipeline
+from ..host import running, scene_time
+from ..host.notices import name_of
+from ..materials import looks
+from ..settings import animated
+from . import invalidation, live_hair, reported
+
+# Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
+_is_opening = False
+
+# Whether an undo or redo may have brought back guides without the hair that was written for them, or the reverse.
+_is_undone = False
+
+
+@persistent
+def after_depsgraph_update(_scene, depsgraph):
+    """Invalidate changed GPU data, and regenerate Curves with changed settings or inputs."""
+    if not scene_time.is_shown(depsgraph):
+        return
+    global _is_opening, _is_undone
+    invalidation.scene_changed(is_hair_only=_is_hair_only(depsgraph))
+    if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
+        looks.follow_guides(depsgraph.view_layer)
+    if _is_opening:
+        _is_opening = False
+        return
+    changed = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
+    for surface_object in _deformed(depsgraph):
+        invalidation.surface_moved(surface_object)
+        # Hair waits until the surface leaves edit and paint modes.
+        if surface_object.mode == "OBJECT":
+            live_hair.follow_surface(surface_object, depsgraph, surface_object.data in changed)
+    moved = [u.id.original for u in depsgraph.updates if u.is_updated_geometry or u.is_updated_transform]
+    live_hair.follow_partings(moved, depsgraph)
+    reported.remember_axes()
+    if _is_undone:
+        _is_undone = False
+        for datablock in _of_kind("HAIR"):
+            if datablock.vellus.is_live and live_hair.is_left_by_undo(datablock):
+                datablock.vellus.is_stale = True
+    if any(isinstance(update.id, bpy.types.Image | bpy.types.World) for update in depsgraph.updates):
+        invalidation.image_changed()
+    _mark_painted({update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Image)})
+    combed = []
+    for datablock in changed:
+        if isinstance(datablock, bpy.types.Curves):
+            invalidation.curves_reported(datablock)
+            if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
+                combed.append(datablock)
+    bindings.is_reported()
+    animated.follow(depsgraph)
+    _evaluate(depsgraph, combed)
+
+
+def _is_hair_only(depsgraph):
+    """Whether nothing but the geometry of Curves has changed: surfaces, lights and the world are as they were."""
+    # Blender reports no datablock for changes of visibility.
+    return len(depsgraph.updates) > 0 and all(_are_curves(update) for update in depsgraph.updates)
+
+
+def _are_curves(update):
+    changed = update.id
+    if isinstance(changed, bpy.types.Object):
+        return changed.type == "CURVES" and not update.is_updated_transform
+    return isinstance(changed, bpy.types.Curves)
+
+
+def _deformed(depsgraph):
+    """The mesh objects whose evaluated shape may have changed."""
+    updated = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
+    return {o for o in updated if isinstance(o, bpy.types.Object) and o.type == "MESH"}
+
+
+def _mark_painted(images):
+    """Mark guides as stale whose image was painted: if it did not change, they keep their roots."""
+    names = {name_of(image) for image in images}
+    painting = set()
+    for guides in _of_kind("GUIDES"):
+        state, surface = guides.vellus, guides.surface
+        if surface is None or not (state.is_live and state.guides.density_image):
+            continue
+        uid = surface.session_uid
+        if surface.mode == "TEXTURE_PAINT":
+            painting.add(uid)
+        if state.guides.density_image in names or (reported.painting_cache.get(uid) and uid not in painting):
+            state.is_stale = True
+    reported.painting_cache.clear()
+    for uid in painting:
+        reported.painting_cache.keep(uid, True)
+
+
+def _of_kind(kind):
+    return [curves for curves in bpy.data.hair_curves if curves.vellus.kind == kind]
+
+
+def _evaluate(depsgraph, combed):
+    """Evaluate guides first, then their hair. During a long operation, updates wait for its end."""
+    if running.job() is not None:
+        for guides in combed:
+            live_hair.mark_followers(guides)
+        return
+    for guides in _of_kind("GUIDES"):
+        if guides.vellus.is_shading_stale:
+            looks.evaluate_guides(guides)
+        if guides.vellus.is_stale and guides.vellus.is_live and _is_surface_at_rest(guides):
+            pipeline.evaluate(guides, depsgraph)
+            invalidation.strands_made(guides)
+            live_hair.follow_mask(guides, depsgraph)
+            combed.append(guides)
+    for hair in _of_kind("HAIR"):
+        state = hair.vellus
+        follows = state.guide_curves in combed
+        if not (state.is_live and _is_surface_at_rest(hair)):
+            state.is_stale = state.is_stale or follows
+        elif state.is_stale and not live_hair.is_ahead(hair):
+            live_hair.make_again(hair, depsgraph)
+        elif follows:
+            live_hair.follow_guides(hair, depsgraph)
+        if state.is_shading_stale:
+            looks.evaluate_shading(hair)
+
+
+def _is_surface_at_rest(curves):
+    """Whether the surface is not in an edit or paint mode: hair waits until that mode is left."""
+    return curves.surface is None or curves.surface.mode == "OBJECT"
+
+
+@persistent
+def before_frame_change(_scene, _depsgraph):
+    """Store setting values, to detect animated changes."""
+    animated.remember()
+
+
+@persistent
+def after_frame_change(scene, depsgraph):
+    """Deform strands with their surfaces in this frame; regenerate animated hair, in renders too."""
+    if scene_time.is_shown(depsgraph):
+        invalidation.scene_changed()
+        for surface_object in _deformed(depsgraph):
+            invalidation.surface_moved(surface_object)
+    if scene_time.may_write(scene, depsgraph) and animated.follow(depsgraph):
+        # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
+        is_render = scene_time.is_rendered(depsgraph)
+        _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, [])
+        if is_render:
+            live_hair.write_all()
+
+
+@persistent
+def before_reading(*_args):
+    """Write hair before its Curves are read by a save or a render."""
+    live_hair.write_all()
+
+
+@persistent
+def after_load(*_args):
+    """Hair in a file is up to date; without a window Blender reports no update of it."""
+    global _is_opening, _is_undone
+    _is_opening = not bpy.app.background
+    _is_undone = True  # does not affect a file that was saved during a stroke
+    live_hair.cancel_writing()
+    invalidation.clear()
+    _hide_drawn_hair()
+
+
+def _hide_drawn_hair():
+    """Keep Blender from drawing hair that Vellus draws: in older files, and after the add-on was disabled, it does."""
+    for hair in _of_kind("HAIR"):
+        if hair.vellus.is_drawn:
+            curves_objects.draw_natively(hair, False)
+
+
+def _take_over():
+    """Draw what Blender drew while the add-on was disabled."""
+    _hide_drawn_hair()
+    looks.follow_guides(bpy.context.view_layer)
+
+
+@persistent
+def after_undo(*_args):
+    """Undo may restore guides without their hair."""
+    global _is_undone
+    _is_undone = True
+    live_hair.cancel_writing()
+    invalidation.data_replaced()
+
+
+_HANDLERS = (
+    (bpy.app.handlers.depsgraph_update_post, after_depsgraph_update),
+    (bpy.app.handlers.frame_change_pre, before_frame_change),
+    (bpy.app.handlers.frame_change_post, after_frame_change),
+    (bpy.app.handlers.save_pre, before_reading),
+    (bpy.app.handlers.render_init, before_reading),
+    (bpy.app.handlers.undo_post, after_undo),
+    (bpy.app.handlers.redo_post, after_undo),
+    (bpy.app.handlers.load_post, after_load),
+)
+
+
+def register():
+    """Listen to Blender."""
+    for handlers, handler in _HANDLERS:
+        handlers.append(handler)
+    # While Blender enables an add-on, it gives no access to the file.
+    bpy.app.timers.register(_take_over)
+
+
+def unregister():
+    """Remove the handlers, after writing pending hair."""
+    for handlers, handler in _HANDLERS:
+        handlers.remove(handler)
+    if bpy.app.timers.is_registered(_take_over):
+        bpy.app.timers.unregister(_take_over)
+    live_hair.write_all()

@@ -1,0 +1,85 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What makes caches stale: every cache of the add-on by name, and a function for each event with those it concerns.
+
+After an event nothing is drawn or computed from what was cached before it. Functions of their arguments alone, under
+`functools.cache`, never become stale.
+"""
+
+from ..gpu import lights, shaders, world_texture
+from ..groom import bindings
+from ..host import notices
+from ..render import hair_cache, region_pictures, viewport
+from ..settings import animated
+from . import reported
+
+# Copies of Blender's data, and what was made of them. Undo and redo put other data in its place.
+COPIES = (
+    hair_cache.strand_cache,
+    hair_cache.pose_cache,
+    viewport.view_cache,
+    bindings.binding_cache,
+    world_texture.light_cache,
+    lights.frame_cache,
+    animated.value_cache,
+    reported.guide_cache,
+    reported.painting_cache,
+    reported.axes_cache,
+)
+
+# Values keyed by everything they depend on, or that check by themselves whether they are up to date.
+OTHERS = (
+    hair_cache.shading_cache,
+    region_pictures.picture_cache,
+    viewport.display_table_cache,
+    shaders.complaint_cache,
+    notices.said_cache,
+)
+
+# If a bound program is freed and a new one gets its address, the GPU module takes the new one for bound, so programs
+# stay until Python ends. Blender must not free them after its graphics either.
+PROGRAMS = (shaders.program_cache,)
+
+CACHES = COPIES + OTHERS + PROGRAMS
+
+
+def scene_changed(is_hair_only=False):
+    """Anything was changed, hidden or shown: viewports read their scenes again; is_hair_only: nothing but hair."""
+    viewport.invalidate(is_hair_only=is_hair_only)
+
+
+def curves_reported(datablock):
+    """Blender reports a Curves datablock as changed, which it may be: its strands, and what binds them."""
+    hair_cache.invalidate_unless_same(datablock)
+
+
+def strands_made(datablock):
+    """Guides or hair were computed again: strands of the datablock."""
+    hair_cache.strand_cache.invalidate(datablock.session_uid)
+
+
+def surface_moved(surface_object):
+    """A surface may have another shape: its pose, and by it where strands are."""
+    hair_cache.invalidate_pose(surface_object)
+
+
+def image_changed():
+    """Pixels of images, or a world, may be others: the world's light. Each render looks by itself."""
+    world_texture.check_image()
+
+
+def data_replaced():
+    """Undo or redo: all copies of data."""
+    for cache in COPIES:
+        cache.clear()
+
+
+def clear():
+    """Drop all there is, but programs: another file, or the add-on is switched off."""
+    for cache in COPIES + OTHERS:
+        cache.clear()
+
+
+def end():
+    """Drop programs too: Python ends, and what is on the GPU is freed while there is one."""
+    for cache in CACHES:
+        cache.clear()

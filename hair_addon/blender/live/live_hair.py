@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Live hair: updates while guides are combed and surfaces are edited.
+
+In a window the picture has priority: strands whose guides moved are recomputed and uploaded, and the hair's Curves
+are written at the end of the interaction, or before they are read. Without a window the Curves are written at once.
+"""
+
+import sys
+
+import bpy
+
+from ...core.errors import HairError
+from ..data import curves, masks
+from ..groom import bindings, edited_surfaces, pipeline, staleness
+from ..render import hair_cache
+from . import invalidation, reported
+
+# Seconds without a change after which an interaction is over, unless its operator still runs.
+_PAUSE = 0.3
+
+# Name prefixes of operators that move guides while a mouse button is held.
+_STROKES = ("SCULPT_CURVES_OT_", "CURVES_OT_", "TRANSFORM_OT_")
+
+
+def has_window():
+    """Whether there is a window, and timers run."""
+    return not bpy.app.background
+
+
+def follow_guides(hair, depsgraph):
+    """Update a hair's strands after combing: no search, unless guides were added, removed or slid."""
+    bound = bindings.of(hair)
+    if bound is None:
+        if hair.vellus.followed and not is_left_by_undo(hair):
+            return  # written for these guides, in another session or before an undo
+        make_again(hair, depsgraph)
+        return
+    try:
+        device = bound.binding.positions.device
+        moved = bound.follow(curves.read_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides))
+    except HairError as error:
+        hair.vellus.status = str(error)
+        return
+    if moved is None:
+        make_again(hair, depsgraph)
+    elif len(moved):
+        hair_cache.move(hair.session_uid, moved)
+        _write_soon(hair)
+
+
+def make_again(hair, depsgraph):
+    """Bind hair to its guides again and compute all strands, after changes of settings, surface or guides."""
+    if not has_window():
+        pipeline.evaluate(hair, depsgraph)
+        invalidation.strands_made(hair)
+        return
+    try:
+        curves.require_editable(hair)
+        guide_curves, settings = pipeline.inputs_of(hair)
+        known = bindings.of(hair)
+        if known is None or known.is_written:
+            pipeline.require_uncombed(hair)
+        bindings.keep(hair, pipeline.bind_hair(guide_curves, settings, depsgraph, hair))
+    except HairError as error:
+        hair.vellus.is_stale = False
+        hair.vellus.status = str(error)
+        return
+    invalidation.strands_made(hair)
+    _write_soon(hair)
+
+
+def is_ahead(hair):
+    """Whether stale hair has been regenerated already, and only has to be written."""
+    bound = bindings.of(hair)
+    if bound is None or bound.is_written or bound.has_moved_only or hair.vellus.guide_curves is None:
+        return False
+    try:
+        guide_curves, settings = pipeline.inputs_of(hair)
+    except HairError:
+        return False  # `make_again` handles it
+    return bound.settings == settings and bound.guide_uid == guide_curves.session_uid
+
+
+def is_left_by_undo(hair):
+    """Whether hair was written for other guides: undo may restore only one of them."""
+    followed = hair.vellus.followed
+    return followed != "" and followed != staleness.guides_digest(hair.vellus.guide_curves)
+
+
+def write_all(*_args):
+    """Write all hair that is newer than its datablock: at the end of an interaction, or before it is read."""
+    cancel_writing()
+    for hair in bpy.data.hair_curves:
+        bound = bindings.of(hair)
+        if bound is not None and not bound.is_written:
+            _write(hair)
+
+
+def _write(hair):
+    """Write hair that is newer than its datablock. An error becomes its status, so that other hair is written."""
+    try:
+        pipeline.write_hair(hair)
+    except HairError as error:
+        bindings.invalidate(hair)
+        hair.vellus.status = str(error)
+        print(f"Vellus: {error}", file=sys.stderr)
+
+
+def cancel_writing():
+    """Drop pending writes after undo, redo and a new file."""
+    if bpy.app.timers.is_registered(write_after_pause):
+        bpy.app.timers.unregister(write_after_pause)
+
+
+def _write_soon(hair):
+    if not has_window():
+        _write(hair)
+        return
+    cancel_writing()  # put off with every change: a stroke brings many
+    bpy.app.timers.register(write_after_pause, first_interval=_PAUSE, persistent=True)
+
+
+def write_after_pause():
+    """For `bpy.app.timers`: write once nothing has changed for a while; seconds until the next try, or None."""
+    if is_stroke_running():
+        return _PAUSE
+    write_all()
+    return None
+
+
+def is_stroke_running():
+    """Whether an operator holds on to guides, in any window."""
+    windows = (window for manager in bpy.data.window_managers for window in manager.windows)
+    return any(o.bl_idname.startswith(_STROKES) for window in windows for o in window.modal_operators)
+
+
+def follow_surface(surface_object, depsgraph, is_mesh_edited):
+    """Transform the guides of a possibly edited surface, and update the hair between them.
+
+    is_mesh_edited: whether its mesh has changed, not modifiers alone, so that its weights may have too.
+    """
+    axes_before = reported.axes_cache.get(surface_object.session_uid)
+    for guides in bpy.data.hair_curves:
+        state = guides.vellus
+        if guides.surface != surface_object or state.kind != "GUIDES" or not state.is_live:
+            continue
+        try:
+            curves.require_editable(guides)
+            was_edited = edited_surfaces.follow_surface(guides, depsgraph, axes_before)
+            if is_mesh_edited and not was_edited and _may_be_painted(guides, depsgraph):
+                state.is_stale = True
+        except HairError as error:
+            state.status = str(error)
+            continue
+        if was_edited:
+            invalidation.strands_made(guides)
+            mark_followers(guides)
+    for hair in bpy.data.hair_curves if is_mesh_edited else ():
+        state = hair.vellus
+        if hair.surface != surface_object or state.kind != "HAIR" or not state.is_live:
+            continue
+        try:
+            if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
+                _mark(hair)
+        except HairError as error:
+            state.status = str(error)
+
+
+def _may_be_painted(target, depsgraph):
+    """Whether weights that limit where roots are have changed; nothing is read where none do."""
+    return masks.of_curves(target).group != "" and staleness.has_other_mask(target, depsgraph)
+
+
+def follow_mask(guides, depsgraph):
+    """Mark hair as stale whose guides' mask has changed; the guides may be unchanged."""
+    for hair in curves.followers(guides):
+        state = hair.vellus
+        if not state.is_live or state.hair.density_group or hair.surface is None:
+            continue
+        try:
+            if staleness.has_other_mask(hair, depsgraph):
+                _mark(hair)
+        except HairError as error:
+            state.status = str(error)
+
+
+def follow_partings(changed, depsgraph):
+    """Mark hair as stale whose part lines or guide regions are among some datablocks and have changed."""
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR" or not state.is_live or not _parts_by(state, changed):
+            continue
+        try:
+            if staleness.has_other_parting(hair, depsgraph):
+                _mark(hair)
+        except HairError as error:
+            state.status = str(error)
+
+
+def _parts_by(state, changed):
+    lines = bpy.data.objects.get(state.hair.part_lines) if state.hair.part_lines else None
+    if lines is not None and (lines in changed or lines.data in changed):
+        return True
+    # Read with each step of a stroke: so only if guides have regions of their own.
+    guides = state.guide_curves
+    return guides is not None and guides in changed and state.hair.region_attribute in guides.attributes
+
+
+def mark_followers(guide_curves):
+    """Mark all hair between some guides as stale."""
+    for hair in curves.followers(guide_curves):
+        _mark(hair)
+
+
+def _mark(hair):
+    """Mark hair as stale, even if it was regenerated since it was written."""
+    bindings.invalidate(hair)
+    hair.vellus.is_stale = True

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Data as of Blender's last update, to find what the next update changed."""
+
+import bpy
+import numpy as np
+
+from ..data import curves
+from ..host.caches import Cache
+
+# session_uid of guide Curves → their (N, 3) points. Blender reports the geometry of Curves as updated even if only the
+# transform of their surface changed.
+guide_cache = Cache()
+
+# session_uid of a surface in Texture Paint mode → True. Blender may not report painting before that mode ends.
+painting_cache = Cache()
+
+# session_uid of a surface → (3, 3) local to world axes. After a rotation or scale was applied, its former value is not
+# stored anywhere else.
+axes_cache = Cache()
+
+
+def have_guides_moved(guide_curves):
+    """Whether guides have moved since this was last called for them; True the first time."""
+    points = curves.read_points(guide_curves)
+    before = guide_cache.get(guide_curves.session_uid)
+    guide_cache.keep(guide_curves.session_uid, points)
+    return before is None or not np.array_equal(before, points)
+
+
+def remember_axes():
+    """Store the world axes of all surfaces, after an update."""
+    axes_cache.clear()
+    for datablock in bpy.data.hair_curves:
+        if datablock.surface is not None:
+            axes = datablock.surface.matrix_world.to_3x3()
+            axes_cache.keep(datablock.surface.session_uid, np.array(axes, np.float64))

@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The manual for F1 and *Online Manual*: a page per panel, a heading per setting or operator.
+
+The pages are files of the add-on: HTML in the installed extension, their Markdown in docs/manual of a checkout.
+"""
+
+import re
+from pathlib import Path
+
+import bpy
+
+from .groom import hair_systems
+from .settings import preferences, properties
+from .ui import operators
+
+# Page → the classes whose properties it explains, unless a property has its own entry below.
+_CLASSES = {
+    "guides": (properties.VellusGuideSettings,),
+    "strands": (properties.VellusHairSettings, properties.VellusCurves),
+    "shading": (properties.VellusAppearance,),
+    "lookup_tables": (properties.VellusMarschnerSettings,),
+    "rendering": (properties.VellusRenderSettings, properties.VellusPassSettings),
+    "index": (preferences.VellusPreferences,),
+    "systems": (hair_systems.VellusSystem,),
+}
+
+_PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading", "show_guides": "systems"}
+_PROPERTIES |= {"table_folder": "lookup_tables"}
+
+# Page → the operators that it explains, a heading each.
+_OPERATORS = {
+    "surface": (
+        *("add_hair", "comb_guides", "select_guides", "select_hair", "pick_hair", "delete_hair"),
+        *("check_uvs", "use_uv_map", "make_uv_map", "attach_to_surface", "apply_scale", "restore_guides"),
+    ),
+    "guides": ("distribute_guides",),
+    "strands": ("interpolate_hair",),
+    "shading": ("apply_preset", "apply_saved_look", "save_look", "remove_look", "toggle_drawing"),
+    "lookup_tables": ("bake_tables",),
+    "systems": ("delete_system",),
+    "use_as_guides": ("use_as_guides",),
+    "output": ("render_picture", "save_groom_settings", "load_groom_settings"),
+}
+
+
+def anchor(label):
+    """The anchor of a heading, as Markdown's readers make it: guide-count of Guide Count."""
+    return re.sub(r"[\s-]+", "-", re.sub(r"[^\w\s-]", "", label).strip().lower())
+
+
+def folder():
+    """(folder of the pages, their suffix)."""
+    root = Path(__file__).resolve().parents[2]
+    installed = root / "manual"
+    return (installed, ".html") if installed.is_dir() else (root / "docs" / "manual", ".md")
+
+
+def manual_map():
+    """(prefix, [(pattern, page and anchor)]), as `bpy.utils.register_manual_map` wants it."""
+    pages, suffix = folder()
+    targets = [
+        (pattern.lower(), f"{page}{suffix}#{anchor(label)}") for pattern, page, label in (*_properties(), *_operators())
+    ]
+    return pages.as_uri() + "/", targets
+
+
+def _properties():
+    for page, classes in _CLASSES.items():
+        for cls in classes:
+            for entry in cls.bl_rna.properties:
+                if entry.identifier in cls.__annotations__ and not entry.is_hidden and entry.name != entry.identifier:
+                    pattern = f"bpy.types.{cls.__name__}.{entry.identifier}"
+                    yield pattern, _PROPERTIES.get(entry.identifier, page), entry.name
+
+
+def _operators():
+    """Of an operator's properties too, which Blender looks up by their operator."""
+    labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in operators.CLASSES}
+    for page, names in _OPERATORS.items():
+        for name in names:
+            yield f"bpy.ops.vellus.{name}", page, labels[name]
+
+
+def register():
+    """Register the manual's pages with Blender."""
+    bpy.utils.register_manual_map(manual_map)
+
+
+def unregister():
+    """Take them away again."""
+    bpy.utils.unregister_manual_map(manual_map)

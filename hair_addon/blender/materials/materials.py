@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The material of hair for Cycles and EEVEE, from the same settings as the viewport."""
+
+import bpy
+
+from ...core.shading import appearance
+from ..data import curves as curves_door
+from ..host.notices import name_of
+from ..settings import properties, setting_properties
+from . import strand_nodes
+
+HAIR_NODE = "ShaderNodeBsdfHairPrincipled"
+
+_OURS = "is_vellus_hair"  # the custom property of materials created by Vellus
+
+
+def write_hair_material(curves):
+    """Give Curves a Principled Hair material of their appearance; an artist's own material is left alone.
+
+    Linked Curves keep what they are linked with: undo neither brings back what is assigned to them nor takes it away,
+    so that they would be left with a material that is gone, which ends Blender.
+    """
+    if curves.library is not None:
+        return
+    slot = next((slot for slot, m in enumerate(curves.materials) if m is not None), None)
+    if slot is None:
+        material = bpy.data.materials.new(name_of(curves))
+        material[_OURS] = True
+        _fill_first_slot(curves, material)
+        _hair_node(material.node_tree)
+    else:
+        material = curves.materials[slot]
+        if is_hair_material(material) and (material.library or _shows_another_look(material, curves)):
+            material = curves.materials[slot] = material.copy()
+    if is_hair_material(material) and material.library is None:
+        node = next((n for n in material.node_tree.nodes if n.bl_idname == HAIR_NODE), None)
+        if node is not None:  # otherwise the user has edited it
+            look = properties.look_of(curves.vellus)
+            if not appearance.strand_settings(look).is_even:
+                curves_door.write_randoms(curves)  # hair of before this attribute
+            _fill(node, material, look)
+
+
+def _fill_first_slot(curves, material):
+    """Fill the first slot, which renderers use; a removed material leaves it empty."""
+    if len(curves.materials):
+        curves.materials[0] = material
+    else:
+        curves.materials.append(material)
+
+
+def _shows_another_look(material, curves):
+    """Whether a material is that of other hair too, as Blender has it after a duplication, and they look different."""
+    look = _values(curves.vellus.appearance)
+    others = (c for c in bpy.data.hair_curves if c != curves and c.vellus.kind == "HAIR")
+    return any(material in {*c.materials} and _values(c.vellus.appearance) != look for c in others)
+
+
+def _values(group):
+    return setting_properties.values_of(group, setting_properties.names_of(appearance.Appearance))
+
+
+def is_hair_material(material):
+    """Whether a material was created by Vellus."""
+    return bool(material.get(_OURS))
+
+
+def _hair_node(tree):
+    tree.nodes.clear()
+    node = tree.nodes.new(HAIR_NODE)
+    node.model = "CHIANG"
+    node.parametrization = "ABSORPTION"
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    output.location.x = 300.0
+    tree.links.new(node.outputs["BSDF"], output.inputs["Surface"])
+
+
+def _fill(node, material, look):
+    color = (*appearance.mean_color(look), 1.0)
+    # By identifier: a socket that the node's parametrization disables cannot be looked up by name.
+    sockets = {socket.identifier: socket for socket in node.inputs}
+    # EEVEE does not support hair: it shows the colour.
+    for name, value in {**appearance.principled_sockets(look), "Color": color}.items():
+        sockets[name].default_value = value
+    material.diffuse_color = color
+    variation = appearance.strand_settings(look)
+    if variation.is_even:
+        strand_nodes.remove(material.node_tree)
+    else:
+        falloff = appearance.kajiya_kay_strand_settings(look).falloff
+        strand_nodes.write(material.node_tree, node, variation, falloff)

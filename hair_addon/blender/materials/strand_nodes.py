@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shader nodes that vary the absorption between and along strands: `strand_variation` in Cycles.
+
+The strand's number comes from the attribute that the viewport reads too; where the strand's points are evenly spaced,
+Hair Info's intercept is the viewport's position.
+"""
+
+import math
+
+from ...core.shading.fibre.pigment import LEAST_LIGHT
+
+_PREFIX = "Vellus "  # of the names of our nodes, by which they are found again
+
+# Name: (type, {property: value}, place in the frame).
+_NODES = {
+    "Strands": ("NodeFrame", {"label": "Variation between strands"}, (0, 0)),
+    "Random": ("ShaderNodeAttribute", {"attribute_name": "strand_random"}, (0, 0)),
+    "Position": ("ShaderNodeHairInfo", {}, (0, 2)),
+    "Factor": ("ShaderNodeMath", {"operation": "MULTIPLY_ADD"}, (1, 0)),
+    "Light": ("ShaderNodeMath", {"operation": "MULTIPLY_ADD"}, (2, 0)),
+    "Least Light": ("ShaderNodeMath", {"operation": "MAXIMUM"}, (3, 0)),
+    "Concentration": ("ShaderNodeMath", {"operation": "LOGARITHM"}, (4, 0)),
+    "Gradient": ("ShaderNodeMapRange", {"interpolation_type": "SMOOTHSTEP"}, (1, 2)),
+    "Tip": ("ShaderNodeMath", {"operation": "MULTIPLY_ADD"}, (5, 1)),
+    "Pigment": ("ShaderNodeVectorMath", {"operation": "SCALE"}, (5, 0)),
+    "Dyed": ("ShaderNodeVectorMath", {"operation": "ADD"}, (6, 0)),
+    "Root": ("ShaderNodeVectorMath", {"operation": "SCALE"}, (7, 0)),
+    "Tip Dye": ("ShaderNodeVectorMath", {"operation": "SCALE"}, (7, 2)),
+    "Absorption": ("ShaderNodeVectorMath", {"operation": "ADD"}, (8, 0)),
+    "Square Root": ("ShaderNodeVectorMath", {"operation": "POWER"}, (9, 1)),
+    "Falloff": ("ShaderNodeVectorMath", {"operation": "SCALE"}, (10, 1)),
+    "Color": ("ShaderNodeVectorMath", {"operation": "POWER"}, (11, 1)),
+    # EEVEE does not support hair, nor colours linked from other nodes.
+    "Diffuse": ("ShaderNodeBsdfDiffuse", {}, (12, 1)),
+    "EEVEE": ("ShaderNodeOutputMaterial", {"target": "EEVEE"}, (13, 1)),
+}
+_SPACING = (180.0, -190.0)
+
+# (node, output, node, input); sockets by index where their names repeat.
+_LINKS = (
+    ("Random", "Fac", "Factor", 0),
+    ("Factor", 0, "Light", 0),
+    ("Light", 0, "Least Light", 0),
+    ("Least Light", 0, "Concentration", 0),
+    ("Position", "Intercept", "Gradient", "Value"),
+    ("Gradient", "Result", "Tip", 0),
+    ("Gradient", "Result", "Tip Dye", "Scale"),
+    ("Pigment", 0, "Dyed", 0),
+    ("Dyed", 0, "Root", 0),
+    ("Tip", 0, "Root", "Scale"),
+    ("Root", 0, "Absorption", 0),
+    ("Tip Dye", 0, "Absorption", 1),
+    ("Absorption", 0, "Square Root", 0),
+    ("Square Root", 0, "Falloff", 0),
+    ("Falloff", 0, "Color", 1),
+    ("Color", 0, "Diffuse", "Color"),
+    ("Diffuse", 0, "EEVEE", "Surface"),
+)
+
+
+def write(tree, hair_node, variation, falloff):
+    """Let the absorption of a Principled Hair node vary; falloff: of the colour that EEVEE shows."""
+    nodes = _ours(tree)
+    if set(nodes) != set(_NODES):
+        remove(tree)
+        nodes = _build(tree)
+        nodes["Strands"].location = (hair_node.location.x - 15 * _SPACING[0], hair_node.location.y)
+    for name, inputs in _values(variation, falloff).items():
+        for socket, value in inputs.items():
+            _input(nodes[name], socket).default_value = value
+    # Pigment without melanin varies directly, not through its concentration.
+    _link(tree, nodes["Concentration" if variation.melanin >= 1e-4 else "Factor"].outputs[0], nodes["Pigment"], "Scale")
+    _link(tree, nodes["Absorption"].outputs[0], hair_node, "Absorption Coefficient")
+    _link(tree, _output(nodes["Random"], "Fac"), hair_node, "Random")
+
+
+def remove(tree):
+    """Take away the nodes of `write`: strands are alike again."""
+    for node in _ours(tree).values():
+        tree.nodes.remove(node)
+
+
+def _ours(tree):
+    return {node.name.removeprefix(_PREFIX): node for node in tree.nodes if node.name.startswith(_PREFIX)}
+
+
+def _build(tree):
+    nodes = {}
+    for name, (kind, properties, (column, row)) in _NODES.items():
+        node = nodes[name] = tree.nodes.new(kind)
+        node.name = _PREFIX + name
+        node.label = name
+        for key, value in properties.items():
+            setattr(node, key, value)
+        if name != "Strands":
+            node.parent = nodes["Strands"]
+            node.location = (column * _SPACING[0], row * _SPACING[1])
+            node.hide = kind != "ShaderNodeAttribute"
+    for source, output, target, socket in _LINKS:
+        tree.links.new(_output(nodes[source], output), _input(nodes[target], socket))
+    return nodes
+
+
+def _values(variation, falloff):
+    """{node: {input: value}}: `strand_variation.strand_sigma_a` and `pigment.color_from_falloff`."""
+    melanin, random_color = variation.melanin, variation.random_color
+    return {
+        "Factor": {1: 2.0 * random_color, 2: 1.0 - random_color},
+        "Light": {1: -melanin, 2: 1.0},
+        "Least Light": {1: LEAST_LIGHT},
+        # The logarithm to this base is the ratio of two concentrations.
+        "Concentration": {1: max(1.0 - melanin, LEAST_LIGHT)},
+        "Gradient": {
+            "From Min": variation.gradient_start,
+            "From Max": max(variation.gradient_end, variation.gradient_start + 1e-4),
+        },
+        "Tip": {1: variation.tip_absorption - 1.0, 2: 1.0},
+        "Pigment": {0: variation.pigment},
+        "Dyed": {1: variation.dye},
+        "Tip Dye": {0: variation.tip_dye},
+        "Square Root": {1: (0.5, 0.5, 0.5)},
+        "Falloff": {"Scale": -falloff},
+        "Color": {0: (math.e, math.e, math.e)},
+    }
+
+
+def _link(tree, output, node, name):
+    """Link a socket, unless an artist has linked something else to it."""
+    socket = _input(node, name)
+    for link in socket.links:
+        if not link.from_node.name.startswith(_PREFIX) or link.from_socket == output:
+            return
+    tree.links.new(output, socket)
+
+
+def _input(node, key):
+    return _by_identifier(node.inputs, key)
+
+
+def _output(node, key):
+    return _by_identifier(node.outputs, key)
+
+
+def _by_identifier(sockets, key):
+    """A socket by its index or its identifier: a disabled one cannot be looked up by name."""
+    return sockets[key] if isinstance(key, int) else next(socket for socket in sockets if socket.identifier == key)

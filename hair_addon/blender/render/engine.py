@@ -1,0 +1,174 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine: surfaces and hair by the viewport's drawing code, at any resolution, also without a window."""
+
+import contextlib
+import time
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.imaging import pixel_sampling
+from ...core.long_work import Stopped, no_progress
+from ..data import scene
+from ..gpu import drawing, world_texture
+from ..host import scene_time
+from ..settings import setting_properties
+from ..settings.translations import error_text, interface_text
+from . import drawn_scene, film, motion_vectors, rendered_view, viewport
+from .tiled_frame import Frame
+
+NAME = viewport.ENGINE
+
+_TURN = 0.002  # [s] between passes, to let the window redraw
+
+
+_listener = no_progress  # an additional progress callback of renders, which may raise `Stopped`
+
+
+@contextlib.contextmanager
+def listening(progress):
+    """Report renders to progress(step, part) in a context; a render ends without a picture if that raises `Stopped`."""
+    global _listener
+    _listener = progress
+    try:
+        yield
+    finally:
+        _listener = no_progress
+
+
+class VellusRenderEngine(bpy.types.RenderEngine):
+    """Surfaces and hair shaded as in the viewport"""
+
+    bl_idname = NAME
+    bl_label = "Vellus"
+    bl_use_gpu_context = True
+    bl_use_eevee_viewport = True  # for Material Preview
+    bl_use_shading_nodes_custom = False
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        """Tell Blender which passes there will be: sockets of the compositor, layers of a multilayer file."""
+        for name in _passes(renderlayer, scene.render.use_motion_blur):
+            channels, kind = film.channels_of(name)
+            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+
+    def view_update(self, context, depsgraph):
+        """Called by Blender after changes, which the handlers process."""
+
+    def view_draw(self, context, depsgraph):
+        """Draw a viewport with Rendered shading."""
+        try:
+            if rendered_view.draw(context):
+                self.tag_redraw()
+        except HairError as error:
+            self.error_set(error_text(error))
+
+    def render(self, depsgraph):
+        """Render a view layer in the depsgraph's frame."""
+        try:
+            self._render(depsgraph)
+        except HairError as error:
+            self.report({"ERROR"}, error_text(error))
+        except KeyboardInterrupt:  # a script's
+            self.report({"ERROR"}, interface_text("Canceled: nothing was rendered."))
+        except Exception as error:  # a bug must not produce a black picture as a result
+            self.report({"ERROR"}, interface_text("Vellus could not render this: {error}", error=error))
+            raise
+
+    def _render(self, depsgraph):
+        blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
+        _require_supported(blender_scene, self.camera_override)
+        size, window = scene.picture_size(blender_scene.render)
+        offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)
+        sample_count = view_layer.samples or blender_scene.vellus.sample_count
+        passes = _passes(view_layer, blender_scene.render.use_motion_blur)
+        film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
+        frame = Frame(size, window, -(-sample_count // len(offsets)), *film_settings)
+        others = self._others(depsgraph, size) if "Vector" in passes else []
+        world_texture.check_image()
+        known, refused, done, in_all = {}, {}, 0, frame.pass_count * len(offsets)
+        for index in scene_time.visit(blender_scene, offsets, self.frame_set):
+            said = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
+            self.update_stats("", said)
+            with drawing.ALONE:
+                drawn = drawn_scene.read_render(depsgraph, known, refused.__setitem__)
+                camera = scene.read_camera(blender_scene, depsgraph, *size, self.camera_override)
+                moving = (
+                    motion_vectors.Motion(others[0], motion_vectors.places(drawn, *camera), others[1], size)
+                    if others
+                    else None
+                )
+            for _pass in frame.expose(drawn, *camera, moving):
+                done += 1
+                if not bpy.app.background:
+                    time.sleep(_TURN)
+                self.update_progress(done / in_all)
+                if self.test_break() or _is_stopped(done / in_all):
+                    return
+            if index + 1 == len(offsets) or not bpy.app.background:
+                self._show(view_layer, window, frame.arrays())
+        # Last, so that there is a picture of everything else. A command that renders to a file fails: a picture
+        # without some of the hair is not a valid result.
+        for error in refused.values():
+            self.report({"ERROR"}, error_text(error))
+
+    def _others(self, depsgraph, size):
+        """Where everything is a frame before and a frame after: [`motion.Places`]."""
+        found = []
+        for _index in scene_time.visit(depsgraph.scene, [-1.0, 1.0], self.frame_set):
+            with drawing.ALONE:
+                there = drawn_scene.read_unlit(depsgraph, {}, _unheard)
+                camera = scene.read_camera(depsgraph.scene, depsgraph, *size, self.camera_override)
+                found.append(motion_vectors.places(there, *camera))
+        return found
+
+    def _show(self, view_layer, window, arrays):
+        """Pass the current picture to Blender."""
+        result = self.begin_result(0, 0, *window[2:], layer=view_layer.name)
+        for render_pass in result.layers[0].passes:
+            if render_pass.name in arrays:
+                render_pass.rect.foreach_set(np.ascontiguousarray(arrays[render_pass.name]).ravel())
+        self.end_result(result)
+
+
+def _unheard(_datablock, _error):
+    """Hair that cannot be drawn is reported for the frame itself, not for those around it."""
+
+
+def _is_stopped(part):
+    try:
+        _listener("Rendering", part)
+    except Stopped:
+        return True
+    return False
+
+
+def _passes(view_layer, is_blurred):
+    """Names of the passes that are switched on. What is blurred already has no motion that could blur it."""
+    wanted = setting_properties.to_settings(view_layer.vellus, pixel_sampling.PassSettings)
+    names = ["Combined"]
+    if view_layer.use_pass_z:
+        names.append("Depth")
+    if view_layer.use_pass_vector and not is_blurred:
+        names.append("Vector")
+    if view_layer.use_pass_shadow:
+        names.append("Shadow")
+    if wanted.has_hair_mask:
+        names.append("Hair Mask")
+    if wanted.has_lobes:
+        names += film.LOBES
+    return names
+
+
+def _offsets(render, count):
+    """Of the moments that are rendered, from the frame [frames]."""
+    if not render.use_motion_blur or render.motion_blur_shutter <= 0.0:
+        return [0.0]
+    return pixel_sampling.moments(render.motion_blur_shutter, render.motion_blur_position, count).tolist()
+
+
+def _require_supported(blender_scene, camera):
+    if blender_scene.render.use_multiview:
+        raise HairError("Vellus cannot render stereo views: turn off Stereoscopy in the Output properties.")
+    if camera is not None and camera.type == "CAMERA" and camera.data.type not in {"PERSP", "ORTHO"}:
+        raise HairError("Vellus renders only perspective and orthographic cameras: change the camera type.")

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Accumulated samples of a tile, for each pass."""
+
+import gpu
+import numpy as np
+
+from ...core.imaging import pixel_sampling
+from ..gpu import drawing, render_programs
+from ..gpu.visibility_buffer import VisibilityBuffer
+from . import drawn_scene, motion_vectors
+
+_MOST_SAMPLES = 4096  # along a tile's side: its textures take 340 MB, 870 with all passes
+
+FAR = 1e10  # distance of the background, as in Cycles
+
+# (names of channels, kind) of passes, as Blender calls them; all others are RGB.
+_CHANNELS = {
+    "Combined": ("RGBA", "COLOR"),
+    "Depth": ("Z", "VALUE"),
+    "Hair Mask": ("X", "VALUE"),
+    "Vector": ("XYZW", "VECTOR"),
+}
+
+# How much of R, TT, TRT and all else that comes from lights is in each of the passes of hair's light, and how much of
+# the world's.
+LOBES = {
+    "Hair R": ((1.0, 0.0, 0.0, 0.0), 0.0),
+    "Hair TT": ((0.0, 1.0, 0.0, 0.0), 0.0),
+    "Hair TRT": ((0.0, 0.0, 1.0, 0.0), 0.0),
+    "Hair Scattered": ((0.0, 0.0, 0.0, 1.0), 0.0),
+    "Hair World": ((0.0, 0.0, 0.0, 0.0), 1.0),
+}
+
+
+def channels_of(name):
+    """(names of its channels, its kind) of a pass, as Blender calls them."""
+    return _CHANNELS.get(name, ("RGB", "COLOR"))
+
+
+class Film:
+    """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
+
+    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Shadow", "Vector" or of `LOBES`;
+    is_transparent: whether the background is left empty; filter_width: of `picture.filter_weights` [pixels]. motion:
+    `motion.Motion` of a film with the pass "Vector".
+    """
+
+    def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0):
+        self.size, self._per_side, self.is_transparent = size, per_side, is_transparent
+        self._filter_width, self._margin = filter_width, pixel_sampling.filter_margin(per_side, filter_width)
+        self._samples = VisibilityBuffer(*(length * per_side + 2 * self._margin for length in size))
+        self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
+        self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
+        self._passes, self.motion = passes, None
+        self.clear()
+
+    def _texture(self):
+        return gpu.types.GPUTexture(self.size, format=render_programs.FILM_FORMAT)
+
+    def clear(self):
+        """Clear the sums, for another tile or motion sample."""
+        self.pass_count, self._weight_sum = 0, 0.0
+        for texture in self._sums.values():
+            texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+        if self._depth is not None:
+            self._depth.clear(format="FLOAT", value=(0.0, FAR, 0.0, 0.0))
+
+    def add_pass(self, drawn, world_to_view, view_to_clip, size, turn, place=(0, 0)):
+        """Draw a `DrawnScene` once.
+
+        world_to_view, view_to_clip: (4, 4); size: (width, height) of the whole picture [pixels]; turn: which of all
+        passes over it this is; place: (left, bottom) of the tile in it [pixels].
+        """
+        whole = tuple(length * self._per_side for length in size)
+        corner = (length * self._per_side - self._margin for length in place)
+        view = drawing.pass_record(world_to_view, view_to_clip, whole, turn, (*corner, *self._samples.size))
+        drawn_scene.draw_behind_hair(drawn, view, self._samples, self.is_transparent)
+        drawn_scene.draw_hair(drawn, view, self._samples)
+        weights = [
+            pixel_sampling.filter_weights(self._per_side, self._filter_width, shift)
+            for shift in drawing.pass_shift(turn)
+        ]
+        weighting = _weights_texture(weights)
+        for name, texture in self._sums.items():
+            samplers = {"picture": self._picture(name, drawn, view), "filter_weights": weighting}
+            self._add(render_programs.film_program(), samplers, texture)
+        if self._depth is not None:
+            program = render_programs.film_depth_program()
+            program.bind()
+            program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
+            names = ("segments", "depths", "surface_depth")
+            samplers = {name: getattr(self._samples, name) for name in names}
+            self._add(program, {**samplers, "filter_weights": weighting}, self._depth)
+        self.pass_count += 1
+        self._weight_sum += float(weights[0].sum() * weights[1].sum())
+
+    @property
+    def sample_count(self):
+        """Of a pixel, so far."""
+        return self.pass_count * self._per_side**2
+
+    def _picture(self, name, drawn, view):
+        """The samples of a pass, as a texture."""
+        if name == "Combined":
+            return self._samples.color
+        if name == "Vector":
+            return motion_vectors.draw(drawn, self.motion, view, self._samples)
+        if name == "Shadow":
+            return drawn_scene.draw_arrival(drawn, view, self._samples)
+        return self._samples.part_of_light(*LOBES[name])
+
+    def _add(self, program, samplers, sums):
+        with drawing.bound(program, {}, samplers):
+            program.uniform_int("samples_per_side", self._per_side)
+            program.uniform_int("margin", self._margin)
+            program.image("sums", sums)
+            drawing.dispatch_over(program, self.size)
+
+    def show(self):
+        """Lay the mean of the samples over the viewport that is bound."""
+        program = render_programs.film_view_program()
+        x, y, _width, _height = gpu.state.viewport_get()
+        with (
+            drawing.bound(program, {}, {"sums": self._sums["Combined"]}),
+            drawing.gpu_state("NONE", False, "ALPHA_PREMULT"),
+        ):
+            program.uniform_float("origin", (x, y))
+            program.uniform_float("weight_sum", self._weight_sum)
+            drawing.cover(program)
+
+    def read(self):
+        """{pass: (height, width, channels) float32}, first row at the bottom: means over the samples, least depths."""
+        found = {name: self._read(texture) / self._weight_sum for name, texture in self._sums.items()}
+        if self._depth is not None:
+            mask, depth, covered, _none = np.split(self._read(self._depth), 4, axis=-1)
+            found |= {"Hair Mask": mask / self._weight_sum, "Depth": depth}
+            if "Vector" in found:  # of objects, not of the background
+                found["Vector"] *= self._weight_sum / np.maximum(covered, 1e-6)
+        return {name: found[name][..., : len(channels_of(name)[0])] for name in self._passes}
+
+    def _read(self, texture):
+        return np.array(texture.read(), np.float32).reshape(self.size[1], self.size[0], 4)
+
+
+def _weights_texture(weights):
+    """Two rows of weights, for x and for y."""
+    texels = np.array(weights, np.float32)
+    data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    return gpu.types.GPUTexture(texels.shape[::-1], format="R32F", data=data)
+
+
+def largest_tile(per_side, filter_width):
+    """Longest side [pixels] of a tile that the graphics driver supports, by the samples along a pixel's side."""
+    most = min(gpu.capabilities.max_texture_size_get(), _MOST_SAMPLES)
+    return max((most - 2 * pixel_sampling.filter_margin(per_side, filter_width)) // per_side, 1)

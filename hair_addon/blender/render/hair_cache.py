@@ -1,0 +1,269 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cache of hair on the GPU, by session UID: invalidated by changes, filled on drawing.
+
+It holds no reference to Blender's data, so undo, deletion and new files cannot leave dangling ones. Points, radii,
+random numbers and roots are read and replaced together.
+"""
+
+import sys
+from concurrent.futures import wait
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.files import table_cache, table_exr
+from ...core.geometry import strands
+from ...core.kernels.checks import require_count, require_indices
+from ...core.shading import appearance
+from ...core.shading.tables import lookup_tables, strand_tables
+from ..data import curves, posed_strands
+from ..gpu import hair_shading, strand_textures
+from ..groom import bindings
+from ..host import paths
+from ..host.caches import Cache
+from ..settings import preferences, properties
+
+# Tables of this many settings are kept: one groom and the last few positions of a slider.
+_SHADING_CAPACITY = 8
+
+
+@dataclass
+class _KeptStrands:
+    """A snapshot of a datablock's strands, at rest, and their GPU data."""
+
+    points: np.ndarray  # (S, P, 3) float32 in local coordinates
+    radii: np.ndarray  # (S, P) float32
+    randoms: np.ndarray  # (S,) float32
+    places: tuple | None  # roots as `curves.read_root_places` returns them; None for none, or those of a binding
+    rooted_on: tuple  # (session_uid of the surface, its topology)
+    on_gpu: strand_textures.StrandsOnGPU | None = None  # where `pose` carried them
+    pose: posed_strands.Pose | None = None  # None where no surface carries them
+    moved: list = field(default_factory=list)  # [(M,) indices of strands] that moved since then
+
+    def __post_init__(self):
+        require_count("radii", len(self.radii), len(self.points))
+        require_count("random numbers", len(self.randoms), len(self.points))
+
+
+_REFUSED = object()  # in place of strands that cannot be drawn
+
+strand_cache = Cache()  # session_uid of Curves → _KeptStrands or _REFUSED
+pose_cache = Cache()  # session_uid of an object that strands grow on → Pose
+shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
+
+
+def hair_on_gpu(datablock):
+    """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`."""
+    strands_there = strands_on_gpu(datablock)
+    return strands_there, strands_there and shading_of(datablock)
+
+
+def strands_on_gpu(datablock):
+    """`StrandsOnGPU` of any Curves datablock, where its surface carries them; uploaded as far as they have changed.
+
+    None where the datablock was refused. Raises `HairError`.
+    """
+    uid, bound = datablock.session_uid, bindings.of(datablock)
+    if bound is not None:
+        wait([bound.growing])  # in the memory of the points that are known here
+    kept = strand_cache.get(uid)
+    if kept is _REFUSED:
+        return None
+    if kept is None or (bound is not None and kept.points is not bound.points):
+        kept = strand_cache.keep(uid, _read(datablock, bound))
+    pose = _pose_of(datablock.surface)
+    moved, kept.moved = kept.moved, []
+    if kept.on_gpu is None or kept.pose is not pose:
+        points = _carried(kept, pose, bound)
+        kept.on_gpu, kept.pose = strand_textures.upload_strands(points, kept.radii, kept.randoms), pose
+    elif moved:
+        chosen = np.unique(np.concatenate(moved))
+        require_indices("strands", chosen, len(kept.points))
+        strand_textures.move_strands(kept.on_gpu, chosen, _carried(kept, pose, bound, chosen))
+    return kept.on_gpu
+
+
+def _carried(kept, pose, bound, chosen=slice(None)):
+    """Points (M, P, 3) of some kept strands where a pose carries them; at rest where nothing deforms the surface.
+
+    bound: what the strands are bound by, None for nothing.
+    """
+    if pose is None or pose.motion is None:
+        return kept.points[chosen]
+    topology, places = kept.rooted_on[1], kept.places
+    if bound is not None:  # the datablock may store data of earlier strands
+        topology, places = bound.surface.topology, bound.surface.places(bound.binding.roots)
+    return pose.carry(kept.points, topology, places, chosen)
+
+
+def _pose_of(surface_object):
+    """The `Pose` of what strands grow on, None where that is nothing. Raises `HairError`."""
+    if surface_object is None:
+        return None
+    depsgraph = bpy.context.evaluated_depsgraph_get
+    return pose_cache.get(surface_object.session_uid, lambda: posed_strands.read_pose(surface_object, depsgraph()))
+
+
+def refuse(datablock, error):
+    """Do not draw a datablock again until it changes; report the reason once."""
+    strand_cache.keep(datablock.session_uid, _REFUSED)
+    print(f"Vellus: {error}", file=sys.stderr)
+
+
+def move(session_uid, moved):
+    """Some strands of bound hair have moved, (M,) indices: with the next redraw they alone are uploaded."""
+    kept = _strands_of(session_uid)
+    if kept is not None and kept.on_gpu is not None:
+        kept.moved.append(moved)
+
+
+def _strands_of(session_uid):
+    """The `_KeptStrands` of a datablock, None where there are none or they were refused."""
+    kept = strand_cache.get(session_uid)
+    return None if kept is _REFUSED else kept
+
+
+def invalidate_pose(surface_object):
+    """A surface may carry its strands to another place: with the next redraw they are uploaded there."""
+    pose_cache.invalidate(surface_object.session_uid)
+    for datablock in bpy.data.hair_curves:
+        # A surface that could not be read may have been repaired.
+        if datablock.surface == surface_object and strand_cache.get(datablock.session_uid) is _REFUSED:
+            strand_cache.invalidate(datablock.session_uid)
+
+
+def invalidate_unless_same(datablock):
+    """Drop the cache of a datablock that Blender reports as changed, if it did change.
+
+    Blender reports Curves whose surface moved, or that have another property. What waits to be written is no change,
+    nor is what we have just written.
+    """
+    uid, bound = datablock.session_uid, bindings.of(datablock)
+    if bound is not None:
+        if not bound.is_report_due:
+            bound.written_radii = None
+        if not bound.is_written:
+            return
+        if bound.is_report_due:
+            kept = _strands_of(uid)
+            if kept is None or kept.points is not bound.points:
+                strand_cache.invalidate(uid)
+            return
+        if not _are_points(datablock, bound.points):
+            bindings.invalidate(datablock)
+            strand_cache.invalidate(uid)
+            return
+    kept = _strands_of(uid)
+    if kept is None or not _is_same(datablock, kept, bound):
+        strand_cache.invalidate(uid)
+
+
+def _is_same(datablock, kept, bound):
+    """Whether kept strands are those of a datablock, and its surface would carry them as it did."""
+    is_known = kept.points is bound.points if bound is not None else _are_points(datablock, kept.points)
+    return (
+        is_known
+        and np.array_equal(kept.radii.ravel(), curves.read_radii(datablock))
+        and np.array_equal(kept.randoms, curves.read_randoms(datablock))
+        and kept.rooted_on == _rooted_on(datablock)
+        and (bound is not None or _are_places(kept.places, curves.read_root_places(datablock, np.inf)))
+    )
+
+
+def _rooted_on(datablock):
+    surface = datablock.surface
+    return None if surface is None else surface.session_uid, datablock.vellus.topology
+
+
+def _are_places(places, others):
+    """Whether roots are unchanged: hair may update the roots of guides."""
+    if places is None or others is None:
+        return places is others
+    return all(map(np.array_equal, places, others))
+
+
+def _are_points(datablock, points):
+    return np.array_equal(points.reshape(-1, 3), curves.read_points(datablock))
+
+
+def _read(datablock, bound):
+    """`_KeptStrands` of a datablock as it is now, or of what it is bound by."""
+    if bound is None:
+        places = None if datablock.surface is None else curves.read_root_places(datablock, np.inf)
+        return _KeptStrands(*read_strands(datablock), places, _rooted_on(datablock))
+    if bound.is_written or bound.has_moved_only:
+        randoms = curves.read_randoms(datablock)
+    else:
+        _identities, randoms = bound.binding.identities
+    radii = np.tile(bound.radii, (len(bound.points), 1))
+    return _KeptStrands(bound.points, radii, randoms, None, _rooted_on(datablock))
+
+
+def read_strands(datablock):
+    """(S, P, 3) points, (S, P) radii in local coordinates and (S,) random numbers of Curves, stored or evaluated.
+
+    Curves of fewer points than the longest are resampled to as many. Raises `HairError`.
+    """
+    counts = curves.point_counts(datablock)
+    if not len(counts):
+        raise HairError(f'"{datablock.name}" has no strands to draw.')
+    points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
+    most = int(counts.max())
+    if (counts == most).all():
+        return points.reshape(-1, most, 3), radii.reshape(-1, most), randoms
+    starts = curves.curve_offsets(datablock)
+    mean_radii = np.add.reduceat(radii, starts[:-1]) / counts
+    return strands.resample(points, starts, most), np.repeat(mean_radii[:, None], most, axis=1), randoms
+
+
+def shading_of(datablock):
+    """`Shading` of a hair Curves datablock: its model, ready to draw. Raises `HairError`."""
+    state = datablock.vellus
+    look = properties.look_of(state)
+    variation = appearance.strand_settings(look)
+    if state.model == "KAJIYA_KAY":
+        if variation.is_even:
+            return _kept_shading((appearance.kajiya_kay_settings(look),), hair_shading.kajiya_kay_shading)
+        return _kept_shading(
+            (appearance.kajiya_kay_strand_settings(look), variation), hair_shading.kajiya_kay_strand_shading
+        )
+    settings = properties.table_settings_of(state)
+    if variation.is_even and not settings.is_elliptic:
+        return _kept_shading(
+            (settings,), lambda wanted: hair_shading.marschner_shading(_tables(wanted, state.table_folder))
+        )
+    return _kept_shading((settings, variation), _strand_shading)
+
+
+def _strand_shading(settings, variation):
+    return hair_shading.marschner_strand_shading(strand_tables.bake(settings, variation, preferences.device()))
+
+
+def _kept_shading(settings, make):
+    return shading_cache.get(settings, lambda: make(*settings))
+
+
+def _tables(settings, folder):
+    """The tables of these settings: from the folder while it holds just those, else from the cache, or baked now."""
+    if folder:
+        path = Path(bpy.path.abspath(folder))
+        if path.is_dir():
+            tables = table_exr.read_tables(path)
+            if tables.settings == settings:
+                return tables
+    cache = cache_folder()
+    if cache is None:
+        return lookup_tables.bake(settings, preferences.device())
+    return table_cache.tables(cache, settings, paths.addon_version(), device=preferences.device())
+
+
+def cache_folder():
+    """The folder of tables that were baked before, for every file of this user; None where we are no extension."""
+    if not preferences.is_extension():
+        return None  # run from a checkout
+    # Empty if Blender could not create it, with a message on the console.
+    folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path="tables", create=True)
+    return Path(folder) if folder else None

@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A viewport's picture of hair: linear light, refined pass by pass while nothing moves."""
+
+import gpu
+import numpy as np
+
+from ..gpu import drawing, shaders
+from ..gpu.visibility_buffer import VisibilityBuffer
+from . import drawn_scene
+
+SAMPLE_COUNT = 32  # of a pixel, in all passes of a picture
+
+
+def samples_per_side():
+    """Samples per pixel side in each pass: fewer with software rendering, for responsiveness."""
+    return 1 if gpu.platform.device_type_get() == "SOFTWARE" else 2
+
+
+class HairPicture:
+    """The mean of passes, each of which samples other places of the pixels and takes other samples of thin strands.
+
+    Light is premultiplied with the part of a pixel that hair covers.
+    """
+
+    def __init__(self, size, per_side=None):
+        self.size = width, height = size  # [pixels]
+        self.per_side = per_side or samples_per_side()
+        samples = (width * self.per_side, height * self.per_side)
+        self._sides = range(self.per_side)
+        self.pass_count = 0
+        self._pass = VisibilityBuffer(*samples)
+        self._color = gpu.types.GPUTexture(self.size, format="RGBA16F")
+        self._depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+        self._sum = gpu.types.GPUFrameBuffer(color_slots=self._color, depth_slot=self._depth)
+
+    @property
+    def is_fine(self):
+        """Whether another pass would change nothing that is seen."""
+        return self.pass_count * self.per_side**2 >= SAMPLE_COUNT
+
+    def restart(self):
+        """Start another picture."""
+        self.pass_count = 0
+
+    def add_pass(self, drawn, world_to_view, view_to_clip, is_see_through=False, outline=None):
+        """Draw a `DrawnScene` once more.
+
+        world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not hide hair; outline: a `HairOutline` that
+        takes part in it until it is fine.
+        """
+        view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, self.pass_count)
+        is_outlined = outline is not None and not outline.is_fine
+        if is_outlined:
+            outline.add_pass(drawn, view, self._pass)
+        with self._pass.surfaces():
+            if not is_see_through:
+                drawn_scene.draw_hiding(drawn, view)
+        drawn_scene.draw_hair(drawn, view, self._pass, is_viewport=True)
+        if is_outlined:
+            outline.add_seen(self._pass)
+        with self._sum.bind():
+            if self.pass_count == 0:
+                self._sum.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+            self._accumulate()
+        self.pass_count += 1
+
+    def _accumulate(self):
+        program = shaders.accumulate_program()
+        program.bind()
+        program.uniform_int("samples_per_side", self.per_side)
+        program.uniform_sampler("picture", self._pass.color)
+        program.uniform_sampler("depths", self._pass.depths)
+        # Light is additive; of depths the nearest is kept.
+        for weight, depth_test in ((1.0, "NONE"), (0.0, "LESS_EQUAL")):
+            program.uniform_float("weight", weight)
+            with drawing.gpu_state(depth_test, depth_writes=depth_test != "NONE", blend="ADDITIVE_PREMULT"):
+                drawing.cover(program)
+
+    def show(self, display_table, exposure, opacity=1.0, depth_test="LESS_EQUAL"):
+        """Lay the picture over the viewport that is bound.
+
+        display_table: texture of a `DisplayTransform`'s table; exposure: what light is multiplied by; depth_test:
+        against what the viewport holds.
+        """
+        program = shaders.display_program()
+        x, y, _width, _height = gpu.state.viewport_get()
+        program.bind()
+        program.uniform_float("origin", (x, y))
+        program.uniform_float("exposure", exposure)
+        program.uniform_float("opacity", opacity)
+        program.uniform_int("pass_count", self.pass_count)
+        program.uniform_sampler("passes", self._color)
+        program.uniform_sampler("depths", self._depth)
+        program.uniform_sampler("display_table", display_table)
+        # Its depth is not written: surfaces occlude guides, the hair around them does not.
+        with drawing.gpu_state(depth_test, depth_writes=False, blend="ALPHA_PREMULT"):
+            drawing.cover(program)
+
+    def hair_at(self, x, y):
+        """Which of the hair is seen at a pixel, counted from 0; None where there is none within the pixel."""
+        places = [(self.per_side * x + i, self.per_side * y + j) for j in self._sides for i in self._sides]
+        return next((found for place in places if (found := self._pass.hair_at(*place)) is not None), None)
+
+    def read(self):
+        """(height, width, 4) float32: premultiplied linear light, first row at the bottom."""
+        pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")
+        return np.array(pixels, np.float32).reshape(self.size[1], self.size[0], 4) / self.pass_count
+
+
+def table_texture(table):
+    """(N, N, N, 3) float32, the last axis but one running along x → a texture between whose texels colours blend."""
+    size = len(table)
+    texels = np.ones((size, size, size, 4), np.float32)
+    texels[..., :3] = table
+    data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    texture = gpu.types.GPUTexture((size, size, size), format="RGBA16F", data=data)
+    texture.filter_mode(True)
+    texture.extend_mode("EXTEND")
+    return texture

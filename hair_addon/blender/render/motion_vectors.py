@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Motion vectors of everything drawn, from the previous frame and to the next."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..gpu import drawing, render_programs, uniforms
+
+
+@dataclass(frozen=True)
+class Places:
+    """Transforms and points of everything drawn at one time.
+
+    world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world)}; surfaces: {owner:
+    (texture of corners, how many)}.
+    """
+
+    world_to_clip: np.ndarray
+    hair: dict
+    surfaces: dict
+
+
+@dataclass(frozen=True)
+class Motion:
+    """The previous and next frames for motion vectors, and the size (width, height) [pixels] of the picture."""
+
+    before: Places
+    now: Places
+    after: Places
+    size: tuple
+
+    def hair(self, owner):
+        """(record, samplers) of a hair: hair without a counterpart of the same shape has no motion."""
+        now = self.now.hair[owner]
+        before, after = (other.hair.get(owner, now) for other in (self.before, self.after))
+        before, after = (place if place[1] == now[1] else now for place in (before, after))
+        matrices = [
+            moment.world_to_clip @ place[2]
+            for moment, place in zip((self.before, self.now, self.after), (before, now, after), strict=True)
+        ]
+        return self._record(matrices), {"strands_before": before[0], "strands_after": after[0]}
+
+    def surface(self, owner):
+        """The same of a surface."""
+        now = self.now.surfaces[owner]
+        before, after = (other.surfaces.get(owner, now) for other in (self.before, self.after))
+        before, after = (place if place[1] == now[1] else now for place in (before, after))
+        matrices = [moment.world_to_clip for moment in (self.before, self.now, self.after)]
+        return self._record(matrices), {"places_before": before[0], "places_after": after[0]}
+
+    def _record(self, matrices):
+        record = uniforms.MOTION.record()
+        record["before_to_clip"], record["now_to_clip"], record["after_to_clip"] = (m.T for m in matrices)
+        record["size"][:2] = self.size
+        return record
+
+
+def draw(drawn, motion, view, buffer):
+    """Return a texture of motion vectors [pixels] for the `VisibilityBuffer` that a `DrawnScene` was drawn into."""
+    with buffer.surfaces_of_part(render_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        for (surface, _color), owner in zip(drawn.surfaces, drawn.surface_owners, strict=True):
+            record, samplers = motion.surface(owner)
+            placed = view.copy()
+            placed["row_strands"] = surface.row_corners
+            blocks = {"view": uniforms.uniform_buffer(placed), "motion": uniforms.uniform_buffer(record)}
+            with drawing.bound(render_programs.surface_motion_program(), blocks, samplers):
+                surface.batch.draw(render_programs.surface_motion_program())
+    inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, drawn.owners)]
+    return buffer.part_by(render_programs.strand_motion_program(), render_programs.MOTION_FORMAT, inputs)
+
+
+def places(drawn, world_to_view, view_to_clip):
+    """Return the `Places` of a `DrawnScene`, also one read without lighting."""
+    hair = {
+        owner: (strands.texture, (strands.strand_count, strands.point_count), to_world)
+        for (strands, _shading, to_world, *_), owner in zip(drawn.hair, drawn.owners, strict=True)
+    }
+    surfaces = {
+        owner: (surface.places, surface.corner_count)
+        for (surface, _color), owner in zip(drawn.surfaces, drawn.surface_owners, strict=True)
+    }
+    return Places(view_to_clip @ world_to_view, hair, surfaces)

@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Offscreen picture: the scene's meshes and hair from its camera, without a window."""
+
+from pathlib import Path
+
+import bpy
+import gpu
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.files.whole_file import whole_file
+from ...core.long_work import Stage, run_now
+from ..data import scene
+from ..gpu import drawing, visibility_buffer, world_texture
+from . import drawn_scene
+
+
+def draw_picture(settings):
+    """(height, width, 4) float32 of the context's scene: scene-linear, premultiplied, first row at the bottom.
+
+    Raises `HairError`.
+    """
+    return run_now(drawing_picture(settings))
+
+
+def drawing_picture(settings):
+    """`draw_picture` as work in stages (core/long_work.py), all of which run where the graphics are."""
+    _start_gpu()
+    samples = settings.samples_per_side
+    width, height = settings.width * samples, settings.height * samples
+    largest = gpu.capabilities.max_texture_size_get()
+    if max(width, height) > largest:
+        raise HairError(f"{width} × {height} samples exceed the graphics driver's {largest} a side: use fewer.")
+    yield Stage("Drawing shadows", 0.0)
+    world_texture.check_image()
+    context = bpy.context
+    depsgraph = context.evaluated_depsgraph_get()
+    world_to_view, view_to_clip = scene.read_camera(context.scene, depsgraph, settings.width, settings.height)
+    view = drawing.pass_record(world_to_view, view_to_clip, (width, height))
+    drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
+    buffer = visibility_buffer.VisibilityBuffer(width, height)
+    yield Stage("Drawing surfaces", 0.4)
+    drawn_scene.draw_behind_hair(drawn, view, buffer, settings.is_transparent)
+    yield Stage("Drawing hair", 0.5)
+    drawn_scene.draw_hair(drawn, view, buffer)
+    return _resolved(buffer, settings)
+
+
+def _resolved(buffer, settings):
+    """The means of a buffer's samples over pixels, as an array."""
+    resolved = gpu.types.GPUTexture((settings.width, settings.height), format="RGBA32F")
+    target = gpu.types.GPUFrameBuffer(color_slots=resolved)
+    with target.bind():
+        drawing.resolve(buffer.color, settings.samples_per_side)
+        pixels = target.read_color(0, 0, settings.width, settings.height, 4, 0, "FLOAT")
+    return np.array(pixels, np.float32).reshape(settings.height, settings.width, 4)
+
+
+def _start_gpu():
+    """Initialise the GPU, which Blender does not do in background mode."""
+    if bpy.app.background:
+        try:
+            gpu.init()
+        except SystemError as error:
+            raise HairError(f"Drawing is not possible: this machine has no OpenGL driver ({error}).") from error
+
+
+def write_picture(pixels, path, blender_scene):
+    """Write a picture of `draw_picture` as PNG, through the scene's view transform, or as linear EXR.
+
+    The file appears whole or not at all. Raises `HairError` for a folder that cannot be written or another format.
+    """
+    path = Path(path)
+    formats = {".png": ("PNG", "8"), ".exr": ("OPEN_EXR", "32")}
+    if path.suffix.lower() not in formats:
+        raise HairError(f"Pictures are saved as .png or .exr, not as {path.suffix or 'a file without an extension'}.")
+    file_format, color_depth = formats[path.suffix.lower()]
+    height, width, _rgba = pixels.shape
+    with whole_file(path) as partial:
+        image = bpy.data.images.new("Vellus picture", width, height, alpha=True, float_buffer=True)
+        try:
+            image.alpha_mode = "PREMUL"
+            image.pixels.foreach_set(pixels.ravel())
+            image.file_format = file_format
+            _save(image, str(partial), blender_scene, file_format, color_depth)
+        finally:
+            bpy.data.images.remove(image)
+
+
+def _save(image, path, blender_scene, file_format, color_depth):
+    """Save through a scene's view transform, with image settings of our own for the time it takes."""
+    settings = blender_scene.render.image_settings
+    # The media type first: the available formats depend on it, and a scene may be set to write a movie.
+    wanted = {"media_type": "IMAGE", "file_format": file_format, "color_mode": "RGBA", "color_depth": color_depth}
+    before = {name: getattr(settings, name) for name in wanted}
+    try:
+        _set(settings, wanted)
+        image.save_render(path, scene=blender_scene)
+    finally:
+        _set(settings, before)
+
+
+def _set(owner, values):
+    for name, value in values.items():
+        setattr(owner, name, value)

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Animated and driven settings: hair is regenerated in frames where they change.
+
+Blender animates properties without calling their `update`, so their values are compared with the previous ones.
+"""
+
+import bpy
+
+from ...core.grooming.groom import GuideSettings, HairSettings
+from ...core.shading import appearance
+from ...core.shading.tables import lookup_tables
+from ..host import scene_time
+from ..host.caches import Cache
+from . import setting_properties
+
+_GROUPS = {
+    "guides": setting_properties.names_of(GuideSettings),
+    "hair": setting_properties.names_of(HairSettings),
+    "appearance": setting_properties.names_of(appearance.Appearance),
+    "marschner": [n for n in setting_properties.names_of(lookup_tables.Settings) if n not in appearance.TABLE_FIELDS],
+}
+
+value_cache = Cache()  # session_uid of Curves → values of all settings when they were looked at last
+
+
+def are_keyed(datablock):
+    """Whether any property of Curves may be moved by a key or a driver."""
+    animation = datablock.animation_data
+    return animation is not None and bool(animation.action or animation.drivers or animation.nla_tracks)
+
+
+def remember():
+    """Store setting values before a frame change."""
+    for datablock in _keyed():
+        value_cache.keep(datablock.session_uid, _values(datablock.vellus))
+
+
+def follow(depsgraph):
+    """Mark Curves as stale whose settings were animated; returns whether any were. A render has its own values."""
+    is_render = scene_time.is_rendered(depsgraph)
+    is_outdated = False
+    for datablock in _keyed():
+        state = datablock.vellus
+        # Blender animates the original values only for viewports.
+        values = _values(datablock.evaluated_get(depsgraph).vellus if is_render else state)
+        before = value_cache.get(datablock.session_uid) or values
+        if values == before:
+            continue
+        value_cache.keep(datablock.session_uid, values)
+        is_outdated = True
+        for group in _GROUPS:
+            for name, value in values[group].items():
+                if value != before[group][name]:
+                    setattr(getattr(state, group), name, value)  # whose `update` marks it
+    return is_outdated
+
+
+def _keyed():
+    return [c for c in bpy.data.hair_curves if c.vellus.kind != "NONE" and c.library is None and are_keyed(c)]
+
+
+def _values(state):
+    return {group: setting_properties.values_of(getattr(state, group), names) for group, names in _GROUPS.items()}

@@ -1,0 +1,291 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings ↔ Blender's properties. Every default, range, unit and tooltip comes from the `Settings` classes.
+
+A change marks its Curves as stale and tags them; handlers.py is notified by the next depsgraph update. So a script
+that sets ten properties costs one evaluation, and hair in an undo step always matches its settings.
+"""
+
+from dataclasses import replace
+
+import bpy
+
+from ...core.grooming.groom import GuideSettings, HairSettings
+from ...core.imaging.pixel_sampling import PassSettings, RenderSettings
+from ...core.params import declared
+from ...core.shading import appearance
+from ...core.shading.appearance import Appearance
+from ...core.shading.tables import lookup_tables
+from . import setting_properties
+from .translations import CONTEXT
+
+_RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
+
+MODELS = (
+    ("KAJIYA_KAY", "Kajiya-Kay", "Opaque cylinder with a diffuse part and one highlight"),
+    (
+        "MARSCHNER",
+        "Marschner",
+        "Translucent fiber with reflection, transmission, and internal reflection from lookup tables",
+    ),
+)
+
+
+def look_of(state):
+    """The `Appearance` of a hair; state: its `VellusCurves`. Raises `HairError`."""
+    return setting_properties.to_settings(state.appearance, Appearance)
+
+
+def own_table_settings_of(state):
+    """The `lookup_tables.Settings` of a hair, those at their defaults that follow from its look. Raises `HairError`."""
+    return setting_properties.to_settings(state.marschner, lookup_tables.Settings, skip=appearance.TABLE_FIELDS)
+
+
+def table_settings_of(state):
+    """The `lookup_tables.Settings` that the Marschner model shades a hair with. Raises `HairError`."""
+    settings = appearance.table_settings(look_of(state), own_table_settings_of(state))
+    # Rounded as in an operator's properties, so that tables baked with these settings match.
+    return replace(
+        settings,
+        **{
+            name: setting_properties.plain(getattr(settings, name), default, details)
+            for name, default, details in declared(lookup_tables.Settings)
+        },
+    )
+
+
+def _mark_geometry(group, _context):
+    group.id_data.vellus.is_stale = True
+    group.id_data.update_tag()
+
+
+def _renew_passes(_group, context):
+    context.view_layer.update_render_passes()
+
+
+def _mark_shading(group, _context):
+    group.id_data.vellus.is_shading_stale = True
+    group.id_data.update_tag()
+
+
+class VellusGuideSettings(bpy.types.PropertyGroup):
+    """Distribution and growth of guides"""
+
+    __annotations__ = setting_properties.annotations(GuideSettings, _mark_geometry)
+
+
+class VellusHairSettings(bpy.types.PropertyGroup):
+    """Interpolation of hair between guides"""
+
+    __annotations__ = setting_properties.annotations(HairSettings, _mark_geometry)
+
+
+class VellusAppearance(bpy.types.PropertyGroup):
+    """Appearance of hair, in the viewport and in Cycles"""
+
+    __annotations__ = setting_properties.annotations(Appearance, _mark_shading)
+
+
+class VellusMarschnerSettings(bpy.types.PropertyGroup):
+    """Settings of the Marschner model's tables that are not in the appearance"""
+
+    __annotations__ = setting_properties.annotations(
+        lookup_tables.Settings, _mark_shading, skip=appearance.TABLE_FIELDS
+    )
+
+
+class VellusCurves(bpy.types.PropertyGroup):
+    """Vellus data of a Curves datablock"""
+
+    kind: bpy.props.EnumProperty(
+        items=[
+            ("NONE", "None", "Not created by Vellus"),
+            ("GUIDES", "Guides", "Guides that hair follows"),
+            ("HAIR", "Hair", "Strands between guides"),
+        ],
+        default="NONE",
+    )
+    guide_curves: bpy.props.PointerProperty(
+        name="Guides",
+        description="Guides that this hair follows",
+        translation_context=CONTEXT,
+        type=bpy.types.Curves,
+        poll=lambda _group, curves: curves.vellus.kind == "GUIDES",
+        update=_mark_geometry,
+    )
+    guides: bpy.props.PointerProperty(type=VellusGuideSettings)
+    hair: bpy.props.PointerProperty(type=VellusHairSettings)
+    model: bpy.props.EnumProperty(
+        name="Shading Model",
+        description="Scattering model that shades the hair in the viewport",
+        translation_context=CONTEXT,
+        items=MODELS,
+        default="MARSCHNER",
+        update=_mark_shading,
+    )
+    appearance: bpy.props.PointerProperty(type=VellusAppearance)
+    marschner: bpy.props.PointerProperty(type=VellusMarschnerSettings)
+    table_folder: bpy.props.StringProperty(
+        name="Table Folder",
+        description="Folder with baked lookup tables; they are used while their settings match this hair",
+        translation_context=CONTEXT,
+        subtype="DIR_PATH",
+        options=_RELATIVE,
+        update=_mark_shading,
+    )
+    is_drawn: bpy.props.BoolProperty(
+        name="Shaded in Viewport",
+        description="Draw this hair with its shading model; when off, Blender draws it as curves",
+        translation_context=CONTEXT,
+        default=True,
+        update=_mark_shading,
+    )
+    viewport_percentage: bpy.props.IntProperty(
+        name="Strands in Viewport",
+        description="Percentage of strands that viewports show, thickened to compensate; renders show all strands",
+        translation_context=CONTEXT,
+        subtype="PERCENTAGE",
+        min=1,
+        max=100,
+        default=100,
+    )
+    show_guides: bpy.props.BoolProperty(
+        name="Show Guides",
+        description="Show the guides in viewports while they are not selected; without hair they always are",
+        translation_context=CONTEXT,
+        default=False,
+        update=_mark_shading,
+    )
+    is_live: bpy.props.BoolProperty(
+        name="Auto Update",
+        description="Update automatically when settings or inputs change",
+        translation_context=CONTEXT,
+        default=True,
+    )
+    is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
+    is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
+    topology: bpy.props.StringProperty(description="Triangulation that the stored roots refer to", options={"HIDDEN"})
+    root_key: bpy.props.StringProperty(description="Settings and inputs that placed the roots", options={"HIDDEN"})
+    parting_key: bpy.props.StringProperty(description="Settings and inputs that parted the hair", options={"HIDDEN"})
+    written: bpy.props.StringProperty(description="Fingerprint of the generated points", options={"HIDDEN"})
+    followed: bpy.props.StringProperty(description="Fingerprint of the followed guides", options={"HIDDEN"})
+    shading_status: bpy.props.StringProperty(description="Shading error", options={"HIDDEN"})
+    uv_status: bpy.props.StringProperty(description="Problem with the surface's UV map", options={"HIDDEN"})
+    status: bpy.props.StringProperty(description="Update error", options={"HIDDEN"})
+
+
+class VellusRenderSettings(bpy.types.PropertyGroup):
+    """Render settings of Vellus"""
+
+    __annotations__ = setting_properties.annotations(RenderSettings)
+
+
+class VellusPassSettings(bpy.types.PropertyGroup):
+    """Render passes of Vellus in a view layer"""
+
+    __annotations__ = setting_properties.annotations(PassSettings, _renew_passes)
+
+
+CLASSES = (
+    VellusGuideSettings,
+    VellusHairSettings,
+    VellusAppearance,
+    VellusMarschnerSettings,
+    VellusCurves,
+    VellusRenderSettings,
+    VellusPassSettings,
+)
+
+
+def register():
+    """Attach the settings to every Curves datablock, scene and view layer."""
+    bpy.types.Curves.vellus = bpy.props.PointerProperty(type=VellusCurves)
+    bpy.types.Scene.vellus = bpy.props.PointerProperty(type=VellusRenderSettings)
+    bpy.types.ViewLayer.vellus = bpy.props.PointerProperty(type=VellusPassSettings)
+
+
+def unregister():
+    """Unregister the settings; values in files remain."""
+    del bpy.types.ViewLayer.vellus
+    del bpy.types.Scene.vellus
+    del bpy.types.Curves.vellus
+
+
+def folder(description):
+    """The `directory` property that a file browser fills."""
+    return bpy.props.StringProperty(
+        name="Folder", description=description, subtype="DIR_PATH", options=_RELATIVE, translation_context=CONTEXT
+    )
+
+
+def file(description):
+    """The `filepath` property that a file browser fills."""
+    return bpy.props.StringProperty(
+        name="File", description=description, subtype="FILE_PATH", options=_RELATIVE, translation_context=CONTEXT
+    )
+
+
+_NOT_KEYED = set()  # computed properties have no animation
+
+
+def computed_text(name, description, get, set):
+    """A line of text of a group that is stored elsewhere; get(group), set(group, text): as in bpy.props."""
+    return bpy.props.StringProperty(**_computed(name, description, get, set), options=_NOT_KEYED)
+
+
+def computed_flag(name, description, get, set):
+    """The same for a boolean, also if the group's datablock is linked."""
+    return bpy.props.BoolProperty(**_computed(name, description, get, set), options={"LIBRARY_EDITABLE"})
+
+
+def computed_index(name, description, get, set):
+    """The same for a list index, -1 for none."""
+    return bpy.props.IntProperty(**_computed(name, description, get, set), options=_NOT_KEYED)
+
+
+def _computed(name, description, get, set):
+    return {"name": name, "description": description, "get": get, "set": set, "translation_context": CONTEXT}
+
+
+def group_of(group_class):
+    """A group of properties."""
+    return bpy.props.PointerProperty(type=group_class)
+
+
+def only_files(pattern):
+    """The `filter_glob` property of a file browser."""
+    return bpy.props.StringProperty(default=pattern, options={"HIDDEN"})
+
+
+def text(name, description):
+    """A string that is not a setting."""
+    return bpy.props.StringProperty(name=name, description=description, translation_context=CONTEXT)
+
+
+def choice(name, description, labels):
+    """An enumeration that is not a setting; labels: {identifier: label}."""
+    items = [(identifier, label, "") for identifier, label in labels.items()]
+    return bpy.props.EnumProperty(name=name, description=description, items=items, translation_context=CONTEXT)
+
+
+def mesh_name(name, description):
+    """The name of a mesh object, offered by name."""
+    return bpy.props.StringProperty(
+        name=name, description=description, translation_context=CONTEXT, search=_mesh_names, search_options=set()
+    )
+
+
+def _mesh_names(_owner, context, typed):
+    names = (o.name for o in context.view_layer.objects if o is not None and o.type == "MESH")
+    return [name for name in names if typed.casefold() in name.casefold()]
+
+
+def switch(name, description, default):
+    """A boolean that is not a setting."""
+    return bpy.props.BoolProperty(name=name, description=description, default=default, translation_context=CONTEXT)
+
+
+def count(name, description, default):
+    """A positive integer that is not a setting."""
+    return bpy.props.IntProperty(
+        name=name, description=description, default=default, min=1, soft_max=100, translation_context=CONTEXT
+    )

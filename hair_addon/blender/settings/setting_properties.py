@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings ↔ Blender's properties: each default, range, unit and tooltip comes from the `Settings` classes."""
+
+import math
+from dataclasses import replace
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.params import declared, from_surface, label_of
+from .translations import CONTEXT
+
+_SMALL_WORDS = {"in", "of", "per", "to"}  # stay lower case in titles
+
+
+def annotations(settings_class, update=None, skip=()):
+    """{name: bpy property} for the fields of a `Settings` class but those of `skip`; `update` as in bpy.props.
+
+    A radius has its diameter beside it, which is shown in its place. Operators have no `update`.
+    """
+    made = {}
+    for name, default, details in declared(settings_class):
+        if name not in skip:
+            made[name] = _property(name, default, details, update)
+            if details.diameter is not None:
+                shown, description = details.diameter
+                made[shown] = _diameter_property(name, shown, description, details, update)
+    return made
+
+
+def _property(name, default, details, update):
+    common = {"name": _title(label_of(name, details)), "description": details.description, "default": default}
+    common["translation_context"] = CONTEXT
+    if update is not None:
+        common["update"] = update
+    elif details.diameter is not None:
+        common["options"] = {"HIDDEN"}  # an operator shows the diameter
+    if isinstance(default, str):
+        if details.choices:
+            return bpy.props.EnumProperty(items=details.choices, **common)
+        return bpy.props.StringProperty(**common)
+    if isinstance(default, bool):
+        return bpy.props.BoolProperty(**common)
+    limits = _limits(details, isinstance(default, int))
+    if isinstance(default, int):
+        return bpy.props.IntProperty(**common, **limits)
+    limits["precision"] = details.precision
+    if isinstance(default, tuple):
+        return bpy.props.FloatVectorProperty(size=len(default), subtype=details.subtype, **common, **limits)
+    # A subtype such as DISTANCE or ANGLE implies its unit.
+    return bpy.props.FloatProperty(subtype=details.subtype, unit=details.unit, **common, **limits)
+
+
+def _diameter_property(radius, name, description, details, update):
+    """A radius shown as a diameter in millimeters, independent of the scene's units."""
+    low, high = (_millimeters_of(limit) for limit in (_limits(details, False)["min"], details.high))
+    common = {"name": _title(label_of(name, details)), "description": description, "translation_context": CONTEXT}
+    common |= {"unit": "CAMERA", "min": low, "max": high, "soft_max": 1e3, "step": 1, "precision": 3}
+    if update is None:
+
+        def take(operator, _context):
+            setattr(operator, radius, _radius_of(getattr(operator, name)))
+
+        # Stored, as a script may give it alone: Blender then calls no `set` of an operator.
+        return bpy.props.FloatProperty(update=take, **common)
+
+    def read(group):
+        return _millimeters_of(getattr(group, radius))
+
+    def write(group, value):
+        # Not by its property, whose `update` tags the dependency graph: animation is evaluated while that is running.
+        wanted = min(max(_radius_of(value), _limits(details, False)["min"]), details.high)
+        group.bl_system_properties_get(do_create=True)[radius] = wanted
+
+    return bpy.props.FloatProperty(get=read, set=write, update=update, **common)
+
+
+def _millimeters_of(radius):
+    return 2e3 * _unit_length() * radius
+
+
+def _radius_of(millimeters):
+    return _shortest(millimeters) / (2e3 * _unit_length())
+
+
+def _unit_length():
+    """Meters in a unit of the scene."""
+    scene = getattr(bpy.context, "scene", None)  # there is none while add-ons are registered
+    return 1.0 if scene is None else scene.unit_settings.scale_length
+
+
+def _title(label):
+    """A label in Blender's title case: Melanin Redness, IOR, Samples per Side."""
+    return " ".join(word if word in _SMALL_WORDS else word[:1].upper() + word[1:] for word in label.split())
+
+
+def _limits(details, is_integer):
+    # Blender has no exclusive limits; ten nanometres represent "above zero".
+    low = max(details.low, details.above + 1e-8) if math.isfinite(details.above) else details.low
+    limits = {"min": low, "max": details.high, "soft_max": min(details.soft_high, details.high)}
+    finite = {key: value for key, value in limits.items() if math.isfinite(value)}
+    return {key: int(value) for key, value in finite.items()} if is_integer else finite
+
+
+def to_settings(owner, settings_class, skip=()):
+    """The `Settings` that an operator or property group holds, those of `skip` at their defaults.
+
+    Raises `HairError` for what the range forbids.
+    """
+    try:
+        values = {
+            name: plain(getattr(owner, name), default, details)
+            for name, default, details in declared(settings_class)
+            if name not in skip
+        }
+    except UnicodeDecodeError as error:
+        raise HairError("A name in the hair settings is not valid UTF-8: pick the item again.") from error
+    return settings_class(**values)
+
+
+def plain(value, default, details):
+    """A property's value as it was meant: single precision gives 0.15 back as 0.15000000596."""
+    if isinstance(default, float):
+        # A default or a limit such as 15° in radians has no short decimal, and rounded up it would be out of range.
+        for meant in (default, details.low, details.high):
+            if np.float32(meant) == np.float32(value):
+                return meant
+        return _shortest(value)
+    if isinstance(default, tuple):
+        return tuple(plain(float(part), meant, details) for part, meant in zip(value, default, strict=True))
+    return value
+
+
+def _shortest(value):
+    """The shortest decimal that equals a value in single precision, as it was typed."""
+    return float(str(np.float32(value)))
+
+
+def given_settings(operator, settings_class, skip=()):
+    """The `Settings` that an operator's properties give.
+
+    Those that follow from the surface are None unless the operator was called or redone with them. skip and errors as
+    in `to_settings`.
+    """
+    is_given = operator.properties.is_property_set
+    for radius, diameter in _diameters(settings_class):
+        if is_given(diameter) and not is_given(radius):
+            setattr(operator, radius, _radius_of(getattr(operator, diameter)))
+    left_open = {name: None for name in from_surface(settings_class) if name not in skip and not is_given(name)}
+    return replace(to_settings(operator, settings_class, skip), **left_open)
+
+
+def show(operator, group, settings_class):
+    """Show values computed from the surface in an operator's redo panel, and keep them when another setting changes."""
+    for name in from_surface(settings_class):
+        setattr(operator, name, getattr(group, name))
+    for radius, diameter in _diameters(settings_class):
+        setattr(operator, diameter, _shortest(_millimeters_of(_shortest(getattr(group, radius)))))
+
+
+def _diameters(settings_class):
+    return [(name, details.diameter[0]) for name, _default, details in declared(settings_class) if details.diameter]
+
+
+def names_of(settings_class):
+    """Names of the settings of a class, in the order of declaration."""
+    return tuple(name for name, _default, _details in declared(settings_class))
+
+
+def assign(owner, settings, skip=()):
+    """Write `Settings` into an operator's or group's properties, but for those of `skip`."""
+    for name, _default, _details in declared(type(settings)):
+        if name not in skip:
+            setattr(owner, name, getattr(settings, name))
+
+
+def values_of(owner, names):
+    """{name: value} of an operator's or group's properties, for comparison."""
+    values = {name: getattr(owner, name) for name in names}
+    return {n: value[:] if isinstance(value, bpy.types.bpy_prop_array) else value for n, value in values.items()}
+
+
+def copy(source, target, settings_class):
+    """Copy the properties of a `Settings` class from one owner to another."""
+    for name, _default, _details in declared(settings_class):
+        setattr(target, name, getattr(source, name))

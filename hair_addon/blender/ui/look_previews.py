@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Previews in the menu of looks: image files for built-in looks, color swatches for saved looks.
+
+Blender loads and keeps them as previews; nothing is loaded before the menu is drawn.
+"""
+
+from pathlib import Path
+
+import bpy
+import bpy.utils.previews
+import numpy as np
+from mathutils import Color
+
+from ...core.errors import HairError
+from ...core.shading import appearance
+from ..settings import saved_looks
+
+# Drawn by blend_samples/look_pictures.py.
+FOLDER = Path(__file__).parent / "look_pictures"
+
+_SWATCH_SIZE = 32  # pixels
+
+_previews = None
+
+
+def picture(identifier):
+    """Icon of a built-in look."""
+    key = f"preset {identifier}"
+    previews = _collection()
+    if key not in previews:
+        previews.load(key, str(FOLDER / f"{identifier}.png"), "IMAGE")
+    return previews[key].icon_id
+
+
+def swatch(name):
+    """Icon of a saved look in its mean color, 0 where its file cannot be read; a file is read once after each save."""
+    key = f"saved {name} {saved_looks.change_time(name)}"
+    previews = _collection()
+    if key not in previews:
+        try:
+            color = appearance.mean_color(saved_looks.read(name))
+        except HairError:
+            return 0
+        preview = previews.new(key)
+        pixels = np.ones((_SWATCH_SIZE, _SWATCH_SIZE, 4), np.float32)
+        pixels[..., :3] = Color(color).from_scene_linear_to_srgb()
+        preview.icon_size = preview.image_size = (_SWATCH_SIZE, _SWATCH_SIZE)
+        preview.icon_pixels_float = preview.image_pixels_float = pixels.ravel().tolist()
+    return previews[key].icon_id
+
+
+def _collection():
+    global _previews
+    if _previews is None:
+        _previews = bpy.utils.previews.new()
+    return _previews
+
+
+def unregister():
+    """Free all previews."""
+    global _previews
+    if _previews is not None:
+        bpy.utils.previews.remove(_previews)
+        _previews = None

@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Menu entries: Add ▸ Curve, and the Object menu."""
+
+import bpy
+
+from ..groom.foreign_curves import is_foreign
+from ..groom.selection import guides_of, hair_of, parts_of
+from ..settings.translations import CONTEXT
+
+
+class VELLUS_MT_hair(bpy.types.Menu):
+    """Operations on hair"""
+
+    bl_label = "Hair"
+    bl_idname = "VELLUS_MT_hair"
+    bl_translation_context = CONTEXT
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator_context = "INVOKE_DEFAULT"
+        if context.object.type == "MESH":
+            layout.operator("vellus.add_hair", icon="OUTLINER_OB_CURVES")
+        layout.operator("vellus.distribute_guides")
+        if guides_of(context.object) is not None:
+            layout.operator("vellus.interpolate_hair")
+            layout.separator()
+            layout.operator("vellus.comb_guides")
+            layout.operator("vellus.select_guides")
+        if hair_of(context.object) is not None:
+            layout.operator("vellus.select_hair")
+            layout.operator("vellus.toggle_drawing")
+            layout.separator()
+            layout.operator_menu_enum("vellus.apply_preset", "preset")
+        if parts_of(context.object):
+            layout.separator()
+            layout.operator("vellus.attach_to_surface")
+            layout.operator("vellus.delete_hair", icon="TRASH")
+
+
+def _in_add_menu(menu, _context):
+    menu.layout.separator()
+    menu.layout.operator("vellus.add_hair", text="Hair System", icon="OUTLINER_OB_CURVES")
+
+
+def _in_object_menu(menu, context):
+    active = context.object
+    if is_foreign(active):
+        menu.layout.separator()
+        menu.layout.operator("vellus.use_as_guides", icon="OUTLINER_OB_CURVES")
+    elif active is not None and (active.type == "MESH" or parts_of(active)):
+        menu.layout.separator()
+        menu.layout.menu("VELLUS_MT_hair", icon="OUTLINER_OB_CURVES")
+
+
+_ENTRIES = (("VIEW3D_MT_curve_add", _in_add_menu), ("VIEW3D_MT_object", _in_object_menu))
+
+CLASSES = (VELLUS_MT_hair,)
+
+
+def register():
+    """Extend Blender's menus."""
+    for menu, entry in _ENTRIES:
+        getattr(bpy.types, menu).append(entry)
+
+
+def unregister():
+    """Take our entries out of them."""
+    for menu, entry in _ENTRIES:
+        getattr(bpy.types, menu).remove(entry)

@@ -1,0 +1,31 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Base of all operators: `HairError` is reported without changes."""
+
+from ....core.errors import HairError
+from ...settings.translations import CONTEXT, error_text, report_text
+
+
+class HairOperator:
+    """Mixin of operators that implement `change`, which raises `HairError` before anything is changed."""
+
+    bl_options = {"REGISTER", "UNDO"}
+    bl_translation_context = CONTEXT
+
+    def change(self, context):
+        """Do it; returns (sentence, values) to report, or None."""
+        raise NotImplementedError
+
+    def execute(self, context):
+        """`change`, or report why not."""
+        try:
+            said = self.change(context)
+        except HairError as error:
+            return self.refuse(error)
+        if said is not None:
+            self.report({"INFO"}, report_text(said[0], **said[1]))
+        return {"FINISHED"}
+
+    def refuse(self, error):
+        """Report a `HairError`."""
+        self.report({"ERROR"}, error_text(error))
+        return {"CANCELLED"}

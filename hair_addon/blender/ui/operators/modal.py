@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Base of long operators: short ones compute at once, others in a thread while the window responds.
+
+Called from a script or without a window they always compute at once. In a window, long computations, and the first use,
+which may compile kernels, run in a thread, with a progress bar and Esc to cancel.
+"""
+
+import bpy
+
+from ....core.errors import HairError
+from ....core.long_work import Job, Stopped, run_now
+from ...host import running
+from ...settings.translations import interface_text, report_text
+from .base import HairOperator
+
+PATIENCE = 0.4  # [s]: what takes longer gets a progress bar
+
+# Navigation does not affect the computation.
+_NAVIGATION = {"MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE"}
+
+
+class LongOperator(HairOperator):
+    """Mixin of operators that implement `work`, `seconds` and `message`."""
+
+    has_run = False  # in this session: its kernels are loaded
+    _said = ""  # in the status bar
+
+    def work(self, context):
+        """The work in steps (core/long_work.py)."""
+        raise NotImplementedError
+
+    def seconds(self, context):
+        """How long the work will take, estimated."""
+        raise NotImplementedError
+
+    def message(self, made):
+        """(sentence, values) of the report for the work's result."""
+        raise NotImplementedError
+
+    def prefill(self, context):
+        """Read settings from the object to regenerate."""
+
+    def after(self, context, made):
+        """Select the result."""
+
+    def invoke(self, context, _event):
+        """Compute at once, or begin to."""
+        self.prefill(context)
+        try:
+            is_quick = type(self).has_run and self.seconds(context) < PATIENCE
+        except HairError as error:
+            return self.refuse(error)
+        return self.execute(context) if bpy.app.background or is_quick else self.begin(context)
+
+    def execute(self, context):
+        """Compute at once."""
+        try:
+            if running.job() is not None:
+                raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
+            return self._done(context, run_now(self.work(context)))
+        except HairError as error:
+            return self.refuse(error)
+
+    def begin(self, context):
+        """Read the input now and compute in a thread."""
+        try:
+            if running.job() is not None:
+                raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
+            self._work = self.work(context)
+            running.begin(context, Job(next(self._work)))
+        except HairError as error:
+            return self.refuse(error)
+        context.window_manager.modal_handler_add(self)
+        self._show(context)
+        return {"RUNNING_MODAL"}
+
+    def modal(self, context, event):
+        """Wait for the thread; write when it is done."""
+        job = running.job()
+        if job is None:  # the add-on was switched off
+            return self._end(context, {"CANCELLED"})
+        if event.type == "ESC" and event.value == "PRESS":
+            job.stop()
+        if event.type == "TIMER":
+            if job.is_done:
+                return self._advance(context, job)
+            self._show(context)
+        return {"PASS_THROUGH"} if event.type in _NAVIGATION else {"RUNNING_MODAL"}
+
+    def cancel(self, context):
+        """The window was closed, or another file is being opened."""
+        self._end(context, {"CANCELLED"})
+
+    def _advance(self, context, job):
+        try:
+            running.begin(context, Job(self._work.send(job.result())))
+            self._show(context)
+            return {"RUNNING_MODAL"}
+        except StopIteration as end:
+            return self._end(context, self._done(context, end.value))
+        except Stopped:
+            self.report({"INFO"}, report_text("Canceled: nothing was changed."))
+            return self._end(context, {"CANCELLED"})
+        except HairError as error:
+            return self._end(context, self.refuse(error))
+        except BaseException:  # a bug must not block the window forever
+            self._end(context, {"CANCELLED"})
+            raise
+
+    def _done(self, context, made):
+        type(self).has_run = True
+        self.after(context, made)
+        sentence, values = self.message(made)
+        self.report({"INFO"}, report_text(sentence, **values))
+        return {"FINISHED"}
+
+    def _end(self, context, outcome):
+        running.end(context)
+        context.workspace.status_text_set(None)
+        _redraw(context)
+        return outcome
+
+    def _show(self, context):
+        job = running.job()
+        step = interface_text("Canceling" if job.is_stopping else job.step)
+        said = interface_text("{step}: {percent}%    Press Esc to cancel", step=step, percent=round(100 * job.part))
+        # A redraw of hair may take as long as the computation: redraw only on changes.
+        if said != self._said:
+            self._said = said
+            context.workspace.status_text_set(said)
+            _redraw(context)
+
+
+def _redraw(context):
+    for area in context.screen.areas:
+        if area.type == "VIEW_3D":
+            area.tag_redraw()

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Hair tab of the sidebar, in the order of the pipeline: layout only."""
+
+from . import guides, interpolation, output, progress, rendering, shading, surface, systems, tables
+
+LISTS = systems.LISTS
+
+CLASSES = (
+    *progress.CLASSES,
+    *systems.CLASSES,
+    *surface.CLASSES,
+    *guides.CLASSES,
+    *interpolation.CLASSES,
+    *shading.CLASSES,
+    *tables.CLASSES,
+    *output.CLASSES,
+    *rendering.CLASSES,
+)

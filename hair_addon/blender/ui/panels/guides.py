@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides panel: number, length and distribution."""
+
+import bpy
+
+from ....core.grooming import cost
+from ....core.grooming.groom import GuideSettings
+from ...data.curves import is_hand_made
+from ...data.scene import triangle_count
+from ...groom.foreign_curves import is_foreign
+from ...groom.selection import guides_again, guides_of, surface_of
+from ...settings.translations import interface_text
+from .. import setting_rows
+from .tab import HairTab, draw_work, split, write
+
+
+class VELLUS_PT_guides(HairTab, bpy.types.Panel):
+    """Guide hairs that strands follow"""
+
+    bl_label = "Guides"
+    bl_idname = "VELLUS_PT_guides"
+
+    @classmethod
+    def poll(cls, context):
+        has_place = surface_of(context.object) is not None or guides_of(context.object) is not None
+        return has_place and not is_foreign(context.object)
+
+    def draw(self, context):
+        layout = split(self.layout)
+        guides, surface = guides_of(context.object), surface_of(context.object)
+        if guides is None:
+            _draw_work(layout, context, surface, GuideSettings())
+            layout.operator("vellus.distribute_guides", text="New Guide Set", icon="OUTLINER_OB_CURVES")
+            return
+        if guides.vellus.status:
+            write(layout, context, interface_text(guides.vellus.status), "ERROR")
+        if is_hand_made(guides):
+            _draw_hand_made(layout, context, guides)
+            return
+        group = guides.vellus.guides
+        setting_rows.guide_rows(layout, group, surface)
+        setting_rows.row(layout, guides.vellus, "is_live")
+        if len(guides.curves) != group.guide_count:  # some were added or removed
+            layout.label(text=interface_text("{count} guides", count=len(guides.curves)), icon="INFO", translate=False)
+        if surface is not None:
+            _draw_work(layout, context, surface, group)
+        if guides_again(context.object) is not None:
+            column = layout.column(align=True)  # in one line it would be cut in a sidebar of its default width
+            column.operator("vellus.distribute_guides", text="Regenerate Guides", icon="FILE_REFRESH")
+            column.label(text="(Discards Combing)", icon="BLANK1")
+        else:
+            layout.operator("vellus.distribute_guides", text="New Guide Set", icon="ADD")
+
+
+def _draw_hand_made(layout, context, guides):
+    said = interface_text("Hand-made guides: settings do not apply, and they are never regenerated.")
+    write(layout, context, said, "INFO")
+    layout.label(text=interface_text("{count} guides", count=len(guides.curves)), translate=False)
+    setting_rows.row(layout, guides.vellus, "is_live")
+    if guides_again(context.object) is None:
+        layout.operator("vellus.distribute_guides", text="New Guide Set", icon="ADD")
+
+
+def _draw_work(layout, context, surface, settings):
+    """settings: `GuideSettings`, or properties of the same names."""
+    face_count = triangle_count(surface, context.view_layer)
+    seconds, byte_count = (cost(settings, face_count) for cost in (cost.guide_seconds, cost.guide_work_bytes))
+    draw_work(layout, seconds, byte_count)
+
+
+class _OfGuides(HairTab):
+    bl_parent_id = "VELLUS_PT_guides"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        guides = guides_of(context.object)
+        return guides is not None and not is_hand_made(guides)
+
+
+class VELLUS_PT_guides_growth(_OfGuides, bpy.types.Panel):
+    """Length and direction of the guides"""
+
+    bl_label = "Growth"
+    bl_idname = "VELLUS_PT_guides_growth"
+
+    def draw(self, context):
+        setting_rows.growth_rows(split(self.layout), guides_of(context.object).vellus.guides)
+
+
+class VELLUS_PT_guides_placement(_OfGuides, bpy.types.Panel):
+    """Distribution of the guides on the surface"""
+
+    bl_label = "Placement"
+    bl_idname = "VELLUS_PT_guides_placement"
+
+    def draw(self, context):
+        setting_rows.placement_rows(split(self.layout), guides_of(context.object).vellus.guides)
+
+
+CLASSES = (VELLUS_PT_guides, VELLUS_PT_guides_growth, VELLUS_PT_guides_placement)

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands panel: number of strands and interpolation."""
+
+import bpy
+
+from ....core.grooming import cost
+from ...data.scene import triangle_count
+from ...groom.diagnostics import parting_warnings
+from ...groom.selection import active_of_kind, guides_of, hair_of
+from ...settings.translations import interface_text
+from .. import setting_rows
+from .tab import HairTab, draw_work, megabytes, split, write
+
+
+class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
+    """Strands between the guides"""
+
+    bl_label = "Strands"
+    bl_idname = "VELLUS_PT_interpolation"
+
+    @classmethod
+    def poll(cls, context):
+        return guides_of(context.object) is not None or hair_of(context.object) is not None
+
+    def draw(self, context):
+        layout = split(self.layout)
+        hair = hair_of(context.object)
+        if hair is None:
+            layout.operator("vellus.interpolate_hair", text="Strands from These Guides", icon="CURVES")
+            return
+        state = hair.vellus
+        if state.status:
+            write(layout, context, interface_text(state.status), "ERROR")
+        setting_rows.row(layout, state, "guide_curves")
+        setting_rows.strand_rows(layout, state.hair, hair.surface)
+        setting_rows.row(layout, state, "is_live")
+        _draw_cost(layout, state.hair)
+        if hair.surface is not None:
+            face_count = triangle_count(hair.surface, context.view_layer)
+            costs = cost.hair_seconds, cost.hair_work_bytes
+            draw_work(layout, *(cost(state.hair, face_count) for cost in costs))
+        is_again = active_of_kind(context.object, "HAIR") is not None
+        text, icon = ("Regenerate Strands", "FILE_REFRESH") if is_again else ("Strands from These Guides", "ADD")
+        layout.operator("vellus.interpolate_hair", text=text, icon=icon)
+
+
+def _draw_cost(layout, group):
+    """Draw the memory estimate for the strand count."""
+    slot_count = group.neighbour_limit if group.guide_map else 0
+    text = interface_text(
+        "{memory}, {gpu_memory} on the GPU",
+        memory=megabytes(cost.curves_bytes(group.strand_count, slot_count=slot_count)),
+        gpu_memory=megabytes(cost.gpu_bytes(group.strand_count)),
+    )
+    layout.label(text=text, icon="MEMORY", translate=False)
+
+
+class VELLUS_PT_interpolation_parting(HairTab, bpy.types.Panel):
+    """Guides that are not blended with each other"""
+
+    bl_label = "Parting"
+    bl_idname = "VELLUS_PT_interpolation_parting"
+    bl_parent_id = "VELLUS_PT_interpolation"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return hair_of(context.object) is not None
+
+    def draw(self, context):
+        layout = split(self.layout)
+        hair = hair_of(context.object)
+        setting_rows.parting_rows(layout, hair.vellus.hair, hair.surface)
+        for warning in parting_warnings(hair):
+            write(layout, context, warning.text, "ERROR")
+
+
+class VELLUS_PT_interpolation_advanced(HairTab, bpy.types.Panel):
+    """Blending of guides to strands"""
+
+    bl_label = "Advanced"
+    bl_idname = "VELLUS_PT_interpolation_advanced"
+    bl_parent_id = "VELLUS_PT_interpolation"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return hair_of(context.object) is not None
+
+    def draw(self, context):
+        setting_rows.blending_rows(split(self.layout), hair_of(context.object).vellus.hair)
+
+
+CLASSES = (VELLUS_PT_interpolation, VELLUS_PT_interpolation_parting, VELLUS_PT_interpolation_advanced)

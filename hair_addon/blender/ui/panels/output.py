@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Output panel: pictures and settings files."""
+
+import bpy
+
+from ...groom.selection import hair_of
+from ...settings import animated
+from ...settings.translations import interface_text
+from .tab import HairTab, write
+
+
+class VELLUS_PT_output(HairTab, bpy.types.Panel):
+    """Pictures of the hair and files of its settings"""
+
+    bl_label = "Output"
+    bl_idname = "VELLUS_PT_output"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout = self.layout
+        layout.operator("vellus.render_picture", icon="IMAGE_DATA")
+        layout.operator("vellus.toggle_drawing", icon="SHADING_RENDERED")
+        row = layout.row(align=True)
+        row.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
+        row.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")
+        hair = hair_of(context.object)
+        if hair is not None and animated.are_keyed(hair) and not context.scene.render.use_lock_interface:
+            write(
+                layout,
+                context,
+                interface_text("Animated settings render reliably only with a locked interface."),
+                "ERROR",
+            )
+            layout.prop(context.scene.render, "use_lock_interface")
+
+
+CLASSES = (VELLUS_PT_output,)

@@ -1,0 +1,82 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Render and View Layer properties, where Vellus is the render engine."""
+
+import bpy
+
+from ....core.imaging.pixel_sampling import PassSettings
+from ...render.engine import NAME
+from ...settings.setting_properties import names_of
+from ...settings.translations import CONTEXT
+from .tab import split
+
+
+class _OfEngine:
+    bl_space_type = "PROPERTIES"
+    bl_region_type = "WINDOW"
+    bl_context = "render"
+    bl_translation_context = CONTEXT
+    COMPAT_ENGINES = {NAME}
+
+    @classmethod
+    def poll(cls, context):
+        return context.engine in cls.COMPAT_ENGINES
+
+
+class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
+    """Number of samples per pixel"""
+
+    bl_label = "Sampling"
+    bl_idname = "VELLUS_PT_sampling"
+
+    def draw(self, context):
+        split(self.layout).prop(context.scene.vellus, "sample_count")
+
+
+class VELLUS_PT_film(_OfEngine, bpy.types.Panel):
+    """Pixel filter and background"""
+
+    bl_label = "Film"
+    bl_idname = "VELLUS_PT_film"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw(self, context):
+        layout, render = split(self.layout), context.scene.render
+        layout.prop(render, "filter_size")
+        layout.prop(render, "film_transparent", text="Transparent")
+
+
+class VELLUS_PT_motion_blur(_OfEngine, bpy.types.Panel):
+    """Exposure of moving objects"""
+
+    bl_label = "Motion Blur"
+    bl_idname = "VELLUS_PT_motion_blur"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    def draw_header(self, context):
+        self.layout.prop(context.scene.render, "use_motion_blur", text="")
+
+    def draw(self, context):
+        layout, render = split(self.layout), context.scene.render
+        layout.active = render.use_motion_blur
+        layout.prop(render, "motion_blur_position", text="Position")
+        layout.prop(render, "motion_blur_shutter")
+        layout.prop(context.scene.vellus, "motion_steps")
+
+
+class VELLUS_PT_passes(_OfEngine, bpy.types.Panel):
+    """Render passes of the view layer"""
+
+    bl_label = "Passes"
+    bl_idname = "VELLUS_PT_passes"
+    bl_context = "view_layer"
+
+    def draw(self, context):
+        layout, view_layer = split(self.layout), context.view_layer
+        for name in ("use_pass_z", "use_pass_vector", "use_pass_shadow"):
+            layout.prop(view_layer, name)
+        for name in names_of(PassSettings):
+            layout.prop(view_layer.vellus, name)
+        layout.prop(view_layer, "samples")
+
+
+CLASSES = (VELLUS_PT_sampling, VELLUS_PT_film, VELLUS_PT_motion_blur, VELLUS_PT_passes)

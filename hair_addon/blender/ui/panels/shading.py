@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shading panel: scattering settings and looks."""
+
+import bpy
+
+from ....core.shading import appearance
+from ....core.shading.appearance import Appearance
+from ....core.shading.presets import PRESETS
+from ...groom.selection import hair_of
+from ...settings import saved_looks
+from ...settings.translations import CONTEXT
+from .. import look_previews
+from ..setting_rows import others, row, rows
+from .tab import HairTab, split, write
+
+_LOOK_COLUMNS = 4
+_LOOK_SCALE = 4.0  # of a picture, in heights of a row
+
+_COLORS = tuple(name for names in appearance.COLOR_FIELDS.values() for name in names)
+
+
+class _OfHair(HairTab):
+    @classmethod
+    def poll(cls, context):
+        return hair_of(context.object) is not None
+
+
+class VELLUS_PT_looks(bpy.types.Panel):
+    """Built-in looks and saved looks"""
+
+    bl_label = "Looks"
+    bl_idname = "VELLUS_PT_looks"
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "HEADER"
+    bl_options = {"INSTANCED"}
+    bl_ui_units_x = 21
+    bl_translation_context = CONTEXT
+
+    def draw(self, _context):
+        layout = self.layout
+        layout.emboss = "PULLDOWN_MENU"
+        layout.operator_context = "EXEC_DEFAULT"
+        grid = layout.grid_flow(columns=_LOOK_COLUMNS, row_major=True, even_columns=True, even_rows=True, align=True)
+        for identifier, (label, _look) in PRESETS.items():
+            column = grid.column(align=True)
+            column.template_icon(icon_value=look_previews.picture(identifier), scale=_LOOK_SCALE)
+            column.operator("vellus.apply_preset", text=label).preset = identifier
+        layout.separator()
+        column = layout.column(align=True)
+        for name in saved_looks.names():
+            line = column.row(align=True)
+            text, icon = bpy.path.display_name(name), look_previews.swatch(name)
+            line.operator("vellus.apply_saved_look", text=text, translate=False, icon_value=icon).name = name
+            line.operator("vellus.remove_look", text="", icon="REMOVE").name = name
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator("vellus.save_look", text="Save Look", icon="ADD")
+
+
+class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
+    """Scattering of light by strands"""
+
+    bl_label = "Shading"
+    bl_idname = "VELLUS_PT_shading"
+
+    def draw_header_preset(self, _context):
+        layout = self.layout
+        layout.emboss = "NONE"
+        layout.popover(panel="VELLUS_PT_looks", icon="PRESET", text="")
+
+    def draw(self, context):
+        layout = split(self.layout)
+        state = hair_of(context.object).vellus
+        if state.shading_status:
+            write(layout, context, state.shading_status, "ERROR")
+        for name in ("is_drawn", "viewport_percentage", "model"):
+            row(layout, state, name)
+        if state.model != "KAJIYA_KAY":
+            row(layout, state.appearance, "mode")
+
+
+class _OfShading(_OfHair):
+    bl_parent_id = "VELLUS_PT_shading"
+    settings = ()
+
+    def draw(self, context):
+        rows(split(self.layout), hair_of(context.object).vellus.appearance, Appearance, self.settings)
+
+
+class VELLUS_PT_shading_color(_OfHair, bpy.types.Panel):
+    """Method to set the hair color"""
+
+    bl_label = "Color"
+    bl_idname = "VELLUS_PT_shading_color"
+    bl_parent_id = "VELLUS_PT_shading"
+
+    def draw(self, context):
+        look = hair_of(context.object).vellus.appearance
+        rows(
+            split(self.layout),
+            look,
+            Appearance,
+            ("parametrization", *appearance.COLOR_FIELDS[look.parametrization]),
+        )
+
+
+class VELLUS_PT_shading_fibre(_OfShading, bpy.types.Panel):
+    """Roughness and refraction of the fiber"""
+
+    bl_label = "Roughness"
+    bl_idname = "VELLUS_PT_shading_fibre"
+    settings = others(Appearance, _COLORS, appearance.STRAND_FIELDS, ("mode", "parametrization"))
+
+
+class VELLUS_PT_shading_variation(_OfShading, bpy.types.Panel):
+    """Variation between strands and along them"""
+
+    bl_label = "Variation"
+    bl_idname = "VELLUS_PT_shading_variation"
+    bl_options = {"DEFAULT_CLOSED"}
+    settings = appearance.STRAND_FIELDS
+
+
+CLASSES = (
+    VELLUS_PT_looks,
+    VELLUS_PT_shading,
+    VELLUS_PT_shading_color,
+    VELLUS_PT_shading_fibre,
+    VELLUS_PT_shading_variation,
+)

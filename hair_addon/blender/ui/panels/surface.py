@@ -1,0 +1,87 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surface panel: the mesh, problems with it, and operators for the hair on it."""
+
+import bpy
+
+from ...groom.diagnostics import warnings_of
+from ...groom.foreign_curves import is_foreign
+from ...groom.selection import active_of_kind, parts_of, surface_of
+from ...settings.translations import interface_text
+from ..setting_rows import row
+from .tab import HairTab, split, write
+
+
+class VELLUS_PT_surface(HairTab, bpy.types.Panel):
+    """Mesh that the hair grows on"""
+
+    bl_label = "Surface"
+    bl_idname = "VELLUS_PT_surface"
+
+    def draw(self, context):
+        layout = split(self.layout)
+        if is_foreign(context.object):
+            _draw_foreign(layout, context)
+            return
+        surface, parts = surface_of(context.object), parts_of(context.object)
+        active = active_of_kind(context.object, "HAIR") or active_of_kind(context.object, "GUIDES")
+        if active is not None:
+            row(layout, active, "surface")
+        elif surface is not None:
+            layout.label(text=surface.name, icon="MESH_DATA", translate=False)
+        else:
+            write(layout, context, interface_text("Select a mesh to grow hair on."), "INFO")
+            return
+        for warning in warnings_of(surface, parts):
+            box = layout.box()
+            write(box, context, warning.text, "ERROR")
+            if warning.operator:
+                box.operator(warning.operator)
+        if parts:
+            _draw_tools(layout)
+
+
+def _draw_foreign(layout, context):
+    if context.object.type == "CURVES":
+        row(layout, context.object.data, "surface")
+    write(
+        layout,
+        context,
+        interface_text("Turn these curves into guides: they keep their shape, and hair grows between them."),
+        "INFO",
+    )
+    layout.operator("vellus.use_as_guides", icon="OUTLINER_OB_CURVES")
+
+
+def _draw_tools(layout):
+    column = layout.column(align=True)
+    column.operator("vellus.comb_guides", icon="SCULPTMODE_HLT")
+    line = column.row(align=True)
+    line.operator("vellus.select_guides", text="Select Guides", icon="RESTRICT_SELECT_OFF")
+    line.operator("vellus.select_hair", text="Select Hair", icon="RESTRICT_SELECT_OFF")
+    column.operator("vellus.delete_hair", icon="TRASH")
+
+
+class VELLUS_PT_surface_uvs(HairTab, bpy.types.Panel):
+    """UV map that hair nodes use to find roots on the surface"""
+
+    bl_label = "UV Map"
+    bl_idname = "VELLUS_PT_surface_uvs"
+    bl_parent_id = "VELLUS_PT_surface"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return surface_of(context.object) is not None
+
+    def draw(self, context):
+        layout = self.layout
+        used = sorted({part.surface_uv_map for part in parts_of(context.object) if part.surface_uv_map})
+        if used:
+            layout.label(text=", ".join(used), icon="GROUP_UVS", translate=False)
+        column = layout.column(align=True)
+        column.operator("vellus.check_uvs", icon="VIEWZOOM")
+        column.operator("vellus.use_uv_map", icon="FILE_REFRESH")
+        column.operator("vellus.make_uv_map", icon="UV")
+
+
+CLASSES = (VELLUS_PT_surface, VELLUS_PT_surface_uvs)

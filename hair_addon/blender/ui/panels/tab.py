@@ -1,0 +1,57 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all panels of the Hair tab share: their place, and text that fits the sidebar."""
+
+import textwrap
+
+from ...settings.translations import CONTEXT, interface_text
+
+_CHARACTER_WIDTH = 6.8  # pixels of Blender's interface font on average, at a scale of one
+_ICON_AND_MARGINS = 66.0
+_NARROWEST = 18  # characters
+
+LONG, LARGE = 2.0, 500e6  # [s], [bytes]: smaller estimates are not shown
+
+
+class HairTab:
+    """Mixed into every panel of the tab."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "UI"
+    bl_category = "Hair"
+    bl_translation_context = CONTEXT
+
+
+def split(layout):
+    """The layout with names in a column of their own."""
+    layout.use_property_split = True
+    layout.use_property_decorate = False
+    return layout
+
+
+def write(layout, context, text, icon="NONE"):
+    """A sentence, translated already, over as many lines as the sidebar's width asks for."""
+    room = context.region.width / context.preferences.system.ui_scale - _ICON_AND_MARGINS
+    lines = textwrap.wrap(text, max(int(room / _CHARACTER_WIDTH), _NARROWEST)) or [""]
+    column = layout.column(align=True)
+    column.scale_y = 0.8 if len(lines) > 1 else 1.0
+    for place, line in enumerate(lines):
+        column.label(text=line, icon=icon if place == 0 else "BLANK1", translate=False)
+
+
+def megabytes(count):
+    """Bytes as an artist reads them."""
+    return f"{count / 1e6:.0f} MB" if count >= 1e7 else f"{count / 1e6:.1f} MB"
+
+
+def draw_work(layout, seconds, byte_count):
+    """Draw the time and memory estimate of long work."""
+    if seconds >= LONG or byte_count >= LARGE:
+        text = interface_text(
+            "Takes about {seconds} s, {memory}", seconds=_rounded(seconds), memory=megabytes(byte_count)
+        )
+        layout.label(text=text, icon="SORTTIME", translate=False)
+
+
+def _rounded(seconds):
+    """Round to one digit, the accuracy of estimates."""
+    return f"{float(f'{seconds:.0e}'):g}"

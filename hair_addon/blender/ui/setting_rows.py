@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rows of settings: the same in the panels of the Hair tab and in the operators' redo panel."""
+
+import bpy
+
+from ...core.grooming.groom import GuideSettings, HairSettings
+from ...core.params import declared
+from ..settings.translations import interface_text
+
+# Blender's own property split gives names 40 % of the width, which cuts them in a sidebar of its default width.
+NAME_SHARE = 0.54
+
+# Too long for one line: the name is above the value.
+WIDE = ("neighbour_limit", "mode")
+
+_GROWTH = ("length_variation", "tilt", "gravity")
+_PLACEMENT = ("seed", "relax_iterations", "curvature", "symmetric")
+_GUIDE_MASKS = ("density_group", "density_image")
+_PARTING_LIMITS = ("angle_limit", "length_limit")
+_PARTING_REGIONS = ("region_group", "region_attribute", "part_lines")
+_INFLUENCE = ("automatic_influence", "influence_distance")
+_BLENDING = ("neighbour_limit", "keep_length", "guide_map", "seed")
+
+
+def row(layout, owner, name):
+    """A row of a property, its name in a column of its own."""
+    value_side = _below_name(layout, owner, name) if name in WIDE else _value_side(layout, owner, name)
+    value_side.prop(owner, name, text="")
+
+
+def _below_name(layout, owner, name):
+    column = layout.column(align=True)
+    column.use_property_split = False
+    column.label(text=interface_text(owner.bl_rna.properties[name].name), translate=False)
+    return column
+
+
+def search_row(layout, owner, name, source, collection, **details):
+    """A `row` whose value is picked by name from a collection, such as the vertex groups of an object."""
+    _value_side(layout, owner, name).prop_search(owner, name, source, collection, text="", **details)
+
+
+def _value_side(layout, owner, name):
+    sides = layout.split(factor=NAME_SHARE)
+    name_side = sides.row()
+    name_side.alignment = "RIGHT"
+    name_side.label(text=interface_text(owner.bl_rna.properties[name].name), translate=False)
+    value_side = sides.column()
+    value_side.use_property_split = False
+    return value_side
+
+
+def rows(layout, owner, settings_class, names):
+    """A row for each of these settings of a class, in the order of declaration."""
+    for name, _default, details in declared(settings_class):
+        if name in names:
+            row(layout, owner, details.diameter[0] if details.diameter else name)
+
+
+def others(settings_class, *shown):
+    """Names of the settings of a class that are in none of some tuples: a new one is never without its row."""
+    names = {name for names in shown for name in names}
+    return tuple(name for name, _default, _details in declared(settings_class) if name not in names)
+
+
+def guide_rows(layout, owner, surface):
+    """Number, length and masks of guides; owner: has properties of `GuideSettings`; surface: object or None."""
+    rows(layout, owner, GuideSettings, others(GuideSettings, _GROWTH, _PLACEMENT, _GUIDE_MASKS))
+    _mask_row(layout, owner, "density_group", surface)
+    search_row(layout, owner, "density_image", bpy.data, "images")
+
+
+def growth_rows(layout, owner):
+    """Length variation and direction of guides."""
+    rows(layout, owner, GuideSettings, _GROWTH)
+
+
+def placement_rows(layout, owner):
+    """Distribution of guides on the surface."""
+    rows(layout, owner, GuideSettings, _PLACEMENT)
+
+
+def strand_rows(layout, owner, surface, skip=()):
+    """Number, thickness and mask of strands; owner: has the properties of `HairSettings` but for those of `skip`."""
+    apart = (_PARTING_LIMITS, _PARTING_REGIONS, _BLENDING, ("density_group",), _INFLUENCE, skip)
+    rows(layout, owner, HairSettings, others(HairSettings, *apart))
+    if "density_group" not in skip:
+        _mask_row(layout, owner, "density_group", surface)
+
+
+def parting_rows(layout, owner, surface):
+    """Limits, regions and lines that separate hair."""
+    rows(layout, owner, HairSettings, _PARTING_LIMITS)
+    _mask_row(layout, owner, "region_group", surface)
+    if surface is None:
+        row(layout, owner, "region_attribute")
+    else:
+        # Suggestions: attributes of modifiers and of guides are not listed.
+        attributes = {"source": surface.data, "collection": "attributes", "results_are_suggestions": True}
+        search_row(layout, owner, "region_attribute", **attributes)
+    search_row(layout, owner, "part_lines", bpy.data, "objects")
+
+
+def blending_rows(layout, owner, skip=()):
+    """Blending of guides to strands."""
+    row(layout, owner, "automatic_influence")
+    distance = layout.column()
+    distance.active = not owner.automatic_influence
+    row(distance, owner, "influence_distance")
+    rows(layout, owner, HairSettings, tuple(name for name in _BLENDING if name not in skip))
+
+
+def _mask_row(layout, owner, name, surface):
+    if surface is not None:
+        search_row(layout, owner, name, surface, "vertex_groups")
+
+
+def all_guide_rows(layout, owner, surface):
+    """The rows of the Guides panel and those below it, for a redo panel."""
+    guide_rows(layout, owner, surface)
+    growth_rows(titled(layout, "Growth"), owner)
+    placement_rows(titled(layout, "Placement"), owner)
+
+
+def all_strand_rows(layout, owner, surface, skip=()):
+    """The rows of the Strands panel and those below it, for a redo panel."""
+    strand_rows(layout, owner, surface, skip)
+    parting_rows(titled(layout, "Parting"), owner, surface)
+    blending_rows(titled(layout, "Advanced"), owner, skip)
+
+
+def titled(layout, title):
+    """A column under a title."""
+    column = layout.column()
+    column.separator()
+    column.label(text=interface_text(title), translate=False)
+    return column
