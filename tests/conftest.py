@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from tests.devices import DEVICE
+from tests.support.devices import DEVICE
 
 
 @pytest.fixture

@@ -12,14 +12,15 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 ADDON = ROOT / "hair_addon"
 MODULES = sorted(ADDON.rglob("*.py"))
+NATIVE = sorted(path for path in ADDON.rglob("*") if path.suffix in {".cpp", ".cu", ".h"})
 SHADERS = sorted(path for path in (ROOT / "shaders").rglob("*") if path.suffix in {".glsl", ".frag", ".vert", ".comp"})
 SCRIPTS = [path for name in ("tests", "tools", "blend_samples") for path in sorted((ROOT / name).rglob("*.py"))]
 SCRIPTS += [ROOT / "__init__.py", ROOT / "tools" / "bootstrap.sh", ROOT / ".ci" / "run"]
-CODE = MODULES + SHADERS + SCRIPTS
+CODE = MODULES + NATIVE + SHADERS + SCRIPTS
 
 
 def name_of(path):
-    """Path inside the add-on, as CONTRIBUTING.md writes it: core/mesh.py."""
+    """Path inside the add-on, as CONTRIBUTING.md writes it: core/geometry/mesh.py."""
     return path.relative_to(ADDON).as_posix()
 
 
@@ -32,32 +33,23 @@ def syntax(path):
     return ast.parse(path.read_text(encoding="utf-8"), path)
 
 
-def page_order():
-    """CONTRIBUTING.md's tree as a list of files, top to bottom; `*.py` stands for a folder's other files."""
+def listed_packages():
+    """CONTRIBUTING.md's list of packages, top to bottom."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
-    tree = re.search(r"## The page order.*?```\n(.*?)```", text, re.DOTALL)[1]
-    order, folders = [], []
-    for line in tree.splitlines()[1:]:  # the first is hair_addon/ itself
-        depth = (len(line) - len(line.lstrip())) // 2 - 1
-        name = line.split()[0]
-        folders[depth:] = [name] if name.endswith("/") else []
-        if not name.endswith("/"):
-            order.append("".join(folders) + name)
-    return order
+    return [line.split()[0] for line in re.search(r"## Packages.*?```\n(.*?)```", text, re.DOTALL)[1].splitlines()]
 
 
-ORDER = page_order()
+PACKAGES = listed_packages()
+# Of which nobody imports anything: the add-on itself, and `python -m`.
+ROOTS = {"__init__", "__main__"}
 
 
-def rank(name):
-    """Place in the page order. A package's `__init__` stands at its folder's end, as it may use all that is in it."""
-    folder, _, file = name.rpartition("/")
-    if name in ORDER:
-        return ORDER.index(name)
-    if file == "__init__.py":
-        return max(place for place, entry in enumerate(ORDER) if entry.startswith(f"{folder}/"))
-    assert f"{folder}/*.py" in ORDER, f"give {name} its line in CONTRIBUTING.md, The page order"
-    return ORDER.index(f"{folder}/*.py")
+def package_of(path):
+    """The listed package that a file is in; api and api_arguments.py are one."""
+    name = name_of(path).removesuffix(".py")
+    if name in ROOTS:
+        return ""
+    return "api" if name.startswith("api") else name.rpartition("/")[0]
 
 
 def imports(path):
@@ -79,27 +71,39 @@ def outside_imports(path):
     return [(line, name) for line, name, _ in imports(path) if name is not None]
 
 
-# ---------------------------------------------------------------------------------------------- the page order
+# -------------------------------------------------------------------------------------------------- the packages
+
+
+def test_every_package_is_listed_and_says_what_lives_in_it():
+    packages = {package_of(path) for path in MODULES} - {""}
+    assert packages == set(PACKAGES)
+    for package in packages - {"api"}:
+        assert len(ast.get_docstring(syntax(ADDON / package / "__init__.py"))) > 20
 
 
 @each(MODULES)
-def test_file_has_a_place_in_the_page_order(path):
-    rank(name_of(path))
-
-
-def test_page_order_lists_only_what_exists():
-    assert [entry for entry in ORDER if not list(ADDON.glob(entry))] == []
-
-
-@each(MODULES)
-def test_imports_point_up_the_page(path):
+def test_a_package_imports_only_packages_above_it(path):
+    package = package_of(path)
+    if not package:
+        return
+    below = PACKAGES[PACKAGES.index(package) + 1 :]
     for line, _, target in imports(path):
-        if target is None:
-            continue
-        is_its_folder = path.name == "__init__.py" and target.is_relative_to(path.parent)
-        assert is_its_folder or rank(name_of(target)) < rank(name_of(path)), (
-            f"{name_of(path)}:{line} imports {name_of(target)}, which stands below it in the page order"
+        assert target is None or package_of(target) not in {*below, ""}, (
+            f"{name_of(path)}:{line} imports {name_of(target)}, whose package stands below its own"
         )
+
+
+@each(MODULES)
+def test_no_import_stands_in_a_function(path):
+    """What must be imported late is a file of a package that imports its files when they are first used."""
+    tree = syntax(path)
+    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    late = [node.lineno for function in functions for node in ast.walk(function) if isinstance(node, ast.ImportFrom)]
+    assert name_of(path).removesuffix(".py") in ROOTS or not [line for line in late if line_is_ours(path, line)]
+
+
+def line_is_ours(path, line):
+    return any(number == line and target is not None for number, _, target in imports(path))
 
 
 @each(MODULES)
@@ -132,50 +136,106 @@ def array_lines(path):
     return sorted({*attribute_lines(tree, ".foreach_get", ".foreach_set", ".attributes.new")} - {*pixels})
 
 
-LAYOUT = [".layout", *(f"layout.{part}" for part in ("prop", "row", "column", "box", "label", "operator", "split"))]
+LAYOUT = [f"layout.{part}" for part in ("prop", "prop_search", "row", "column", "box", "label", "operator", "split")]
 
 ROOMS = {
     "bpy": (lambda path: import_lines(path, "bpy", "mathutils", "bmesh", "bl_ui", "bpy_extras"), r"blender/.*"),
-    "gpu": (
-        lambda path: import_lines(path, "gpu", "gpu_extras"),
-        r"blender/(uniforms|shaders|render_programs|strand_textures|hair_shading|drawing|hair_buffer|shadows|visibility"
-        r"|surroundings|hair_picture|viewport|render|film)\.py",
-    ),
+    "gpu": (lambda path: import_lines(path, "gpu", "gpu_extras"), r"blender/(gpu|render)/.*"),
     "bpy.props": (
         lambda path: [*attribute_lines(syntax(path), "bpy.props"), *import_lines(path, "bpy.props")],
-        r"blender/(properties|preferences)\.py",
+        r"blender/settings/.*",
     ),
-    "Blender's arrays": (array_lines, r"blender/(scene|partings|attributes|curves)\.py"),
+    "Blender's arrays": (array_lines, r"blender/(data/.*|ui/look_previews\.py)"),
     "layout": (
         lambda path: list(attribute_lines(syntax(path), *LAYOUT)),
-        r"blender/(panels/.*|menus\.py|preferences\.py)",
+        r"blender/(ui/.*|settings/preferences\.py)",
+    ),
+    # A redo panel's layout is handed on to setting_rows.py, which draws what the panels draw.
+    ".layout": (
+        lambda path: list(attribute_lines(syntax(path), ".layout")),
+        r"blender/(ui/.*|settings/preferences\.py)",
     ),
     "self.report": (
         lambda path: list(attribute_lines(syntax(path), "self.report")),
-        r"blender/(operators/.*|engine\.py)",
+        r"blender/(ui/operators/.*|render/engine\.py)",
     ),
     "wp.kernel": (lambda path: list(attribute_lines(syntax(path), "wp.kernel", "wp.func")), r"core/.*"),
-    "OpenEXR": (lambda path: import_lines(path, "OpenEXR"), r"core/exr\.py"),
+    "kernels": (
+        lambda path: list(
+            attribute_lines(syntax(path), "wp.launch", "wp.force_load", "wp.load_module", "wp.init", "wp.config")
+        ),
+        r"core/kernels/.*",
+    ),
+    "which frame it is": (
+        lambda path: list(
+            attribute_lines(
+                syntax(path),
+                *(".frame_current", ".frame_current_final", ".frame_subframe", ".frame_float"),
+                *("blender_scene.frame_set", "scene.frame_set", "depsgraph.mode"),
+            )
+        ),
+        r"blender/host/scene_time\.py",
+    ),
+    "OpenEXR": (lambda path: import_lines(path, "OpenEXR"), r"core/files/.*"),
 }
 
 
 @pytest.mark.parametrize("rule", ROOMS)
 @each(MODULES)
-def test_a_line_knows_its_room(path, rule):
+def test_code_is_in_its_package(path, rule):
     lines_of, rooms = ROOMS[rule]
     if not re.fullmatch(rooms, name_of(path)):
         assert lines_of(path) == [], f"{rule} belongs in {rooms}"
 
 
-@pytest.mark.parametrize("folder", [entry.removesuffix("*.py") for entry in ORDER if entry.endswith("*.py")])
+@each(MODULES)
+def test_native_code_stands_in_files(path):
+    """C++ and CUDA are read from a file beside the module that declares the function."""
+    calls = [node for node in ast.walk(syntax(path)) if isinstance(node, ast.Call)]
+    sources = [ast.unparse(call.args[0]) for call in calls if ast.unparse(call.func) == "wp.func_native"]
+    assert [source for source in sources if not source.startswith("native_code.body(__file__,")] == []
+
+
+@each(NATIVE)
+def test_native_code_fits_the_columns_of_python(path):
+    assert max(map(len, path.read_text(encoding="utf-8").splitlines())) <= 120
+
+
+# Files of these folders that others are made of stand beside the others.
+BASES = {"blender/ui/operators": {"base", "modal", "file_browser"}}
+
+
+@pytest.mark.parametrize("folder", BASES)
 def test_folder_tuple_names_every_file(folder):
     """What grows without end is found by its folder's tuple, one line each."""
-    files = {path.stem for path in (ADDON / folder).glob("*.py") if name_of(path) not in ORDER} - {"__init__"}
+    files = {path.stem for path in (ADDON / folder).glob("*.py")} - {"__init__"} - BASES[folder]
     tree = syntax(ADDON / folder / "__init__.py")
     imported = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
     file_of = {alias.asname or alias.name: node.module or alias.name for node in imported for alias in node.names}
     tuples = [node for node in ast.walk(tree) if isinstance(node, ast.Tuple)]
     assert files == {file_of[ast.unparse(element)] for node in tuples for element in node.elts}
+
+
+# -------------------------------------------------------------------------------------------------------- types
+
+
+def public_functions(body):
+    """Public functions and methods, and methods that operators call, such as __len__; kernels excepted."""
+    for node in body:
+        if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            yield from public_functions(node.body)
+        elif isinstance(node, ast.FunctionDef) and re.match(r"[^_]|__", node.name):
+            if not any(ast.unparse(decorator).startswith("wp.") for decorator in node.decorator_list):
+                yield node
+
+
+@each([path for path in MODULES if re.match(r"core/|api|blender/groom/", name_of(path))])
+def test_public_functions_have_type_annotations(path):
+    for function in public_functions(syntax(path).body):
+        given = function.args
+        arguments = [*given.posonlyargs, *given.args, *given.kwonlyargs, given.vararg, given.kwarg]
+        untyped = [a.arg for a in arguments if a and a.annotation is None and a.arg not in {"self", "cls"}]
+        assert untyped == [] and function.returns is not None, f"{name_of(path)}:{function.lineno} {function.name}"
 
 
 # ------------------------------------------------------------------------------------- what runs, and what may not
@@ -198,19 +258,21 @@ def test_core_imports_without_blender():
 
 
 def test_register_is_light():
-    """Blender registers add-ons while an artist waits for it to start: no Warp (0.6 s), so no compiling either."""
+    """Blender registers add-ons while an artist waits for it to start: no Warp, so no compiling, and less work than Warp."""
     printed = run_python(
         "import bpy, sys, time\n"
         "start = time.process_time()\n"
         "import hair_addon\n"
         "hair_addon.register()\n"
-        "seconds = time.process_time() - start\n"
+        "ours = time.process_time() - start\n"
         "heavy = [name for name in ('warp', 'scipy') if name in sys.modules]\n"
         "assert not heavy, heavy\n"
         "hair_addon.unregister()\n"
-        "print(seconds)\n"
+        "start = time.process_time()\n"
+        "import warp\n"
+        "print(ours / (time.process_time() - start))\n"
     )
-    assert float(printed.split()[-1]) < 0.3
+    assert float(printed.split()[-1]) < 0.8
 
 
 # RELIABILITY: somebody hostile supplies the .blend; and an extension has no business on the network.
@@ -242,7 +304,7 @@ def test_file_names_its_licence_first(path):
 
 
 @each(CODE)
-def test_file_is_one_room(path):
+def test_files_stay_below_400_lines(path):
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 400
 
 

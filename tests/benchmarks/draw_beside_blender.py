@@ -27,8 +27,9 @@ import head  # the samples' scene
 from draw_frames import median_milliseconds  # beside this file
 
 import hair_addon
-from hair_addon.blender import drawn_scene, hair_picture, scene, viewport
-from hair_addon.blender.display_transform import DisplayTransform
+from hair_addon.blender.data import scene
+from hair_addon.blender.gpu.display_transform import DisplayTransform
+from hair_addon.blender.render import drawn_scene, hair_picture, viewport
 
 NATIVE = [
     (shading, hair_type, kind)
@@ -89,7 +90,7 @@ def by_vellus(view):
     """A function that draws a frame as the add-on does in a viewport."""
     context = bpy.context
     drawn = drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get())
-    picture = hair_picture.HairPicture(*view.size)
+    picture = hair_picture.HairPicture(view.size)
     table = hair_picture.table_texture(DisplayTransform.of(context.scene).table())
 
     def draw():

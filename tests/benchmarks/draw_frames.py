@@ -22,18 +22,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
 import head  # the samples' scene
 
 import hair_addon
-from hair_addon.blender import (
-    drawing,
-    drawn_scene,
-    hair_buffer,
-    hair_shading,
-    pipeline,
-    scene,
-    strand_textures,
-    visibility,
-)
-from hair_addon.core import groom
-from hair_addon.core.shading import kajiya_kay, lookup_tables, strand_tables, strand_variation
+from hair_addon.blender.data import curves, scene
+from hair_addon.blender.gpu import ambient_visibility, drawing, hair_shading, strand_textures, visibility_buffer
+from hair_addon.blender.render import drawn_scene
+from hair_addon.core.grooming import groom
+from hair_addon.core.shading.fibre import kajiya_kay, strand_variation
+from hair_addon.core.shading.tables import lookup_tables, strand_tables
 
 REPETITIONS = 15
 
@@ -56,7 +50,7 @@ class Frame:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
         self.view = drawing.view_record(*camera, height, least_width=1.0)
-        self._buffer = hair_buffer.HairBuffer(width, height)
+        self._buffer = visibility_buffer.VisibilityBuffer(width, height)
         self._pixel = gpu.types.GPUTexture((1, 1), format="RGBA16F")
         self._end = gpu.types.GPUFrameBuffer(color_slots=self._pixel)
 
@@ -81,7 +75,7 @@ def strands_between(guides, strand_count, device):
     surface = scene.read_surface(surface_object, depsgraph)
     density = scene.read_vertex_group(surface_object, depsgraph, "scalp")
     settings = groom.HairSettings(strand_count=strand_count, radius=6e-5)
-    rooted = pipeline.read_guides(guides.data, surface)
+    rooted = curves.read_guides(guides.data, surface, "cpu")
     hair = groom.generate_hair(surface.mesh, rooted, settings, density=density, device=device)
     points = surface.to_local(hair.numpy())
     radii = np.broadcast_to(groom.strand_radii(settings, points.shape[1]), points.shape[:2])
@@ -105,7 +99,7 @@ def measure(drawn, frame, points, radii):
         frame.wait()
 
     def see_world():
-        seen = visibility.measure([(uploaded[0], to_world)], [surface for surface, _ in drawn.surfaces], [0.6])
+        seen = ambient_visibility.measure([(uploaded[0], to_world)], [surface for surface, _ in drawn.surfaces], [0.6])
         frame.wait()
         return seen
 

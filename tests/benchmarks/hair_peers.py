@@ -10,9 +10,11 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from hair_addon.blender import curves, live_hair, pipeline
-from hair_addon.core import groom
-from tests.core.conftest import HEAD
+from hair_addon.blender.data import curves
+from hair_addon.blender.groom import pipeline
+from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.core.grooming import groom
+from tests.support.meshes import HEAD
 
 GUIDE_COUNT = 4000
 NODE_ASSETS = "/procedural_hair_node_assets.blend"
@@ -113,7 +115,8 @@ class Ours(Way):
     def drop(self):
         """Take away the hair, and leave the guides."""
         bpy.data.hair_curves.remove(self.hair.data)
-        live_hair.forget()
+        live_hair.cancel_writing()
+        invalidation.data_replaced()
         bpy.context.view_layer.update()
 
     def _interpolate(self, target):

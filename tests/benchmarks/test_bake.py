@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core.shading import absorption_slices, appearance, lookup_tables, strand_tables, texel_kernels
+from hair_addon.core.shading import appearance
+from hair_addon.core.shading.tables import absorption_slices, lookup_tables, strand_tables, texel_kernels
 
 
 def median_time(way, repetitions=7):

@@ -6,7 +6,7 @@ import time
 import numpy as np
 from scipy.interpolate import BSpline
 
-from hair_addon.core import bspline
+from hair_addon.core.geometry import bspline
 
 
 def medians(ways, repetitions=200):

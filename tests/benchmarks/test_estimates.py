@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core import estimate, groom, hash_grid
-from hair_addon.core.groom import GuideSettings, HairSettings
-from hair_addon.core.mesh import TriMesh
-from tests.core.conftest import flat_grid
+from hair_addon.core.geometry import hash_grid
+from hair_addon.core.geometry.mesh import TriMesh
+from hair_addon.core.grooming import cost, groom
+from hair_addon.core.grooming.groom import GuideSettings, HairSettings
+from tests.support.hair import generate_hair
+from tests.support.meshes import flat_grid
 
 FACTOR = 3.0  # that a ratio between two sizes may be off by
 
@@ -51,14 +53,14 @@ def assert_proportional(cases):
 
 
 @pytest.mark.long
-def test_placing_takes_what_is_said():
+def test_placement_takes_the_estimated_time():
     place(hills(10), GuideSettings(guide_count=300))  # kernels are loaded
     cases = {}
     for side_count, guide_count in ((32, 1000), (32, 8000), (200, 1000), (350, 200), (350, 4000)):
         mesh, settings = hills(side_count), GuideSettings(guide_count=guide_count)
         face_count = len(mesh.triangles)
         measured = seconds(lambda mesh=mesh, settings=settings: place(mesh, settings))
-        cases[f"{face_count} triangles, {guide_count} guides"] = measured, estimate.guide_seconds(settings, face_count)
+        cases[f"{face_count} triangles, {guide_count} guides"] = measured, cost.guide_seconds(settings, face_count)
     assert_proportional(cases)
 
 
@@ -67,8 +69,9 @@ WORK = """
 import json, sys, time
 from pathlib import Path
 sys.path.insert(0, ".")
-from hair_addon.core import groom
+from hair_addon.core.grooming import groom
 from tests.benchmarks.test_estimates import hills, place
+from tests.support.hair import generate_hair
 
 def most():  # not ru_maxrss, which a process inherits from the one that started it
     lines = Path("/proc/self/status").read_text().splitlines()
@@ -77,12 +80,12 @@ def most():  # not ru_maxrss, which a process inherits from the one that started
 side_count, guide_count, strand_count = map(int, sys.argv[1:])
 small = hills(20)
 settings = groom.HairSettings(strand_count=strand_count)
-groom.generate_hair(small, place(small, groom.GuideSettings(guide_count=300)), groom.HairSettings(strand_count=100))
+generate_hair(small, place(small, groom.GuideSettings(guide_count=300)), groom.HairSettings(strand_count=100))
 mesh = hills(side_count)
 start, before = time.perf_counter(), most()
 guides = place(mesh, groom.GuideSettings(guide_count=guide_count))
 placed, placing = time.perf_counter(), most() - before
-hair = groom.generate_hair(mesh, guides, settings)
+hair = generate_hair(mesh, guides, settings)
 print(json.dumps({"seconds": [placed - start, time.perf_counter() - placed], "bytes": [placing, most() - before],
                   "counts": [len(guides), len(hair)]}))
 """
@@ -97,8 +100,8 @@ def worked(*counts):
 
 def assert_memory_is_as_said(side_count, guide_count, strand_count):
     found, face_count = worked(side_count, guide_count, strand_count), 2 * side_count**2
-    said = estimate.guide_work_bytes(GuideSettings(guide_count=guide_count), face_count)
-    said = max(said, estimate.hair_work_bytes(HairSettings(strand_count=strand_count), face_count))
+    said = cost.guide_work_bytes(GuideSettings(guide_count=guide_count), face_count)
+    said = max(said, cost.hair_work_bytes(HairSettings(strand_count=strand_count), face_count))
     took = found["bytes"][1]
     print(
         f"{face_count} triangles, {guide_count} guides, {strand_count} strands: {took / 1e6:.0f} MB, said "
@@ -110,7 +113,7 @@ def assert_memory_is_as_said(side_count, guide_count, strand_count):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="no measure of a process's most memory")
 @pytest.mark.parametrize("counts", [(400, 500, 1000), (30, 20_000, 1000), (30, 500, 500_000)])
-def test_memory_is_as_said(counts):
+def test_memory_equals_the_estimate(counts):
     assert_memory_is_as_said(*counts)
 
 
@@ -122,7 +125,7 @@ def test_two_million_triangles():
 
 
 @pytest.mark.long
-def test_growing_takes_what_is_said():
+def test_growth_takes_the_estimated_time():
     cases = {}
     for side_count, strand_count in ((32, 100_000), (32, 300_000), (350, 30_000), (350, 300_000)):
         mesh, settings = hills(side_count), HairSettings(strand_count=strand_count)
@@ -130,10 +133,10 @@ def test_growing_takes_what_is_said():
         face_count = len(mesh.triangles)
 
         def grow(mesh=mesh, guides=guides, settings=settings):
-            return groom.generate_hair(TriMesh(mesh.vertices, mesh.triangles), guides, settings)
+            return generate_hair(TriMesh(mesh.vertices, mesh.triangles), guides, settings)
 
         measured = seconds(grow)
-        cases[f"{face_count} triangles, {strand_count} strands"] = measured, estimate.hair_seconds(settings, face_count)
+        cases[f"{face_count} triangles, {strand_count} strands"] = measured, cost.hair_seconds(settings, face_count)
     assert_proportional(cases)
 
 

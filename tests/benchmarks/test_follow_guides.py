@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core import groom, hair_binding
-from tests.core.conftest import HEAD, read_obj
+from hair_addon.core.grooming import following, groom
+from tests.support.meshes import HEAD, read_obj
 
 
 def devices():
@@ -37,13 +37,13 @@ def test_follow_guides(strand_count, device):
     guides = groom.distribute_guides(head, groom.GuideSettings(), density=density, device=device)
     settings = groom.HairSettings(strand_count=strand_count)
     binding = groom.bind_hair(head, guides, settings, density=density, device=device)
-    weights = hair_binding.weights_now(binding, guides)
-    on_host = hair_binding.growing_points(binding, guides, weights).result()
+    weights = following.weights_now(binding, guides)
+    on_host = following.growing_points(binding, guides, weights).result()
     points = wp.empty((strand_count, groom.POINT_COUNT), dtype=wp.vec3, device=device)
     ways = {
         "bind": lambda: groom.bind_hair(head, guides, settings, density=density, device=device),
-        "follow": lambda: hair_binding.follow_guides(binding, guides),
-        "follow, to the host": lambda: hair_binding.growing_points(binding, guides, weights, out=on_host).result(),
+        "follow": lambda: following.follow_guides(binding, guides),
+        "follow, to the host": lambda: following.growing_points(binding, guides, weights, out=on_host).result(),
         "fill as much": lambda: points.fill_(wp.vec3(1.0, 2.0, 3.0)),
     }
     times = {name: median_time(way, device) for name, way in ways.items()}

@@ -21,13 +21,17 @@ import warp as wp
 from scipy.spatial import cKDTree
 
 import hair_addon
-from hair_addon.blender import bindings, live_hair, pipeline
-from hair_addon.core import groom, guide_weights, hash_grid
-from hair_addon.core.mesh import positions
-from hair_addon.core.sampling import sample_surface
+from hair_addon.blender.data import curves
+from hair_addon.blender.groom import bindings
+from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.core.geometry import hash_grid
+from hair_addon.core.geometry.mesh import positions
+from hair_addon.core.geometry.sampling import sample_surface
+from hair_addon.core.grooming import groom
+from hair_addon.core.interpolation import guide_weights
 from tests.benchmarks import hair_peers
 from tests.benchmarks.hair_peers import Asset, LeanGraph, Ours
-from tests.core.conftest import HEAD, read_obj
+from tests.support.meshes import HEAD, read_obj
 
 MEMORY = Path(__file__).with_name("hair_memory.py")
 
@@ -48,7 +52,8 @@ def head_and_guides():
     """The add-on registered, and the head with its guides."""
     hair_addon.register()
     yield hair_peers.head_with_guides()
-    live_hair.forget()
+    live_hair.cancel_writing()
+    invalidation.data_replaced()
     hair_addon.unregister()
 
 
@@ -155,8 +160,8 @@ def test_editing_guides(head_and_guides, count, monkeypatch):
     moved = bound.reach.of([0])
 
     def follow(chosen=None):
-        bound.guides = pipeline.read_guides(guides.data, bound.surface)
-        live_hair.follow_bound(bound, chosen)
+        bound.guides = curves.read_guides(guides.data, bound.surface, "cpu")
+        bound.grow(chosen)
         assert bound.points is not None  # waits for them
 
     times = best_times({"ours, all guides": follow, "ours, one guide": lambda: follow(moved)}, 9)

@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 import hair_addon
-from hair_addon.blender import curves, drawn_scene, hair_cache, hair_picture, live_hair, scene
-from tests.blender.counting import counts_of
-from tests.core.conftest import HEAD
+from hair_addon.blender.data import curves, scene
+from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture
+from tests.support.counting import counts_of
+from tests.support.meshes import HEAD
 
 _GUIDE_COUNT = 200
 _COMBED = 8  # guides under a brush
@@ -31,7 +33,8 @@ def head():
     head = bpy.context.selected_objects[0]
     bpy.context.view_layer.objects.active = head
     yield head
-    live_hair.forget()
+    live_hair.cancel_writing()
+    invalidation.data_replaced()
     hair_addon.unregister()
 
 
@@ -69,7 +72,7 @@ class View:
     """What a viewport of 1280 × 720 pixels shows of the head while a stroke runs."""
 
     def __init__(self):
-        self.picture = hair_picture.HairPicture(1280, 720)
+        self.picture = hair_picture.HairPicture((1280, 720))
         self.matrices = drawing_place()
         self.drawn = self._read(None)
 
@@ -117,7 +120,7 @@ def test_live_editing(head, strand_count, monkeypatch):
     monkeypatch.undo()
     monkeypatch.setattr(live_hair, "has_window", lambda: True)
     write = median_ms(lambda: (comb(guides), live_hair.write_all())) - edit
-    whole = median_ms(lambda: (hair_cache.forget(hair.session_uid), on_gpu(hair)))
+    whole = median_ms(lambda: (invalidation.strands_made(hair), on_gpu(hair)))
 
     basis = head.shape_key_add(name="Basis")
     key = head.shape_key_add(name="Key")

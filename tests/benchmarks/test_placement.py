@@ -17,13 +17,13 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.core import cvt
-from hair_addon.core.groom import GuideSettings
-from hair_addon.core.mesh import TriMesh, positions
-from hair_addon.core.sampling import sample_surface
+from hair_addon.core.geometry.mesh import TriMesh, positions
+from hair_addon.core.geometry.sampling import sample_surface
+from hair_addon.core.grooming.groom import GuideSettings
+from hair_addon.core.placement import cvt
 from tests.benchmarks.placement_quality import evenness
-from tests.core.conftest import HEAD, read_obj, subdivided_sphere
-from tests.devices import DEVICE
+from tests.support.devices import DEVICE
+from tests.support.meshes import HEAD, read_obj, subdivided_sphere
 
 REPETITIONS = 5  # of each, in turns: the quickest counts, as other work can only slow one down
 THOROUGH = 10, 30  # Lloyd's and Newton's rounds: twice geogram's usual time
@@ -160,7 +160,7 @@ def versions():
 
 @pytest.mark.filterwarnings("default")  # peers have theirs
 @pytest.mark.parametrize("name", ["sphere", "Suzanne", "head"])
-def test_sites_are_more_even_than_anybody_elses(name):
+def test_sites_are_more_even_than_those_of_peers(name):
     mesh = surface(name)
     ours(mesh, 200)  # compiles kernels
     print("\n" + json.dumps({"surface": name, "triangles": len(mesh.triangles), **versions()}))

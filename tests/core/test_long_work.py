@@ -6,9 +6,9 @@ import threading
 import numpy as np
 import pytest
 
-from hair_addon.core import groom
 from hair_addon.core.errors import HairError
-from hair_addon.core.groom import GuideSettings
+from hair_addon.core.grooming import groom
+from hair_addon.core.grooming.groom import GuideSettings
 from hair_addon.core.long_work import Job, Stage, Stopped, part_of, run_now
 
 
@@ -74,7 +74,7 @@ def test_parts_nest():
 
 
 def square(side):
-    from hair_addon.core.mesh import TriMesh
+    from hair_addon.core.geometry.mesh import TriMesh
 
     vertices = np.array([(0, 0, 0), (side, 0, 0), (side, side, 0), (0, side, 0)], np.float32)
     return TriMesh(vertices, np.array([(0, 1, 2), (0, 2, 3)], np.int32))
@@ -114,7 +114,7 @@ def test_guides_can_be_stopped_in_every_step(device):
 
 
 def test_what_is_wrong_is_said_before_anything_is_compiled():
-    from hair_addon.core.mesh import TriMesh
+    from hair_addon.core.geometry.mesh import TriMesh
 
     def never(_step, _part):
         raise AssertionError

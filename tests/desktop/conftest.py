@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tools import build_extension, desktop_blender
+from tools import build_extension, compile_kernels, desktop_blender
 
 ROOT = build_extension.ROOT
 WALK = Path(__file__).with_name("walk.py")
@@ -55,7 +55,7 @@ def walk(request, desktop, tmp_path_factory):
     folder = ROOT / "out" / "desktop" / request.param
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    extension = build_extension.build(build_extension.this_platform())
+    extension = build_extension.build(compile_kernels.this_platform())
     packages = Path(sysconfig.get_paths()["purelib"]).resolve()
     profile = tmp_path_factory.mktemp("profile")
     statuses = [

@@ -7,8 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.commands import HEAD, load, run
-from tools import build_extension
+from tests.support.commands import HEAD, load, run
+from tools import build_extension, compile_kernels
 
 pytestmark = pytest.mark.desktop
 
@@ -20,7 +20,7 @@ def vellus(desktop, tmp_path_factory):
     """A function that calls blender --command vellus in a profile with the extension; `.folder` is seen by both."""
     profile = tmp_path_factory.mktemp("profile")
     installing = ("--command", "extension", "install-file", "--repo", "user_default", "--enable")
-    installed = desktop.command(*installing, build_extension.build(build_extension.this_platform()), profile=profile)
+    installed = desktop.command(*installing, build_extension.build(compile_kernels.this_platform()), profile=profile)
     assert installed.returncode == 0, installed.stdout + installed.stderr
 
     def call(*arguments):
@@ -67,7 +67,7 @@ def test_a_groom_is_made_told_of_and_drawn(vellus):
 
 def test_it_ends_as_it_should(vellus):
     missing = vellus("groom", "missing.obj", "--out", "x.npz")
-    assert missing.returncode == 1 and missing.stderr == "vellus: missing.obj is not there: check the name.\n"
+    assert missing.returncode == 1 and missing.stderr == "vellus: missing.obj does not exist: check the path.\n"
     assert vellus("comb").returncode == 2
     helped = vellus("groom", "--help")
     assert helped.returncode == 0 and "usage: blender --command vellus groom" in helped.stdout

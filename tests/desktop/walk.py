@@ -2,9 +2,8 @@
 """What an artist does in a window: installs the extension, grows hair on the head, combs it, saves and loads.
 
 Run by a desktop Blender: walk.py -- PART ZIP HEAD OUT SITE_PACKAGES. Writes to OUT a picture of the screen for each
-step, what the tests want to know (facts.json) and the outcome of the shaders' tests (twins.xml). A walk has `PARTS`,
-each in a Blender of its own: a hundred redraws of its window in a row crash Blender 5.2.2 on Mesa's software Vulkan,
-with the add-on on or off.
+step, what the tests need (facts.json) and the outcome of the shaders' tests (twins.xml). Each of the `PARTS` runs in a
+Blender of its own: a hundred redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or without add-on.
 """
 
 import json
@@ -22,7 +21,9 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.window import (  # noqa: E402
     drag,
+    import_head,
     in_viewport,
+    no_hair_near,
     offscreen_light,
     places,
     press,
@@ -91,11 +92,7 @@ def head():
     """The sample's head alone, in the middle of the view, lit by a sun over the viewer's shoulder."""
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
-    with in_viewport():
-        bpy.ops.wm.obj_import(filepath=HEAD)
-        head_object = bpy.context.object
-        bpy.ops.object.transform_apply(rotation=True)
-    head_object.name = "Head"
+    head_object = import_head(HEAD)
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 4.0, (0.9, 0.2, 0.4)
     bpy.context.scene.collection.objects.link(sun)
@@ -209,12 +206,6 @@ def comb():
     yield
 
 
-def no_hair_near(drawn, place):
-    """Whether a pixel has no hair within the distance at which Blender takes a click for a hit."""
-    around = np.add(place, np.indices((5, 5)).reshape(2, -1).T * 5 - 10)
-    return not any(drawn.hair_at(bpy.context, int(x), int(y)) for x, y in around)
-
-
 def click():
     """On hair and beside it, with each of the tools that select."""
     blender = sys.modules[f"{MODULE}.hair_addon.blender"]
@@ -223,14 +214,14 @@ def click():
     screen("clicks")
     with in_viewport():
         near = [(int(x) - region.x, int(y) - region.y) for x, y in places(points("Hair"))[20::41]]
-        on_hair = next(place for place in near if blender.viewport.hair_at(bpy.context, *place) == hair)
+        on_hair = next(place for place in near if blender.render.viewport.hair_at(bpy.context, *place) == hair)
         # What of the head is closest to the viewer is in front of everything else of it.
         eye = area.spaces.active.region_3d.view_matrix.inverted().translation
         skin = sorted(
             (head_object.matrix_world @ v.co for v in head_object.data.vertices), key=lambda p: (p - eye).length
         )
         near = places(np.array(skin)) - (region.x, region.y)
-        on_head = next(place for place in near if no_hair_near(blender.viewport, place))
+        on_head = next(place for place in near if no_hair_near(blender.render.viewport, place))
     facts["clicks"] = {}
     for tool in ("builtin.select_box", "builtin.select"):
         with in_viewport():
@@ -245,6 +236,8 @@ def click():
             selected.append([o.name for o in (head_object, hair) if o.select_get()])
         facts["clicks"][tool] = selected
     screen("selected")
+    area.spaces.active.overlay.show_outline_selected = False
+    show("not_outlined")
 
 
 def write_files():
@@ -331,21 +324,23 @@ def twins():
     import pytest
 
     options = ["--noconftest", "-p", "tests.conftest", "-p", "no:cacheprovider", f"--junitxml={OUT / 'twins.xml'}"]
-    facts["twins"] = pytest.main(["-q", *options, "tests/blender/test_glsl.py", "tests/blender/test_varied_glsl.py"])
+    facts["twins"] = pytest.main(
+        ["-q", *options, "tests/blender/gpu/test_glsl.py", "tests/blender/gpu/test_varied_glsl.py"]
+    )
     yield
 
 
 def break_shader():
     """A driver that refuses the shader that lays hair over the viewport: twice, and mended again."""
-    shaders = sys.modules[f"{MODULE}.hair_addon.blender.shaders"]
+    shaders = sys.modules[f"{MODULE}.hair_addon.blender.gpu.shaders"]
     file = shaders.FOLDER / "include" / "display_place.glsl"
     text = file.read_text()
     file.write_text(text.replace("return log2", "return nonsense + log2"))
-    shaders.display_program.cache_clear()
+    shaders.program_cache.invalidate((shaders.display_program.__wrapped__, ()))
     screen("broken")
     screen("broken_again")
     file.write_text(text)
-    shaders._complaints.clear()
+    shaders.complaint_cache.clear()
     yield
     show("mended")
 
@@ -360,7 +355,7 @@ def reopen():
 
 def hurry():
     """Four samples a pixel in each pass, as with a graphics card: a picture is fine after eight redraws, not 32."""
-    sys.modules[f"{MODULE}.hair_addon.blender.hair_picture"].samples_per_side = lambda: 2
+    sys.modules[f"{MODULE}.hair_addon.blender.render.hair_picture"].samples_per_side = lambda: 2
     yield
 
 

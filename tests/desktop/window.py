@@ -27,6 +27,16 @@ def in_viewport():
     return bpy.context.temp_override(window=window(), area=area, region=region)
 
 
+def import_head(path):
+    """The sample's head, from its OBJ file."""
+    with in_viewport():
+        bpy.ops.wm.obj_import(filepath=path)
+        head = bpy.context.object
+        bpy.ops.object.transform_apply(rotation=True)
+    head.name = "Head"
+    return head
+
+
 def take_picture(path):
     """Redraw until nothing is refined any more, and write a picture of the whole screen."""
     with in_viewport():
@@ -92,7 +102,7 @@ def offscreen_light(blender):
     """
     import gpu
 
-    drawing, drawn_scene = blender.viewport.drawing, blender.viewport.drawn_scene
+    drawing, drawn_scene = blender.gpu.drawing, blender.render.drawn_scene
     area, region = viewport()
     view, samples = area.spaces.active.region_3d, 4
     size = (region.width * samples, region.height * samples)
@@ -100,7 +110,7 @@ def offscreen_light(blender):
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, area.spaces.active)
     matrices = np.array(view.view_matrix, np.float64), np.array(view.window_matrix, np.float64)
     record = drawing.view_record(*matrices, size[1], least_width=1.0)
-    buffer = blender.hair_picture.HairBuffer(*size)
+    buffer = blender.gpu.visibility_buffer.VisibilityBuffer(*size)
     with buffer.surfaces():
         drawn_scene.draw_hiding(drawn, record)
     drawn_scene.draw_hair(drawn, record, buffer)
@@ -110,3 +120,9 @@ def offscreen_light(blender):
         drawing.resolve(buffer.color, samples)
         pixels = np.array(target.read_color(0, 0, region.width, region.height, 4, 0, "FLOAT"), np.float32)
     return pixels.reshape(region.height, region.width, 4)
+
+
+def no_hair_near(drawn, place):
+    """Whether a pixel has no hair within the distance at which Blender takes a click for a hit."""
+    around = np.add(place, np.indices((5, 5)).reshape(2, -1).T * 5 - 10)
+    return not any(drawn.hair_at(bpy.context, int(x), int(y)) for x, y in around)

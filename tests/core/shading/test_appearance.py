@@ -10,8 +10,10 @@ from hypothesis import strategies as st
 
 from hair_addon.core.errors import HairError
 from hair_addon.core.params import declared
-from hair_addon.core.shading import albedo, appearance, kajiya_kay, lookup_tables, presets, strand_variation
+from hair_addon.core.shading import appearance, presets
 from hair_addon.core.shading.appearance import Appearance
+from hair_addon.core.shading.fibre import kajiya_kay, strand_variation
+from hair_addon.core.shading.tables import albedo, lookup_tables
 
 # Of a freshly made Principled Hair BSDF.
 SOCKETS = {

@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Any value for any argument of the functions for scripts, and for any property: it works, or is a `HairError`.
+
+Afterwards the file has nothing that was half made; it is saved, drawn, and an undo works. VELLUS_TEST_STEPS sets the
+number of calls.
+"""
+
+import math
+import os
+import random
+from dataclasses import fields
+from fractions import Fraction
+
+import bpy
+import numpy as np
+
+from hair_addon import api
+from hair_addon.blender.live import live_hair
+from hair_addon.core.imaging.pixel_sampling import FrameSettings, PictureSettings
+from hair_addon.core.params import declared
+from hair_addon.core.shading.tables import lookup_tables
+from tests.support.following import update
+from tests.support.reading import everything, points
+
+STEPS = int(os.environ.get("VELLUS_TEST_STEPS", "60"))
+
+NUMBERS = [0, 1, -1, 2, 7, 0.5, 1e-300, 1e-30, 1e-9, 1e6, 1e30, 1e300, -1e300, 2**31 - 1, 2**31, 10**400, math.pi]
+NUMBERS += [math.nan, math.inf, -math.inf, True, np.int8(3), np.float32(0.25), np.float16(2), Fraction(1, 3), 5e-324]
+OTHERS = [
+    None,
+    "",
+    "top",
+    "x" * 300,
+    "\udcff",
+    "a\0b",
+    b"top",
+    "BLOND",
+    "MARSCHNER",
+    "energy",
+    "COLOR",
+    1j,
+    [],
+    {},
+    set(),
+]
+OTHERS += [
+    np.zeros(3),
+    np.ones((2, 2)),
+    np.array(None),
+    (0, 0, 0),
+    [1, 1, 1],
+    (1, 2),
+    object(),
+    print,
+    range(3),
+    NUMBERS,
+]
+
+# What would take long, or fill memory, without being wrong.
+COSTLY = {
+    "guide_count": 40,
+    "strand_count": 100,
+    "relax_iterations": 3,
+    "size": 32,
+    "width": 24,
+    "height": 24,
+    "samples_per_side": 2,
+    "sample_count": 2,
+}
+
+
+def extremes(default, details):
+    """The ends of a setting's range, now and then just beyond."""
+    if isinstance(default, bool | str):
+        return [not default] if isinstance(default, bool) else [choice[0] for choice in details.choices] or [default]
+    ends = [v for v in (details.low, details.high, details.soft_high) if math.isfinite(v)] or [default]
+    above = details.above if math.isfinite(details.above) else details.low
+    found = [*ends, *ends, math.nextafter(above, math.inf), math.nextafter(details.high, math.inf)]
+    return [tuple([value] * len(default)) for value in found] + found if isinstance(default, tuple) else found
+
+
+def value_for(dice, name, default, details):
+    kind = dice.random()
+    value = dice.choice(extremes(default, details) if kind < 0.85 else NUMBERS if kind < 0.93 else OTHERS)
+    is_number = isinstance(value, int | float) and not isinstance(value, bool)
+    return COSTLY[name] if name in COSTLY and is_number and value > COSTLY[name] else value
+
+
+def changes(dice, settings_class, cheap):
+    declarations = {name: (default, details) for name, default, details in declared(settings_class)}
+    chosen = dice.sample(sorted(declarations), dice.randint(0, 2))
+    found = {name: value for name, value in COSTLY.items() if name in declarations and name in cheap}
+    return found | {name: value_for(dice, name, *declarations[name]) for name in chosen}
+
+
+def target(dice, kind):
+    """Mostly what is asked for, else anything."""
+    of_kind = [o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind]
+    of_kind += [o for o in bpy.data.objects if kind == "MESH" and o.type == "MESH"]
+    return dice.choice(of_kind if dice.random() < 0.85 else [*bpy.data.objects, dice.choice(OTHERS)])
+
+
+def settings(dice):
+    """Mostly a groom's settings, made of anything."""
+    if dice.random() < 0.1:
+        return dice.choice(OTHERS)
+    parts = {}
+    for section in fields(api.GroomSettings):
+        if dice.random() < 0.3:
+            parts[section.name] = section.type(**changes(dice, section.type, COSTLY))
+    few = {"guides": api.GuideSettings(guide_count=20), "hair": api.HairSettings(strand_count=50)}
+    return api.GroomSettings(**(few | parts))
+
+
+def anything(dice, *often):
+    return dice.choice(OTHERS + NUMBERS) if dice.random() < 0.15 else dice.choice(often)
+
+
+CALLS = {
+    "distribute_guides": lambda d: api.distribute_guides(target(d, "MESH"), **changes(d, api.GuideSettings, COSTLY)),
+    "interpolate_hair": lambda d: api.interpolate_hair(target(d, "GUIDES"), **changes(d, api.HairSettings, COSTLY)),
+    "add_hair": lambda d: api.add_hair(target(d, "MESH"), settings(d)),
+    "arrays": lambda d: api.distribute_guides(
+        (anything(d, np.eye(3)), anything(d, [[0, 1, 2]])), **changes(d, api.GuideSettings, COSTLY)
+    ),
+    "points": lambda d: api.points(target(d, d.choice(["GUIDES", "HAIR"]))),
+    "shade": lambda d: api.shade(
+        target(d, "HAIR"),
+        anything(d, None, "BLOND", api.Appearance()),
+        model=anything(d, None, "KAJIYA_KAY", "MARSCHNER"),
+        **changes(d, api.Appearance, ()),
+    ),
+    "table_settings": lambda d: api.table_settings(settings(d), **changes(d, lookup_tables.Settings, COSTLY)),
+    "bake_tables": lambda d: api.bake_tables(
+        anything(d, "tables"), has_plots=anything(d, False), **changes(d, lookup_tables.Settings, COSTLY)
+    ),
+    "draw": lambda d: api.draw(**changes(d, PictureSettings, COSTLY)),
+    "render": lambda d: api.render(
+        anything(d, "a.png", "b_##.exr"),
+        frame=anything(d, None, 1, 5),
+        engine=anything(d, "vellus"),
+        **changes(d, FrameSettings, COSTLY),
+    ),
+    "settings_of": lambda d: api.settings_of(target(d, "HAIR")),
+    "save_settings": lambda d: api.save_settings(anything(d, "a.json"), settings(d)),
+    "load_settings": lambda d: api.load_settings(anything(d, "a.json")),
+    "apply_settings": lambda d: api.apply_settings(target(d, "HAIR"), settings(d)),
+}
+
+
+def set_property(dice):
+    """A property of a random hair's settings, which Blender may refuse."""
+    hair = dice.choice([c for c in bpy.data.hair_curves if c.vellus.kind != "NONE"])
+    groups = {"guides": api.GuideSettings, "hair": api.HairSettings, "appearance": api.Appearance}
+    name, settings_class = dice.choice([*groups.items(), ("marschner", lookup_tables.Settings)])
+    setting, default, details = dice.choice(declared(settings_class))
+    if name == "marschner" and not hasattr(hair.vellus.marschner, setting):
+        return
+    value = value_for(dice, setting, default, details)
+    if setting in COSTLY and (not isinstance(value, int | float) or value > COSTLY[setting]):
+        return
+    try:
+        setattr(getattr(hair.vellus, name), setting, value)
+    except (TypeError, ValueError, OverflowError):  # Blender's own answer
+        return
+    update()
+
+
+MADE = ("objects", "hair_curves", "materials", "node_groups")
+
+
+def assert_whole():
+    """No curves are half made, and each hair has what it needs."""
+    for shown in bpy.data.objects:
+        if shown.type == "CURVES":
+            assert shown.data.vellus.kind != "NONE" and len(shown.data.curves) > 0
+            assert np.isfinite(points(shown)).all()
+    assert all(curves.users for curves in bpy.data.hair_curves)
+    assert not bpy.app.timers.is_registered(live_hair.write_after_pause)
+
+
+def test_any_argument_works_or_is_refused(lit, tmp_path, monkeypatch, capfd):
+    monkeypatch.chdir(tmp_path)
+    dice = random.Random(int(os.environ.get("VELLUS_TEST_SEED", "5")))
+    refusals = 0
+    for step in range(STEPS):
+        name = dice.choice([*CALLS, "property", "property", "undo"])
+        before = everything()
+        state = dice.getstate()
+        try:
+            if name == "property":
+                set_property(dice)
+            elif name == "undo":
+                bpy.ops.ed.undo_push(message="step")
+                set_property(dice)
+                bpy.ops.ed.undo_push(message="property")
+                bpy.ops.ed.undo()
+            else:
+                CALLS[name](dice)
+        except api.HairError as error:
+            refusals += 1
+            assert "\n" not in str(error), (step, name)
+            assert everything() == before, (step, name, str(error))
+        except BaseException as error:
+            raise AssertionError(f"step {step}, {name}: {state[1][-1]}") from error
+        assert_whole()
+        if len(bpy.data.hair_curves) > 8:  # or every call would take longer than the one before
+            for shown in [o for o in bpy.data.objects if o.type == "CURVES" and o.name not in ("Hair", "Guides")]:
+                bpy.data.hair_curves.remove(shown.data)
+            update()
+        said = capfd.readouterr()
+        assert "Traceback" not in said.err + said.out, (step, name, said)
+    assert 0 < refusals < STEPS
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "saved.blend"))
+    for hair in (c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"):
+        api.shade(hair, api.Appearance())
+        hair.vellus.marschner.size = 16
+    assert np.isfinite(api.draw(width=16, height=12, samples_per_side=1)).all()

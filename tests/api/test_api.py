@@ -1,0 +1,165 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The functions for scripts: their documented examples run, README's too, and what they cannot do is one sentence."""
+
+import doctest
+import math
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+import warp
+
+from hair_addon import api
+from tests.support.following import update
+from tests.support.reading import evaluated_points, points, snapshot
+
+ROOT = Path(__file__).resolve().parents[2]
+WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'): sys.modules[name] = None\n"
+
+
+def examples():
+    """The doctests of the functions, in the order of the file; the module's own is the first."""
+    found = doctest.DocTestFinder(exclude_empty=True).find(api, "api")
+    return sorted((test for test in found if test.examples), key=lambda test: test.lineno)
+
+
+def readme(language):
+    """The blocks of code of a language in README.md."""
+    return re.findall(rf"```{language}\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+
+
+@pytest.fixture
+def scalp(sphere):
+    """The sphere under another name, before a camera."""
+    sphere.name = "Scalp"
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -6.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    return sphere
+
+
+def test_examples_of_functions_run(scalp, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(warp.config, "log_level", warp.LOG_WARNING)
+    documented, runner = examples()[1:], doctest.DocTestRunner()
+    for example in documented:
+        example.globs = {"api": api, "bpy": bpy}
+        runner.run(example)
+    assert runner.summarize(verbose=False).failed == 0
+    public = [name for name in api.__all__ if name[0].islower()]
+    assert {example.name.removeprefix("api.") for example in documented} == {*public} - {"settings_of"}
+
+
+def run_python(program, folder):
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=folder, env={"PYTHONPATH": str(ROOT)}, capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_the_example_of_plain_arrays_runs_without_blender(tmp_path):
+    program = "import doctest, warp\nfrom hair_addon import api\nwarp.config.log_level = warp.LOG_WARNING\n"
+    program += "test = doctest.DocTestFinder(recurse=False).find(api, 'api')[0]\n"
+    program += "assert doctest.DocTestRunner().run(test).failed == 0 and test.examples\n"
+    run_python(WITHOUT_BLENDER + program, tmp_path)
+
+
+def test_examples_of_the_readme_run(tmp_path):
+    in_blender, plain = readme("python")
+    assert "import bpy" in in_blender and "bpy" not in plain
+    run_python("import hair_addon\nhair_addon.register()\n" + in_blender, tmp_path)
+    run_python(WITHOUT_BLENDER + plain, tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: api.distribute_guides(bpy.data.objects["Sphere"], guide_cuont=3), "Unknown setting"),
+        (lambda: api.distribute_guides(bpy.data.objects["Sphere"], guide_count=0), "Guide count must be between"),
+        (lambda: api.distribute_guides(bpy.data.objects["Sphere"], density_group="none"), "no vertex group"),
+        (lambda: api.distribute_guides("Sphere"), "neither a mesh object"),
+        (lambda: api.distribute_guides(None), "neither a mesh object"),
+        (lambda: api.distribute_guides(([[0, 0, 0]], [[0, 0, 5]])), "uses vertex 5"),
+        (lambda: api.distribute_guides(([[0, 0]], [[0, 0, 0]])), "A mesh is vertices"),
+        (lambda: api.distribute_guides((np.eye(3), [[0, 1, 2]]), density_group="top"), "plain arrays"),
+        (lambda: api.interpolate_hair(bpy.data.objects["Hair"]), "is not Vellus guides"),
+        (lambda: api.interpolate_hair(api.distribute_guides((np.eye(3), [[0, 1, 2]]), guide_count=3)), "mesh="),
+        (lambda: api.add_hair(bpy.data.objects["Hair"]), "neither a mesh object"),
+        (lambda: api.shade(bpy.data.objects["Hair"], "PLAID"), "Unknown preset"),
+        (lambda: api.shade(bpy.data.objects["Hair"], model="PHONG"), "Unknown model"),
+        (lambda: api.shade(bpy.data.objects["Hair"], melanin=3), "Melanin must be between"),
+        (lambda: api.shade(bpy.data.objects["Guides"]), "is not Vellus hair"),
+        (lambda: api.points(bpy.data.objects["Sphere"]), "is not Vellus guides or hair"),
+        (lambda: api.draw(width=0), "Width must be"),
+        (lambda: api.draw(), "no camera"),
+        (lambda: api.render("a.png"), "no camera"),
+        (lambda: api.render("a.gif"), "saved as .png or .exr"),
+        (lambda: api.render("a.png", engine="pencil"), "Unknown engine"),
+        (lambda: api.load_settings("missing.json"), "does not exist"),
+        (lambda: api.save_settings("pyproject.toml/a.json", api.GroomSettings()), "cannot be written"),
+    ],
+)
+def test_failures_are_one_sentence_and_change_nothing(hair, call, said, tmp_path, monkeypatch):
+    (tmp_path / "pyproject.toml").touch()
+    monkeypatch.chdir(tmp_path)
+    before = snapshot()
+    with pytest.raises(api.HairError) as refused:
+        call()
+    assert said in str(refused.value) and "\n" not in str(refused.value)
+    assert snapshot() == before
+    assert [path.name for path in tmp_path.iterdir()] == ["pyproject.toml"]
+
+
+def test_points_are_metres_in_the_world(hair):
+    sphere = bpy.data.objects["Sphere"]
+    sphere.location, sphere.rotation_euler, sphere.scale = (1.0, 2.0, 3.0), (0.3, 0.2, 0.5), (2.0, 2.0, 2.0)
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    update()
+    matrix = np.array(hair.matrix_world)
+    expected = 0.01 * (points(hair) @ matrix[:3, :3].T + matrix[:3, 3])
+    np.testing.assert_allclose(api.points(hair), expected, atol=1e-6)
+
+
+def test_points_are_where_the_surface_carries_them(hair):
+    twist = bpy.data.objects["Sphere"].modifiers.new("Twist", "SIMPLE_DEFORM")
+    twist.deform_method, twist.angle = "TWIST", 1.0
+    update()
+    assert np.abs(evaluated_points(hair) - points(hair)).max() > 0.1
+    np.testing.assert_allclose(api.points(hair), evaluated_points(hair), atol=1e-5)
+
+
+def test_points_follow_guides_that_were_combed(guides):
+    bpy.ops.vellus.interpolate_hair(strand_count=50)
+    hair = bpy.data.objects["Hair"]
+    before = api.points(hair)
+    moved = points(guides)
+    moved[:, 1:] += (0.0, 0.0, 0.2)
+    guides.data.attributes["position"].data.foreach_set("vector", moved.ravel())
+    guides.data.update_tag()
+    update()
+    assert np.abs(api.points(hair) - before).max() > 0.1
+
+
+def test_a_look_keeps_how_it_is_drawn(hair):
+    api.shade(hair, mode="classic", model="KAJIYA_KAY")
+    api.shade(hair, "BLOND")
+    look = api.settings_of(hair).appearance
+    assert (look.mode, look.melanin, hair.data.vellus.model) == ("classic", 0.22, "KAJIYA_KAY")
+
+
+def test_settings_of_combed_guides_leave_them(guides):
+    bpy.ops.vellus.interpolate_hair(strand_count=50)
+    moved = points(guides) + np.float32(0.01)
+    guides.data.attributes["position"].data.foreach_set("vector", moved.ravel())
+    guides.data.update_tag()
+    update()
+    api.apply_settings(bpy.data.objects["Hair"], api.GroomSettings(api.GuideSettings(guide_count=7)))
+    update()
+    assert np.array_equal(points(guides), moved)
+    assert "Regenerate Guides" in guides.data.vellus.status

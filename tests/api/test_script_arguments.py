@@ -1,0 +1,256 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Arguments of wrong types given to the functions for scripts: one sentence, and the file is as it was."""
+
+import math
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Color
+
+from hair_addon import api
+from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh
+from hair_addon.core.geometry.strands import Strands
+from tests.support.following import update
+from tests.support.reading import everything
+
+TRIANGLE = [[0, 1, 2]]
+SMALL = {"width": 16, "height": 12}
+
+
+def data(name):
+    return bpy.data.objects[name]
+
+
+def removed():
+    """An object that a script holds on to after it was removed."""
+    gone = bpy.data.objects.new("Gone", bpy.data.meshes["Icosphere"])
+    bpy.data.objects.remove(gone)
+    return gone
+
+
+def elsewhere():
+    """Make the mesh object Other in another scene."""
+    other = bpy.data.objects.new("Other", bpy.data.meshes["Icosphere"])
+    bpy.data.scenes.new("Elsewhere").collection.objects.link(other)
+    return other
+
+
+def mesh(vertices=None, triangles=TRIANGLE):
+    return api.distribute_guides((np.eye(3) if vertices is None else vertices, triangles), guide_count=3)
+
+
+def strands():
+    return api.distribute_guides((np.eye(3), TRIANGLE), guide_count=3)
+
+
+def hair_of_arrays(guides, arrays=None):
+    return api.interpolate_hair(guides, mesh=(np.eye(3), TRIANGLE) if arrays is None else arrays, strand_count=5)
+
+
+def evaluated_curves(name):
+    return data(name).evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+
+
+# (call, what the sentence says)
+REFUSED = {
+    # Settings.
+    "None for text": (lambda: api.interpolate_hair(data("Guides"), density_group=None), "Strand mask must be text"),
+    "None for a number": (
+        lambda: api.interpolate_hair(data("Guides"), neighbour_limit=None),
+        "Max guides per strand must be",
+    ),
+    "text for a number": (
+        lambda: api.distribute_guides(data("Sphere"), guide_count="12"),
+        "Guide count must be",
+    ),
+    "a truth for a number": (
+        lambda: api.distribute_guides(data("Sphere"), guide_count=True),
+        "Guide count must be",
+    ),
+    "a number for a truth": (lambda: api.distribute_guides(data("Sphere"), symmetric=1), "Symmetric must be True or"),
+    "a huge integer": (lambda: api.distribute_guides(data("Sphere"), seed=10**400), "Seed must be between"),
+    "a huge length": (lambda: api.distribute_guides(data("Sphere"), length=10**400), "Length must be positive"),
+    "no number": (lambda: api.interpolate_hair(data("Guides"), radius=math.nan), "Radius must be positive"),
+    "an array": (lambda: api.interpolate_hair(data("Guides"), radius=np.ones(3)), "Radius must be a number"),
+    "a complex color": (lambda: api.shade(data("Hair"), color=(1j, 0, 0)), "Color must be a number"),
+    "a gray color": (lambda: api.shade(data("Hair"), color=0.5), "Color needs 3 numbers"),
+    "a name no .blend can hold": (
+        lambda: api.interpolate_hair(data("Guides"), region_group="\udcff"),
+        "Region group has",
+    ),
+    "settings of another class": (
+        lambda: api.distribute_guides(data("Sphere"), api.HairSettings()),
+        "settings must be",
+    ),
+    "a dictionary of settings": (lambda: api.interpolate_hair(data("Guides"), {"seed": 1}), "settings must be"),
+    "zero for settings": (lambda: api.interpolate_hair(data("Guides"), 0), "settings must be"),
+    "settings of a stage": (lambda: api.add_hair(data("Sphere"), api.GuideSettings()), "settings must be"),
+    "nothing for a groom": (lambda: api.apply_settings(data("Hair"), None), "settings must be"),
+    "text for a groom": (lambda: api.save_settings("a.json", "settings"), "settings must be"),
+    "tables of a look": (lambda: api.table_settings(api.Appearance()), "settings must be"),
+    "a look of another class": (lambda: api.shade(data("Hair"), api.GuideSettings()), "settings must be"),
+    "a number for a look": (lambda: api.shade(data("Hair"), 3), "settings must be"),
+    "a list for a model": (lambda: api.shade(data("Hair"), model=["MARSCHNER"]), "Unknown model a value of type list"),
+    "a model and a wrong look": (lambda: api.shade(data("Hair"), model="KAJIYA_KAY", melanin=3), "Melanin must be"),
+    "plots of none": (lambda: api.bake_tables("tables", has_plots=None, size=16), "has_plots must be True or False"),
+    # Objects.
+    "bytes for a surface": (lambda: api.distribute_guides(b"Sphere"), "neither a mesh object"),
+    "an array for a surface": (lambda: api.distribute_guides(np.eye(3)), "type ndarray is neither a mesh object"),
+    "a mesh for its object": (lambda: api.distribute_guides(data("Sphere").data), "neither a mesh object"),
+    "a removed surface": (lambda: api.distribute_guides(removed()), "was removed from the file"),
+    "a removed surface of a groom": (lambda: api.add_hair(removed()), "was removed from the file"),
+    "a surface elsewhere": (lambda: api.distribute_guides(data("Other")), "not in this scene"),
+    "no guides": (lambda: api.interpolate_hair(None), "None is not Vellus guides"),
+    "text for guides": (lambda: api.interpolate_hair("Guides"), "'Guides' is not Vellus guides"),
+    "removed guides": (lambda: api.interpolate_hair(removed()), "was removed from the file"),
+    "removed hair": (lambda: api.shade(removed(), "BLOND"), "was removed from the file"),
+    "an array for hair": (
+        lambda: api.points(np.zeros((2, 3, 3))),
+        "a value of type ndarray is not Vellus guides or hair",
+    ),
+    "what modifiers made": (lambda: api.points(evaluated_curves("Hair")), "is not Vellus guides or hair"),
+    "an object without data": (lambda: api.points(data("Empty")), "is not Vellus guides or hair"),
+    # Arrays.
+    "one array": (lambda: api.distribute_guides([np.eye(3)]), "pair of arrays"),
+    "three arrays": (lambda: api.distribute_guides((1, 2, 3)), "pair of arrays"),
+    "fractions of vertices": (lambda: mesh(triangles=[[0, 1, 1.5]]), "must be whole numbers"),
+    "a vertex that is no number": (lambda: mesh(triangles=[[0, 1, math.nan]]), "must be whole numbers"),
+    "an infinite vertex": (lambda: mesh(triangles=[[0, 1, math.inf]]), "must be whole numbers"),
+    "a vertex beyond 32 bits": (lambda: mesh(triangles=[[0, 1, 2**32 + 2]]), "uses vertex 4294967298"),
+    "a vertex beyond 64 bits": (lambda: mesh(triangles=[[0, 1, 10**30]]), "must be numbers"),
+    "a vertex below zero": (lambda: mesh(triangles=[[0, 1, -1]]), "uses vertex -1"),
+    "a vertex that wraps": (lambda: mesh(triangles=np.array([[0, 1, 2**64 - 1]], np.uint64)), "uses vertex 1844"),
+    "truths for triangles": (lambda: mesh(triangles=np.ones((1, 3), bool)), "must be numbers"),
+    "text for vertices": (lambda: mesh([["a", "b", "c"]]), "must be numbers"),
+    "objects for vertices": (lambda: mesh([[None, 0, 0]] * 3), "must be numbers"),
+    "complex vertices": (lambda: mesh(1j * np.eye(3)), "must be numbers"),
+    "ragged vertices": (lambda: mesh([[0, 0, 0], [1, 0]]), "must be an array of numbers"),
+    "flat vertices": (lambda: mesh(np.arange(9.0)), "A mesh is vertices"),
+    "vertices that single precision cannot hold": (lambda: mesh(1e200 * np.eye(3)), "non-finite"),
+    "a mesh of lists": (lambda: api.distribute_guides(TriMesh([[None] * 3], TRIANGLE)), "must be numbers"),
+    "a mesh of long indices": (
+        lambda: api.distribute_guides(TriMesh(np.eye(3), np.array([[0, 1, 2**32]]))),
+        "uses vertex 4294967296",
+    ),
+    "no mesh": (lambda: api.interpolate_hair(strands()), "mesh="),
+    "text for the mesh": (lambda: hair_of_arrays(strands(), "mesh"), "pair of arrays"),
+    "strands of arrays": (lambda: hair_of_arrays(Strands(np.zeros((1, 4, 3)), None)), "Warp array"),
+    "strands without roots": (lambda: hair_of_arrays(Strands(strands().points, None)), "SurfacePoints"),
+    "strands of fewer roots": (
+        lambda: hair_of_arrays(Strands(strands().points, SurfacePoints(np.zeros(1, np.int32), np.eye(3)[:1]))),
+        "SurfacePoints",
+    ),
+    # Paths, frames, engines, progress.
+    "no path": (lambda: api.render(None), "A path must be"),
+    "bytes for a path": (lambda: api.render(b"a.png"), "A path must be"),
+    "a number for a path": (lambda: api.save_settings(3, api.GroomSettings()), "A path must be"),
+    "no path to load": (lambda: api.load_settings(None), "A path must be"),
+    "an empty path": (lambda: api.load_settings(""), "A path must be"),
+    "a null character": (lambda: api.save_settings("a\0b.json", api.GroomSettings()), "A path must be"),
+    "no folder": (lambda: api.bake_tables(None, size=16), "A path must be"),
+    "a file name too long": (lambda: api.render("a" * 300 + ".png", **SMALL), "cannot be written"),
+    "a file name of surrogates": (lambda: api.render("\udcff.png", **SMALL), "cannot be written"),
+    "a file name no system has": (lambda: api.render("\ud800.png", **SMALL), "A path must be"),
+    "half a frame": (lambda: api.render("a.png", frame=1.5, **SMALL), "frame must be a whole number"),
+    "text for a frame": (lambda: api.render("a.png", frame="1", **SMALL), "frame must be a whole number"),
+    "a frame Blender lacks": (lambda: api.render("a.png", frame=10**9, **SMALL), "There is no frame"),
+    "a list of engines": (lambda: api.render("a.png", engine=["vellus"]), "Unknown engine a value of type list"),
+    "no progress": (lambda: api.distribute_guides(data("Sphere"), progress=None), "progress must be a function"),
+    "no progress of a picture": (lambda: api.draw(progress=1, **SMALL), "progress must be a function"),
+}
+
+
+def assert_all_goes_on(folder):
+    """The file is saved and drawn, and an undo works."""
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "saved.blend"))
+    assert np.isfinite(api.draw(width=16, height=12, samples_per_side=1)).all()
+
+
+def test_wrong_arguments_are_one_sentence_and_change_nothing(lit, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    elsewhere(), bpy.data.objects.new("Empty", None)
+    model, before = lit.data.vellus.model, everything()
+    for name, (call, said) in REFUSED.items():
+        with pytest.raises(api.HairError) as refused:
+            call()
+        sentence = str(refused.value)
+        assert said in sentence and "\n" not in sentence and len(sentence) < 500, name
+        assert (everything(), lit.data.vellus.model, [*tmp_path.iterdir()]) == (before, model, []), name
+    assert_all_goes_on(tmp_path)
+
+
+def test_numbers_of_any_kind_are_settings(lit, tmp_path):
+    guides = api.distribute_guides(data("Sphere"), guide_count=np.int64(20), length=1, gravity=1, symmetric=np.True_)
+    hair = api.interpolate_hair(guides, strand_count=50.0, neighbour_limit=4.0, radius=np.float32(0.004))
+    assert (hair.vellus.hair.neighbour_limit, len(hair.curves)) == (4, 50)
+    api.shade(hair, parametrization="COLOR", color=Color((0.2, 0.3, 0.4)))
+    assert api.settings_of(hair).appearance.color == (0.2, 0.3, 0.4)
+    expected = api.GuideSettings(guide_count=20, length=1.0, gravity=1.0, symmetric=True)
+    assert api.settings_of(hair).guides == expected
+    assert_all_goes_on(tmp_path)
+
+
+def test_arrays_of_any_numbers_are_a_mesh():
+    expected = mesh().numpy()
+    for vertices, triangles in [
+        (np.eye(3, dtype=np.int16), np.array(TRIANGLE, np.uint64)),
+        (np.eye(3).tolist(), [[0.0, 1.0, 2.0]]),
+        (np.asfortranarray(np.eye(3)), np.array([[0, 1, 2, 3]])[:, :3]),
+    ]:
+        np.testing.assert_array_equal(mesh(vertices, triangles).numpy(), expected)
+
+
+def test_evaluated_copies_stand_for_their_originals(lit):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    guides = api.distribute_guides(data("Sphere").evaluated_get(depsgraph), guide_count=10)
+    assert guides.surface == data("Sphere")
+    hair = api.interpolate_hair(guides.evaluated_get(bpy.context.evaluated_depsgraph_get()), strand_count=20)
+    assert hair.vellus.guide_curves == guides
+    update()
+    its_object = next(o for o in bpy.data.objects if o.data == hair)
+    evaluated = its_object.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    np.testing.assert_array_equal(api.points(evaluated), api.points(hair))
+
+
+FEW = api.GroomSettings(api.GuideSettings(guide_count=10), api.HairSettings(strand_count=30))
+STOPPED = {
+    "distribute_guides": lambda progress: api.distribute_guides(data("Sphere"), guide_count=10, progress=progress),
+    "interpolate_hair": lambda progress: api.interpolate_hair(data("Guides"), strand_count=30, progress=progress),
+    "add_hair": lambda progress: api.add_hair(data("Sphere"), FEW, progress=progress),
+    "bake_tables": lambda progress: api.bake_tables("tables", size=16, progress=progress),
+    "draw": lambda progress: api.draw(progress=progress, **SMALL),
+    "render": lambda progress: api.render("a.png", progress=progress, **SMALL),
+    "render in Cycles": lambda progress: api.render(
+        "a.png", engine="cycles", sample_count=1, progress=progress, **SMALL
+    ),
+}
+
+
+@pytest.mark.parametrize("name", STOPPED)
+def test_progress_that_raises_leaves_nothing_half_made(lit, name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    render = bpy.context.scene.render
+    before = everything(), render.engine, render.filepath, render.resolution_x, bpy.context.scene.frame_current
+    for call_count in (0, *(2**power for power in range(12))):
+        left = iter(range(call_count))
+
+        def progress(_step, _part, left=left):
+            if next(left, None) is None:
+                raise LookupError("enough")
+
+        try:
+            STOPPED[name](progress)
+        except (LookupError, api.HairError) as error:
+            assert "enough" in str(error)
+        else:
+            break  # it is told no more often than that
+        after = everything(), render.engine, render.filepath, render.resolution_x, bpy.context.scene.frame_current
+        assert after == before and not [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert call_count > 0
+    assert_all_goes_on(tmp_path)
+
+
+def test_a_path_may_be_a_path(lit, tmp_path):
+    assert api.render(tmp_path / "a_##.png", frame=np.int32(2), **SMALL) == Path(tmp_path / "a_02.png")

@@ -1,0 +1,164 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands grow where their guides do, unless they have a vertex group of their own; changes are followed live."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon import api
+from tests.support.reading import points, vertex_positions, write_points
+
+LOWEST = -0.2  # of roots in the group `top`: a ring of faces below its border, where its weight runs out
+
+
+@pytest.fixture
+def masked(sphere):
+    """40 guides on the upper half of the sphere and 300 strands between them: (guides, hair)."""
+    bpy.ops.vellus.add_hair(guide_count=40, strand_count=300, density_group="top")
+    return bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+
+
+@pytest.fixture
+def image(sphere):
+    """An image that is white in a part of the sphere's UV map: U from an eighth to a half."""
+    image = bpy.data.images.new("Mask", 32, 32, float_buffer=True)
+    pixels = np.zeros((32, 32, 4), np.float32)
+    pixels[:, 4:16] = 1.0
+    image.pixels.foreach_set(pixels.ravel())
+    material = bpy.data.materials.new("Painted")  # Blender reports changes of images that a material shows
+    material.node_tree.nodes.new("ShaderNodeTexImage").image = image
+    sphere.data.materials.append(material)
+    return image
+
+
+def lowest(curves_object):
+    return points(curves_object)[:, 0, 2].min()
+
+
+def add_group(name, chosen):
+    """A vertex group of the sphere with the vertices that chosen(positions) marks."""
+    sphere = bpy.data.objects["Sphere"]
+    group = sphere.vertex_groups.new(name=name)
+    group.add([int(i) for i in np.flatnonzero(chosen(vertex_positions(sphere)))], 1.0, "REPLACE")
+    bpy.context.view_layer.update()  # so that what follows from the group does not follow from the edit of the mesh
+
+
+def set_setting(group, name, value):
+    setattr(group, name, value)
+    bpy.context.view_layer.update()
+
+
+WAYS = {
+    "operators": lambda: (
+        bpy.ops.vellus.distribute_guides(guide_count=40, density_group="top"),
+        bpy.ops.vellus.interpolate_hair(strand_count=300),
+    ),
+    "one operator": lambda: bpy.ops.vellus.add_hair(guide_count=40, strand_count=300, density_group="top"),
+    "script": lambda: api.interpolate_hair(
+        api.distribute_guides(bpy.context.object, guide_count=40, density_group="top"), strand_count=300
+    ),
+    "script in one step": lambda: api.add_hair(
+        bpy.context.object,
+        api.GroomSettings(api.GuideSettings(guide_count=40, density_group="top"), api.HairSettings(strand_count=300)),
+    ),
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_no_root_is_outside_the_mask_of_the_guides(sphere, way):
+    WAYS[way]()
+    for name in ("Guides", "Hair"):
+        assert lowest(bpy.data.objects[name]) > LOWEST
+    assert bpy.data.objects["Hair"].data.vellus.hair.density_group == ""
+
+
+def test_a_group_of_the_strands_alone_wins(masked):
+    guides, hair = masked
+    add_group("low", lambda positions: positions[:, 2] < -0.3)
+    set_setting(hair.data.vellus.hair, "density_group", "low")
+    assert points(hair)[:, 0, 2].max() < 0.0 and lowest(guides) > LOWEST
+    set_setting(hair.data.vellus.hair, "density_group", "")
+    assert lowest(hair) > LOWEST
+
+
+def test_another_mask_of_the_guides_moves_both(masked):
+    guides, _hair = masked
+    add_group("right", lambda positions: positions[:, 0] > 0.0)
+    set_setting(guides.data.vellus.guides, "density_group", "right")
+    for one in masked:
+        assert points(one)[:, 0, 0].min() > LOWEST and lowest(one) < -0.5
+    set_setting(guides.data.vellus.guides, "density_group", "")
+    for one in masked:
+        assert points(one)[:, 0, 0].min() < -0.5
+
+
+def test_strands_follow_the_mask_of_guides_that_were_combed(masked):
+    guides, hair = masked
+    combed = points(guides)
+    combed[:, 1:] += (0.0, 0.0, 0.05)
+    write_points(guides, combed)
+    add_group("right", lambda positions: positions[:, 0] > 0.0)
+    set_setting(guides.data.vellus.guides, "density_group", "right")
+    np.testing.assert_array_equal(points(guides), combed)
+    assert points(hair)[:, 0, 0].min() > LOWEST and lowest(hair) < -0.5
+
+
+def test_painting_the_mask_of_the_guides_moves_the_strands(masked):
+    _guides, hair = masked
+    sphere = bpy.data.objects["Sphere"]
+    before = points(hair)
+    positions = vertex_positions(sphere)
+    sphere.vertex_groups["top"].remove([int(i) for i in np.flatnonzero(positions[:, 0] < 0.0)])
+    sphere.data.update()
+    bpy.context.view_layer.update()
+    assert not np.array_equal(points(hair), before)
+    for one in masked:
+        assert points(one)[:, 0, 0].min() > LOWEST
+
+
+def test_a_setting_that_is_no_mask_moves_no_root(masked):
+    guides, hair = masked
+    before = points(hair)[:, 0].copy()
+    set_setting(guides.data.vellus.guides, "length", 0.9)
+    np.testing.assert_array_equal(points(hair)[:, 0], before)
+
+
+def test_strands_take_the_image_of_their_guides(masked, image):
+    guides, hair = masked
+    set_setting(guides.data.vellus.guides, "density_image", "Mask")
+    root_uvs = np.empty((300, 2), np.float32)
+    hair.data.attributes["surface_uv_coordinate"].data.foreach_get("vector", root_uvs.ravel())
+    pixel = 1.0 / 32.0  # it is linear between pixels
+    assert ((root_uvs[:, 0] > 0.125 - pixel) & (root_uvs[:, 0] < 0.5 + pixel)).all()
+    assert lowest(hair) > LOWEST
+    set_setting(hair.data.vellus.hair, "density_group", "top")  # a group of their own stands alone
+    hair.data.attributes["surface_uv_coordinate"].data.foreach_get("vector", root_uvs.ravel())
+    assert (root_uvs[:, 0] > 0.6).any()
+
+
+def test_painting_the_image_of_the_guides_moves_the_strands(masked, image):
+    guides, hair = masked
+    set_setting(guides.data.vellus.guides, "density_image", "Mask")
+    before = points(hair)[:, 0].copy()
+    assert hair.data.vellus.status == ""
+    image.pixels.foreach_set(np.ones(32 * 32 * 4, np.float32))
+    image.update_tag()
+    bpy.context.view_layer.update()
+    assert not np.array_equal(points(hair)[:, 0], before)
+
+
+def test_guides_without_a_mask_leave_the_whole_surface(sphere):
+    bpy.ops.vellus.distribute_guides(guide_count=40)
+    bpy.ops.vellus.interpolate_hair(strand_count=300)
+    assert lowest(bpy.data.objects["Hair"]) < -0.8
+
+
+def test_a_missing_mask_is_reported_and_hair_is_kept(masked):
+    _guides, hair = masked
+    before = points(hair)
+    sphere = bpy.data.objects["Sphere"]
+    sphere.vertex_groups.remove(sphere.vertex_groups["top"])
+    hair.data.vellus.hair.strand_count = 200
+    bpy.context.view_layer.update()
+    assert "no vertex group" in hair.data.vellus.status
+    np.testing.assert_array_equal(points(hair), before)

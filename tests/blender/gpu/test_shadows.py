@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shadows of hair and of surfaces: soft with the light's size, and quiet while a light turns."""
+
+import numpy as np
+import pytest
+
+from hair_addon.blender.gpu import ambient_visibility, drawing, shadows, strand_textures, uniforms
+
+
+def tuft(rng, strand_count=3000):
+    """Strands all over a ball of radius 10 cm, bent by gravity: (S, P, 3) points, (S, P) radii."""
+    roots = rng.normal(size=(strand_count, 3))
+    roots *= 0.1 / np.linalg.norm(roots, axis=1)[:, None]
+    along = np.linspace(0.0, 1.0, 21)[None, :, None]
+    points = roots[:, None] * (1.0 + 0.6 * along) - np.array([0.0, 0.0, 0.08]) * along**2
+    return points.astype(np.float32), np.full(points.shape[:2], 4e-5, np.float32)
+
+
+def sun(azimuth, height, radius=0.0):
+    """A `uniforms.LIGHTS` record of a sun that stands at these angles [rad]; radius: the tangent of its own."""
+    lights = uniforms.LIGHTS.record()
+    lights["count"] = 1
+    light = lights["light"][0]
+    light["kind"], light["casts_shadow"], light["radius"] = shadows.SUN, True, radius
+    towards = np.cos(height) * np.cos(azimuth), np.cos(height) * np.sin(azimuth), np.sin(height)
+    light["axis"][:3] = -np.array(towards)
+    light["power"][0] = 1.0
+    return lights
+
+
+def lit(lights, hair, surfaces, places, size=512):
+    """(N,) part of a sun's light that arrives at places (N, 3), by way of what the world's visibility reads of maps."""
+    maps = shadows.ShadowMaps(size, 1)
+    maps.draw(lights, [(hair, np.eye(4))], [surface.batch for surface in surfaces])
+    receiver = drawing.upload_surface(*[np.repeat(places, 3, axis=0).astype(np.float32)] * 2)
+    view = ambient_visibility._view_of_surface(receiver)
+    view["seen_opacity"] = 1.0
+    target = ambient_visibility._Target(view, receiver.places)
+    target.add(lights, maps.samplers)
+    texels = [np.array(texture.read()).reshape(-1, 4) for texture in target.textures.values()]
+    return sum(texel.sum(axis=1) for texel in texels)[: 3 * len(places) : 3]
+
+
+def test_shadows_in_hair_do_not_flicker_while_the_sun_turns(scene, rng):
+    """Between two steps of half a degree light changes smoothly; what does not is noise of the maps' texels."""
+    points, radii = tuft(rng)
+    hair = strand_textures.upload_strands(points, radii)
+    places = points[:, 1::4].reshape(-1, 3)
+    steps = np.radians(0.5) * np.arange(7)
+    frames = np.array([lit(sun(0.3 + step, 0.8), hair, [], places) for step in steps])
+    lit_places = frames.mean(axis=0) > 0.05
+    noise = np.diff(frames[:, lit_places], n=2, axis=0) / np.sqrt(6.0)  # of independent noise of one
+    assert noise.std() < 0.05
+    assert np.abs(np.diff(frames.mean(axis=1))).max() < 0.005
+
+
+@pytest.mark.parametrize(
+    "steps", [drawing.Steps(), drawing.Steps(point_count=6, strand_count=1000)], ids=["all", "some"]
+)
+@pytest.mark.parametrize("radius", [4e-5, 8e-4])
+def test_triangles_and_the_computed_make_the_same_map(scene, rng, radius, steps):
+    """Strands behind each texel, layer by layer: the mean is the same, and texels differ by a strand here or there."""
+    points, radii = tuft(rng)
+    hair = [(strand_textures.upload_strands(points, np.full_like(radii, radius)), np.eye(4))]
+    found = []
+    for in_compute in (False, True):
+        maps = shadows.ShadowMaps(128, 1, in_compute)
+        maps.draw(sun(0.4, 0.7), hair, [], steps)
+        front, layers = (np.array(maps.samplers[name].read()) for name in ("hair_front", "hair_layers"))
+        found.append((front.reshape(128, 128), layers.reshape(128, 128, 4)))
+    (triangle_front, triangle_layers), (front, layers) = found
+    hit = (triangle_front < 1.9) & (front < 1.9)
+    assert hit.sum() > 0.97 * (triangle_front < 1.9).sum() > 0
+    assert np.median(np.abs(front - triangle_front)[hit]) < 2e-3
+    assert (np.diff(layers, axis=2) >= 0.0).all()  # each counts what is in front of its far side
+    np.testing.assert_allclose(layers.mean(axis=(0, 1)), triangle_layers.mean(axis=(0, 1)), rtol=0.03)
+
+
+def test_turning_past_the_pole_keeps_the_shadow(scene, rng):
+    """A light from almost straight above has its map turned the other way round."""
+    points, radii = tuft(rng)
+    hair = strand_textures.upload_strands(points, radii)
+    places = points[:, 1::4].reshape(-1, 3)
+    heights = np.arcsin([0.899, 0.901])  # where the map's up changes from z to x
+    first, second = (lit(sun(0.3, height), hair, [], places) for height in heights)
+    assert np.abs(first - second).mean() < 0.03
+
+
+@pytest.mark.parametrize("radius", [0.01, 0.1, 0.2])
+def test_the_shadow_of_an_edge_is_as_wide_as_the_light(scene, rng, radius):
+    """A half plane above the hair: the way from dark to lit is the sun's width times about the edge's distance."""
+    points, radii = tuft(rng)
+    hair = strand_textures.upload_strands(points, np.full_like(radii, 1e-9))
+    height = 0.25
+    corners = np.array(
+        [[0, -9, height], [9, -9, height], [9, 9, height], [0, -9, height], [9, 9, height], [0, 9, height]]
+    )
+    roof = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
+    x = np.linspace(-0.1, 0.1, 801)
+    places = np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=-1)
+    light = lit(sun(0.0, 0.5 * np.pi, radius), hair, [roof], places)
+    assert light[0] > 0.97 and light[-1] < 0.03
+    assert (np.diff(light) < 1e-3).all()
+    slope = np.abs(np.diff(light)).max() / (x[1] - x[0])
+    extent = 2.0 * drawing.bounding_sphere([(hair, np.eye(4))])[1]
+    blur = max(0.5 * radius * shadows._SHADE_DISTANCE * extent, shadows._LEAST_BLUR * extent / 512)
+    # A Gaussian edge rises by 1 / (sqrt(2 pi) deviation); the bound that is read off the moments has a sharper middle.
+    assert 0.5 < slope * np.sqrt(2.0 * np.pi) * blur < 3.0

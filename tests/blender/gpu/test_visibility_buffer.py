@@ -1,0 +1,119 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which strand a sample of a picture shows: where it lies by hand, and the same from triangles as from the computed."""
+
+import gpu
+import numpy as np
+import pytest
+
+from hair_addon.blender.gpu import drawing, hair_shading, shaders, strand_textures, uniforms, visibility_buffer
+from hair_addon.core.shading.fibre import kajiya_kay
+
+SIZE = (160, 96)
+HALF_WIDTH = 0.2 * SIZE[0] / SIZE[1]  # of what a camera at distance one sees [m]
+
+ALL = drawing.Steps()
+
+PERSPECTIVE = np.array([[1 / HALF_WIDTH, 0, 0, 0], [0, 5.0, 0, 0], [0, 0, -1.02, -0.101], [0, 0, -1, 0]])
+PARALLEL = np.array([[1 / HALF_WIDTH, 0, 0, 0], [0, 5.0, 0, 0], [0, 0, -0.2, -1.0], [0, 0, 0, 1]])
+
+
+@pytest.fixture(scope="module")
+def shading():
+    return hair_shading.kajiya_kay_shading(kajiya_kay.Settings())
+
+
+def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
+    """(segments, depths), each (height, width), of [(points, radii, object to world)] seen along -Z from the origin.
+
+    A segment is negative where there is none. hiding_at: distance of a surface that fills the left half of the view.
+    """
+    buffer = visibility_buffer.VisibilityBuffer(*SIZE)
+    view = drawing.view_record(np.eye(4), view_to_clip, SIZE[1], least_width=1.0)
+    lights = uniforms.LIGHTS.record()
+    none = {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in shaders.SHADOW_SAMPLERS}
+    none |= {name: gpu.types.GPUTexture((1, 1), format="RGBA16F") for name in shaders.VISIBILITY_SAMPLERS}
+    with buffer.surfaces(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        if hiding_at is not None:
+            corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
+            corners[3:, :2] = [[-9, -9], [0, 9], [-9, 9]]
+            surface = drawing.upload_surface(corners, corners)
+            drawing.draw_surface_depth(surface.batch, view, lights, "surface_hides.frag")
+    hair = [
+        (strand_textures.upload_strands(points, radii), shading, to_world, np.zeros(3), none, steps)
+        for points, radii, to_world in placed
+    ]
+    buffer.add_hair(hair, lights, view, in_compute)
+    counts = [len(points) * ((steps.point_count or points.shape[1]) - 1) for points, _radii, _place in placed]
+    segments = np.array(buffer.segments.read(), np.int64).reshape(SIZE[::-1])
+    depths = np.array(buffer.depths.read()).astype(np.uint32).reshape(SIZE[::-1]).view(np.float32)
+    covered = np.array(buffer.color.read(), np.float32).reshape(*SIZE[::-1], 4)[..., 3] == 1.0
+    np.testing.assert_array_equal(covered, segments != visibility_buffer._NO_SEGMENT)  # what is found is shaded
+    for y, x in np.argwhere(covered)[::97]:
+        assert buffer.hair_at(int(x), int(y)) == np.searchsorted(np.cumsum(counts), segments[y, x], side="right")
+    assert covered.all() or buffer.hair_at(*map(int, np.argwhere(~covered)[0][::-1])) is None
+    return np.where(covered, segments, -1), depths
+
+
+def tuft(rng, strand_count=60, point_count=33, thickness=0.004):
+    """Arcs that cross the whole view, and the near plane: (S, P, 3) points, (S, P) radii."""
+    start = rng.uniform([-0.3, -0.2, -1.6], [0.3, 0.2, -0.1], (strand_count, 1, 3))
+    axes = rng.normal(size=(2, strand_count, 1, 3)) * [0.15, 0.1, 0.2]
+    turn = np.linspace(0.0, 4.0, point_count)[None, :, None]
+    points = (start + np.sin(turn) * axes[0] + np.cos(turn) * axes[1]).astype(np.float32)
+    return points, np.full(points.shape[:2], thickness, np.float32)
+
+
+@pytest.mark.parametrize("in_compute", [True, False])
+def test_a_sample_is_covered_if_its_centre_lies_in_the_strand(shading, in_compute):
+    """Straight strands across the picture in a parallel view: the distance of a centre from the axis decides."""
+    height, width = np.indices(SIZE[::-1])
+    centres = np.stack([(width + 0.5) / SIZE[0] * 2 - 1, (height + 0.5) / SIZE[1] * 2 - 1], axis=-1)
+    centres *= [HALF_WIDTH, 0.2]
+    for angle, radius in ((0.3, 0.011), (1.2, 0.02), (-0.6, 0.005), (0.0, 0.007), (np.pi / 2, 0.007)):
+        along = np.array([np.cos(angle), np.sin(angle)])
+        points = np.zeros((1, 3, 3), np.float32)
+        points[0, :, :2] = np.array([-1.0, 0.1, 1.0])[:, None] * along + [0.012, 0.005]
+        points[..., 2] = -2.0
+        found, depths = drawn([(points, np.full((1, 3), radius, np.float32), np.eye(4))], PARALLEL, shading, in_compute)
+        distance = np.abs((centres - [0.012, 0.005]) @ [-along[1], along[0]])
+        sure = np.abs(distance - radius) > 1e-4
+        np.testing.assert_array_equal((found >= 0)[sure], (distance < radius)[sure])
+        np.testing.assert_allclose(depths[found >= 0], 0.5 * (0.2 * 2.0 - 1.0) + 0.5, rtol=1e-5)
+        second = (centres - [0.012, 0.005]) @ along > 0.1
+        away = np.abs((centres - [0.012, 0.005]) @ along - 0.1) > 0.03
+        np.testing.assert_array_equal(found[(found >= 0) & away], second[(found >= 0) & away])
+
+
+@pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL], ids=["perspective", "parallel"])
+@pytest.mark.parametrize("steps", [ALL, drawing.Steps(17, 45, 30)], ids=["all", "some"])
+@pytest.mark.parametrize("thickness", [0.004, 0.0003])
+def test_triangles_and_the_computed_show_the_same_strands(rng, shading, view_to_clip, thickness, steps):
+    """All but samples at a strand's very edge, and where a strip turns: it is mitred there."""
+    stretched = np.diag([1.5, 1.5, 1.5, 1.0])
+    placed = [(*tuft(rng, thickness=thickness), np.eye(4)), (*tuft(rng, 50, 25, thickness / 3), stretched)]
+    (triangles, depths), (computed, same) = (
+        drawn(placed, view_to_clip, shading, in_compute, 0.7, steps) for in_compute in (False, True)
+    )
+    assert (triangles >= 0).sum() > 500
+    assert (computed >= 0).sum() == pytest.approx((triangles >= 0).sum(), rel=0.02)
+    both = (triangles >= 0) & (computed >= 0)
+    assert both.sum() > 0.93 * (triangles >= 0).sum()
+    assert (triangles == computed)[both].mean() > 0.93
+    alike = both & (triangles == computed)
+    assert np.median(np.abs(depths - same)[alike]) < 1e-4
+    # Strands of both are there, and what is behind the surface is in neither.
+    count = placed[0][0].shape[0] * ((steps.point_count or 33) - 1)
+    assert (computed[both] >= count).any() and (computed[both] < count).any()
+
+
+def test_a_strand_behind_a_surface_is_hidden(shading):
+    points = np.zeros((1, 2, 3), np.float32)
+    points[0, :, 0], points[..., 2] = [-0.3, 0.3], -1.0
+    strand = [(points, np.full((1, 2), 0.02, np.float32), np.eye(4))]
+    for in_compute in (True, False):
+        found, _depths = drawn(strand, PERSPECTIVE, shading, in_compute, hiding_at=0.9)
+        left, right = np.split(found >= 0, 2, axis=1)
+        assert not left.any() and right.any()
+        found, _depths = drawn(strand, PERSPECTIVE, shading, in_compute, hiding_at=1.1)
+        left, right = np.split(found >= 0, 2, axis=1)
+        assert left.any() and right.any()

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The world's light: its picture as Cycles sees it, and what of it arrives among strands and on surfaces."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.gpu import ambient_visibility, drawing, lights, strand_textures, world_texture
+from hair_addon.blender.render import offscreen
+from hair_addon.core.imaging import environment
+from hair_addon.core.imaging.pixel_sampling import PictureSettings
+
+HEIGHT = 64
+
+
+def picture(rng):
+    """A smooth coloured picture with one bright spot, as an image of Blender's."""
+    width, height = 64, 32
+    u, v = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
+    pixels = np.ones((height, width, 4), np.float32)
+    pixels[..., 0] = 0.5 + 0.4 * np.sin(2.0 * np.pi * u)
+    pixels[..., 1] = v
+    pixels[..., 2] = 0.3
+    pixels[..., :3] += np.array([6.0, 5.0, 4.0]) * np.exp(-200.0 * ((u - 0.3) ** 2 + (v - 0.7) ** 2))[..., None]
+    image = bpy.data.images.new("Surroundings", width, height, float_buffer=True, is_data=True)
+    image.pixels.foreach_set(pixels.ravel())
+    image.update()
+    return image
+
+
+def environment_node(scene, image, **settings):
+    """Light the scene with a picture; returns the node that holds it."""
+    scene.world = bpy.data.worlds.new("World")
+    tree = scene.world.node_tree
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    node = tree.nodes.new("ShaderNodeTexEnvironment")
+    node.image = image
+    for name, value in settings.items():
+        setattr(node, name, value)
+    tree.links.new(node.outputs["Color"], background.inputs["Color"])
+    return node
+
+
+def turn(node, kind, rotation, scale=(1.0, 1.0, 1.0)):
+    """Put a Mapping node before an environment's."""
+    tree = node.id_data
+    mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+    mapping.vector_type = kind
+    mapping.inputs["Rotation"].default_value, mapping.inputs["Scale"].default_value = rotation, scale
+    tree.links.new(coordinates.outputs["Generated"], mapping.inputs["Vector"])
+    tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+
+
+def panorama(scene, folder):
+    """(H, 2 H, 3) radiance of the world by longitude and latitude, rendered by Cycles."""
+    camera = bpy.data.cameras.new("Camera")
+    camera.type, camera.panorama_type = "PANO", "EQUIRECTANGULAR"
+    scene.camera = bpy.data.objects.new("Camera", camera)
+    scene.camera.rotation_euler = (0.5 * math.pi, 0.0, -0.5 * math.pi)  # looks along +x, z up
+    scene.collection.objects.link(scene.camera)
+    scene.render.engine = "CYCLES"
+    scene.cycles.samples, scene.cycles.use_denoising = 64, False
+    scene.render.resolution_x, scene.render.resolution_y, scene.render.resolution_percentage = 2 * HEIGHT, HEIGHT, 100
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(folder / "panorama.exr")
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath)
+    pixels = np.empty(2 * HEIGHT * HEIGHT * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    return pixels.reshape(HEIGHT, 2 * HEIGHT, 4)[..., :3]
+
+
+@pytest.mark.parametrize(
+    ("settings", "mapping"),
+    [
+        ({}, None),
+        ({}, ("POINT", (0.3, 0.5, 1.1))),
+        ({}, ("TEXTURE", (0.3, 0.5, 1.1), (1.0, 2.0, 0.5))),
+        ({}, ("VECTOR", (0.0, 0.0, 2.0), (1.0, -1.0, 1.0))),
+        ({"projection": "MIRROR_BALL"}, ("POINT", (0.0, 0.4, 0.0))),
+    ],
+)
+def test_environment_orientation_equals_cycles(scene, rng, tmp_path, settings, mapping):
+    node = environment_node(scene, picture(rng), **settings)
+    if mapping:
+        turn(node, *mapping)
+    unrolled = world_texture._unrolled(lights.read_world(scene))
+    rendered = panorama(scene, tmp_path)
+    # Where a mirror ball's or a longitude's seam lies, a texel is a mean of both sides.
+    is_close = np.isclose(unrolled, rendered, rtol=0.05, atol=0.05).all(axis=-1)
+    assert is_close.mean() > 0.97
+
+
+def test_decomposition_of_an_environment_conserves_light(scene, rng):
+    environment_node(scene, picture(rng))
+    world = lights.read_world(scene)
+    unrolled = world_texture._unrolled(world)
+    lobes, sides = world_texture.light_of(world)
+    _directions, solid_angles = environment._texels(*unrolled.shape[:2])
+    # A plane that faces a lobe receives its light at slightly oblique angles.
+    in_lobes = sum(lobe.irradiance / (1.0 - lobe.variance) for lobe in lobes)
+    assert len(lobes) == 1
+    found = in_lobes + 4.0 * np.pi * sides.mean(axis=0)
+    np.testing.assert_allclose(found, solid_angles @ unrolled.reshape(-1, 3), rtol=0.01)
+
+
+def test_a_world_of_other_nodes_shines_in_its_viewport_colour(scene):
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.color = (0.1, 0.2, 0.3)
+    tree = scene.world.node_tree
+    background = next(node for node in tree.nodes if node.type == "BACKGROUND")
+    noise = tree.nodes.new("ShaderNodeTexNoise")
+    tree.links.new(noise.outputs[1], background.inputs["Color"])
+    np.testing.assert_allclose(lights.read_world(scene).color, (0.1, 0.2, 0.3), rtol=1e-6)
+
+
+def test_the_picture_is_seen_behind_the_scene(scene, rng, tmp_path):
+    environment_node(scene, picture(rng))
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.rotation_euler = (1.2, 0.0, 0.7)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    settings = PictureSettings(48, 32, 2)
+    bpy.context.view_layer.update()
+    drawn = offscreen.draw_picture(settings)
+    scene.render.engine, scene.render.resolution_percentage = "CYCLES", 100
+    scene.render.resolution_x, scene.render.resolution_y = 48, 32
+    scene.cycles.samples, scene.cycles.use_denoising = 32, False
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    scene.render.filepath = str(tmp_path / "behind.exr")
+    bpy.ops.render.render(write_still=True)
+    pixels = np.empty(48 * 32 * 4, np.float32)
+    bpy.data.images.load(scene.render.filepath).pixels.foreach_get(pixels)
+    np.testing.assert_allclose(drawn[..., :3], pixels.reshape(32, 48, 4)[..., :3], rtol=0.05, atol=0.02)
+
+
+def seen(places, strands=None, opacity=1.0):
+    """(N, 6) part of each side that places (N, 3) see among strands (S, P, 3) of radius (S, P)."""
+    corners = np.repeat(places, 3, axis=0).astype(np.float32)
+    surface = drawing.upload_surface(corners, np.zeros_like(corners))
+    hair = [(strand_textures.upload_strands(*strands), np.eye(4))] if strands else []
+    _hair, (found,) = ambient_visibility.measure(hair, [surface], [opacity] * len(hair))
+    texels = [np.array(found[name].read()).reshape(-1, 4) for name in ("visibility_x_y", "visibility_z")]
+    return np.concatenate([texels[0], texels[1][:, :2]], axis=1)[: len(corners) : 3]
+
+
+def test_nothing_hides_the_world_from_places_without_hair(scene, rng):
+    np.testing.assert_allclose(seen(rng.normal(size=(5, 3))), 1.0, atol=2e-3)
+
+
+def test_transmittance_of_a_cloud_equals_ray_tracing(scene, rng):
+    """Brute force: rays from the middle of a cloud cross as many strands as its density says."""
+    middles = rng.normal(size=(6000, 3))
+    middles *= (rng.random(6000) ** (1 / 3) / np.linalg.norm(middles, axis=1))[:, None]
+    along = rng.normal(size=(6000, 3))
+    along *= 0.06 / np.linalg.norm(along, axis=1)[:, None]
+    points = (middles[:, None] + np.linspace(-1.0, 1.0, 5)[:, None] * along[:, None]).astype(np.float32)
+    radii = np.full((6000, 5), 0.0014, np.float32)
+    places = 0.3 * rng.normal(size=(20, 3)) / np.sqrt(3.0)
+    found = seen(places, (points, radii)).mean()
+    # The shadow of an isotropic strand is pi / 4 of length × width; the cloud fills a ball of radius 1.
+    density = 6000 * 0.25 * np.pi * 0.12 * 0.0028 / (4.0 / 3.0 * np.pi)
+    directions = rng.normal(size=(4000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    along = places @ directions.T
+    ways = -along + np.sqrt(along**2 + 1.0 - np.square(places).sum(axis=1)[:, None])
+    assert found == pytest.approx(np.exp(-density * ways).mean(), rel=0.05)
+
+
+@pytest.mark.parametrize("has_hair", [False, True])
+def test_an_even_world_gives_a_surface_its_colour(sphere, scene, has_hair):
+    """With and without hair in the scene, which has surfaces look through it."""
+    color = np.array([0.2, 0.4, 0.6])
+    scene.world = bpy.data.worlds.new("World")
+    scene.world.node_tree.nodes["Background"].inputs["Color"].default_value = (*color, 1.0)
+    if has_hair:
+        bpy.ops.vellus.add_hair(guide_count=3, strand_count=3, length=0.01, radius=1e-5)
+    bpy.ops.object.camera_add(location=(0.0, 0.0, 8.0))
+    scene.camera = bpy.context.object
+    drawn = offscreen.draw_picture(PictureSettings(32, 32, 1, is_transparent=True))
+    surface = drawn[drawn[..., 3] == 1.0][:, :3]
+    assert len(surface) > 50
+    np.testing.assert_allclose(np.median(surface, axis=0), 0.8 * color, rtol=0.02)

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Caches: what is made once, what gives way, what is made again."""
+
+from hair_addon.blender.host.caches import Cache
+
+
+def test_a_value_is_made_once_until_it_is_invalid():
+    cache, made = Cache(), []
+
+    def ask(key):
+        return cache.get(key, lambda: made.append(key) or len(made))
+
+    assert [ask("a"), ask("b"), ask("a")] == [1, 2, 1]
+    cache.invalidate("a")
+    assert cache.get("a") is None
+    assert [ask("a"), ask("b")] == [3, 2]
+    cache.clear()
+    assert len(cache) == 0
+    assert ask("b") == 4
+
+
+def test_what_fails_to_be_made_is_not_kept():
+    cache = Cache()
+
+    def fail():
+        raise ValueError
+
+    for _ in range(2):
+        try:
+            cache.get("a", fail)
+        except ValueError:
+            assert len(cache) == 0
+
+
+def test_what_was_used_longest_ago_gives_way():
+    cache = Cache(capacity=2)
+    cache.keep("a", 1), cache.keep("b", 2)
+    cache.get("a")
+    cache.keep("c", 3)
+    assert [cache.get(key) for key in "abc"] == [1, None, 3]
+    cache.keep("a", 4)
+    cache.keep("d", 5)
+    assert cache.values() == [4, 5]
+
+
+def test_another_value_takes_the_place_of_the_one_before():
+    cache = Cache()
+    cache.keep("a", 1)
+    assert cache.keep("a", 2) == 2
+    assert cache.values() == [2]

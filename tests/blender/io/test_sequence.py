@@ -1,0 +1,282 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sequences of frames, stopped and gone on with, and shared by processes: no frame is made twice, none is broken."""
+
+import contextlib
+import errno
+import itertools
+import json
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.io import frames, sequence
+from hair_addon.core.errors import HairError
+from hair_addon.core.files import file_lock
+from hair_addon.core.files.file_lock import claim
+from hair_addon.core.files.whole_file import whole_file
+from tests.support.commands import ROOT, command, run, run_here
+
+COUNT = 6
+
+HOLD = """
+import sys, time
+from hair_addon.core.files import file_lock as claims
+from hair_addon.core.files.file_lock import claim
+with claim(sys.argv[1]):
+    print(flush=True)
+    time.sleep(2)
+"""
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+
+
+@pytest.fixture(scope="module")
+def turning(tmp_path_factory):
+    """A .blend of a ball with hair that turns before a camera."""
+    path = tmp_path_factory.mktemp("turning") / "ball.blend"
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+    ball = bpy.context.object
+    for frame, angle in ((1, 0.0), (COUNT, 2.0)):
+        ball.rotation_euler.z = angle
+        ball.keyframe_insert("rotation_euler", frame=frame)
+    bpy.ops.vellus.add_hair(guide_count=30, strand_count=200, length=0.08, gravity=1.0, radius=0.002)
+    bpy.ops.object.light_add(type="SUN")
+    bpy.ops.object.camera_add(location=(0.0, -0.6, 0.0), rotation=(np.pi / 2.0, 0.0, 0.0))
+    scene = bpy.context.scene
+    scene.camera = bpy.context.object
+    scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = COUNT, 64, 48
+    scene.vellus.sample_count = 4
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def words(turning, folder, *more, ending="png"):
+    return ("render", turning, "--frames", f"1-{COUNT}", "--out", folder / f"f_###.{ending}", "--json", *more)
+
+
+def start(turning, folder):
+    """The command in a process of its own, whose standard output may be read."""
+    line = list(map(str, command(*words(turning, folder))))
+    return subprocess.Popen(line, stdout=subprocess.PIPE, env=ENVIRONMENT, cwd=ROOT)
+
+
+def pixels(path):
+    """(N,) float32 of a picture."""
+    image = bpy.data.images.load(str(path))
+    values = np.empty(len(image.pixels), np.float32)
+    image.pixels.foreach_get(values)
+    bpy.data.images.remove(image)
+    return values
+
+
+def frame_numbers(ended):
+    return [result["frame"] for result in ended.results]
+
+
+def pictures(folder):
+    return sorted(path.name for path in folder.glob("*.png"))
+
+
+def hidden(folder):
+    return sorted(path.name for path in folder.glob(".*"))
+
+
+ALL = [f"f_{number:03}.png" for number in range(1, COUNT + 1)]
+
+
+@pytest.fixture(scope="module")
+def whole(turning, tmp_path_factory):
+    """A folder with the sequence, made in one go."""
+    folder = tmp_path_factory.mktemp("whole")
+    ended = run(*words(turning, folder))
+    assert ended.status == 0, ended.errors
+    assert frame_numbers(ended) == list(range(1, COUNT + 1))
+    assert pictures(folder) == ALL
+    return folder
+
+
+def test_hair_turns_with_its_surface(whole):
+    made = [pixels(whole / name) for name in ALL]
+    assert all(np.abs(one - other).max() > 0.05 for one, other in itertools.combinations(made, 2))
+
+
+def test_a_frame_does_not_depend_on_those_before(turning, whole, tmp_path):
+    ended = run("render", turning, "--frames", "4-4", "--out", tmp_path / "f_###.png", "--json")
+    assert frame_numbers(ended) == [4]
+    np.testing.assert_array_equal(pixels(tmp_path / ALL[3]), pixels(whole / ALL[3]))
+
+
+@pytest.mark.parametrize("asked", [signal.SIGKILL, signal.SIGINT], ids=["killed", "Ctrl-C"])
+def test_the_same_command_goes_on(turning, whole, tmp_path, asked):
+    with start(turning, tmp_path) as process:
+        first = [json.loads(process.stdout.readline())["frame"] for _ in range(2)]
+        process.send_signal(asked)
+        first += [json.loads(line)["frame"] for line in process.stdout]
+    there = {name: (tmp_path / name).stat().st_mtime_ns for name in pictures(tmp_path)}
+    assert 2 <= len(there) < COUNT
+    ended = run(*words(turning, tmp_path))
+    assert ended.status == 0, ended.errors
+    assert set(frame_numbers(ended)).isdisjoint(first)
+    assert pictures(tmp_path) == ALL
+    assert {name: (tmp_path / name).stat().st_mtime_ns for name in there} == there
+    assert hidden(tmp_path) == [".f_###.png.json"]
+    for name in ALL:
+        np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))
+    assert frame_numbers(run(*words(turning, tmp_path))) == []
+
+
+def test_another_machine_goes_on(turning, whole, tmp_path):
+    """Where the file and the frames have other paths: what counts is what is in them."""
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    shutil.copy(turning, here / "ball.blend")
+    assert run_here("render", here / "ball.blend", "--frames", "1-4", "--out", here / "f_###.png").status == 0
+    here.rename(there)
+    ended = run_here(*words(there / "ball.blend", there))
+    assert frame_numbers(ended) == [5, 6]
+    for name in ALL:
+        np.testing.assert_array_equal(pixels(there / name), pixels(whole / name))
+
+
+def test_processes_share_the_frames(turning, whole, tmp_path):
+    """Those of one command, and another command that runs at the same time."""
+    other = start(turning, tmp_path)
+    ended = run(*words(turning, tmp_path, "--jobs", 2))
+    out, _errors = other.communicate(timeout=120)
+    assert (ended.status, other.returncode) == (0, 0), ended.errors
+    made = frame_numbers(ended) + [json.loads(line)["frame"] for line in out.splitlines()]
+    assert sorted(made) == list(range(1, COUNT + 1))
+    for name in ALL:
+        np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))
+    assert hidden(tmp_path) == [".f_###.png.json"]
+
+
+def test_frames_of_another_sequence_are_kept(turning, whole, tmp_path):
+    with contextlib.chdir(tmp_path):
+        assert run_here(*words(turning, tmp_path)).status == 0
+    before = {path: path.read_bytes() for path in tmp_path.iterdir()}
+    ended = run_here(*words(turning, tmp_path, "--width", 32))
+    assert ended.status == 1 and ".f_###.png.json belongs to another sequence (settings)" in ended.errors
+    (tmp_path / ".f_###.png.json").unlink()
+    ended = run_here(*words(turning, tmp_path))
+    assert ended.status == 1 and "f_001.png belongs to no known sequence" in ended.errors
+    (tmp_path / ".f_###.png.json").write_text("half of")
+    ended = run_here(*words(turning, tmp_path))
+    assert ended.status == 1 and "cannot be read" in ended.errors
+    assert all(path.read_bytes() == held for path, held in before.items() if path.suffix == ".png")
+    ended = run_here(*words(turning, tmp_path, "--width", 32, "--overwrite"))
+    assert ended.status == 0 and frame_numbers(ended) == list(range(1, COUNT + 1))
+    assert frame_numbers(run_here(*words(turning, tmp_path, "--width", 32))) == []
+
+
+def test_a_full_disk_keeps_complete_frames(turning, tmp_path):
+    """As the system says it of a file that may not grow further."""
+
+    def limit():
+        signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (4096, 4096))
+
+    ended = run(*words(turning, tmp_path, ending="exr"), preexec_fn=limit)
+    assert ended.status == 1 and len(ended.errors.splitlines()) == 1
+    assert not [path for path in tmp_path.iterdir() if path.suffix == ".exr"]
+    assert run(*words(turning, tmp_path, ending="exr")).status == 0
+    assert len(list(tmp_path.glob("f_*.exr"))) == COUNT
+
+
+def test_a_folder_without_space_is_reported(turning, tmp_path, monkeypatch):
+    """As on a disk that has no room for a name."""
+
+    def refuse(_path):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(file_lock, "_locked", refuse)
+    ended = run_here(*words(turning, tmp_path))
+    assert ended.status == 1 and "No space left on device" in ended.errors and len(ended.errors.splitlines()) == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_failing_worker_reports_its_error_once(turning, tmp_path):
+    bpy.ops.wm.open_mainfile(filepath=str(turning))
+    bpy.data.objects.remove(bpy.context.scene.camera)
+    blind = tmp_path / "blind.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(blind))
+    ended = run("render", blind, "--frames", "1-4", "--out", tmp_path / "f_##.png", "--jobs", 2)
+    assert ended.status == 1 and len(ended.errors.splitlines()) == 1
+    assert ended.errors == "vellus: The scene has no camera: add one.\n"
+    assert not list(tmp_path.glob("f_*.png")) and hidden(tmp_path) == [".f_##.png.json"]
+
+
+def test_it_waits_for_frames_of_other_processes(tmp_path):
+    """A frame that another process has claimed is made here if that ends without it."""
+    pattern = tmp_path / "f_#.png"
+    line = [*command()[:1], "-c", HOLD, str(frames.path_of(pattern, 1))]
+    with subprocess.Popen(line, stdout=subprocess.PIPE, env=ENVIRONMENT) as holder:
+        holder.stdout.readline()
+        started = time.monotonic()
+        made = [n for n, _ in sequence.make(pattern, [1, 2], lambda path, number: path.write_text(str(number)))]
+        assert made == [2, 1] and time.monotonic() - started > 1.0
+
+
+def test_sequences_are_started_by_one_process_at_a_time(tmp_path):
+    pattern = tmp_path / "f_#.png"
+    sequence.begin(pattern, [1], {"of": "this"})
+    sequence.begin(pattern, [1], {"of": "this"})
+    with pytest.raises(HairError, match="another sequence"):
+        sequence.begin(pattern, [1], {"of": "that"})
+    with claim(sequence.record_of(pattern)) as is_ours:
+        assert is_ours
+
+
+def spoil(folder, ending):
+    """Leave frame 1 empty and frame 2 cut short, as another program or a lost network drive does."""
+    (folder / f"f_001.{ending}").write_bytes(b"")
+    cut = folder / f"f_002.{ending}"
+    cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2])
+
+
+@pytest.mark.parametrize("more", [("--out", "f_###.png"), ("--out", "f_###.exr"), ("--out", "f_###.exr", "--passes")])
+def test_unreadable_pictures_are_rendered_again(turning, tmp_path, monkeypatch, more):
+    monkeypatch.chdir(tmp_path)
+    line = ("render", turning, "--frames", "1-3", "--width", 32, "--samples", 1, "--json", *more)
+    assert frame_numbers(run_here(*line)) == [1, 2, 3]
+    ending = more[1][-3:]
+    made = {path.name: pixels(path) for path in tmp_path.glob(f"*.{ending}")}
+    spoil(tmp_path, ending)
+    assert frame_numbers(run_here(*line)) == [1, 2]
+    spoil(tmp_path, ending)
+    (tmp_path / f".f_###.{ending}.json").unlink()  # as if another program had left them
+    (tmp_path / f"f_003.{ending}").unlink()
+    assert frame_numbers(run_here(*line)) == [1, 2, 3]
+    for name, held in made.items():
+        np.testing.assert_array_equal(pixels(tmp_path / name), held)
+
+
+def test_pictures_of_other_origin_are_kept(turning, tmp_path):
+    (tmp_path / "f_002.png").write_text("A text of somebody's.")
+    ended = run_here(*words(turning, tmp_path))
+    assert ended.status == 1 and "f_002.png belongs to no known sequence" in ended.errors
+    (tmp_path / "f_002.png").unlink()
+    (tmp_path / "f_002.png").mkdir()
+    for more in ((), ("--overwrite",)):
+        ended = run_here(*words(turning, tmp_path, *more))
+        assert (
+            ended.status == 1
+            and ended.errors == f"vellus: {tmp_path}/f_002.png is a folder: move it, or choose another file name.\n"
+        )
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["f_002.png"]
+
+
+def test_an_unwritten_file_does_not_replace_another(tmp_path):
+    (tmp_path / "f.exr").write_text("before")
+    for write in (lambda _path: None, Path.touch):
+        with pytest.raises(HairError, match="was not written"), whole_file(tmp_path / "f.exr") as partial:
+            write(partial)
+    assert [(path.name, path.read_text()) for path in tmp_path.iterdir()] == [("f.exr", "before")]

@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Caches: nothing is drawn that is older than an event, and nothing is kept beyond another file or the add-on's end."""
+
+import importlib
+import inspect
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+import hair_addon
+from hair_addon.blender.data import scene as scene_door
+from hair_addon.blender.host.caches import Cache
+from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.render import hair_cache, hair_picture, viewport
+from tests.blender.gpu.test_world_texture import environment_node
+from tests.blender.render.test_hair_places import view3d
+from tests.support.always import changed
+from tests.support.reading import points, write_points
+from tests.test_house import ADDON, MODULES
+
+SIZE = 24
+
+
+# ------------------------------------------------------------------------------------------------------- the table
+
+
+def every_cache():
+    """{where it stands: cache} of all modules."""
+    names = [".".join(path.relative_to(ADDON).with_suffix("").parts) for path in MODULES]
+    modules = [importlib.import_module(f"hair_addon.{name}") for name in names if not name.endswith("__")]
+    return {
+        f"{module.__name__}.{name}": value
+        for module in modules
+        for name, value in vars(module).items()
+        if isinstance(value, Cache)
+    }
+
+
+def test_the_table_names_every_cache_once():
+    assert len({*invalidation.CACHES}) == len(invalidation.CACHES)
+    assert {*every_cache().values()} == {*invalidation.CACHES}
+
+
+@pytest.fixture
+def full(hair):
+    """Something in every cache."""
+    for cache in every_cache().values():
+        cache.keep("something", "kept")
+
+
+def filled():
+    return {cache for cache in every_cache().values() if len(cache)}
+
+
+def test_another_file_leaves_programs_alone(full):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    assert filled() == {*invalidation.PROGRAMS}
+
+
+def test_undo_leaves_no_copy_of_data(full):
+    changed("before")
+    changed("after")
+    bpy.ops.ed.undo()
+    kept = {cache for cache in every_cache().values() if cache.get("something")}
+    assert kept == {*invalidation.OTHERS, *invalidation.PROGRAMS}
+
+
+def test_the_addon_leaves_programs_when_it_is_switched_off(full):
+    hair_addon.unregister()
+    try:
+        assert filled() == {*invalidation.PROGRAMS}
+    finally:
+        hair_addon.register()
+
+
+def test_nothing_is_left_when_python_ends(full, monkeypatch):
+    for cache in invalidation.PROGRAMS:  # which the process needs after this test, as it does not end
+        monkeypatch.setattr(cache, "_values", dict(cache._values))
+    invalidation.end()
+    assert not filled()
+
+
+# ------------------------------------------------------------------------------------------------------ the events
+
+
+@pytest.fixture
+def stage(lit, monkeypatch):
+    """Hair on a surface that a modifier may bend, lit by a sun and by a world's image."""
+    monkeypatch.setattr(hair_picture, "SAMPLE_COUNT", 4)
+    image = bpy.data.images.new("Sky", 16, 8)
+    image.generated_color = (0.2, 0.4, 0.8, 1.0)
+    environment_node(bpy.context.scene, image)
+    changed("stage")
+    return image
+
+
+def seen():
+    """What a viewport shows, and what of: arrays by name."""
+    context = bpy.context
+    shown = SimpleNamespace(
+        space_data=view3d(),
+        scene=context.scene,
+        view_layer=context.view_layer,
+        evaluated_depsgraph_get=context.evaluated_depsgraph_get,
+    )
+    drawn = viewport.drawn_scene_of(shown)
+    camera = scene_door.read_camera(context.scene, context.evaluated_depsgraph_get(), SIZE, SIZE)
+    view = SimpleNamespace(view_matrix=camera[0], window_matrix=camera[1])
+    region = SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 1)
+    region_picture = viewport._picture(drawn, view, region, is_see_through=False)
+    while not region_picture.picture.is_fine:
+        region_picture = viewport._picture(drawn, view, region, is_see_through=False)
+    (strands, shading, *_place), guides = drawn.hair[0], hair_cache.strands_on_gpu(bpy.data.hair_curves["Guides"])
+    return {
+        "picture": region_picture.picture.read(),
+        "strands": np.array(strands.texture.read()),
+        "strands here": strands.points,
+        "guides": np.array(guides.texture.read()),
+        "forward": shading.forward,
+        "lights": np.array(drawn.lights.tobytes()),
+    }
+
+
+def sculpt():
+    """Hair itself, by somebody else than its guides."""
+    sculpted = points(bpy.data.objects["Hair"])
+    sculpted[:, -1] += np.float32([0.3, 0.0, 0.2])
+    write_points(bpy.data.objects["Hair"], sculpted)
+
+
+def regrow():
+    """Guides, which are drawn before Blender has reported what became of them."""
+    bpy.data.objects["Guides"].data.vellus.guides.length = 0.8
+
+
+def move_sun():
+    bpy.data.objects["Sun"].rotation_euler = (1.5, 0.3, 0.0)
+
+
+def bend():
+    bend = bpy.data.objects["Sphere"].modifiers.new("Bend", "SIMPLE_DEFORM")
+    bend.angle = 1.0
+
+
+def repaint():
+    bpy.data.images["Sky"].generated_color = (0.9, 0.1, 0.0, 1.0)
+
+
+def spoil():
+    """Another hair, surface, light and picture, which viewports have drawn."""
+    sculpt()
+    move_sun()
+    bend()
+    repaint()
+    changed("spoilt")
+    seen()
+
+
+def undo():
+    """What a window shows ahead of the hair's Curves."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(live_hair, "has_window", lambda: True)
+        bpy.data.objects["Hair"].data.vellus.hair.strand_count = 300
+        changed("fewer strands")
+        assert len(seen()["strands here"]) == 300
+    bpy.ops.ed.undo()
+
+
+def open_another(folder):
+    bpy.ops.wm.save_as_mainfile(filepath=str(folder / "other.blend"), copy=True)
+    spoil()
+    bpy.ops.wm.open_mainfile(filepath=str(folder / "other.blend"))
+
+
+# What somebody does, by the event that is told of it.
+SCENARIOS = {
+    "scene_changed": lambda _folder: move_sun(),
+    "curves_reported": lambda _folder: sculpt(),
+    "strands_made": lambda _folder: regrow(),
+    "surface_moved": lambda _folder: bend(),
+    "image_changed": lambda _folder: repaint(),
+    "data_replaced": lambda _folder: undo(),
+    "clear": open_another,
+}
+
+
+BROUGHT_BACK = {"data_replaced", "clear"}
+
+
+def test_each_event_has_a_scenario():
+    events = {name for name, value in vars(invalidation).items() if inspect.isfunction(value)}
+    assert events - {"end"} == {*SCENARIOS}
+
+
+def older_than(event, folder):
+    """Names of what is drawn after an event that is not what a first redraw would show, of all that viewports show."""
+    before = seen()
+    SCENARIOS[event](folder)
+    bpy.context.view_layer.update()
+    after = seen()
+    for cache in invalidation.COPIES + invalidation.OTHERS:
+        cache.clear()
+    fresh = seen()
+    assert np.array_equal(before["picture"], fresh["picture"]) == (event in BROUGHT_BACK)
+    return {name for name in after if not np.array_equal(after[name], fresh[name])}
+
+
+@pytest.mark.parametrize("event", SCENARIOS)
+def test_nothing_older_than_an_event_is_drawn(stage, event, tmp_path):
+    assert older_than(event, tmp_path) == set()
+
+
+@pytest.mark.parametrize(
+    "event", sorted({*SCENARIOS} - {"clear"})
+)  # after which nothing has the number that it had before
+def test_something_older_is_drawn_where_an_event_is_not_told(stage, event, tmp_path, monkeypatch):
+    monkeypatch.setattr(invalidation, event, lambda *_arguments, **_options: None)
+    assert older_than(event, tmp_path)

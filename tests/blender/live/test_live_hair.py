@@ -1,0 +1,293 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair follows what it was made from: settings, guides, surface; and is kept where somebody's hand was in it."""
+
+import math
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import curves
+from hair_addon.blender.groom import pipeline
+from hair_addon.blender.settings import properties, setting_properties
+from hair_addon.core.grooming import groom
+from hair_addon.core.grooming.groom import GuideSettings, HairSettings
+from hair_addon.core.params import declared
+from hair_addon.core.shading import appearance
+from hair_addon.core.shading.appearance import Appearance
+from hair_addon.core.shading.tables import lookup_tables
+from tests.support.reading import attribute, points, write_points
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+def test_a_changed_setting_makes_hair_again(hair):
+    hair.data.vellus.hair.strand_count = 200
+    hair.data.vellus.hair.seed = 9
+    update()
+    assert len(hair.data.curves) == 200
+    again = points(hair)
+    bpy.ops.vellus.interpolate_hair(strand_count=200, seed=9, radius=0.004)
+    assert np.array_equal(points(hair), again)
+
+
+def test_a_changed_guide_setting_makes_guides_and_their_hair_again(hair):
+    guides = bpy.data.objects["Guides"]
+    before = points(hair)
+    guides.data.vellus.guides.length = 0.8
+    update()
+    lengths = np.linalg.norm(np.diff(points(guides), axis=1), axis=-1).sum(axis=1)
+    assert lengths.mean() == pytest.approx(0.8, rel=0.1)
+    assert not np.array_equal(points(hair), before)
+
+
+def test_radii_are_written_where_they_are_others(hair, monkeypatch):
+    """Again where somebody has changed them, and not while they are what was written."""
+    written = []
+    write = curves._write_radii
+    monkeypatch.setattr(curves, "_write_radii", lambda *args: (written.append(1), write(*args)))
+    before = attribute(hair, "radius")
+    settings = setting_properties.to_settings(hair.data.vellus.hair, HairSettings)
+
+    def make(seed):
+        guides, depsgraph = hair.data.vellus.guide_curves, bpy.context.evaluated_depsgraph_get()
+        pipeline.interpolate_hair(guides, replace(settings, seed=seed), depsgraph, hair.data)
+        update()
+
+    make(2)
+    make(3)
+    assert written == []
+    hair.data.attributes["radius"].data.foreach_set("value", 3.0 * before)
+    hair.data.update_tag()
+    update()
+    make(4)
+    assert len(written) == 1
+    np.testing.assert_array_equal(attribute(hair, "radius"), before)
+
+
+def test_hair_follows_a_combed_guide(hair):
+    guides = bpy.data.objects["Guides"]
+    before, combed = points(hair), points(guides)
+    combed[0] += np.linspace(0.0, 0.3, 41)[:, None] * np.array([0.0, 0.0, 1.0], np.float32)
+    write_points(guides, combed)
+    moved = np.abs(points(hair) - before).max(axis=(1, 2)) > 1e-6
+    near = np.linalg.norm(before[:, 0] - combed[0, 0], axis=1)
+    assert moved.any() and not moved.all()
+    assert near[moved].max() < near[~moved].max()
+    assert np.array_equal(points(hair)[:, 0], before[:, 0])
+
+
+def test_a_combed_guide_is_not_taken_away_by_a_slider(hair):
+    guides = bpy.data.objects["Guides"]
+    combed = points(guides)
+    combed[:, -1] += 0.1
+    write_points(guides, combed)
+    guides.data.vellus.guides.guide_count = 10
+    update()
+    assert np.array_equal(points(guides), combed)
+    assert "Hand-edited" in guides.data.vellus.status
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.vellus.distribute_guides(guide_count=10)
+    assert len(guides.data.curves) == 10 and guides.data.vellus.status == ""
+
+
+def test_a_moved_surface_vertex_moves_the_roots(hair, sphere):
+    sphere.data.transform(((2, 0, 0, 0), (0, 2, 0, 0), (0, 0, 2, 0), (0, 0, 0, 1)))
+    sphere.data.update()
+    update()
+    np.testing.assert_allclose(np.linalg.norm(points(hair)[:, 0], axis=1), 2.0, atol=0.01)
+
+
+def test_nothing_is_made_again_while_live_is_off(hair):
+    hair.data.vellus.is_live = False
+    hair.data.vellus.hair.strand_count = 200
+    update()
+    assert len(hair.data.curves) == 500
+    hair.data.vellus.is_live = True
+    hair.data.update_tag()
+    update()
+    assert len(hair.data.curves) == 200
+
+
+def test_a_nan_setting_keeps_the_hair_and_is_reported(hair):
+    before = points(hair)
+    hair.data.vellus.hair.automatic_influence = False
+    hair.data.vellus.hair.influence_distance = math.nan
+    update()
+    assert np.array_equal(points(hair), before)
+    assert "Influence distance" in hair.data.vellus.status
+
+
+def test_an_update_that_changes_nothing_makes_nothing_again(hair):
+    hair.data.attributes["radius"].data[0].value = 0.123
+    bpy.data.objects["Sphere"].location.x = 3.0
+    update()
+    update()
+    assert attribute(hair, "radius")[0] == pytest.approx(0.123)
+
+
+def test_undo_brings_back_settings_and_hair_together(hair):
+    bpy.ops.ed.undo_push(message="made")
+    before = points(hair)
+    hair.data.vellus.hair.strand_count = 200
+    update()
+    bpy.ops.ed.undo_push(message="fewer")
+    bpy.ops.ed.undo()
+    update()
+    hair = bpy.data.objects["Hair"]
+    assert hair.data.vellus.hair.strand_count == 500
+    assert np.array_equal(points(hair), before)
+
+
+def test_everything_survives_save_and_load(hair, tmp_path):
+    hair.data.vellus.appearance.cuticle_angle = 0.12
+    hair.data.vellus.marschner.size = 128
+    hair.data.vellus.model = "KAJIYA_KAY"
+    update()
+    made, guides_made = points(hair), points(bpy.data.objects["Guides"])
+    path = str(tmp_path / "groom with spaces.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    update()
+    hair = bpy.data.objects["Hair"]
+    assert np.array_equal(points(hair), made)
+    assert np.array_equal(points(bpy.data.objects["Guides"]), guides_made)
+    assert hair.data.vellus.guide_curves == bpy.data.objects["Guides"].data
+    kept = setting_properties.to_settings(hair.data.vellus.hair, HairSettings)
+    assert kept == HairSettings(strand_count=500, radius=0.004, influence_distance=0.03)
+    assert properties.look_of(hair.data.vellus) == Appearance(cuticle_angle=0.12)
+    assert hair.data.vellus.marschner.size == 128
+    assert hair.data.vellus.model == "KAJIYA_KAY"
+
+
+@pytest.mark.parametrize(
+    ("group", "settings_class"),
+    [
+        ("guides", GuideSettings),
+        ("hair", HairSettings),
+        ("appearance", Appearance),
+    ],
+)
+def test_a_fresh_datablock_has_the_declared_defaults(scene, group, settings_class):
+    state = bpy.data.hair_curves.new("Fresh").vellus
+    defaults = {name: default for name, default, _details in declared(settings_class)}
+    assert setting_properties.to_settings(getattr(state, group), settings_class) == settings_class(**defaults)
+
+
+@pytest.mark.parametrize(
+    ("group", "settings_class", "skip"),
+    [
+        ("guides", GuideSettings, ()),
+        ("hair", HairSettings, ()),
+        ("appearance", Appearance, ()),
+        ("marschner", lookup_tables.Settings, appearance.TABLE_FIELDS),
+    ],
+)
+@pytest.mark.parametrize("end", ["low", "high"])
+def test_a_slider_at_its_end_is_within_the_range(scene, group, settings_class, skip, end):
+    """15 degrees in single precision are a little more than 15 degrees, which the range would forbid."""
+    owner = getattr(bpy.data.hair_curves.new("Fresh").vellus, group)
+    for name, default, details in declared(settings_class):
+        limit = getattr(details, end)
+        if name not in skip and isinstance(default, float) and math.isfinite(limit):
+            setattr(owner, name, limit)
+            assert getattr(setting_properties.to_settings(owner, settings_class, skip), name) == limit
+
+
+def hair_node(hair):
+    return next(n for n in hair.data.materials[0].node_tree.nodes if n.bl_idname == "ShaderNodeBsdfHairPrincipled")
+
+
+def assert_material_is(hair, look):
+    """Every socket of the hair's material is what a look asks for."""
+    sockets = hair_node(hair).inputs
+    for name, value in appearance.principled_sockets(look).items():
+        np.testing.assert_allclose(np.array(sockets[name].default_value), value, rtol=1e-6, err_msg=name)
+
+
+# Every field differs from its default.
+LOOKS = [
+    {"melanin": 0.2, "redness": 0.3, "tint": (0.5, 0.4, 0.9), "random_roughness": 0.2},
+    {"parametrization": "COLOR", "color": (0.5, 0.2, 0.1), "roughness": 0.5, "radial_roughness": 0.6},
+    {"parametrization": "ABSORPTION", "absorption": (0.1, 0.2, 0.3), "ior": 1.4, "coat": 0.5, "cuticle_angle": 0.1},
+]
+
+
+@pytest.mark.parametrize("changes", LOOKS)
+def test_material_and_viewport_follow_the_same_look(hair, changes):
+    state = hair.data.vellus
+    assert_material_is(hair, Appearance())
+    for name, value in changes.items():
+        setattr(state.appearance, name, value)
+    update()
+    look = Appearance(**changes)
+    assert_material_is(hair, look)
+    assert properties.look_of(state) == look
+    asked, found = appearance.table_settings(look), properties.table_settings_of(state)
+    for name in appearance.TABLE_FIELDS:
+        if name != "mode":
+            np.testing.assert_allclose(getattr(found, name), getattr(asked, name), rtol=1e-6, err_msg=name)
+    np.testing.assert_allclose(
+        hair.data.materials[0].diffuse_color[:3], appearance.kajiya_kay_settings(look).diffuse_color, rtol=1e-6
+    )
+
+
+def test_tables_differ_by_what_artists_do_not_set(hair):
+    state = hair.data.vellus
+    state.marschner.size, state.marschner.glint_gain = 64, 2.0
+    state.appearance.mode = "classic"
+    found = properties.table_settings_of(state)
+    assert (found.mode, found.size, found.glint_gain) == ("classic", 64, 2.0)
+
+
+def test_a_node_of_another_parametrization_is_filled_too(hair):
+    hair_node(hair).parametrization = "MELANIN"
+    hair.data.vellus.appearance.ior = 1.4
+    update()
+    assert hair_node(hair).inputs["IOR"].default_value == pytest.approx(1.4)
+
+
+def test_a_nan_look_keeps_the_material_and_is_reported(hair):
+    hair.data.vellus.appearance.roughness = math.nan
+    update()
+    assert_material_is(hair, Appearance())
+    assert "Roughness" in hair.data.vellus.shading_status
+    hair.data.vellus.appearance.roughness = 0.3
+    update()
+    assert hair.data.vellus.shading_status == ""
+
+
+def test_a_deleted_surface_is_reported(hair):
+    bpy.data.objects.remove(bpy.data.objects["Sphere"])
+    hair.data.vellus.hair.strand_count = 100
+    update()
+    assert "mesh" in hair.data.vellus.status
+    assert len(hair.data.curves) == 500
+
+
+def test_an_operator_computes_once(sphere, monkeypatch):
+    """What an operator itself changes must not count as a change of its inputs."""
+    calls = {"distribute_guides": 0, "bind_hair": 0}
+
+    def counted(name):
+        real = getattr(groom, name)
+
+        def wrapper(*args, **kwargs):
+            calls[name] += 1
+            return real(*args, **kwargs)
+
+        return wrapper
+
+    for name in calls:
+        monkeypatch.setattr(groom, name, counted(name))
+    bpy.ops.vellus.distribute_guides(guide_count=20)
+    bpy.ops.vellus.interpolate_hair(strand_count=100)
+    update()
+    assert calls == {"distribute_guides": 1, "bind_hair": 1}
+    sphere.location.x = 2.0  # hair is parented: it moves along
+    update()
+    assert calls == {"distribute_guides": 1, "bind_hair": 1}

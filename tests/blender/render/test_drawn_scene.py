@@ -1,0 +1,81 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is read again when something changes: hair alone while it is combed, all of the scene otherwise."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import drawn_meshes
+from hair_addon.blender.gpu import ambient_visibility
+from hair_addon.blender.render import drawn_scene, viewport
+from tests.support.reading import points, write_points
+
+
+@pytest.fixture
+def forgotten(hair, monkeypatch):
+    """What is said to be hair only, update by update."""
+    bpy.ops.object.light_add(type="SUN")
+    bpy.context.view_layer.update()
+    said = []
+    monkeypatch.setattr(viewport, "invalidate", lambda is_hair_only=False: said.append(is_hair_only))
+    return said
+
+
+def comb(guides):
+    combed = points(guides)
+    combed[3, 1:] += np.float32([0.0, 0.01, 0.02])
+    write_points(guides, combed)
+
+
+def test_combing_changes_hair_only(hair, forgotten):
+    comb(bpy.data.objects["Guides"])
+    bpy.context.view_layer.update()
+    assert forgotten and all(forgotten)
+
+
+CHANGES = {
+    "a light moves": lambda hair: setattr(bpy.data.objects["Sun"], "location", (1.0, 2.0, 3.0)),
+    "a light is brighter": lambda hair: setattr(bpy.data.lights["Sun"], "energy", 7.0),
+    "a light is hidden": lambda hair: setattr(bpy.data.objects["Sun"], "hide_viewport", True),
+    "the hair moves": lambda hair: setattr(hair, "location", (0.1, 0.0, 0.0)),
+    "the surface moves": lambda hair: setattr(hair.data.surface, "location", (0.1, 0.0, 0.0)),
+    "the surface is another": lambda hair: hair.data.surface.data.update_tag() or hair.data.surface.data.flip_normals(),
+    "another world": lambda hair: setattr(bpy.context.scene, "world", bpy.data.worlds.new("Blue")),
+    "a light is gone": lambda hair: bpy.data.objects.remove(bpy.data.objects["Sun"]),
+}
+
+
+@pytest.mark.parametrize("change", CHANGES)
+def test_what_else_changes_is_read_again(change, hair, forgotten):
+    CHANGES[change](hair)
+    bpy.context.view_layer.update()
+    assert False in forgotten
+
+
+def test_a_stroke_reads_no_surfaces_and_draws_coarse_shadows(lit, monkeypatch):
+    calls = []
+
+    def counted(module, name):
+        real = getattr(module, name)
+        monkeypatch.setattr(module, name, lambda *args, **kwargs: (calls.append(name), real(*args, **kwargs))[1])
+
+    def read(**details):
+        context = bpy.context
+        calls.clear()
+        return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), **details)
+
+    before = read()
+    counted(drawn_meshes, "read_drawn_meshes")
+    counted(ambient_visibility, "measure")
+    comb(bpy.data.objects["Guides"])
+    draft = read(before=before, is_draft=True)
+    assert calls == []
+    assert draft.surfaces is before.surfaces
+    whole = read(before=draft)
+    assert calls == ["measure"]
+    afresh = read()
+    assert calls == ["read_drawn_meshes", "measure"]
+    for name, texture in whole.shadow_maps.samplers.items():
+        np.testing.assert_array_equal(texture.read(), afresh.shadow_maps.samplers[name].read())
+    for name, texture in whole.hair_visibility[0].items():
+        np.testing.assert_array_equal(texture.read(), afresh.hair_visibility[0][name].read())

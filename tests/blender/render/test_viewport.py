@@ -1,0 +1,304 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a viewport shows of hair: the scene's colours, strands of any width at their brightness, no work for nothing."""
+
+import re
+import shutil
+import sys
+from types import SimpleNamespace
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+from scipy.ndimage import map_coordinates
+
+from hair_addon.blender.data import curves_objects, drawn_meshes, scene
+from hair_addon.blender.gpu import display_transform, shaders
+from hair_addon.blender.host import notices
+from hair_addon.blender.host.caches import Cache
+from hair_addon.blender.live import invalidation
+from hair_addon.blender.render import drawn_scene, hair_picture, region_pictures, viewport
+from hair_addon.core.errors import HairError
+from tests.support import glsl
+
+SIZE = 96
+
+# ------------------------------------------------------------------------------------------------- the display
+
+
+@pytest.fixture
+def colors(rng):
+    """(20000, 3) scene-linear float32, from deep shadow to glints, grey to saturated."""
+    return (2.0 ** rng.uniform(-9.0, 5.0, (20_000, 1)) * rng.random((20_000, 3)) ** 2).astype(np.float32)
+
+
+SETTINGS = [
+    ("AgX", "None", 1.0),
+    ("AgX", "AgX - Punchy", 1.0),
+    ("Filmic", "High Contrast", 1.3),
+    ("Standard", "None", 0.8),
+    ("Raw", "None", 1.0),
+    ("Khronos PBR Neutral", "None", 1.0),
+]
+
+
+def set_view(blender_scene, view, look, gamma):
+    settings = blender_scene.view_settings
+    settings.view_transform, settings.look, settings.gamma = view, look, gamma
+    return display_transform.DisplayTransform.of(blender_scene)
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_colours_are_those_that_blender_writes_into_a_picture(blender_scene, colors, tmp_path, settings):
+    transform = set_view(blender_scene, *settings)
+    image = bpy.data.images.new("colours", 200, 100, float_buffer=True)
+    image.pixels.foreach_set(np.concatenate([colors, np.ones((len(colors), 1), np.float32)], axis=1).ravel())
+    output = blender_scene.render.image_settings
+    output.file_format, output.color_mode, output.color_depth = "PNG", "RGB", "16"
+    blender_scene.render.dither_intensity = 0.0
+    image.save_render(str(tmp_path / "colours.png"), scene=blender_scene)
+    written = bpy.data.images.load(str(tmp_path / "colours.png"))
+    written.colorspace_settings.name = "Non-Color"
+    blenders = np.empty(4 * len(colors), np.float32)
+    written.pixels.foreach_get(blenders)
+    ours = np.clip(display_transform.apply(transform, colors), 0.0, 1.0)
+    np.testing.assert_allclose(ours, blenders.reshape(-1, 4)[:, :3], atol=2e-4)
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_the_table_is_as_good_as_eight_bits(blender_scene, colors, settings):
+    transform = set_view(blender_scene, *settings)
+    at = display_transform.display_place(colors)[:, ::-1].T * (display_transform.SIZE - 1)
+    found = np.stack([map_coordinates(transform.table()[..., c], at, order=1) for c in range(3)], axis=-1)
+    error = 255.0 * np.abs(found - np.clip(display_transform.apply(transform, colors), 0.0, 1.0))
+    assert error.mean() < 0.25
+    assert np.quantile(error, 0.99) < 4.0
+
+
+def test_places_in_the_table_are_twins_and_come_back():
+    light = np.concatenate([[0.0, 512.0, 1e6], np.geomspace(1e-6, 500.0, 1000)]).astype(np.float32)
+    text = glsl.source("include/display_place.glsl")
+    shader = glsl.evaluate(text, "vec3", "display_place(vec3(light))", light=light)[:, 1]
+    python = display_transform.display_place(light.astype(np.float64))
+    np.testing.assert_allclose(shader, python, atol=1e-5)
+    np.testing.assert_allclose(display_transform.linear_at(python), np.minimum(light, 512.0), rtol=1e-9, atol=1e-12)
+
+
+def test_without_opencolorio_colours_are_the_standard_view(blender_scene, colors, monkeypatch, capsys):
+    standard = display_transform.apply(set_view(blender_scene, "Standard", "None", 1.0), colors)
+    monkeypatch.setitem(sys.modules, "PyOpenColorIO", None)
+    without = display_transform.apply(set_view(blender_scene, "AgX", "None", 1.0), colors)
+    np.testing.assert_allclose(without, np.clip(standard, 0.0, 1.0), atol=1e-3)
+    assert "PyOpenColorIO" in capsys.readouterr().err
+
+
+def test_hair_is_laid_over_a_viewport_in_its_colours(lit):
+    """Over white: shown is the mix of white and the light's display colour, to the power that Blender undoes."""
+    picture = pictured(lit, 2, per_side=2)
+    transform = display_transform.DisplayTransform.of(bpy.context.scene)
+    table = hair_picture.table_texture(transform.table())
+    below = gpu.types.GPUTexture((SIZE, SIZE), format="RGBA32F")
+    framebuffer = gpu.types.GPUFrameBuffer(color_slots=below)
+    with framebuffer.bind():
+        framebuffer.clear(color=(1.0, 1.0, 1.0, 1.0))
+        picture.show(table, exposure=2.0, opacity=0.5, depth_test="NONE")
+        shown = np.array(framebuffer.read_color(0, 0, SIZE, SIZE, 4, 0, "FLOAT"))[..., :3]
+    light = picture.read()
+    alpha = light[..., 3:]
+    straight = (2.0 * light[..., :3] / np.maximum(alpha, 1e-9)).reshape(-1, 3).astype(np.float32)
+    display = np.clip(display_transform.apply(transform, straight), 0.0, 1.0).reshape(SIZE, SIZE, 3)
+    assert (alpha > 0.1).sum() > 500
+    np.testing.assert_allclose(shown, 1.0 - 0.5 * alpha + 0.5 * alpha * display**2.2, atol=0.02)
+
+
+# ------------------------------------------------------------------------------------------------- thin strands
+
+
+@pytest.mark.parametrize("coverage", [0.03, 0.25, 0.7, 1.0])
+def test_of_a_thin_strand_just_its_part_is_drawn(coverage):
+    """Over a picture for each strand, and nearly so over sixteen samples of a row or column."""
+    size = 64
+    strand, x, y = (grid.ravel() for grid in np.indices((20, size, size)))
+    text = glsl.source("include/coverage.glsl")
+    expression = f"is_covered(strand_offset(strand) + 0.25, ivec2(x, y), {coverage}) ? 1.0 : 0.0"
+    drawn = glsl.evaluate(text, "float", expression, strand=strand, x=x, y=y).reshape(20, size, size)
+    np.testing.assert_allclose(drawn.mean(axis=(1, 2)), coverage, atol=0.01)
+    for rows in (drawn, drawn.swapaxes(1, 2)):
+        runs = rows.reshape(20, size, size // 16, 16).sum(axis=-1)
+        assert np.abs(runs - 16 * coverage).max() <= 4.0  # by chance it would be eight
+
+
+def test_strands_that_cross_are_left_out_of_different_samples():
+    text = glsl.source("include/coverage.glsl")
+    strand = np.arange(4000)
+    offsets = glsl.evaluate(text, "float", "strand_offset(strand)", strand=strand)
+    np.testing.assert_allclose(np.histogram(offsets, bins=10, range=(0.0, 1.0))[0], 400, atol=80)
+    assert abs(np.corrcoef(offsets[:-1], offsets[1:])[0, 1]) < 0.05
+
+
+def pictured(hair, passes, per_side, size=SIZE):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    picture = hair_picture.HairPicture((size, size), per_side)
+    matrices = scene.read_camera(bpy.context.scene, depsgraph, size, size)
+    for _ in range(passes):
+        picture.add_pass(drawn, *matrices)
+    return picture
+
+
+def sparkles(light):
+    """How many pixels are half as bright again as the brightest of their eight neighbours."""
+    luminance = light[..., :3] @ np.array([0.2126, 0.7152, 0.0722])
+    around = [np.roll(luminance, (y, x), (0, 1)) for y in (-1, 0, 1) for x in (-1, 0, 1) if x or y]
+    return np.count_nonzero((luminance > 1.5 * np.max(around, axis=0)) & (luminance > 0.1 * luminance.max()))
+
+
+@pytest.mark.parametrize("per_side", [1, 2])
+def test_thin_hair_keeps_its_brightness_and_does_not_sparkle(thin, per_side):
+    """The first pass, and what becomes of it, against many samples: in a picture large enough that chance is small."""
+    size = 2 * SIZE
+    reference = pictured(thin, 32, 2, size).read()
+    fine = hair_picture.SAMPLE_COUNT // per_side**2
+    first, last = (pictured(thin, passes, per_side, size).read() for passes in (1, fine))
+    for light in (first, last):
+        np.testing.assert_allclose(light.mean(axis=(0, 1)), reference.mean(axis=(0, 1)), rtol=0.03)
+    assert sparkles(last) <= sparkles(reference) + 0.002 * size**2
+
+
+def test_surfaces_hide_hair_in_every_sample(lit):
+    """The half of the strands that is behind the sphere shows only where surfaces are seen through."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    bare = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    bare.surfaces.clear()
+    matrices = scene.read_camera(bpy.context.scene, depsgraph, SIZE, SIZE)
+    pictures = {}
+    for name, of, through in (("hidden", drawn, False), ("through", drawn, True), ("bare", bare, False)):
+        picture = hair_picture.HairPicture((SIZE, SIZE))
+        picture.add_pass(of, *matrices, is_see_through=through)
+        pictures[name] = picture.read()
+    np.testing.assert_array_equal(pictures["through"], pictures["bare"])
+    assert pictures["hidden"][..., 3].sum() < 0.9 * pictures["bare"][..., 3].sum()
+
+
+# ------------------------------------------------------------------------------------------------- when it is drawn
+
+
+@pytest.fixture
+def region(lit):
+    """Stand-ins for a region and its view, with the place of the scene's camera."""
+    matrices = scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE)
+    names = ("view_matrix", "window_matrix")
+    view = SimpleNamespace(**dict(zip(names, matrices, strict=True)))
+    yield SimpleNamespace(width=SIZE, height=SIZE, as_pointer=lambda: 1), view
+    region_pictures.picture_cache.clear()
+
+
+def test_a_view_at_rest_is_drawn_until_it_is_fine_and_no_more(region, monkeypatch):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    draws = []
+    real = drawn_scene.draw_hair
+    monkeypatch.setattr(drawn_scene, "draw_hair", lambda *args, **kwargs: (draws.append(1), real(*args, **kwargs)))
+    place, view = region
+    pass_count = hair_picture.SAMPLE_COUNT // hair_picture.samples_per_side() ** 2
+
+    def redraw(count, is_see_through=False):
+        draws.clear()
+        for _ in range(count):
+            viewport._picture(drawn, view, place, is_see_through)
+        return len(draws)
+
+    assert redraw(pass_count + 5) == pass_count
+    assert redraw(5) == 0
+    view.view_matrix = view.view_matrix + np.eye(4) * 1e-3
+    assert redraw(pass_count + 5) == pass_count
+    assert redraw(1, is_see_through=True) == 1
+    place.width = SIZE - 10
+    assert redraw(1, is_see_through=True) == 1
+
+
+def test_blender_draws_hair_itself_only_where_this_does_not(hair):
+    assert blenders_drawing(hair) == "nothing"
+    hair.data.vellus.is_drawn = False
+    bpy.context.view_layer.update()
+    assert blenders_drawing(hair) == "TEXTURED"
+    curves_objects.draw_natively(hair.data, False)
+    assert blenders_drawing(hair) == "nothing" and not hair.hide_render and not hair.hide_select
+    assert blenders_drawing(bpy.data.objects["Sphere"]) == "TEXTURED"
+
+
+def blenders_drawing(shown):
+    """What Blender draws of an object: its display, or nothing, of bounds without a shape."""
+    shapes = np.empty(len(bpy.data.objects), np.int32)
+    bpy.data.objects.foreach_get("display_bounds_type", shapes)
+    has_shape = shapes[bpy.data.objects.find(shown.name)] < 4
+    return shown.display_type if has_shape or shown.display_type != "BOUNDS" else "nothing"
+
+
+def test_meshes_that_are_no_surface_in_the_viewport_hide_nothing(sphere):
+    space = next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
+
+    def count():
+        bpy.context.view_layer.update()
+        return len(drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get(), space))
+
+    assert count() == 1
+    sphere.display_type = "WIRE"
+    assert count() == 0
+    sphere.display_type = "TEXTURED"
+    sphere.hide_set(True)
+    assert count() == 0
+
+
+# ------------------------------------------------------------------------------------------------- shaders that fail
+
+
+PROGRAMS = {
+    "guides.frag": lambda: shaders.strip_program.__wrapped__("guides.frag"),
+    "strand_segments.comp": lambda: shaders.segments_program.__wrapped__(),
+}
+
+
+@pytest.mark.parametrize("file", PROGRAMS)
+def test_a_shader_that_does_not_compile_is_reported_once_with_file_and_line(file, tmp_path, monkeypatch):
+    shutil.copytree(shaders.FOLDER, tmp_path / "shaders")
+    broken = tmp_path / "shaders" / "include" / "strand.glsl"
+    text = broken.read_text()
+    line = next(number for number, words in enumerate(text.splitlines(), 1) if "int row =" in words)
+    broken.write_text(text.replace("int row =", "int row = nonsense; int other =", 1))
+    monkeypatch.setattr(shaders, "FOLDER", tmp_path / "shaders")
+    monkeypatch.setattr(shaders, "complaint_cache", Cache())
+    compilations = []
+    real = gpu.shader.create_from_info
+    monkeypatch.setattr(gpu.shader, "create_from_info", lambda info: (compilations.append(1), real(info))[1])
+    for _ in range(3):
+        with pytest.raises(HairError, match=rf"{re.escape(file)} .*include/strand\.glsl:{line}: .*nonsense"):
+            PROGRAMS[file]()
+    assert len(compilations) == 2  # and once more, to hear where
+
+
+def test_a_complaint_is_found_in_what_vulkan_writes():
+    log = (
+        "00:02.605  gpu.shader       | ERROR pyGPU_Shader vertex: \n"
+        "                            |       | python_shader.glsl:2: Error: 'x' : undeclared identifier\n"
+    )
+    vertex, fragment = [("a.vert", 1), ("include/b.glsl", 7)], [("c.frag", 1), ("c.frag", 2)]
+    assert shaders.complaint(log, vertex, fragment) == "include/b.glsl:7: Error: 'x' : undeclared identifier"
+    assert shaders.complaint(log.replace("vertex", "fragment"), vertex, fragment).startswith("c.frag:2: ")
+    assert shaders.complaint("something else", vertex, fragment) is None
+
+
+def test_undrawable_hair_is_reported_once(monkeypatch, capsys):
+    def refuse(_context):
+        raise HairError("The shader x.frag does not compile.")
+
+    space = SimpleNamespace(shading=SimpleNamespace(type="SOLID"), overlay=SimpleNamespace(show_overlays=False))
+    monkeypatch.setattr(viewport, "_draw_hair", refuse)
+    notices.said_cache.clear()
+    monkeypatch.setattr(viewport, "bpy", SimpleNamespace(context=SimpleNamespace(space_data=space)))
+    viewport.draw()
+    viewport.draw()
+    assert capsys.readouterr().err == "Vellus: The shader x.frag does not compile.\n"
+    invalidation.clear()
+    PROGRAMS["guides.frag"]()  # others compile as before

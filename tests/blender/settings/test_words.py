@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The words of the interface: US spelling, and labels that fit a sidebar of its default width."""
+
+import ast
+import re
+
+import blf
+import bpy
+import pytest
+
+from hair_addon.blender.settings import translations
+from hair_addon.blender.ui import panels, setting_rows
+from tests.support import spoken
+from tests.support.layout import draw
+from tools import manual_pages
+
+BRITISH = re.compile(
+    r"\b(\w*colour\w*|grey\w*|\w*neighbour\w*|\w*fibre\w*|\w*centre[sd]?|licence\w*|behaviour\w*|favour\w*|honour\w*|"
+    r"(?:kilo|milli|centi|nano)?metres?|modell(?:ed|ing)|travell\w+|cancell(?:ed|ing)|labell\w+|catalogue\w*|"
+    r"(?:normal|organ|visual|random|initial|optim|minim|maxim)is(?:e|es|ed|ing|ation)|analys(?:e|ed|es)|"
+    r"towards|whilst|analogue|grown-up|artefacts?)\b",
+    re.IGNORECASE,
+)
+
+
+def errors():
+    """The fixed parts of all sentences of `HairError`, those with values in f-strings too."""
+    for path in sorted(spoken.ADDON.rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "HairError" and node.args:
+                for part in ast.walk(node.args[0]):
+                    if isinstance(part, ast.Constant) and isinstance(part.value, str):
+                        yield part.value
+
+
+def test_the_interface_has_us_spelling():
+    texts = {*spoken.strings_of_classes(), *spoken.strings_of_sources(), *errors()}
+    assert sorted(text for text in texts if BRITISH.search(text)) == []
+
+
+@pytest.mark.parametrize("page", sorted(manual_pages.SOURCE.glob("*.md")), ids=lambda page: page.stem)
+def test_the_manual_has_us_spelling(page):
+    prose = re.sub(r"`[^`]*`|\]\([^)]*\)", "", page.read_text(encoding="utf-8"))  # no identifiers, no addresses
+    assert [match[0] for match in BRITISH.finditer(prose)] == []
+
+
+# In a sidebar of 280 pixels, as a window shows it: the rows of a panel, and what a label keeps free at its sides.
+ROW_WIDTH, MARGIN = 224, 10
+FONT_SIZE = 11  # of Blender's interface, at a scale of one
+ICON_WIDTH, BUTTON_MARGIN = 20, 16
+
+
+def width(text):
+    blf.size(0, FONT_SIZE)
+    return blf.dimensions(0, text)[0]
+
+
+def shown_in(locale, text):
+    return text if locale == "en_US" else translations.dictionaries()[locale][text]
+
+
+def names_in_the_sidebar():
+    """{label of a property that has its row in the sidebar: where it stands}."""
+    groups = [cls for cls in spoken.blender.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
+    of_renders = {"VellusRenderSettings", "VellusPassSettings"}  # in the Properties editor, which is wider
+    return {
+        entry.name: f"{cls.__name__}.{entry.identifier}"
+        for cls in groups
+        for entry in spoken.properties_of(cls)
+        if cls.__name__ not in of_renders
+        and not entry.is_hidden
+        and entry.name != entry.identifier
+        and entry.identifier not in setting_rows.WIDE
+    }
+
+
+@pytest.mark.parametrize("locale", ["en_US", *translations.dictionaries()])
+def test_names_fit_the_sidebar(locale):
+    room = ROW_WIDTH * setting_rows.NAME_SHARE - MARGIN
+    names = {shown_in(locale, name): where for name, where in names_in_the_sidebar().items()}
+    assert {name: (width(name), where) for name, where in names.items() if width(name) > room} == {}
+
+
+@pytest.mark.parametrize("active", ["Sphere", "Guides", "Hair"])
+@pytest.mark.parametrize("locale", ["en_US", *translations.dictionaries()])
+def test_buttons_fit_the_sidebar(hair, active, locale):
+    bpy.context.view_layer.objects.active = bpy.data.objects[active]
+    layouts = [draw(panel) for panel in panels.CLASSES if panel.bl_region_type == "UI"]
+    buttons = {shown_in(locale, text) for layout in layouts if layout is not None for text in layout.buttons}
+    room = ROW_WIDTH - ICON_WIDTH - BUTTON_MARGIN
+    assert buttons and {text: width(text) for text in buttons if width(text) > room} == {}
+
+
+@pytest.mark.parametrize("locale", ["en_US", *translations.dictionaries()])
+def test_choices_fit_their_menus(locale):
+    """The text of a menu button has the value's side, but for its arrow."""
+    room = ROW_WIDTH * (1.0 - setting_rows.NAME_SHARE) - ICON_WIDTH - MARGIN
+    groups = [cls for cls in spoken.blender.CLASSES if issubclass(cls, bpy.types.PropertyGroup)]
+    choices = {
+        shown_in(locale, choice.name): f"{cls.__name__}.{entry.identifier}"
+        for cls in groups
+        for entry in spoken.properties_of(cls)
+        if entry.type == "ENUM" and entry.name != entry.identifier and entry.identifier not in setting_rows.WIDE
+        for choice in entry.enum_items
+    }
+    assert {name: (width(name), where) for name, where in choices.items() if width(name) > room} == {}

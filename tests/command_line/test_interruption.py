@@ -1,0 +1,124 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Ctrl-C and a request to end, in the middle of work: one sentence, a status of its own, and whole files only."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import time
+
+import bpy
+import pytest
+
+from hair_addon import api
+from hair_addon.command_line.interruption import Interruption
+from hair_addon.core.long_work import Stopped
+from tests.support.commands import HEAD, ROOT, command
+
+LONG = ("groom", HEAD, "--guides", 4000, "--relax-iterations", 1000, "--strands", 100)
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+
+
+class Terminal:
+    """A terminal that a command's standard error goes to."""
+
+    def __init__(self):
+        self.reading, self.writing = pty.openpty()
+        self.said = ""
+
+    def wait_for(self, words, seconds=60.0):
+        """Read until some words were said."""
+        end = time.monotonic() + seconds
+        while words not in self.said:
+            assert time.monotonic() < end, self.said
+            self.said += os.read(self.reading, 4096).decode()
+
+    def rest(self):
+        """All that was said, once the command has ended."""
+        os.close(self.writing)
+        try:
+            while part := os.read(self.reading, 4096).decode():
+                self.said += part
+        except OSError:  # Linux ends a terminal that nobody writes to any more with an error
+            pass
+        os.close(self.reading)
+        return self.said
+
+
+@pytest.mark.parametrize(
+    ("asked", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)], ids=["Ctrl-C", "a request to end"]
+)
+def test_long_work_ends_at_its_next_step(tmp_path, asked, status):
+    terminal, out = Terminal(), tmp_path / "new" / "out.npz"
+    process = subprocess.Popen(
+        command(*LONG, "--out", out), stdout=subprocess.PIPE, stderr=terminal.writing, env=ENVIRONMENT, cwd=tmp_path
+    )
+    terminal.wait_for("Spreading guides: ")
+    process.send_signal(asked)
+    started = time.monotonic()
+    printed = process.communicate(timeout=60)[0]
+    assert time.monotonic() - started < 20.0
+    assert (process.returncode, printed) == (status, b"")
+    # What is shown of progress is wiped away: one sentence stays.
+    left = terminal.rest().rpartition("\r\x1b[K")[2]
+    assert left == "vellus: stopped: unfinished results were not written.\r\n"
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
+
+
+def test_progress_is_for_terminals_only(tmp_path):
+    words = command("groom", HEAD, "--guides", 50, "--strands", 100, "--out", tmp_path / "out.npz")
+    piped = subprocess.run(words, capture_output=True, env=ENVIRONMENT, timeout=120)
+    assert piped.stderr == b""
+    for quiet, expected in (((), True), (("--quiet",), False)):
+        terminal = Terminal()
+        subprocess.run([*words, *quiet], stdout=subprocess.PIPE, stderr=terminal.writing, env=ENVIRONMENT, timeout=120)
+        said = terminal.rest()
+        assert ("Spreading guides" in said) is expected
+        assert said.rpartition("\r\x1b[K")[2] == ""
+
+
+def test_finished_frames_are_complete(lit, tmp_path):
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    render = ("render", tmp_path / "shot.blend", "--frames", "1-500", "--width", 64, "--height", 48, "--json")
+    process = subprocess.Popen(
+        command(*render, "--out", tmp_path / "out" / "f_####.png"),
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=ENVIRONMENT,
+        text=True,
+    )
+    lines = [process.stdout.readline() for _ in range(3)]
+    process.send_signal(signal.SIGINT)
+    printed, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert errors == "vellus: stopped: unfinished results were not written.\n"
+    told = [json.loads(line)["out"] for line in [*lines, *printed.splitlines()]]
+    assert sorted(told) == sorted(str(path) for path in (tmp_path / "out").glob("[!.]*"))
+    assert len(told) < 100
+    for path in told:
+        image = bpy.data.images.load(path)
+        assert tuple(image.size) == (64, 48)
+
+
+def test_a_second_ctrl_c_does_not_wait():
+    before = signal.getsignal(signal.SIGINT)  # ignored, where a shell has put the tests in the background
+    with Interruption() as interruption:
+        signal.raise_signal(signal.SIGINT)
+        assert interruption.is_asked
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+    assert interruption.status == 130
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_progress_callback_can_stop_a_script(sphere):
+    """The same for the functions that scripts call: nothing is left in the scene."""
+
+    def stop(_step, part):
+        if part > 0.3:
+            raise Stopped
+
+    with pytest.raises(Stopped):
+        api.add_hair(sphere, progress=stop)
+    assert not bpy.data.hair_curves

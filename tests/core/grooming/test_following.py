@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands that follow guides: whatever joins the weighted sum is in all of them, however they are updated."""
+
+import numpy as np
+import pytest
+
+from hair_addon.core.geometry import strands
+from hair_addon.core.grooming import following, groom
+from hair_addon.core.interpolation import hair_binding
+from tests.support.devices import DEVICE
+
+
+@pytest.fixture
+def bound(head, scalp):
+    """(guides, binding) of 2,000 strands."""
+    guides = groom.distribute_guides(head, groom.GuideSettings(guide_count=100), density=scalp, device=DEVICE)
+    settings = groom.HairSettings(strand_count=2000)
+    return guides, groom.bind_hair(head, guides, settings, density=scalp, device=DEVICE)
+
+
+@pytest.fixture
+def curled(monkeypatch):
+    """A style for want of a real one: each strand's segments are turned about its normal by its own angle."""
+    summed = following.strands_now
+
+    def strands_now(binding, guides, weights, chosen=None, out=None):
+        points = summed(binding, guides, weights, chosen, out)
+        rows = slice(None) if chosen is None else chosen.numpy()
+        angles, normals = 3.0 * binding.identities[1][rows, None, None], binding.normals.numpy()[rows, None]
+        offsets = np.diff(points.numpy(), axis=1)
+        along = (offsets * normals).sum(axis=2, keepdims=True) * normals
+        turned = along + np.cos(angles) * (offsets - along) + np.sin(angles) * np.cross(normals, offsets)
+        styled = np.concatenate([points.numpy()[:, :1], turned], axis=1).cumsum(axis=1)
+        points.assign(styled.astype(np.float32))
+        return points
+
+    monkeypatch.setattr(following, "strands_now", strands_now)
+    return summed
+
+
+def test_a_style_is_in_strands_of_every_update(bound, curled):
+    guides, binding = bound
+    weights = following.weights_now(binding, guides)
+    whole = following.follow_guides(binding, guides).numpy()
+    plain = curled(binding, guides, weights).numpy()
+    assert np.abs(whole - plain).max() > 0.01
+    np.testing.assert_array_equal(whole[:, 0], plain[:, 0])
+    np.testing.assert_allclose(strands.lengths(whole), strands.lengths(plain), rtol=1e-4)
+    np.testing.assert_array_equal(following.growing_points(binding, guides, weights).result(), whole)
+    chosen = np.arange(3, 2000, 7)
+    some = following.follow_some(binding, guides, chosen, following.weights_now(binding, guides, chosen))
+    np.testing.assert_allclose(some, whole[chosen], atol=1e-6)
+
+
+def test_identities_and_leaders_stay_while_guides_are_combed_and_weighed_again(bound):
+    _guides, binding = bound
+    again = hair_binding.weigh_again(binding, groom.HairSettings(strand_count=2000, length_limit=1.5))
+    np.testing.assert_array_equal(again.identities, binding.identities)
+    np.testing.assert_array_equal(again.leaders, binding.leaders)
+    first = binding.guide_weights.indices.numpy()[:, 0]
+    np.testing.assert_array_equal(first[binding.leaders], first)
+    assert len(np.unique(binding.identities[0])) == 2000
+
+
+def test_what_was_combed_is_told_from_what_is_rooted_elsewhere(bound):
+    guides, _binding = bound
+    points = guides.numpy().copy()
+    points[[3, 7], 1:] += 0.01
+    np.testing.assert_array_equal(following.combed(guides.moved(points), guides), [3, 7])
+    slid = guides.roots[np.roll(np.arange(100), 1)]
+    assert following.combed(strands.from_numpy(points, slid, DEVICE), guides) is None
+    assert following.combed(strands.from_numpy(points[:50], guides.roots[:50], DEVICE), guides) is None

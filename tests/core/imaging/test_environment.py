@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surroundings taken apart: nothing is lost, and what is put in is found again."""
+
+import numpy as np
+import pytest
+
+from hair_addon.core.imaging import ambient_cube, environment
+
+HEIGHT = 48
+
+
+def surroundings(radiance_of):
+    """(H, W, 3) of a function of unit directions (N, 3)."""
+    directions, _solid_angles = environment._texels(HEIGHT, 2 * HEIGHT)
+    return np.broadcast_to(radiance_of(directions)[:, None], (len(directions), 3)).reshape(HEIGHT, 2 * HEIGHT, 3)
+
+
+def test_solid_angles_fill_the_sphere():
+    directions, solid_angles = environment._texels(HEIGHT, 2 * HEIGHT)
+    assert solid_angles.sum() == pytest.approx(4.0 * np.pi)
+    np.testing.assert_allclose(np.linalg.norm(directions, axis=1), 1.0)
+
+
+def test_even_light_has_no_lobes_and_the_same_sides():
+    lobes, sides = environment.split(surroundings(lambda directions: np.full(len(directions), 0.7)))
+    assert lobes == []
+    np.testing.assert_allclose(sides, 0.7)
+
+
+@pytest.mark.parametrize("sharpness", [60.0, 150.0])
+def test_a_bright_lobe_is_found_with_its_place_light_and_width(rng, sharpness):
+    """A spherical Gaussian of sharpness s has the irradiance 2 pi / s and the variance 1 / s, both to 1 / s."""
+    axis = rng.normal(size=3)
+    axis /= np.linalg.norm(axis)
+    (lobe,), sides = environment.split(
+        surroundings(lambda directions: 0.2 + 20.0 * np.exp(sharpness * (directions @ axis - 1.0)))
+    )
+    assert lobe.direction @ axis > np.cos(np.radians(2.0))
+    np.testing.assert_allclose(lobe.irradiance, 20.0 * 2.0 * np.pi / sharpness, rtol=0.05)
+    assert lobe.variance == pytest.approx(1.0 / sharpness, rel=0.1)
+    np.testing.assert_allclose(sides, 0.2, atol=0.02)
+
+
+def test_two_lamps_are_two_lobes():
+    lamps = np.array([[0.6, 0.0, 0.8], [-0.8, 0.6, 0.0]])
+    lobes, _sides = environment.split(
+        surroundings(lambda directions: np.exp(60.0 * (directions @ lamps.T - 1.0)) @ [20.0, 10.0])
+    )
+    np.testing.assert_allclose([lobe.direction for lobe in lobes], lamps, atol=0.03)
+    assert lobes[0].irradiance[0] == pytest.approx(2.0 * lobes[1].irradiance[0], rel=0.05)
+
+
+def test_black_and_broken_pictures_give_no_light():
+    lobes, sides = environment.split(np.zeros((HEIGHT, 2 * HEIGHT, 3)))
+    assert lobes == [] and not sides.any()
+    lobes, sides = environment.split(np.full((HEIGHT, 2 * HEIGHT, 3), -1.0))
+    assert lobes == [] and not sides.any()
+
+
+def test_directions_average_polynomials_of_degree_five():
+    """Over the sphere the mean of x² is 1/3, of x⁴ 1/5, of x² y² 1/15, and of odd powers 0."""
+    x, y, _z = ambient_cube.DIRECTIONS.T
+    means = [float(ambient_cube.WEIGHTS @ values) for values in (x**0, x**2, x**4, x**2 * y**2, x**3 * y**2, x)]
+    np.testing.assert_allclose(means, [1.0, 1 / 3, 1 / 5, 1 / 15, 0.0, 0.0], atol=1e-12)
+
+
+def test_sides_share_every_direction(rng):
+    directions = rng.normal(size=(50, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    shares = ambient_cube.side_shares(directions)
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0)
+    for axis in range(3):
+        assert (shares[directions[:, axis] > 0.0, 2 * axis + 1] == 0.0).all()

@@ -1,0 +1,175 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kernels that come compiled: the same hair as from kernels compiled here, and none where they do not fit."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+import warp as wp
+
+from hair_addon.core.geometry import transform
+from hair_addon.core.kernels import compiled_kernels
+from tools import build_extension, compile_kernels
+
+ROOT = build_extension.ROOT
+
+pytestmark = pytest.mark.skipif(
+    compile_kernels.this_platform() not in compile_kernels.PROCESSORS,
+    reason="no kernels are compiled for this platform",
+)
+
+# Digests of guides and of hair, with the kernels of one folder after another; the first has none, so Warp compiles or
+# has compiled them. What it compiles for the others lies in a cache of its own.
+PROGRAM = """
+import hashlib, sys
+from pathlib import Path
+import numpy as np
+import warp as wp
+from hair_addon.core.kernels import compiled_kernels, kernel_cache
+from hair_addon.core.grooming import groom
+from tests.support.meshes import HEAD, read_obj
+from tests.support.hair import generate_hair
+
+def digest(*values):
+    return hashlib.sha256(b"".join(np.ascontiguousarray(value).tobytes() for value in values)).hexdigest()
+
+mesh = read_obj(HEAD)
+cache, none, *folders = sys.argv[1:]
+for folder in (none, *folders):
+    compiled_kernels.FOLDER = Path(folder)
+    kernel_cache._loaded.clear()
+    for module in wp._src.context.user_modules.values():
+        module.unload()
+    guides = groom.distribute_guides(mesh, groom.GuideSettings(guide_count=200, curvature=1.0))
+    hair = generate_hair(mesh, guides, groom.HairSettings(strand_count=3000))
+    print(digest(guides.numpy(), guides.roots.barycentric), digest(hair.numpy(), hair.roots.triangle))
+    wp.config.kernel_cache_dir = cache
+"""
+
+
+@pytest.fixture(scope="module")
+def made():
+    """The folder as the extension's zip has it: compiled once for the same sources."""
+    return build_extension.compiled_kernels()
+
+
+@pytest.fixture
+def folder(made, tmp_path, monkeypatch):
+    """A copy of that folder, which is the one that kernels are loaded from."""
+    copy = tmp_path / "kernels"
+    shutil.copytree(made, copy)
+    monkeypatch.setattr(compiled_kernels, "FOLDER", copy)
+    return copy
+
+
+def loads():
+    return compiled_kernels.load(wp.get_module(transform.__name__), wp.get_device("cpu"))
+
+
+def change_index(folder, change):
+    path = folder / compiled_kernels.INDEX
+    index = json.loads(path.read_text(encoding="utf-8"))
+    change(index)
+    path.write_text(json.dumps(index), encoding="utf-8")
+
+
+def test_the_same_hair_and_nothing_is_compiled(made, tmp_path):
+    """Of every kind of processor that this one is. Those without fused multiply-add round strands in their own way."""
+    index = json.loads((made / compiled_kernels.INDEX).read_text(encoding="utf-8"))
+    features = compiled_kernels.processor_features()
+    kinds = [kind for kind in index["processors"] if features.issuperset(kind["features"])]
+    folders = []
+    for kind in kinds:
+        folders.append(tmp_path / kind["name"])
+        shutil.copytree(made, folders[-1])
+        change_index(folders[-1], lambda index, kind=kind: index.update(processors=[kind]))
+    cache = tmp_path / "cache"
+    command = [sys.executable, "-c", PROGRAM, cache, tmp_path / "none", *folders]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    (guides, hair), *compiled = (line.split() for line in done.stdout.splitlines() if len(line) == 129)
+    assert len(compiled) == len(kinds) > 0
+    for kind, (its_guides, its_hair) in zip(kinds, compiled, strict=True):
+        assert its_guides == guides
+        assert its_hair == hair or ("fma" in features and "fma" not in kind["features"])
+    assert list(cache.rglob("*.o")) == []
+
+
+def test_native_code_is_among_the_sources():
+    native = {path for path in (ROOT / "hair_addon").rglob("*") if path.suffix in {".cpp", ".cu", ".h"}}
+    assert native and native <= set(compile_kernels.sources())
+
+
+@pytest.mark.usefixtures("folder")
+def test_kernels_that_fit_are_loaded():
+    assert loads()
+
+
+def test_no_folder(folder):
+    shutil.rmtree(folder)
+    assert not loads()
+
+
+def test_an_empty_folder(folder):
+    shutil.rmtree(folder)
+    folder.mkdir()
+    assert not loads()
+
+
+def test_a_damaged_index(folder):
+    path = folder / compiled_kernels.INDEX
+    path.write_bytes(path.read_bytes()[:100])
+    assert not loads()
+
+
+@pytest.mark.parametrize("part", ["warp", "llvm", "triple"])
+def test_another_compiler(folder, part):
+    change_index(folder, lambda index: index["compiler"].update({part: "0"}))
+    assert not loads()
+
+
+def test_other_sources(folder):
+    change_index(folder, lambda index: index["modules"]["core.geometry.transform"].update(hash="0" * 64))
+    assert not loads()
+
+
+def test_other_options(folder, monkeypatch):
+    """What changes the code that Warp would compile, here checks of every number, is not in compiled kernels."""
+    module = wp.get_module(transform.__name__)
+    monkeypatch.setattr(wp.config, "verify_fp", True)
+    module.mark_modified()
+    try:
+        assert not loads()
+    finally:
+        module.mark_modified()
+
+
+def test_a_lesser_processor(folder):
+    """One that lacks a feature of each kind of processor gets none; of the best kind alone, the next kind's."""
+    first, *others = json.loads((folder / compiled_kernels.INDEX).read_text(encoding="utf-8"))["processors"]
+    change_index(folder, lambda index: index["processors"][0]["features"].append("another"))
+    assert loads() == bool(others)
+    assert compiled_kernels._fitting(folder)[0] != first["name"]
+    compiled_kernels._fitting.cache_clear()
+    change_index(folder, lambda index: [kind["features"].append("another") for kind in index["processors"]])
+    assert not loads()
+
+
+def test_a_damaged_file(folder):
+    processor, _modules = compiled_kernels._fitting(folder)
+    binary, _meta = compiled_kernels.file_names("core.geometry.transform", processor)
+    content = bytearray((folder / binary).read_bytes())
+    content[len(content) // 2] ^= 1
+    (folder / binary).write_bytes(content)
+    assert not loads()
+    (folder / binary).unlink()
+    assert not loads()
+
+
+def test_nothing_of_this_machine(made):
+    """The files hold no path."""
+    for path in filter(os.path.isfile, made.rglob("*")):
+        assert not [word for word in (str(ROOT), os.path.expanduser("~")) if word.encode() in path.read_bytes()]

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kernels on all cores give what one core gives."""
+
+import os
+import threading
+
+import numpy as np
+import pytest
+import warp as wp
+
+from hair_addon.core.kernels import parallel
+from hair_addon.core.kernels.parallel import Rows
+from tests.support.devices import DEVICE
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.kernel
+def _scale(
+    values: wp.array2d[float],
+    factors: wp.array[float],
+    # outputs
+    out_values: wp.array2d[float],
+    out_sums: wp.array[float],
+):
+    row = wp.tid()
+    total = float(0.0)
+    for column in range(values.shape[1]):
+        out_values[row, column] = factors[column] * values[row, column]
+        total += out_values[row, column]
+    out_sums[row] = total
+
+
+@pytest.mark.parametrize("row_count", [0, 1, 7, 4096, 50_001])
+@pytest.mark.parametrize("core_count", [1, 2, 5])
+def test_rows_are_computed_once_each_on_any_number_of_cores(rng, monkeypatch, row_count, core_count):
+    monkeypatch.setattr(os, "process_cpu_count", lambda: core_count)
+    values, factors = rng.random((row_count, 3), np.float32), np.float32([1.0, 2.0, 4.0])
+    there = wp.array(values, dtype=float, device=DEVICE, ndim=2)
+    out_values, out_sums = wp.zeros_like(there), wp.zeros(row_count, dtype=float, device=DEVICE)
+    given = [Rows(there), wp.array(factors, dtype=float, device=DEVICE)]
+    parallel.launch(_scale, row_count, inputs=given, outputs=[out_values, out_sums], device=DEVICE)
+    np.testing.assert_array_equal(out_values.numpy(), factors * values)
+    np.testing.assert_allclose(out_sums.numpy(), (factors * values).sum(axis=1), rtol=1e-6)
+
+
+def test_no_thread_is_left(rng):
+    before = threading.active_count()
+    test_rows_are_computed_once_each_on_any_number_of_cores(rng, pytest.MonkeyPatch(), 50_001, 2)
+    assert threading.active_count() == before
+
+
+def test_what_goes_wrong_in_a_part_is_raised():
+    wrong = wp.zeros(50_000, dtype=wp.vec3, device="cpu")
+    with pytest.raises(RuntimeError):
+        parallel.launch(_scale, 50_000, inputs=[Rows(wrong), wrong], outputs=[wrong, wrong], device="cpu")
+
+
+def test_empty_vectors_have_their_shape():
+    assert parallel.empty_vectors((5, 4), DEVICE).shape == (5, 4)
+    assert parallel.empty_vectors((5, 4), DEVICE).dtype is wp.vec3

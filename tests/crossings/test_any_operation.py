@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair survives any operations in any order: walk_operations.py, in a process whose crash is a failure, not an end."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.mark.parametrize("seed", [1, 3])
+def test_random_operations_raise_no_exception(seed):
+    """200 operations a run; the seed fixes the way."""
+    walked = subprocess.run(
+        [sys.executable, "-u", "-m", "tests.support.walk_operations", "12", "200", str(seed)],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        timeout=240,
+    )
+    way = "\n".join(walked.stdout.splitlines()[-40:])
+    assert walked.returncode == 0 and walked.stdout.endswith("walked\n"), f"{way}\n{walked.stderr[-4000:]}"

@@ -1,0 +1,274 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair duplicated, linked, appended, overridden, in two scenes, and while the add-on is off."""
+
+import dataclasses
+import math
+import sys
+from types import ModuleType
+
+import bpy
+import numpy as np
+import pytest
+
+import hair_addon
+from hair_addon.blender.host.caches import Cache
+from hair_addon.blender.live import handlers, invalidation
+from hair_addon.blender.render import hair_cache, offscreen
+from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from tests.support.reading import points, snapshot, write_points
+
+
+def select(*names):
+    for other in bpy.context.view_layer.objects:
+        other.select_set(other.name in names)
+    bpy.context.view_layer.objects.active = bpy.data.objects[names[0]]
+
+
+def comb(guides, amount):
+    combed = points(guides)
+    combed[:, -1] += amount
+    write_points(guides, combed)
+
+
+def test_a_duplicated_head_has_hair_of_its_own(hair):
+    """Shift-D of surface, guides and hair: combing one leaves the other alone."""
+    select("Sphere", "Guides", "Hair")
+    bpy.ops.object.duplicate()
+    bpy.context.view_layer.update()
+    copy = bpy.data.objects["Hair.001"]
+    assert copy.data.vellus.guide_curves == bpy.data.objects["Guides.001"].data
+    assert copy.data.surface == copy.parent == bpy.data.objects["Sphere.001"]
+    before = points(hair)
+    comb(bpy.data.objects["Guides.001"], 0.2)
+    assert np.array_equal(points(hair), before)
+    assert not np.array_equal(points(copy), before)
+
+
+def test_duplicated_hair_follows_the_same_guides(hair):
+    select("Hair")
+    bpy.ops.object.duplicate()
+    bpy.context.view_layer.update()
+    comb(bpy.data.objects["Guides"], 0.2)
+    assert np.array_equal(points(bpy.data.objects["Hair.001"]), points(hair))
+    bpy.data.objects["Hair.001"].data.vellus.hair.strand_count = 50
+    bpy.context.view_layer.update()
+    assert (len(hair.data.curves), len(bpy.data.objects["Hair.001"].data.curves)) == (500, 50)
+
+
+def test_duplicated_hair_has_a_look_of_its_own(hair):
+    """Blender lets a duplicate share its material: another look must not repaint the first."""
+    select("Hair")
+    bpy.ops.object.duplicate()
+    bpy.context.view_layer.update()
+    copy = bpy.data.objects["Hair.001"]
+    assert copy.data.materials[0] == hair.data.materials[0]
+    before = tuple(hair.data.materials[0].diffuse_color)
+    copy.data.vellus.appearance.melanin = 0.1
+    bpy.context.view_layer.update()
+    assert tuple(hair.data.materials[0].diffuse_color) == before
+    assert tuple(copy.data.materials[0].diffuse_color) != before
+
+
+def test_linked_duplicates_are_one_hair(hair):
+    select("Sphere", "Guides", "Hair")
+    bpy.ops.object.duplicate(linked=True)
+    bpy.context.view_layer.update()
+    assert bpy.data.objects["Hair.001"].data == hair.data
+    comb(bpy.data.objects["Guides.001"], 0.2)
+    assert len(bpy.data.hair_curves) == 2
+
+
+def test_a_full_copy_of_the_scene_is_on_its_own(hair):
+    bpy.ops.scene.new(type="FULL_COPY")
+    bpy.context.view_layer.update()
+    copy = next(o for o in bpy.context.scene.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR")
+    assert copy.data != hair.data
+    assert copy.data.vellus.guide_curves.surface == copy.data.surface == copy.parent
+    assert copy.parent.name in bpy.context.scene.objects
+
+
+@pytest.fixture
+def groom_file(hair, tmp_path):
+    """A .blend with hair, and another one that is open."""
+    path = tmp_path / "groom.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    return path
+
+
+def bring(path, is_linked):
+    """The hair object of a file, linked or appended, in the scene."""
+    with bpy.data.libraries.load(str(path), link=is_linked) as (_source, target):
+        target.objects = ["Hair"]
+    for brought in bpy.data.objects:
+        bpy.context.scene.collection.objects.link(brought)
+    bpy.context.view_layer.update()
+    bpy.context.view_layer.objects.active = target.objects[0]
+    return target.objects[0]
+
+
+def test_appended_hair_brings_what_it_follows(groom_file):
+    hair = bring(groom_file, is_linked=False)
+    assert hair.data.vellus.guide_curves.name == "Guides"
+    assert hair.data.surface.name == "Sphere"
+    hair.data.vellus.hair.strand_count = 30
+    bpy.context.view_layer.update()
+    assert (len(hair.data.curves), hair.data.vellus.status) == (30, "")
+
+
+LINKED = {
+    "interpolate_hair": {"strand_count": 10},
+    "distribute_guides": {"guide_count": 10},
+    "apply_preset": {"preset": "BLOND"},
+    "toggle_drawing": {},
+    "delete_hair": {},
+    "make_uv_map": {},
+    "apply_scale": {},
+    "use_uv_map": {},
+}
+
+
+@pytest.mark.parametrize("operator", LINKED)
+def test_linked_hair_is_left_alone(groom_file, operator):
+    """Blender would take the change and lose it on reload."""
+    hair = bring(groom_file, is_linked=True)
+    before, made = snapshot(), points(hair)
+    with pytest.raises(RuntimeError, match="library override"):
+        getattr(bpy.ops.vellus, operator)(**LINKED[operator])
+    assert snapshot() == before and np.array_equal(points(hair), made)
+
+
+def test_linked_hair_is_drawn_and_settings_change_nothing(groom_file):
+    hair = bring(groom_file, is_linked=True)
+    assert hair_cache.strands_on_gpu(hair.data).strand_count == 500
+    hair.data.vellus.hair.strand_count = 30
+    bpy.context.view_layer.update()
+    assert len(hair.data.curves) == 500 and "library override" in hair.data.vellus.status
+
+
+def test_linked_hair_keeps_the_materials_of_its_file(groom_file):
+    """Undo frees a material of this file and leaves what is linked alone: the next one would end Blender."""
+    hair = bring(groom_file, is_linked=True)
+    linked = list(hair.data.materials)
+    hair.data.vellus.appearance.roughness = 0.9
+    bpy.context.view_layer.update()
+    assert list(hair.data.materials) == linked and linked[0].library is not None
+
+
+def test_overridden_hair_is_editable_or_reports_why_not(groom_file):
+    linked = bring(groom_file, is_linked=True)
+    local = linked.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer, do_fully_editable=True)
+    bpy.context.view_layer.update()
+    assert local.library is None
+    bpy.context.view_layer.objects.active = local
+    before = points(local)
+    local.data.vellus.hair.strand_count = 30
+    bpy.context.view_layer.update()
+    assert np.isfinite(points(local)).all()
+    assert len(local.data.curves) == 30 or (np.array_equal(points(local), before) and local.data.vellus.status)
+
+
+def test_hair_of_another_scene_is_drawn_there(hair):
+    other = bpy.data.scenes.new("Other")
+    other.collection.objects.link(hair)
+    bpy.context.window.scene = other
+    bpy.context.view_layer.update()
+    comb(bpy.data.objects["Guides"], 0.2)
+    for curves_object in (hair, bpy.data.objects["Guides"]):
+        drawn = hair_cache.strands_on_gpu(curves_object.data).points
+        assert np.array_equal(drawn, points(curves_object))
+
+
+def test_hair_stays_in_the_file_while_the_addon_is_disabled(hair, tmp_path):
+    path, made = str(tmp_path / "groom.blend"), points(hair)
+    hair_addon.unregister()
+    try:
+        assert hair.display_type == "TEXTURED"  # as Blender draws it
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+    finally:
+        hair_addon.register()
+    hair = bpy.data.objects["Hair"]
+    assert np.array_equal(points(hair), made)
+    assert (hair.data.vellus.kind, hair.data.vellus.hair.strand_count) == ("HAIR", 500)
+    assert hair.data.vellus.guide_curves == bpy.data.objects["Guides"].data
+    hair.data.vellus.hair.strand_count = 40
+    bpy.context.view_layer.update()
+    assert len(hair.data.curves) == 40
+
+
+def test_hair_is_drawn_once_when_the_addon_is_enabled_again(hair):
+    shown = hair.display_type
+    hair_addon.unregister()
+    assert hair.display_type != shown
+    hair_addon.register()
+    assert bpy.app.timers.is_registered(handlers._take_over)
+    handlers._take_over()  # as Blender does with its next redraw
+    assert (hair.display_type, bpy.data.objects["Guides"].display_type) == (shown, "BOUNDS")
+
+
+@pytest.mark.parametrize("how", ["factory", "homefile"])
+def test_a_new_file_leaves_nothing_in_memory(hair, how):
+    hair_cache.strands_on_gpu(hair.data)
+    if how == "factory":
+        bpy.ops.wm.read_factory_settings(use_empty=True)
+    else:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    assert not any(map(len, invalidation.COPIES + invalidation.OTHERS))
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2)
+    assert bpy.ops.vellus.add_hair(guide_count=5, strand_count=10) == {"FINISHED"}
+
+
+def test_a_removed_material_comes_back(hair):
+    bpy.data.materials.remove(hair.data.materials[0])
+    hair.data.vellus.appearance.melanin = 0.3
+    bpy.context.view_layer.update()
+    assert hair.data.vellus.shading_status == "" and hair.data.materials[0] is not None
+
+
+def held(value, depth=3):
+    """What a value holds, itself first, through containers, caches and dataclasses."""
+    yield value
+    if depth == 0:
+        return
+    inside = ()
+    if isinstance(value, Cache):
+        inside = value.values()
+    elif isinstance(value, dict):
+        inside = [*value.keys(), *value.values()]
+    elif isinstance(value, (list, tuple, set)):
+        inside = list(value)
+    elif dataclasses.is_dataclass(value) and not isinstance(value, type):
+        inside = [getattr(value, field.name) for field in dataclasses.fields(value)]
+    for part in inside:
+        yield from held(part, depth - 1)
+
+
+def test_no_module_keeps_blenders_data(hair):
+    """A reference that outlives its owner is a crash to come: none in any module after all of them had work to do."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location.z = 5.0
+    bpy.context.scene.collection.objects.link(camera)
+    bpy.context.scene.camera = camera
+    hair_cache.strands_on_gpu(bpy.data.objects["Guides"].data)
+    small = PictureSettings(width=8, height=8, samples_per_side=1)
+    offscreen.draw_picture(small)
+    modules = {name: module for name, module in sys.modules.items() if name.startswith("hair_addon.")}
+    for name, module in modules.items():
+        for variable, value in vars(module).items():
+            if variable.startswith("__") or isinstance(value, (type, ModuleType)):
+                continue
+            kept = [part for part in held(value) if isinstance(part, bpy.types.bpy_struct)]
+            assert not kept, f"{name}.{variable} keeps {kept[:3]}"
+
+
+def test_a_surface_without_faces_is_reported(hair):
+    """Guides remember triangles that are gone."""
+    sphere = bpy.data.objects["Sphere"]
+    before = points(hair)
+    sphere.data.clear_geometry()
+    sphere.data.update_tag()
+    bpy.context.view_layer.update()
+    assert "no faces" in bpy.data.objects["Guides"].data.vellus.status
+    assert np.array_equal(points(hair), before)
+    assert math.isfinite(before.sum())

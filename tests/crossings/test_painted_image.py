@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides follow an image that is painted on, when the painting is finished."""
+
+import bpy
+import numpy as np
+import pytest
+
+from tests.support.reading import points
+
+SIDE = 16
+
+
+@pytest.fixture
+def image(sphere):
+    """A white image that a material of the sphere shows."""
+    image = bpy.data.images.new("Density", SIDE, SIDE)
+    paint(image, slice(None))
+    material = bpy.data.materials.new("Painted")
+    node = material.node_tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    sphere.data.materials.append(material)
+    return image
+
+
+@pytest.fixture
+def guides(image):
+    bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5, density_image="Density")
+    bpy.context.view_layer.update()
+    return bpy.data.objects["Guides"]
+
+
+def paint(image, columns, is_reported=True):
+    """White columns on black; is_reported: as an image that a stroke or an undo has changed."""
+    pixels = np.zeros((SIDE, SIDE, 4), np.float32)
+    pixels[:, columns] = 1.0
+    image.pixels.foreach_set(pixels.ravel())
+    if is_reported:
+        image.update_tag()
+
+
+def test_guides_leave_what_was_painted_black(guides, image):
+    before = points(guides)
+    paint(image, slice(0, SIDE // 2))
+    bpy.context.view_layer.update()
+    after = points(guides)
+    assert len(after) == 60 and not np.array_equal(after, before)
+    paint(image, slice(None))
+    bpy.context.view_layer.update()
+    assert np.array_equal(points(guides), before)
+
+
+def test_an_unchanged_image_moves_no_guide(guides, image):
+    before, key = points(guides), guides.data.vellus.root_key
+    image.update_tag()
+    bpy.context.view_layer.update()
+    assert np.array_equal(points(guides), before)
+    assert guides.data.vellus.root_key == key
+
+
+def test_guides_wait_until_painting_is_left(guides, image, sphere):
+    """Blender need not report an image when a stroke ends in the viewport."""
+    before = points(guides)
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.object.mode_set(mode="TEXTURE_PAINT")
+    bpy.context.view_layer.update()
+    paint(image, slice(0, SIDE // 2), is_reported=False)
+    bpy.context.view_layer.update()
+    assert np.array_equal(points(guides), before)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    assert not np.array_equal(points(guides), before)
+
+
+def test_guides_without_auto_update_stay(guides, image):
+    guides.data.vellus.is_live = False
+    before = points(guides)
+    paint(image, slice(0, SIDE // 2))
+    bpy.context.view_layer.update()
+    assert np.array_equal(points(guides), before)

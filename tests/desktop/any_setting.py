@@ -1,0 +1,364 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every setting in random order in a real window, on surfaces that are deformed, animated, emptied and linked.
+
+Run by a desktop Blender: any_setting.py -- SEED STEPS OUT [ZIP]. Installs the extension from ZIP unless it is there.
+Writes any_setting_SEED.json to OUT: the steps taken, and whether the end was reached. In background hair is written at
+once; in a window the picture is ahead of the Curves, and what is drawn then comes from both.
+"""
+
+import json
+import math
+import random
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+MODULE = "bl_ext.user_default.vellus"
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+from tests.desktop.window import in_viewport, viewport, wait  # noqa: E402
+
+SURFACES = ("Plain", "Subdivided", "Bent", "Keyed", "Scaled")
+LIBRARY = "library.blend"
+
+
+class Artist:
+    """Takes random steps; each is printed before it is taken, so that the log ends with what ended Blender."""
+
+    def __init__(self, seed, step_count, folder):
+        self.random = random.Random(seed)
+        self.step_count, self.folder, self.taken = step_count, folder, []
+        self.blender = sys.modules[f"{MODULE}.hair_addon.blender"]
+        self.core = sys.modules[f"{MODULE}.hair_addon.core"]
+
+    # ------------------------------------------------------------------------------------------------- the scene
+
+    def build(self):
+        """Surfaces of every kind with hair, and one that is linked with its hair from another file."""
+        self.blender.render.hair_picture.SAMPLE_COUNT = 1  # one pass a picture: it is not its quality that is looked at
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        yield
+        with in_viewport():
+            self._build_library()
+            for number, name in enumerate(SURFACES):
+                self._add_surface(name, (2.5 * (number - 2), 0.0, 0.0))
+                bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=30, strand_count=300, length=0.4)
+            with bpy.data.libraries.load(str(self.folder / LIBRARY), link=True) as (found, wanted):
+                wanted.objects = list(found.objects)
+            for linked in wanted.objects:
+                bpy.context.scene.collection.objects.link(linked)
+            sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+            bpy.context.scene.collection.objects.link(sun)
+            bpy.ops.ed.undo_push(message="Scene")
+        view = viewport()[0].spaces.active.region_3d
+        view.view_location, view.view_distance = (0.0, 0.0, 0.0), 16.0
+        yield
+
+    def _build_library(self):
+        self._add_surface("Linked", (0.0, 3.0, 0.0))
+        bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=30, strand_count=300, length=0.4)
+        bpy.data.libraries.write(str(self.folder / LIBRARY), {bpy.data.objects["Linked"], *self._objects("CURVES")})
+        for thing in list(bpy.data.objects):
+            bpy.data.objects.remove(thing)
+        bpy.data.orphans_purge()
+
+    def _add_surface(self, name, place):
+        if name == "Plain":
+            bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, location=place)
+        else:
+            bpy.ops.mesh.primitive_monkey_add(location=place)
+        surface = bpy.context.object
+        surface.name = name
+        surface.vertex_groups.new(name="half").add(
+            [v.index for v in surface.data.vertices if v.co.z > 0.0], 1.0, "REPLACE"
+        )
+        if name == "Subdivided":
+            surface.modifiers.new("Subdivision", "SUBSURF").levels = 1
+        if name in {"Bent", "Linked"}:
+            surface.modifiers.new("Bend", "SIMPLE_DEFORM").angle = 0.8
+        if name == "Keyed":
+            surface.shape_key_add(name="Basis")
+            key = surface.shape_key_add(name="Long")
+            for point in key.points:
+                point.co.z *= 1.6
+            for frame, value in ((1, 0.0), (20, 1.0)):
+                key.value = value
+                key.keyframe_insert("value", frame=frame)
+        if name == "Scaled":
+            surface.scale = (-1.0, 0.7, 1.3)
+
+    # ------------------------------------------------------------------------------------------------- the steps
+
+    def take(self):
+        """All steps, with Blender's own events and redraws between them."""
+        moves = [getattr(self, name) for name in sorted(dir(self)) if name.startswith("do_")]
+        weights = [12.0 if move in (self.do_setting, self.do_two_settings) else 1.0 for move in moves]
+        for number in range(self.step_count):
+            (move,) = self.random.choices(moves, weights)
+            try:
+                with in_viewport():
+                    move()
+                    # Refused for a moment after a file was opened.
+                    if bpy.context.mode == "OBJECT" and bpy.ops.ed.undo_push.poll():
+                        bpy.ops.ed.undo_push(message=move.__name__)
+            except RuntimeError as refusal:  # an operator that reported why not
+                self.say(f"refused: {refusal}")
+                assert "Traceback" not in str(refusal), refusal
+            yield
+            if number % 2:
+                self.look()
+            yield
+        yield from wait(1.0)
+        self.look()
+
+    def say(self, text):
+        """Tell the log, at once."""
+        self.taken.append(text)
+        print(f"any_setting: {text}", flush=True)
+
+    def look(self):
+        """Draw the window, and compare what is kept of hair with what a first drawing would bring."""
+        with in_viewport():
+            bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=1)
+        cache = self.blender.render.hair_cache
+        for curves_object in self._objects("CURVES"):
+            datablock = curves_object.data
+            try:
+                kept = cache.strands_on_gpu(datablock)
+            except self.core.errors.HairError as error:
+                self.say(f"not drawn: {error}")
+                continue
+            bound = self.blender.groom.bindings.of(datablock)
+            strand_count = len(datablock.curves) if bound is None else len(bound.points)
+            assert kept is None or kept.strand_count == strand_count, datablock.name
+            assert kept is None or np.isfinite(kept.points).all(), datablock.name
+
+    def _objects(self, kind):
+        return [o for o in bpy.context.view_layer.objects if o.type == kind]
+
+    def _curves(self, kind=None):
+        found = [o for o in self._objects("CURVES") if o.data.vellus.kind in ({kind} if kind else {"GUIDES", "HAIR"})]
+        return self.random.choice(sorted(found, key=lambda o: o.name)) if found else None
+
+    def _surface(self):
+        found = sorted(o.name for o in self._objects("MESH"))
+        return bpy.data.objects[self.random.choice(found)] if found else None
+
+    def do_setting(self):
+        """Any property that hair stores, at any value it takes; counts stay small enough to draw."""
+        curves_object = self._curves()
+        if curves_object is None:
+            return
+        state = curves_object.data.vellus
+        group = self.random.choice([state, state.guides if state.kind == "GUIDES" else state.hair])
+        if state.kind == "HAIR" and self.random.random() < 0.3:
+            group = self.random.choice([state.appearance, state.marschner])
+        hidden = {"rna_type", "name", "kind"}
+        declared = [p for p in group.bl_rna.properties if p.identifier not in hidden and not p.is_readonly]
+        names = [p.identifier for p in declared if not p.is_hidden and p.type != "POINTER"]
+        name = self.random.choice(sorted(names))
+        value = self._value(group.bl_rna.properties[name], name, curves_object)
+        self.say(f"{curves_object.name}.{name} = {value!r}")
+        setattr(group, name, value)
+
+    def do_two_settings(self):
+        """Both before Blender has evaluated either."""
+        self.do_setting()
+        self.do_setting()
+
+    def _value(self, declared, name, curves_object):
+        names = {
+            "density_group": ["", "half", "missing"],
+            "region_group": ["", "half", "missing"],
+            "region_attribute": ["", "sharp_face", "missing"],
+            "part_lines": ["", "Sun", "missing"],
+            "density_image": ["", "missing"],
+        }
+        if declared.type == "STRING":
+            return self.random.choice(names.get(name, [""]))
+        if declared.type == "BOOLEAN":
+            return self.random.random() < 0.5
+        if declared.type == "ENUM":
+            return self.random.choice([item.identifier for item in declared.enum_items])
+        if declared.is_array:
+            return [self.random.random() for _ in range(declared.array_length)]
+        most = {"guide_count": 300, "strand_count": 5000, "relax_iterations": 20, "size": 64}
+        low, high = declared.hard_min, min(declared.hard_max, most.get(name, declared.soft_max))
+        if declared.type == "INT":
+            return self.random.choice([int(low), int(high), self.random.randint(int(low), max(int(low), int(high)))])
+        return self.random.choice([low, high, low + (high - low) * self.random.random() ** 3])
+
+    def do_many_strands(self):
+        hair = self._curves("HAIR")
+        if hair is not None:
+            hair.data.vellus.hair.strand_count = self.random.choice([6000, 40_000, 7])
+            self.say(f"{hair.name}: {hair.data.vellus.hair.strand_count} strands")
+
+    def do_edit(self):
+        """Delete all or some in Edit Mode."""
+        curves_object = self._curves()
+        if curves_object is None or curves_object.library is not None or not self._activate(curves_object):
+            return
+        action = self.random.choice(["SELECT", "INVERT"])
+        self.say(f"empty {curves_object.name}: {action}")
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.curves.select_all(action="SELECT")
+        if action == "INVERT":
+            bpy.ops.curves.select_random(probability=0.5)
+        bpy.ops.curves.delete()
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    def do_regenerate(self):
+        curves_object = self._curves()
+        if curves_object is None or not self._activate(curves_object):
+            return
+        self.say(f"regenerate {curves_object.name}")
+        if curves_object.data.vellus.kind == "GUIDES":
+            bpy.ops.vellus.distribute_guides("EXEC_DEFAULT", guide_count=self.random.choice([1, 25, 60]), length=0.3)
+        else:
+            bpy.ops.vellus.interpolate_hair("EXEC_DEFAULT", strand_count=self.random.choice([1, 500, 9000]))
+
+    def do_comb(self):
+        """Move the points of some guides, as a brush does: in sculpt mode, the mode left open now and then."""
+        guides = self._curves("GUIDES")
+        if guides is None or guides.library is not None or not len(guides.data.points) or not self._activate(guides):
+            return
+        self.say(f"comb {guides.name}")
+        bpy.ops.object.mode_set(mode="SCULPT_CURVES")
+        positions = np.empty(3 * len(guides.data.points), np.float32)
+        guides.data.attributes["position"].data.foreach_get("vector", positions)
+        positions[: len(positions) // 2] += 0.05 * self.random.random()
+        guides.data.attributes["position"].data.foreach_set("vector", positions)
+        guides.data.update_tag()
+        if self.random.random() < 0.7:
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+    def do_deform(self):
+        surface = self._surface()
+        if surface is None or surface.library is not None:
+            return
+        self.say(f"deform {surface.name}")
+        for modifier in surface.modifiers:
+            modifier.show_viewport = self.random.random() < 0.7
+            if modifier.type == "SUBSURF":
+                modifier.levels = self.random.randint(0, 2)
+            elif modifier.type == "SIMPLE_DEFORM":
+                modifier.angle = self.random.uniform(-math.pi, math.pi)
+
+    def do_edit_mesh(self):
+        surface = self._surface()
+        if surface is None or surface.library is not None or surface.data.shape_keys or not self._activate(surface):
+            return
+        self.say(f"edit {surface.name}")
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.mesh.select_all(action="SELECT")
+        edit = self.random.choice(["delete", "subdivide", "scale", "nothing"])
+        if edit == "delete":
+            bpy.ops.mesh.select_random(ratio=0.9, action="DESELECT")
+            bpy.ops.mesh.delete(type="FACE")
+        elif edit == "subdivide" and len(surface.data.polygons) < 3000:
+            bpy.ops.mesh.subdivide()
+        elif edit == "scale":
+            bpy.ops.transform.resize(value=(1.1, 0.9, 1.0))
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+    def do_move(self):
+        surface = self._surface()
+        if surface is not None and surface.library is None:
+            self.say(f"move {surface.name}")
+            surface.rotation_euler.z += self.random.random()
+            surface.scale.x *= self.random.choice([1.0, -1.0, 1.1])
+
+    def do_frame(self):
+        frame = self.random.randint(1, 24)
+        self.say(f"frame {frame}")
+        bpy.context.scene.frame_set(frame)
+
+    def do_undo(self):
+        steps = self.random.randint(1, 3)
+        self.say(f"undo {steps}, redo 1")
+        for _ in range(steps):
+            if bpy.ops.ed.undo.poll():
+                bpy.ops.ed.undo()
+        if self.random.random() < 0.5 and bpy.ops.ed.redo.poll():
+            bpy.ops.ed.redo()
+
+    def do_hide(self):
+        curves_object = self._curves()
+        if curves_object is not None:
+            self.say(f"hide {curves_object.name}")
+            curves_object.hide_set(self.random.random() < 0.4)
+
+    def do_save_and_load(self):
+        self.say("save and load")
+        self._leave_mode()
+        path = str(self.folder / "any_setting.blend")
+        bpy.ops.wm.save_as_mainfile(filepath=path)
+        bpy.ops.wm.open_mainfile(filepath=path)
+
+    def do_duplicate(self):
+        curves_object = self._curves()
+        if curves_object is not None and len(self._objects("CURVES")) < 20 and self._activate(curves_object):
+            self.say(f"duplicate {curves_object.name}")
+            bpy.ops.object.duplicate(linked=self.random.random() < 0.3)
+
+    def do_delete(self):
+        curves_object = self._curves()
+        if curves_object is not None and len(self._objects("CURVES")) > 8 and self._activate(curves_object):
+            self.say(f"delete {curves_object.name}")
+            bpy.ops.object.delete()
+
+    def do_shading(self):
+        mode = self.random.choice(["SOLID", "WIREFRAME"])
+        self.say(f"shading {mode}")
+        viewport()[0].spaces.active.shading.type = mode
+
+    def _leave_mode(self):
+        if bpy.context.mode != "OBJECT" and bpy.context.object is not None:
+            bpy.ops.object.mode_set(mode="OBJECT")
+
+    def _activate(self, thing):
+        """Select one object alone; whether it can be."""
+        self._leave_mode()
+        if not thing.visible_get():
+            return False
+        bpy.ops.object.select_all(action="DESELECT")
+        thing.select_set(True)
+        bpy.context.view_layer.objects.active = thing
+        return thing.select_get()
+
+
+def walk(seed, step_count, folder):
+    """All of it, as a generator between whose parts Blender lives."""
+    artist = Artist(seed, step_count, folder)
+    report = folder / f"any_setting_{seed}.json"
+    report.write_text(json.dumps({"is_done": False}))
+    yield from artist.build()
+    yield from artist.take()
+    report.write_text(json.dumps({"is_done": True, "steps": artist.taken}, indent=1))
+
+
+def advance(steps):
+    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
+    try:
+        next(steps)
+        return 0.02
+    except StopIteration:
+        print("any_setting: done", flush=True)
+    except Exception:
+        traceback.print_exc()
+    bpy.ops.wm.quit_blender()
+    return None
+
+
+if __name__ == "__main__":
+    SEED, STEPS, OUT = sys.argv[sys.argv.index("--") + 1 :][:3]
+    bpy.context.preferences.view.show_splash = False
+    if MODULE not in bpy.context.preferences.addons:
+        zip_path = sys.argv[sys.argv.index("--") + 4]
+        bpy.ops.extensions.package_install_files(filepath=zip_path, repo="user_default", enable_on_install=True)
+    walking = walk(int(SEED), int(STEPS), Path(OUT))
+    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)

@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The first ten minutes of a new artist, in a window: three clicks to hair, then README's five minutes.
+
+Run by a desktop Blender with a clean profile: first_minutes.py -- ZIP HEAD OUT. Writes a picture of the screen for each
+step to OUT, and first_minutes.json with what the tests want to know. README's pictures are made of them by
+`tools/manual_pictures.py five_minutes`.
+"""
+
+import json
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+from tests.desktop.window import drag, import_head, in_viewport, places, take_picture, viewport, wait, wait_for  # noqa: E402
+
+MODULE = "bl_ext.user_default.vellus"
+ZIP, HEAD, OUT = sys.argv[sys.argv.index("--") + 1 :]
+OUT = Path(OUT)
+
+# Pixels from the upper right corner of the 3D view: the arrow that opens its sidebar.
+_ARROW = (8, 86)
+
+# Pixels from the upper left corner of a sidebar of the default width, with an interface scale of one.
+_HAIR_TAB = (277, 237)
+_NEW_HAIR_SYSTEM = (120, 46)
+
+# The hairline of the sample's head from the side, (y, z) [m], from the forehead to the nape; the face looks to -Y.
+_HAIRLINE = np.array([(-0.17, 0.82), (-0.105, 0.787), (-0.068, 0.74), (-0.03, 0.744), (0.0, 0.69), (0.04, 0.68)])
+
+facts = {"steps": []}
+
+
+def step(name):
+    """A picture of the screen after a step."""
+    take_picture(OUT / f"first_{name}.png")
+    facts["steps"].append(name)
+    print(f"first_minutes: {name}", flush=True)
+
+
+def click(x, y):
+    """The left mouse button, pressed and let go at a place of the window."""
+    place = np.array([x, y])
+    yield from drag(place, place, steps=1)
+    yield from wait(0.3)
+
+
+def sidebar():
+    area, _region = viewport()
+    return next(region for region in area.regions if region.type == "UI")
+
+
+def of_kind(kind):
+    return next((o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind), None)
+
+
+def covered(hair):
+    """The part of the mesh's pixels in the 3D view that hair changes."""
+    _area, region = viewport()
+    mesh = hair.data.surface
+    pictures = {}
+    for name, shown in (("both", (mesh, hair)), ("mesh", (mesh,)), ("none", ())):
+        for thing in (mesh, hair):
+            thing.hide_set(thing not in shown)
+        take_picture(OUT / "covered.png")
+        image = bpy.data.images.load(str(OUT / "covered.png"))
+        pixels = np.empty((image.size[1], image.size[0], 4), np.float32)
+        image.pixels.foreach_get(pixels.ravel())
+        bpy.data.images.remove(image)
+        bottom, left = region.y, region.x
+        pictures[name] = pixels[bottom : bottom + region.height, left : left + region.width - sidebar().width, :3]
+    for thing in (mesh, hair):
+        thing.hide_set(False)
+    differ = lambda a, b: np.abs(pictures[a] - pictures[b]).max(axis=2) > 0.02  # noqa: E731
+    is_mesh = differ("mesh", "none")
+    return float((differ("both", "mesh") & is_mesh).sum() / is_mesh.sum())
+
+
+def look_at(thing, direction, distance):
+    """Turn the 3D view to the middle of an object, from a direction and a distance [m]."""
+    view = viewport()[0].spaces.active.region_3d
+    corners = np.array([thing.matrix_world @ Vector(corner) for corner in thing.bound_box])
+    view.view_location = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    view.view_rotation = Vector(direction).to_track_quat("Z", "Y")
+    view.view_distance = distance
+
+
+def three_clicks():
+    """From the installed extension to hair on the default cube: the sidebar, the tab, the button."""
+    bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+    bpy.context.preferences.system.use_region_overlap = False
+    sys.modules[f"{MODULE}.hair_addon.blender"].render.hair_picture.SAMPLE_COUNT = 8  # of 32, for drivers without a GPU
+    area, _region = viewport()
+    yield
+    step("installed")
+    yield from click(area.x + area.width - _ARROW[0], area.y + area.height - _ARROW[1])
+    yield from wait(1.0)
+    panel = sidebar()
+    top = panel.y + panel.height
+    yield from click(panel.x + _HAIR_TAB[0], top - _HAIR_TAB[1])
+    step("hair_tab")
+    facts["category"] = panel.active_panel_category
+    yield from click(panel.x + _NEW_HAIR_SYSTEM[0], top - _NEW_HAIR_SYSTEM[1])
+    yield from wait_for(lambda: of_kind("HAIR") is not None)
+    yield from wait(1.0)
+    hair = of_kind("HAIR")
+    facts["surface"] = hair.data.surface.name if hair else None
+    if hair is not None:
+        step("cube")
+        facts["covered"] = covered(hair)
+        look_at(hair.data.surface, (1.0, -0.8, 0.65), 7.0)
+        step("cube_near")
+
+
+def open_head():
+    """The sample's head with a scalp, in place of the cube."""
+    for thing in list(bpy.data.objects):
+        if thing.type in {"MESH", "CURVES"}:
+            bpy.data.objects.remove(thing)
+    head = import_head(HEAD)
+    with in_viewport():
+        bpy.ops.object.shade_smooth()
+    positions = np.empty((len(head.data.vertices), 3), np.float32)
+    head.data.vertices.foreach_get("co", positions.ravel())
+    scalp = head.vertex_groups.new(name="scalp")
+    above = positions[:, 2] > np.interp(positions[:, 1], *_HAIRLINE.T)
+    scalp.add(np.flatnonzero(above).tolist(), 1.0, "REPLACE")
+    look_at(head, (1.0, -0.7, 0.3), 0.55)
+    yield
+
+
+def grow_on_the_head():
+    """1. New Hair System, a vertex group as Guide Mask, which the strands follow, and how the hair is to grow."""
+    with in_viewport():
+        bpy.ops.vellus.add_hair("INVOKE_DEFAULT")
+    yield from wait_for(lambda: of_kind("HAIR") is not None)
+    guides, hair = of_kind("GUIDES").data.vellus, of_kind("HAIR").data
+    hair.vellus.hair.strand_count = 40_000
+    guides.guides.density_group = "scalp"
+    guides.guides.length = 0.12
+    guides.guides.gravity = 0.75
+    hair.vellus.hair.thickness = 0.15
+    yield from wait_for(lambda: len(hair.curves) == 40_000)
+    step("head")
+    group = hair.surface.vertex_groups["scalp"].index
+    weights = np.array([any(g.group == group for g in v.groups) for v in hair.surface.data.vertices])
+    roots = np.empty((3, len(hair.curves)), np.int32)
+    for corner in range(3):
+        hair.attributes[f"root_vertex_{corner}"].data.foreach_get("value", roots[corner])
+    facts["roots off the mask"] = int((~weights[roots].any(axis=0)).sum())
+
+
+def comb():
+    """2. Comb Guides, and two strokes across the hair, from the face to the back."""
+    with in_viewport():
+        bpy.ops.vellus.comb_guides()
+    yield from wait(1.0)
+    guides, hair = of_kind("GUIDES"), of_kind("HAIR")
+    before = _points(guides), _points(hair)
+    facts["mode"] = bpy.context.mode
+    bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 120
+    middle = places(before[0][40::41]).mean(axis=0)
+    for below in (0, 70):
+        yield from drag(middle + np.array([-130, 20 - below]), middle + np.array([90, 80 - below]))
+    yield from wait(2.0)
+    step("combed")
+    facts["combed"] = [float(np.abs(_points(o) - b).max()) for o, b in zip((guides, hair), before, strict=True)]
+    with in_viewport():
+        bpy.ops.object.mode_set(mode="OBJECT")
+    yield
+
+
+def _points(curves_object):
+    curves = curves_object.data
+    values = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", values.ravel())
+    return values
+
+
+def shade():
+    """3. A look, Marschner, melanin, roughness and cuticle angle."""
+    hair = of_kind("HAIR")
+    with in_viewport():
+        bpy.ops.vellus.select_hair()
+        bpy.ops.vellus.apply_preset(preset="GINGER")
+    hair.data.vellus.model = "MARSCHNER"
+    hair.data.vellus.appearance.roughness = 0.25
+    yield from wait(2.0)
+    step("shaded")
+
+
+def write_and_export():
+    """4., 5. Render Picture, settings, lookup tables; USD and Alembic."""
+    view = viewport()[0].spaces.active.region_3d
+    with in_viewport():
+        bpy.context.scene.camera.matrix_world = view.view_matrix.inverted()
+        bpy.context.scene.camera.data.lens = 33.0  # [mm]: the head fills the picture
+        bpy.context.view_layer.objects.active = of_kind("HAIR")
+        bpy.ops.vellus.render_picture("INVOKE_DEFAULT", filepath=str(OUT / "first_picture.png"), width=480, height=300)
+    yield from wait_for((OUT / "first_picture.png").exists)
+    yield from wait(1.0)
+    with in_viewport():
+        bpy.ops.vellus.save_groom_settings(filepath=str(OUT / "first_groom.json"))
+        bpy.ops.vellus.bake_tables(directory=str(OUT / "first_tables"), size=32)
+        # Not every build of Blender has these.
+        if "usd_export" in dir(bpy.ops.wm):
+            bpy.ops.wm.usd_export(filepath=str(OUT / "first.usdc"))
+        if "alembic_export" in dir(bpy.ops.wm):
+            bpy.ops.wm.alembic_export(filepath=str(OUT / "first.abc"), as_background_job=False)
+    yield
+    names = ("first_picture.png", "first_groom.json", "first_tables/n_g.exr")
+    facts["files"] = {name: (OUT / name).stat().st_size if (OUT / name).exists() else 0 for name in names}
+
+
+def walk():
+    """All steps; between them Blender handles its events and redraws."""
+    for part in (three_clicks, open_head, grow_on_the_head, comb, shade, write_and_export):
+        yield from part()
+
+
+def advance(steps):
+    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
+    try:
+        next(steps)
+        return 0.05
+    except StopIteration:
+        facts["is_done"] = True
+    except Exception:
+        traceback.print_exc()
+    (OUT / "first_minutes.json").write_text(json.dumps(facts, indent=1))
+    bpy.ops.wm.quit_blender()
+    return None
+
+
+if __name__ == "__main__":
+    bpy.context.preferences.view.show_splash = False  # before it is shown: it would take the first click
+    walking = walk()
+    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings in random order in a window with a clean profile: Blender comes to the end, and nothing raises."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from tools import build_extension, compile_kernels
+
+pytestmark = pytest.mark.desktop
+
+SCRIPT = Path(__file__).with_name("any_setting.py")
+
+
+def check(desktop, profile, seed, step_count, limit):
+    """Take the steps that follow from a seed, in `limit` seconds at most; what was printed is in out/desktop."""
+    folder = build_extension.ROOT / "out" / "desktop" / f"any_setting_{seed}_{step_count}"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    extension = build_extension.build(compile_kernels.this_platform())
+    status = desktop.run(
+        SCRIPT,
+        [str(seed), str(step_count), folder, extension],
+        profile=profile,
+        log=folder / "any_setting.log",
+        limit=limit,
+        size=(640, 400),
+    )
+    log = (folder / "any_setting.log").read_text(errors="replace")
+    report = json.loads((folder / f"any_setting_{seed}.json").read_text())
+    assert status == 0 and report["is_done"], log[-4000:]
+    # What Blender calls by itself, as handlers and drawing, raises into the console alone.
+    assert "Traceback" not in log, log
+    assert "Not freed memory blocks" not in log, log[-4000:]
+
+
+def test_a_few_random_settings(desktop, tmp_path):
+    check(desktop, tmp_path, seed=1, step_count=15, limit=300)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
+def test_many_random_settings(desktop, tmp_path, seed):
+    check(desktop, tmp_path, seed, step_count=300, limit=3600)

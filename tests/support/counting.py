@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How often hair is searched, uploaded and written: counted where it happens."""
+
+from hair_addon.blender.data import curves
+from hair_addon.blender.gpu import strand_textures
+from hair_addon.core.geometry import hash_grid
+
+_COUNTED = {
+    "searches": [(hash_grid, "neighbours")],
+    "uploads": [(strand_textures, "upload_strands")],
+    "moves": [(strand_textures, "move_strands")],
+    "writes": [(curves, "write_points")],
+}
+
+
+def counts_of(monkeypatch):
+    """{searches, uploads, moves, writes} from now on, counting up."""
+    counts = dict.fromkeys(_COUNTED, 0)
+
+    def counted(kind, real):
+        def wrapper(*args, **kwargs):
+            counts[kind] += 1
+            return real(*args, **kwargs)
+
+        return wrapper
+
+    for kind, functions in _COUNTED.items():
+        for module, name in functions:
+            monkeypatch.setattr(module, name, counted(kind, getattr(module, name)))
+    return counts

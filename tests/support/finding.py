@@ -1,0 +1,10 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The guides that strands follow, and how much of each, in one step."""
+
+from hair_addon.core.interpolation import guide_weights
+
+
+def find_guides(roots, normals, guide_roots, guide_normals, influence_distance, neighbour_limit, **parting):
+    """`GuideWeights` as `groom.bind_hair` makes them; arguments of `find_candidates` and `weigh`."""
+    candidates = guide_weights.find_candidates(roots, normals, guide_roots, guide_normals, neighbour_limit, **parting)
+    return guide_weights.weigh(candidates, normals, guide_normals, influence_distance, neighbour_limit)

@@ -1,0 +1,52 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair on surfaces that deform: grown, and compared with where its surface is."""
+
+import bpy
+import numpy as np
+
+from hair_addon.blender.render import hair_cache
+from tests.support.reading import attribute, evaluated_points, points
+
+
+def update():
+    bpy.context.view_layer.update()
+
+
+def grow(surface, guide_count=40, strand_count=200, **settings):
+    """Guides and hair on a surface: (guides, hair) objects."""
+    before = set(bpy.data.objects)
+    bpy.context.view_layer.objects.active = surface
+    # What is left open follows from the surface as it stands, which may be bent.
+    settings = {"length": 0.3, "gravity": 0.4} | settings
+    bpy.ops.vellus.distribute_guides(guide_count=guide_count, **settings)
+    guides = next(iter(set(bpy.data.objects) - before))
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.vellus.interpolate_hair(strand_count=strand_count)
+    return guides, next(iter(set(bpy.data.objects) - before - {guides}))
+
+
+def surface_points(curves_object, surface=None):
+    """(S, 3) where the evaluated surface is at the stored roots, in its local coordinates."""
+    surface = (surface or curves_object.data.surface).evaluated_get(bpy.context.evaluated_depsgraph_get())
+    mesh = surface.to_mesh()
+    mesh.calc_loop_triangles()
+    triangles = np.array([triangle.vertices[:] for triangle in mesh.loop_triangles])
+    vertices = np.array([vertex.co for vertex in mesh.vertices])
+    surface.to_mesh_clear()
+    corners = vertices[triangles[attribute(curves_object, "root_triangle")]]
+    return np.einsum("sc,scx->sx", attribute(curves_object, "root_barycentric", 3), corners)
+
+
+def drawn_points(curves_object):
+    """(S, P, 3) that the viewport draws, in local coordinates."""
+    return hair_cache.strands_on_gpu(curves_object.data).points
+
+
+def assert_follows(*curves_objects):
+    """Roots are where the surface is, strands as long as ever; Cycles and the viewport agree."""
+    for curves_object in curves_objects:
+        found = evaluated_points(curves_object)
+        np.testing.assert_allclose(found[:, 0], surface_points(curves_object), atol=1e-5)
+        lengths, at_rest = (np.linalg.norm(np.diff(p, axis=1), axis=-1) for p in (found, points(curves_object)))
+        np.testing.assert_allclose(lengths, at_rest, atol=1e-5)
+        np.testing.assert_allclose(drawn_points(curves_object), found, atol=1e-5)

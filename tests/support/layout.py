@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A stand-in for Blender's UILayout that notes what was drawn and refuses what does not exist."""
+
+from collections import Counter
+from types import SimpleNamespace
+
+import bpy
+
+from hair_addon.blender.ui import panels
+
+SIDEBAR_WIDTH = 260  # pixels of the N-panel as Blender opens it
+
+
+class Layout:
+    """Every property must exist on its owner, every operator, menu and panel be registered."""
+
+    def __init__(self, whole=None):
+        self.drawn = Counter() if whole is None else whole.drawn
+        self.texts = [] if whole is None else whole.texts
+        self.buttons = [] if whole is None else whole.buttons  # labels of operators
+        self.picked = {} if whole is None else whole.picked  # property → the collection that it is picked from
+
+    def _part(self, align=False):
+        return Layout(self)
+
+    row = column = box = _part
+
+    def split(self, factor):
+        assert 0.0 < factor < 1.0
+        return self._part()
+
+    def separator(self):
+        pass
+
+    def label(self, *, text, icon="NONE", translate=True):
+        self.drawn["label"] += 1
+        self.texts.append(text)
+
+    def progress(self, *, text, factor, type):
+        assert 0.0 <= factor <= 1.0
+        self.drawn["progress"] += 1
+        self.texts.append(text)
+
+    def template_list(self, list_type, list_id, owner, name, active_owner, active_name, rows):
+        """Every row that its filter shows."""
+        assert active_name in active_owner.bl_rna.properties
+        self.drawn["template_list"] += 1
+        drawing = SimpleNamespace(bitflag_filter_item=1)
+        list_class = next(cls for cls in panels.LISTS if cls.bl_idname == list_type)
+        shown, _order = list_class.filter_items(drawing, Context(), owner, name)
+        for item, is_shown in zip(getattr(owner, name), shown, strict=True):
+            if is_shown:
+                list_class.draw_item(drawing, Context(), self, owner, item, 0, active_owner, active_name)
+
+    def prop(self, owner, name, text="", icon="NONE", emboss=True):
+        assert name in owner.bl_rna.properties
+        self.drawn[name] += 1
+
+    def prop_search(self, owner, name, source, collection, text="", results_are_suggestions=False):
+        self.picked[name] = getattr(source, collection)
+        self.prop(owner, name)
+
+    def grid_flow(self, columns, row_major, even_columns, even_rows, align):
+        return self._part()
+
+    def template_icon(self, icon_value, scale):
+        self.drawn["template_icon"] += 1
+
+    def operator(self, name, text="", icon="NONE", icon_value=0, translate=True):
+        category, operator = name.split(".")
+        assert operator in dir(getattr(bpy.ops, category))
+        self.drawn[name] += 1
+        self.texts.append(text)
+        self.buttons.append(text or getattr(getattr(bpy.ops, category), operator).get_rna_type().name)
+        return SimpleNamespace()
+
+    def operator_menu_enum(self, name, choice):
+        category, operator = name.split(".")
+        choices = getattr(getattr(bpy.ops, category), operator).get_rna_type().properties[choice].enum_items
+        assert len(choices) > 1
+        return self.operator(name)
+
+    def menu(self, name, icon="NONE"):
+        assert hasattr(bpy.types, name)
+        self.drawn[name] += 1
+
+    def popover(self, *, panel, icon, text):
+        assert hasattr(bpy.types, panel)
+        self.drawn[panel] += 1
+
+
+class Context:
+    """The present context, with a sidebar of Blender's own width."""
+
+    region = SimpleNamespace(width=SIDEBAR_WIDTH)
+    preferences = SimpleNamespace(system=SimpleNamespace(ui_scale=1.0))
+
+    def __getattr__(self, name):
+        return getattr(bpy.context, name)
+
+
+def draw(panel):
+    """The `Layout` that a panel or menu fills in the present context; None where it is not shown."""
+    context = Context()
+    if hasattr(panel, "poll") and not panel.poll(context):
+        return None
+    drawing = SimpleNamespace(layout=Layout(), settings=getattr(panel, "settings", ()))
+    if hasattr(panel, "draw_header_preset"):
+        panel.draw_header_preset(drawing, context)
+    panel.draw(drawing, context)
+    return drawing.layout
+
+
+def draw_all(panels):
+    """Counter of all that some panels draw together."""
+    layouts = [draw(panel) for panel in panels]
+    return sum((layout.drawn for layout in layouts if layout is not None), Counter())

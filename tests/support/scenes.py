@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Fixtures: Blender without a window, the registered add-on, and scenes for hair."""
+
+import math
+
+import bpy
+import gpu
+import numpy as np
+import pytest
+
+import hair_addon
+import tests.support.examples  # noqa: F401 (for what it sets)
+from hair_addon.blender.data import curves
+from tests.support.imported import curves_object, lines_on
+from tests.support.reading import vertex_positions
+
+
+@pytest.fixture(scope="session", autouse=True)
+def blender():
+    """The add-on in Blender, with graphics: once in a process, whichever folders of tests it runs."""
+    if not hasattr(bpy.types.Curves, "vellus"):
+        hair_addon.register()
+    gpu.init()
+    yield
+    if hasattr(bpy.types.Curves, "vellus"):
+        hair_addon.unregister()
+
+
+@pytest.fixture
+def scene():
+    """An empty scene, undo ready."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.context.preferences.edit.use_global_undo = True
+    return bpy.context.scene
+
+
+@pytest.fixture
+def sphere(scene):
+    """A sphere of one metre with a UV map and a vertex group `top` on its upper half; active."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=1.0)
+    sphere = bpy.context.object
+    sphere.name = "Sphere"
+    group = sphere.vertex_groups.new(name="top")
+    positions = vertex_positions(sphere)
+    group.add([int(i) for i in np.flatnonzero(positions[:, 2] > 0.0)], 1.0, "REPLACE")
+    bpy.ops.ed.undo_push(message="sphere")
+    return bpy.context.object
+
+
+@pytest.fixture
+def guides(sphere):
+    """60 guides on the sphere; their object is active."""
+    bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    return bpy.data.objects["Guides"]
+
+
+@pytest.fixture
+def hair(guides):
+    """500 strands between the guides; their object is active."""
+    bpy.ops.vellus.interpolate_hair(strand_count=500, radius=0.004, influence_distance=0.03)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
+    return bpy.data.objects["Hair"]
+
+
+@pytest.fixture
+def arm(scene):
+    """A cylinder along X, 4 m long, whose second bone bends it from straight in frame 1 to a right angle in 11."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=24, size=2.0)
+    arm = bpy.context.object
+    for vertex in arm.data.vertices:
+        x, turn = 2.0 * vertex.co.x, np.pi * vertex.co.y
+        vertex.co = (x, 0.5 * np.cos(turn), 0.5 * np.sin(turn))
+    bpy.ops.object.armature_add(enter_editmode=True)
+    rig = bpy.context.object
+    bones = rig.data.edit_bones
+    bones[0].head, bones[0].tail, bones[0].name = (-2, 0, 0), (0, 0, 0), "upper"
+    lower = bones.new("lower")
+    lower.head, lower.tail, lower.parent = (0, 0, 0), (2, 0, 0), bones[0]
+    bpy.ops.object.mode_set(mode="OBJECT")
+    for name, sign in (("upper", -1.0), ("lower", 1.0)):
+        group = arm.vertex_groups.new(name=name)
+        for vertex in arm.data.vertices:
+            group.add([vertex.index], float(np.clip(0.5 + sign * vertex.co.x, 0.0, 1.0)), "REPLACE")
+    arm.modifiers.new("Armature", "ARMATURE").object = rig
+    bone = rig.pose.bones["lower"]
+    bone.rotation_mode = "XYZ"
+    for frame, angle in ((1, 0.0), (11, np.pi / 2)):
+        bone.rotation_euler.x = angle
+        bone.keyframe_insert("rotation_euler", frame=frame)
+    scene.frame_set(1)
+    bpy.context.view_layer.update()
+    return arm
+
+
+@pytest.fixture
+def lit(hair):
+    """The hairy sphere with a camera in front of it and a sun over the camera's shoulder."""
+    blender_scene = bpy.context.scene
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -8.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    sun.data.energy, sun.rotation_euler = 3.0, (math.pi / 3, 0.0, 0.0)
+    for new in (camera, sun):
+        blender_scene.collection.objects.link(new)
+    blender_scene.camera = camera
+    return hair
+
+
+@pytest.fixture
+def blender_scene(scene):
+    """The empty scene, where a module is called `scene`."""
+    return scene
+
+
+@pytest.fixture
+def thin(lit):
+    """Hair of which a strand covers a fifth of a pixel."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    bpy.data.objects["Hair"].data.vellus.hair.strand_count = 4000
+    bpy.data.objects["Hair"].data.vellus.hair.radius = 0.003
+    bpy.context.view_layer.update()
+    return lit
+
+
+@pytest.fixture
+def head(sphere):
+    """The sphere, turned, moved and scaled."""
+    sphere.location, sphere.rotation_euler, sphere.scale = (1.0, 2.0, 3.0), (0.3, 0.2, 0.5), (2.0, 2.0, 2.0)
+    bpy.context.view_layer.update()
+    return sphere
+
+
+@pytest.fixture
+def imported(head, rng):
+    """60 curves of 2 to 12 points around the head, with an attribute, an object transform and no surface."""
+    made = curves_object(list(lines_on(head, rng)))
+    made.location = (0.3, -0.2, 0.1)  # nothing of it is left afterwards
+    made.data.attributes["position"].data.foreach_set(
+        "vector", (curves.read_points(made.data) - np.float32(made.location)).ravel()
+    )
+    named = made.data.attributes.new("clump", "INT", "CURVE")
+    named.data.foreach_set("value", np.arange(60, dtype=np.int32))
+    made.data.materials.append(bpy.data.materials.new("Artist's"))
+    bpy.context.view_layer.update()
+    return made

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Every string of the add-on that an artist reads: of its registered classes, and of its sources."""
+
+import ast
+from pathlib import Path
+
+import bpy
+
+from hair_addon import blender
+
+ADDON = Path(blender.__file__).resolve().parents[1]
+
+# Functions whose first argument, or progress's step, is read by an artist.
+_SPEAKING = {
+    "interface_text",
+    "report_text",
+    "HairError",
+    "poll_message_set",
+    "progress",
+    "relaxing",
+    "Stage",
+    "Warning",
+}
+
+
+def strings_of_classes():
+    """{string: where it stands} of labels, tooltips and choices of all registered classes."""
+    found = {}
+    for cls in blender.CLASSES:
+        where = cls.__name__
+        if not issubclass(cls, (bpy.types.PropertyGroup, bpy.types.AddonPreferences, bpy.types.UIList)):
+            found[cls.bl_label] = found[cls.__doc__] = where
+        for entry in properties_of(cls):
+            if entry.is_hidden or entry.name == entry.identifier:  # of the latter, no name was given
+                continue
+            for spoken in (entry, *(entry.enum_items if entry.type == "ENUM" else ())):
+                found[spoken.name] = found[spoken.description] = f"{where}.{entry.identifier}"
+    found.pop("", None)
+    return found
+
+
+def properties_of(cls):
+    """RNA of the properties that a class itself declares."""
+    rna = cls.bl_rna
+    if issubclass(cls, bpy.types.Operator):
+        category, name = cls.bl_idname.split(".")
+        rna = getattr(getattr(bpy.ops, category), name).get_rna_type()
+    own = getattr(cls, "__annotations__", {})
+    return [entry for entry in rna.properties if entry.identifier in own]
+
+
+def strings_of_sources():
+    """{string: where it stands} of literals that are reported, drawn as labels or raised."""
+    found = {}
+    for path in sorted((ADDON / "blender").rglob("*.py")) + sorted((ADDON / "core").rglob("*.py")):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for text in _spoken(node):
+                found[text] = f"{path.relative_to(ADDON)}:{node.lineno}"
+    found.pop("", None)
+    return found
+
+
+def _spoken(node):
+    if isinstance(node, ast.Call):
+        name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+        texts = [keyword.value for keyword in node.keywords if keyword.arg == "text"]
+        if name in _SPEAKING:
+            texts += node.args[:1]
+        return _literals(texts)
+    if isinstance(node, ast.Return) and isinstance(node.value, ast.Tuple) and isinstance(node.value.elts[-1], ast.Dict):
+        return _literals(node.value.elts[:1])  # an operator's message
+    return []
+
+
+def _literals(nodes):
+    return [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]

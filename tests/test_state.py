@@ -1,0 +1,115 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What modules hold between calls: caches, which blender/live/invalidation.py names, and handles, jobs and locks."""
+
+import ast
+
+from tests.test_house import MODULES, name_of, syntax
+
+# What is no cache, each with who ends it.
+STATE = {
+    "blender/groom/brushes.py: _fitted": "nobody: Blender's brushes outlive a file, and so does what was set in them",
+    "blender/host/cli_command.py: _command": "unregister",
+    "blender/host/running.py: _job": "end",
+    "blender/host/running.py: _timer": "end",
+    "blender/live/first_setup.py: _job": "unregister",
+    "blender/live/handlers.py: _is_opening": "the first update after a file was opened",
+    "blender/live/handlers.py: _is_undone": "the first update after an undo",
+    "blender/render/engine.py: _listener": "listening, a context",
+    "blender/render/viewport.py: _handles": "unregister",
+    "blender/ui/look_previews.py: _previews": "unregister",
+    # Kernels stay loaded as long as Python runs.
+    "core/kernels/kernel_cache.py: _choosing": "nobody: a lock",
+    "core/kernels/kernel_cache.py: _loaded": "nobody",
+    "core/kernels/kernel_cache.py: _locks": "nobody",
+    "core/kernels/kernel_setup.py: _under_way": "the end of each loading, at the latest Python's",
+    "blender/gpu/drawing.py: ALONE": "nobody: a lock",
+}
+
+# Functions of their arguments alone, and of what the extension was installed with: what they return is never stale.
+PURE = {
+    "blender/gpu/drawing.py: _parts",
+    "blender/gpu/uniforms.py: settings_block",
+    "blender/host/paths.py: addon_version",
+    "core/geometry/bspline.py: basis_matrix",
+    "core/geometry/bspline.py: _device_matrix",
+    "core/geometry/bspline.py: _flat_matrix",
+    "core/kernels/compiled_kernels.py: _fitting",
+}
+
+_DISPLAYS = (ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.Set, ast.SetComp)
+_CONTAINERS = {"dict", "list", "set"}
+_HELD = {"defaultdict", "deque", "Counter", "OrderedDict", "WeakKeyDictionary", "WeakSet", "WeakValueDictionary"}
+_HELD |= {"Lock", "RLock", "Condition", "Event", "Queue"}
+_CHANGING = {
+    "append",
+    "add",
+    "update",
+    "pop",
+    "popitem",
+    "clear",
+    "remove",
+    "discard",
+    "extend",
+    "insert",
+    "setdefault",
+}
+
+
+def called(node):
+    """The name of what an expression calls, without its module; empty where it calls nothing."""
+    return ast.unparse(node.func).rpartition(".")[2] if isinstance(node, ast.Call) else ""
+
+
+def module_values(tree):
+    """{name: value} of what a module assigns at its top."""
+    assigned = [node for node in tree.body if isinstance(node, ast.Assign | ast.AnnAssign)]
+    pairs = [(t, node) for node in assigned for t in (node.targets if isinstance(node, ast.Assign) else [node.target])]
+    return {target.id: node.value for target, node in pairs if isinstance(target, ast.Name)}
+
+
+def changed_in_place(tree):
+    """Names that are written to by key, or by a method that changes what it is called on."""
+    for node in ast.walk(tree):
+        is_written = isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load)
+        if is_written or (isinstance(node, ast.Attribute) and node.attr in _CHANGING):
+            yield ast.unparse(node.value)
+
+
+def state_of(tree):
+    """Names of a module whose values may change while it is loaded, but for caches."""
+    found = {name for node in ast.walk(tree) if isinstance(node, ast.Global) for name in node.names}
+    changed = set(changed_in_place(tree))
+    for name, value in module_values(tree).items():
+        is_container = isinstance(value, _DISPLAYS) or called(value) in _CONTAINERS
+        if called(value) in _HELD or (is_container and (name in changed or not name.isupper())):
+            found.add(name)
+    return found - {"__all__"}
+
+
+def cached_functions(tree):
+    """Names of functions under `functools.cache` or `lru_cache`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.FunctionDef):
+            names = {ast.unparse(decorator).partition("(")[0].rpartition(".")[2] for decorator in node.decorator_list}
+            if names & {"cache", "lru_cache"}:
+                yield node.name
+
+
+def found_by(search):
+    return {f"{name_of(path)}: {name}" for path in MODULES for name in search(syntax(path))}
+
+
+def test_whatever_changes_at_module_level_is_listed():
+    assert found_by(state_of) == set(STATE)
+
+
+def test_functions_whose_results_are_kept_are_listed():
+    assert found_by(cached_functions) == PURE
+
+
+def test_caches_stand_at_the_top_of_a_module():
+    """Where `invalidation.CACHES` can name them."""
+    for path in MODULES:
+        tree = syntax(path)
+        made = [node.lineno for node in ast.walk(tree) if called(node) == "Cache"]
+        assert made == [value.lineno for value in module_values(tree).values() if called(value) == "Cache"], path
