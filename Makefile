@@ -1,43 +1,44 @@
-# make demo, make test: from a bare clone, everything that they need is installed into .venv first.
+# make demo and make test work from a fresh clone: dependencies are installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
 .PHONY: help demo compare turntable test desktop bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
-# uv trusts the certificates that the machine trusts, as pip does: some networks have their own.
+# Let uv use the system's certificates, as pip does: some networks have their own.
 export UV_SYSTEM_CERTS = true
 
 python = .venv/bin/python
 installed = .venv/installed
 peers = .venv/peers
 
-help: ## this list
+help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
-demo: $(installed) ## the head, 200 guides, 30,000 strands: pictures and tables in out/demo
+demo: $(installed) ## the head with 200 guides and 30,000 strands: images and tables in out/demo
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
 
-test: $(installed) ## every test but the long benchmarks and those in a window
-	$(python) -m pytest -m "not long and not desktop" $(ARGS)
+test: $(installed) ## all tests except long benchmarks and tests in a window, in up to four processes
+	$(python) -m pytest -m "not long and not desktop" --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
 
-desktop: $(installed) ## the tests in a window of Blender, OpenGL and Vulkan: pictures in out/desktop
-	$(python) -m pytest -m desktop tests/desktop $(ARGS)
+desktop: $(installed) ## tests in a window of Blender, with OpenGL and Vulkan: screenshots in out/desktop
+	$(python) -m pytest -m "desktop and not long" tests/desktop $(ARGS)
 
 bench: $(installed) $(peers) ## the benchmarks, with their figures
 	$(python) -m pytest tests/benchmarks -s $(ARGS)
 
-compare: $(installed) ## the head by Cycles and by Vellus: mean colours, and both pictures, in out/compare
+compare: $(installed) ## the head rendered by Cycles and Vellus: mean colours and both images, in out/compare
 	$(python) blend_samples/compare.py --out out/compare $(ARGS)
 
-turntable: $(installed) ## the head turning, 24 frames by the command line, in out/turntable; goes on where it was stopped
+turntable: $(installed) ## a turntable of the head, 24 frames by the command line, in out/turntable; resumable
 	$(python) blend_samples/turntable.py --out out/turntable $(ARGS)
 
 build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
 	$(python) tools/build_extension.py $(PLATFORM)
 
-lint: $(installed) ## ruff: rules and format
+lint: $(installed) ## ruff: rules and format; pyrefly: types
 	$(python) -m ruff check
 	$(python) -m ruff format --check
+	$(python) -m pyrefly check
 
 samples: $(installed) ## the .blend files of blend_samples
 	$(python) blend_samples/build_samples.py $(ARGS)
@@ -48,7 +49,7 @@ lock: $(installed) ## requirements.lock from pyproject.toml; make lock ARGS=--up
 	$(python) -m uv pip compile --quiet --group bench --constraint requirements.lock --universal --python-version 3.13 \
 	  --generate-hashes --no-header --no-emit-index-url --no-annotate --output-file requirements-bench.lock $(ARGS)
 
-clean: ## what was made, but not what was installed (.venv) or downloaded (wheels)
+clean: ## delete build products, but not the installation (.venv) or downloaded wheels
 	rm -rf build dist out .hypothesis .pytest_cache .ruff_cache
 
 $(installed): requirements.lock tools/bootstrap.sh tools/debian-packages.txt

@@ -23,7 +23,7 @@ def build_head():
 
 
 def build_parting():
-    """The head with a line drawn along its parting, which no strand follows guides across."""
+    """The head with a part line along its parting."""
     skull = head.build()
     _guides, hair = head.grow(skull, guide_count=300)
     hair.data.vellus.hair.part_lines = parting.draw_part_line(skull).name

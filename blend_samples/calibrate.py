@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The gain of dual scattering's backward part, fitted to Cycles: python blend_samples/calibrate.py --reuse out/compare.
+"""Fit of dual scattering's backscattering gain to Cycles: python blend_samples/calibrate.py --reuse out/compare.
 
-Draws the pictures of compare.py with several gains and prints how far each is from Cycles. The best stands in
-dual_scattering.BACK_GAIN, from where the shaders have it.
+Draws the pictures of compare.py with several gains and prints their deviation from Cycles. The best is
+dual_scattering.BACK_GAIN, which the shaders use.
 """
 
 import argparse
@@ -13,8 +13,8 @@ from pathlib import Path
 import compare  # beside this file
 import numpy as np
 
-from hair_addon.blender import hair_cache
-from hair_addon.core.shading import dual_scattering
+from hair_addon.blender.live import invalidation
+from hair_addon.core.shading.tables import dual_scattering
 
 GAINS = (1.2, 1.35, 1.5, 1.7)
 
@@ -22,7 +22,7 @@ GAINS = (1.2, 1.35, 1.5, 1.7)
 def main():
     """Fit and print."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--reuse", type=Path, default=Path("out/compare"), help="folder with pictures by Cycles")
+    parser.add_argument("--reuse", type=Path, default=Path("out/compare"), help="folder with images by Cycles")
     options = parser.parse_args()
     stage = compare.Stage(strand_count=30_000)
     lights = ("front", "back")  # the sun alone: an even world hides what comes from where
@@ -30,7 +30,7 @@ def main():
     deviations = []
     for gain in GAINS:
         dual_scattering.BACK_GAIN = gain
-        hair_cache.clear()
+        invalidation.clear()
         ratios = []
         for color in compare.COLORS:
             for light in lights:
@@ -42,7 +42,7 @@ def main():
         means = "  ".join(f"{np.mean(ratio):.3f}" for ratio in ratios)
         print(f"{gain:6.2f}{deviations[-1]:12.4f}    {means}", flush=True)
     quadratic = np.polyfit(GAINS, np.square(deviations), 2)
-    print(f"least at {-0.5 * quadratic[1] / quadratic[0]:.2f}")
+    print(f"minimum at {-0.5 * quadratic[1] / quadratic[0]:.2f}")
 
 
 if __name__ == "__main__":

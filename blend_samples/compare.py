@@ -22,7 +22,8 @@ import head  # beside this file
 import ratio_plot
 
 import hair_addon
-from hair_addon.blender import drawn_scene, hair_picture, render, scene
+from hair_addon.blender.data import scene
+from hair_addon.blender.render import drawn_scene, hair_picture, offscreen
 
 WIDTH, HEIGHT = 400, 225
 CYCLES_SAMPLES = 128
@@ -51,7 +52,7 @@ def main():
     """Render, draw, measure."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out/compare"))
-    parser.add_argument("--reuse", type=Path, help="folder with pictures by Cycles of an earlier run")
+    parser.add_argument("--reuse", type=Path, help="folder with images by Cycles from an earlier run")
     parser.add_argument("--strands", type=int, default=30_000)
     parser.add_argument("--colors", nargs="+", choices=COLORS, default=list(COLORS))
     options = parser.parse_args()
@@ -74,7 +75,7 @@ def main():
     sheet = np.concatenate(rows[::-1])
     sheet += (1.0 - sheet[..., 3:]) * np.array([0.05, 0.05, 0.05, 1.0])
     bpy.context.scene.view_settings.exposure = 1.0  # stops: the sun is kept dim, so that nothing clips
-    render.write_picture(sheet, options.out / "compare.png", bpy.context.scene)
+    offscreen.write_picture(sheet, options.out / "compare.png", bpy.context.scene)
     ratio_plot.write(ratios, options.out / "ratios.png")
 
 
@@ -160,7 +161,7 @@ class Stage:
         context = bpy.context
         depsgraph = context.evaluated_depsgraph_get()
         drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
-        picture = hair_picture.HairPicture(WIDTH, HEIGHT, per_side=2)
+        picture = hair_picture.HairPicture((WIDTH, HEIGHT), per_side=2)
         while not picture.is_fine:
             picture.add_pass(drawn, *scene.read_camera(context.scene, depsgraph, WIDTH, HEIGHT))
         return picture.read()

@@ -21,8 +21,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import head  # beside this file
 
 import hair_addon
-from hair_addon.blender import drawing, drawn_scene, hair_buffer, hair_cache, scene
-from hair_addon.core import bspline
+from hair_addon.blender.data import scene
+from hair_addon.blender.gpu import drawing, visibility_buffer
+from hair_addon.blender.render import drawn_scene, hair_cache
+from hair_addon.core.geometry import bspline
 
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
 REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
@@ -95,7 +97,7 @@ def _frames_per_second(drawn, width=1280, height=720, frame_count=2):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
     view = drawing.view_record(*camera, height, least_width=1.0)
-    buffer = hair_buffer.HairBuffer(width, height)
+    buffer = visibility_buffer.VisibilityBuffer(width, height)
     pixel = gpu.types.GPUTexture((1, 1), format="RGBA16F")
     end = gpu.types.GPUFrameBuffer(color_slots=pixel)
 

@@ -2,6 +2,8 @@
 """The head that the samples and the demo grow hair on: mesh, scalp, material, camera and lights."""
 
 import math
+import os
+import tempfile
 from pathlib import Path
 
 import bpy
@@ -9,7 +11,7 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from hair_addon.core.shading.principled import roughness_from_beta_r
+from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 
 HEAD = Path(__file__).with_name("head.obj")
 
@@ -107,6 +109,18 @@ def _add_light(name, location, watts, color):
 
 def _point_at(turned, target):
     turned.rotation_euler = (target - turned.location).to_track_quat("-Z", "Y").to_euler()
+
+
+def rendered():
+    """(height, width, 3) uint8: the scene through its camera, the top row first."""
+    render = bpy.context.scene.render
+    with tempfile.TemporaryDirectory() as folder:
+        render.filepath = os.path.join(folder, "picture.png")
+        bpy.ops.render.render(write_still=True)
+        image = bpy.data.images.load(render.filepath)
+        pixels = np.empty((render.resolution_y, render.resolution_x, image.channels), np.float32)
+        image.pixels.foreach_get(pixels.ravel())
+    return np.round(255.0 * pixels[::-1, :, :3]).astype(np.uint8)
 
 
 def grow(head, guide_count=200, strand_count=30_000, seed=1):

@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/parting.png: one parting from above, by Blender's Interpolate Hair Curves and by Vellus, and how many stray."""
+"""docs/parting.png: a parting by Blender's Interpolate Hair Curves and by Vellus, with a count of stray strands."""
 
 import argparse
 import os
 import sys
-import tempfile
 from pathlib import Path
 
 import bpy
@@ -17,7 +16,7 @@ import head  # beside this file
 import ratio_plot
 
 import hair_addon
-from hair_addon.blender import curves
+from hair_addon.blender.data import curves
 
 COUNT = 20_000
 SIDE = 500  # pixels of one picture
@@ -48,10 +47,10 @@ def main():
     for column, (name, strands) in enumerate(grooms.items()):
         stray = strays(strands, combed)
         share = stray[is_near(strands)].mean()
-        print(f"{name}: {100.0 * share:.1f} % of {is_near(strands).sum()} strands near the part line point in between")
+        print(f"{name}: {100.0 * share:.1f} % of {is_near(strands).sum()} strands near the part line point across it")
         pictures.append(picture(strands, stray, skull))
         words.append((name, SIDE * column + 16, 26))
-        words.append((f"{100.0 * share:.0f} % near the parting point in between", SIDE * column + 16, 50))
+        words.append((f"{100.0 * share:.0f} % near the parting point across it", SIDE * column + 16, 50))
     caption = np.full((CAPTION, SIDE * len(pictures), 3), 24, np.uint8)
     ratio_plot.save(np.concatenate([caption, np.concatenate(pictures, axis=1)]), words, out)
 
@@ -161,14 +160,9 @@ def picture(strands, stray, skull):
     shown = bpy.data.objects.new("Picture", data)
     shown.parent = skull
     bpy.context.scene.collection.objects.link(shown)
-    with tempfile.TemporaryDirectory() as folder:
-        bpy.context.scene.render.filepath = os.path.join(folder, "picture.png")
-        bpy.ops.render.render(write_still=True)
-        image = bpy.data.images.load(bpy.context.scene.render.filepath)
-        pixels = np.empty(SIDE * SIDE * image.channels, np.float32)
-        image.pixels.foreach_get(pixels)
+    pixels = head.rendered()
     bpy.data.objects.remove(shown)
-    return np.round(255.0 * pixels.reshape(SIDE, SIDE, -1)[::-1, :, :3]).astype(np.uint8)
+    return pixels
 
 
 def _material():

@@ -2,9 +2,7 @@
 """docs/guide_placement.png: 400 guides on the scalp, random, by Blender's Poisson disks, and as Vellus places them."""
 
 import argparse
-import os
 import sys
-import tempfile
 from pathlib import Path
 
 import bpy
@@ -16,10 +14,11 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import head  # beside this file
 import ratio_plot
 
-from hair_addon.blender import scene
-from hair_addon.core import cvt, sampling
-from hair_addon.core.groom import GuideSettings
-from hair_addon.core.mesh import normals, positions
+from hair_addon.blender.data import scene
+from hair_addon.core.geometry import sampling
+from hair_addon.core.geometry.mesh import normals, positions
+from hair_addon.core.grooming.groom import GuideSettings
+from hair_addon.core.placement import cvt
 
 COUNT = 400
 SIDE = 520  # pixels of one picture
@@ -121,14 +120,9 @@ def _picture(places):
     cloud.materials.append(material)
     dots = bpy.data.objects.new("Dots", cloud)
     bpy.context.scene.collection.objects.link(dots)
-    with tempfile.TemporaryDirectory() as folder:
-        bpy.context.scene.render.filepath = os.path.join(folder, "picture.png")
-        bpy.ops.render.render(write_still=True)
-        image = bpy.data.images.load(bpy.context.scene.render.filepath)
-        pixels = np.empty(SIDE * SIDE * image.channels, np.float32)
-        image.pixels.foreach_get(pixels)
+    pixels = head.rendered()
     bpy.data.objects.remove(dots)
-    return np.round(255.0 * pixels.reshape(SIDE, SIDE, -1)[::-1, :, :3]).astype(np.uint8)
+    return pixels
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ def write(ratios, path):
         for value, color in zip(np.clip(values, _LOW, _HIGH), _CHANNELS, strict=True):
             column = _column(value)
             pixels[middle - _DOT : middle + _DOT, column - _DOT // 2 : column + _DOT // 2 + 1] = color
-    words.append(("mean colour of the hair: Vellus by Cycles", _LEFT, _TOP - 14))
+    words.append(("mean colour of the hair: Vellus / Cycles", _LEFT, _TOP - 14))
     save(pixels, words, path)
 
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """make turntable: the head turning under a fixed light, 24 frames as EXR with passes, rendered by the command line.
 
-Writes head.blend, frames/head_####.exr and sheet.png to a folder. Stopped and started again, it goes on.
+Writes head.blend, frames/head_####.exr and sheet.png to a folder. An interrupted run can be resumed.
 """
 
 import argparse
@@ -20,7 +20,8 @@ import head  # beside this file
 import OpenEXR
 
 import hair_addon
-from hair_addon.blender import files, render
+from hair_addon.blender.render import offscreen
+from hair_addon.core.files.whole_file import whole_file
 
 COUNT = 24
 WIDTH, HEIGHT = 960, 540
@@ -31,8 +32,8 @@ def main():
     """Make everything; the exit status is that of the command that renders."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--out", type=Path, default=Path("out/turntable"))
-    parser.add_argument("--samples", type=int, default=16, help="of each pixel")
-    parser.add_argument("--jobs", type=int, default=1, help="processes that share the frames")
+    parser.add_argument("--samples", type=int, default=16, help="samples per pixel")
+    parser.add_argument("--jobs", type=int, default=1, help="number of processes")
     options = parser.parse_args()
     out = options.out.resolve()
     hair_addon.register()
@@ -49,7 +50,7 @@ def main():
         bpy.ops.wm.open_mainfile(filepath=str(scene_file))
         frames = [_small(_combined(pattern.with_name(f"head_{frame:04}.exr"))) for frame in range(1, COUNT + 1)]
         rows = [np.concatenate(frames[first : first + COLUMNS], axis=1) for first in range(0, COUNT, COLUMNS)]
-        render.write_picture(np.concatenate(rows[::-1]), out / "sheet.png", bpy.context.scene)
+        offscreen.write_picture(np.concatenate(rows[::-1]), out / "sheet.png", bpy.context.scene)
         print(f"made: {out / 'sheet.png'}")
     return status
 
@@ -68,7 +69,7 @@ def _build(path):
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
     scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = COUNT, WIDTH, HEIGHT
-    with files.whole_file(path) as partial:
+    with whole_file(path) as partial:
         bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 
 

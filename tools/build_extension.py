@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension's zip, one per platform: `python tools/build_extension.py [linux-x64|windows-x64|macos-arm64|all]`.
 
-Blender's own builder (blender_ext.py, inside the bpy wheel) builds and validates. It wants every wheel of every
-platform to be there, so it is given a staged copy whose manifest lists one platform and the wheels of that platform.
+Blender's own builder (blender_ext.py, inside the bpy wheel) builds and validates. It needs all wheels of all
+platforms, so it gets a staged copy whose manifest lists one platform and the wheels of that platform.
 """
 
 import argparse
 import fnmatch
 import hashlib
 import importlib.util
-import platform
+import os
 import re
 import shutil
 import subprocess
@@ -18,19 +18,16 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from tools import compile_kernels, manual_pages  # noqa: E402
+
 # How a wheel's file name ends → which Blender runs it.
 PLATFORM_TAGS = {"linux-x64": "_x86_64.whl", "windows-x64": "-win_amd64.whl", "macos-arm64": "_arm64.whl"}
 
 
 class BuildError(Exception):
-    """Something that whoever builds can mend; the message says how."""
-
-
-def this_platform() -> str:
-    """Blender's name of the platform that this Python runs on."""
-    system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}.get(platform.system(), platform.system())
-    machine = {"x86_64": "x64", "AMD64": "x64", "aarch64": "arm64"}.get(platform.machine(), platform.machine())
-    return f"{system}-{machine}"
+    """A build error that the user can fix; the message says how."""
 
 
 def manifest() -> dict:
@@ -39,7 +36,7 @@ def manifest() -> dict:
 
 
 def left_out(folder: str, names: list[str]) -> set[str]:
-    """The names in a folder that the manifest's patterns leave out: an `ignore` for `shutil.copytree`."""
+    """Names in a folder that the manifest's patterns exclude: an `ignore` for `shutil.copytree`."""
     patterns = manifest()["build"]["paths_exclude_pattern"]
     applying = [pattern.strip("/") for pattern in patterns if Path(folder) == ROOT or not pattern.startswith("/")]
     return {name for pattern in applying for name in fnmatch.filter(names, pattern)}
@@ -67,7 +64,7 @@ def lock_entry(package: str) -> str:
 
 
 def is_locked(wheel: Path) -> bool:
-    """Whether a wheel is here and its content is what requirements.lock says."""
+    """Whether a wheel exists with the hash of requirements.lock."""
     if not wheel.is_file():
         return False
     with wheel.open("rb") as content:
@@ -95,17 +92,42 @@ def fetch(wheel: Path) -> None:
     if subprocess.run(command).returncode != 0:
         raise BuildError(f"{wheel.name} could not be downloaded; see pip's message above.")
     if not is_locked(wheel):
-        raise BuildError(f"The manifest names {wheel.name}, which is not what requirements.lock pins; mend its wheels.")
+        raise BuildError(f"The manifest names {wheel.name}, which requirements.lock does not pin; correct its wheels.")
+
+
+def compiled_kernels() -> Path:
+    """Return the folder of this platform's compiled kernels, compiled in 20 s if the sources have changed."""
+    # A folder for each version of the sources, which appears whole: two processes may build at once.
+    folder = ROOT / "build" / "kernels" / compile_kernels.sources_digest()[:16]
+    if not compile_kernels.are_up_to_date(folder):
+        print("compiling kernels", flush=True)
+        partial = folder.with_name(f"{folder.name}-{os.getpid()}")
+        if subprocess.run([sys.executable, compile_kernels.__file__, partial]).returncode != 0:
+            raise BuildError("The kernels could not be compiled; see Warp's message above.")
+        try:
+            partial.rename(folder)
+        except OSError:
+            if not compile_kernels.are_up_to_date(folder):
+                raise
+            shutil.rmtree(partial)  # another process was first
+    return folder
 
 
 def stage(target: str) -> Path:
-    """A copy of what the zip holds, with a manifest for one platform. Returns its folder."""
+    """Stage the zip's content with a manifest for one platform. Returns its folder."""
     folder = ROOT / "build" / f"extension-{target}"
     shutil.rmtree(folder, ignore_errors=True)
     shutil.copytree(ROOT, folder, ignore=left_out)
+    if target == compile_kernels.this_platform() and target in compile_kernels.PROCESSORS:
+        shutil.copytree(compiled_kernels(), folder / "kernels")
+    else:
+        print(
+            f"{target}: its kernels are not compiled on another platform; Blender compiles them when Vellus is enabled"
+        )
     (folder / "wheels").mkdir()
     for wheel in wheels_of(target):
         (folder / "wheels" / wheel.name).hardlink_to(wheel)
+    manual_pages.write(folder / "manual")
     text = (ROOT / "blender_manifest.toml").read_text(encoding="utf-8")
     text = re.sub(r"^platforms = .*$", f'platforms = ["{target}"]', text, flags=re.MULTILINE)
     lines = text.splitlines(keepends=True)
@@ -124,7 +146,7 @@ def blender_ext(*arguments: str | Path) -> None:
 
 
 def build(target: str) -> Path:
-    """Build and validate the zip of one platform; raises BuildError with what to mend."""
+    """Build and validate the zip of one platform; raises BuildError."""
     for wheel in wheels_of(target):
         if not is_locked(wheel):
             fetch(wheel)
@@ -140,7 +162,7 @@ def main() -> None:
     """The command line."""
     platforms = manifest()["platforms"]
     parser = argparse.ArgumentParser(description="Build the extension's zip.")
-    parser.add_argument("platform", nargs="?", default=this_platform(), choices=[*platforms, "all"])
+    parser.add_argument("platform", nargs="?", default=compile_kernels.this_platform(), choices=[*platforms, "all"])
     chosen = parser.parse_args().platform
     try:
         for target in platforms if chosen == "all" else [chosen]:

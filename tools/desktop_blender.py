@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A desktop Blender in a virtual display, for machines without one: installed once, run with a script.
 
-    python tools/desktop_blender.py                    install it, or say why it cannot be
+    python tools/desktop_blender.py                    install it, or print why that is not possible
     python tools/desktop_blender.py SCRIPT [ARGUMENT]  run a script in its window
 
 Blender comes from Debian's package, into a folder with a Debian of its own, so that the host's libraries do not matter:
@@ -36,7 +36,7 @@ _PACKAGES = (
 
 
 class Unavailable(Exception):
-    """One sentence: why there is no desktop Blender here."""
+    """The reason why there is no desktop Blender, in one sentence."""
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,16 @@ class DesktopBlender:
     executable: Path
     folder: Path | None = None
 
-    def run(self, script, arguments=(), *, backend="opengl", profile, folders=(), log=None, limit=300):
-        """Run a script in a window of `WINDOW_SIZE`; returns Blender's exit status, 124 where it ran past `limit` [s].
+    def run(
+        self, script, arguments=(), *, backend="opengl", profile, folders=(), log=None, limit=300, size=WINDOW_SIZE
+    ):
+        """Run a script in a window; returns Blender's exit status, 124 where it ran past `limit` [s].
 
         profile: a folder for Blender's user files and home; folders: more that the script sees, at the paths that they
-        have here; log: a file for all that Blender prints, the terminal without one.
+        have here; log: a file for all that Blender prints, the terminal without one; size: (width, height) of the
+        window in pixels.
         """
-        width, height = WINDOW_SIZE
+        width, height = size
         command = [
             *("env", *_environment(profile)),
             *("xvfb-run", "--auto-servernum", "--server-args", f"-screen 0 {width}x{height}x24 -nolisten tcp"),
@@ -66,7 +69,10 @@ class DesktopBlender:
             command = _inside(self.folder, command, [ROOT, profile, *folders])
         output = open(log, "wb") if log else None
         try:
-            return subprocess.run(command, stdout=output, stderr=subprocess.STDOUT, timeout=limit + 60).returncode
+            done = subprocess.run(
+                command, stdout=output, stderr=subprocess.STDOUT, timeout=limit + 60, env=_inherited()
+            )
+            return done.returncode
         finally:
             if output:
                 output.close()
@@ -76,7 +82,13 @@ class DesktopBlender:
         command = ["env", *_environment(profile), "timeout", str(limit), self.executable, *arguments]
         if self.folder is not None:
             command = _inside(self.folder, command, [ROOT, profile, *folders])
-        return subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=limit + 60)
+        words = list(map(str, command))
+        return subprocess.run(words, capture_output=True, text=True, timeout=limit + 60, env=_inherited())
+
+
+def _inherited():
+    """What this process was started with: bpy sets paths of its own files, which another Blender cannot read."""
+    return dict(os.environ)
 
 
 def _environment(profile):
@@ -152,7 +164,7 @@ def _call(command, environment):
 def _inside(folder, command, shared):
     """A command with `folder` as its root, where it sees the folders `shared` at their own paths.
 
-    What is mounted for it is seen by nobody else and is gone when it ends.
+    Its mounts are private, and removed when it ends.
     """
     mounts = [f'mount -t proc proc "{folder}/proc"', f'mount --rbind /dev "{folder}/dev"']
     for path in shared:

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Compile the extension's kernels for the processors of this platform: `python tools/compile_kernels.py FOLDER`.
+
+Warp's compiler produces code only for the platform that it runs on, so each platform's kernels are compiled there. The
+files contain no path, time or name of this machine: the same sources and the same Warp give the same bytes.
+core/kernels/compiled_kernels.py loads them where they fit.
+"""
+
+import argparse
+import hashlib
+import importlib
+import json
+import os
+import platform
+import shutil
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+CACHE = ROOT / "build" / "kernel-cache"  # Warp's own: after a change only what it changes is compiled again
+SOURCE_SUFFIXES = {".py", ".cpp", ".cu", ".h"}
+sys.path.insert(0, str(ROOT))
+
+README = """\
+Kernels of hair_addon/core, compiled by Warp with `python tools/compile_kernels.py FOLDER` from Vellus's sources.
+
+They only save time: without this folder, or if it does not match, Warp compiles the same kernels on first use.
+"""
+
+
+@dataclass(frozen=True)
+class Processor:
+    """A processor target: its LLVM name, and its minimum features in LLVM's terms."""
+
+    name: str
+    features: tuple[str, ...]
+
+
+# Warp always compiles for AVX and F16C on x86-64: its own kernels do not run on less either.
+_AVX = ("avx", "crc32", "cx16", "f16c", "popcnt", "sahf", "sse3", "sse4.1", "sse4.2", "ssse3", "xsave")
+_AVX2 = (*_AVX, "avx2", "bmi", "bmi2", "fma", "lzcnt", "movbe")
+_X86 = (
+    Processor("x86-64-v4", (*_AVX2, "avx512bw", "avx512cd", "avx512dq", "avx512f", "avx512vl")),
+    Processor("x86-64-v3", _AVX2),
+    Processor("x86-64-v2", _AVX),
+)
+# The best first.
+PROCESSORS = {"linux-x64": _X86, "windows-x64": _X86, "macos-arm64": (Processor("apple-m1", ()),)}
+
+
+def this_platform() -> str:
+    """Blender's name of the platform that this Python runs on."""
+    system = {"Linux": "linux", "Windows": "windows", "Darwin": "macos"}.get(platform.system(), platform.system())
+    machine = {"x86_64": "x64", "AMD64": "x64", "aarch64": "arm64"}.get(platform.machine(), platform.machine())
+    return f"{system}-{machine}"
+
+
+def sources():
+    """The files that decide what is compiled: those of the core, this one, and the lock that pins Warp."""
+    core = sorted(path for path in (ROOT / "hair_addon" / "core").rglob("*") if path.suffix in SOURCE_SUFFIXES)
+    return [*core, ROOT / "requirements.lock", Path(__file__)]
+
+
+def sources_digest():
+    """SHA-256 of `sources`, names and contents."""
+    total = hashlib.sha256()
+    for path in sources():
+        total.update(path.relative_to(ROOT).as_posix().encode() + b"\0" + path.read_bytes())
+    return total.hexdigest()
+
+
+def compile_into(folder, processors):
+    """Write the folder that `compiled_kernels` reads: an index, and each Warp module for each `Processor`."""
+    import warp as wp
+
+    wp.config.kernel_cache_dir = str(CACHE)
+    wp.config.log_level = wp.LOG_WARNING
+    wp.init()
+    from hair_addon.core.kernels import compiled_kernels
+
+    modules = [module for module in _warp_modules() if module.kernels]
+    names = {module: compiled_kernels.short_name(module) for module in modules}
+    # The hash that a user's Warp computes holds its flags, not the processor that those stand for.
+    entries = {names[m]: {"hash": m.get_module_hash(1).hex(), "files": {}} for m in modules}
+    native_flags = wp.config.cpu_compiler_flags
+    for processor in processors:
+        wp.config.cpu_compiler_flags = native_flags.replace("-march=native", f"-target-cpu {processor.name}")
+        assert wp.config.cpu_compiler_flags != native_flags
+        for module in modules:
+            module.unload()
+        wp.force_load("cpu", modules, max_workers=os.process_cpu_count() or 1)
+        for module in modules:
+            made = Path(wp.config.kernel_cache_dir) / module.get_module_identifier(1)
+            paths = [folder / path for path in compiled_kernels.file_names(names[module], processor.name)]
+            for path, ending in zip(paths, (".o", ".meta"), strict=True):
+                (compiled,) = made.glob(f"*{ending}")
+                path.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(compiled, path)
+            entries[names[module]]["files"][processor.name] = compiled_kernels.digest(*paths)
+    index = {
+        "sources": sources_digest(),
+        "compiler": compiled_kernels.compiler(),
+        "processors": [{"name": kind.name, "features": sorted(kind.features)} for kind in processors],
+        "modules": entries,
+    }
+    (folder / "README.txt").write_text(README, encoding="utf-8")
+    (folder / compiled_kernels.INDEX).write_text(json.dumps(index, indent=1, sort_keys=True) + "\n", encoding="utf-8")
+
+
+def _warp_modules():
+    """Warp's modules of every file of the core, which are known to it once the files are imported."""
+    import warp as wp
+
+    core = ROOT / "hair_addon" / "core"
+    paths = [path for path in sorted(core.rglob("*.py")) if "@wp.kernel" in path.read_text(encoding="utf-8")]
+    names = [".".join(path.relative_to(ROOT).with_suffix("").parts) for path in paths]
+    for name in names:
+        importlib.import_module(name)
+    return [wp.get_module(name) for name in names]
+
+
+def are_up_to_date(folder):
+    """Whether a folder holds the kernels of the sources as they are."""
+    try:
+        index = json.loads((folder / "index.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return index["sources"] == sources_digest()
+
+
+def main():
+    """The command line."""
+    parser = argparse.ArgumentParser(description="Compile the extension's kernels for this platform.")
+    parser.add_argument("folder", type=Path, help="output folder; its content is replaced")
+    folder = parser.parse_args().folder.resolve()
+    processors = PROCESSORS.get(this_platform())
+    if processors is None:
+        sys.exit(f"Kernels are not compiled for {this_platform()}.")
+    shutil.rmtree(folder, ignore_errors=True)
+    compile_into(folder, processors)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,327 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The manual's screenshots: `python tools/manual_pictures.py [NAME …]` writes docs/manual/NAME.png, or all of them.
+
+Grows hair on the sample's head, opens it in a window of a desktop Blender with the built extension, and takes a picture
+of each panel in a sidebar of `SIDEBAR_WIDTH`. With the name `windows`, also build/manual/window_*.png of the whole
+window for each kind of active object, to look for labels that are cut. With the name `five_minutes`, README's pictures
+of its five minutes alone: docs/five_minutes/*.png, cut out of what `tests/desktop/test_first_minutes.py` saw in its
+window when it ran last.
+"""
+
+import subprocess
+import sys
+import time
+import traceback
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+MANUAL = ROOT / "docs" / "manual"
+MODULE = "bl_ext.user_default.vellus"
+
+# Step of tests/desktop/first_minutes.py → its picture in README.
+FIVE_MINUTES = {"cube_near": "new_hair_system", "head": "guide_mask", "combed": "comb_guides", "shaded": "look"}
+SEEN = ROOT / "out" / "desktop" / "first_opengl"
+
+# (left, top, right, bottom) pixels of its window: the 3D view with the top of its sidebar; and the size it is shown in.
+SEEN_PART = (190, 60, 1310, 807)
+SHOWN_SIZE = (640, 427)
+
+WINDOW_SIZE = (1600, 1000)
+SIDEBAR_WIDTH = 280  # pixels
+
+# Picture → the panels in it, which is all that the sidebar shows meanwhile.
+PANELS = {
+    "systems": ("systems",),
+    "surface": ("surface", "surface_uvs"),
+    "guides": ("guides", "guides_growth", "guides_placement"),
+    "strands": ("interpolation", "interpolation_parting", "interpolation_advanced"),
+    "shading": ("shading", "shading_color", "shading_fibre", "shading_variation"),
+    "lookup_tables": ("tables",),
+    "output": ("output",),
+}
+
+
+def start():
+    """Make the sample, build the extension, and run this file in a window with it; returns the exit status."""
+    sys.path.insert(0, str(ROOT))
+    from tools import build_extension, compile_kernels, desktop_blender
+
+    if sys.argv[1:] == ["five_minutes"]:
+        return cut_five_minutes()
+    folder = ROOT / "build" / "manual"
+    folder.mkdir(parents=True, exist_ok=True)
+    if len(sys.argv) == 1 or not (folder / "head.blend").exists():
+        save_sample(folder / "head.blend")
+    extension = build_extension.build(compile_kernels.this_platform())
+    arguments = [extension, folder / "head.blend", *sys.argv[1:]]
+    log = folder / "log.txt"
+    blender = desktop_blender.find_or_install()
+    status = blender.run(__file__, arguments, profile=folder, limit=500, size=WINDOW_SIZE, log=log)
+    errors = [line for line in log.read_text(errors="replace").splitlines() if line.startswith("Traceback")]
+    return status or (f"{len(errors)} errors, see {log}" if errors else 0)
+
+
+def cut_five_minutes():
+    """Write README's pictures of the five minutes; returns the exit status."""
+    import bpy
+
+    left, top, right, bottom = SEEN_PART
+    for step, name in FIVE_MINUTES.items():
+        seen = read(SEEN / f"first_{step}.png")[top:bottom, left:right]
+        write(ROOT / "docs" / "five_minutes" / f"{name}.png", seen, SHOWN_SIZE)
+    bpy.data.images.load(str(SEEN / "first_picture.png")).save(
+        filepath=str(ROOT / "docs" / "five_minutes" / "picture.png")
+    )
+    return 0
+
+
+def read(path):
+    """(height, width, 4) float32 colors of a picture as they are seen, first row at the top."""
+    import bpy
+    import numpy as np
+
+    image = bpy.data.images.load(str(path))
+    pixels = np.empty((image.size[1], image.size[0], 4), np.float32)
+    image.pixels.foreach_get(pixels.ravel())
+    bpy.data.images.remove(image)
+    return pixels[::-1]
+
+
+def write(path, pixels, size=None):
+    """Colors as a PNG, scaled to a size (width, height) where one is given."""
+    import bpy
+
+    image = bpy.data.images.new(path.stem, pixels.shape[1], pixels.shape[0])
+    image.pixels.foreach_set(pixels[::-1].ravel())
+    if size is not None:
+        image.scale(*size)
+    image.filepath_raw, image.file_format = str(path), "PNG"
+    image.save()
+    bpy.data.images.remove(image)
+
+
+def save_sample(path):
+    """Grow hair on the head, draw hair.png, and save the scene with less hair, which a window draws quickly."""
+    sys.path.insert(0, str(ROOT / "blend_samples"))
+    import bpy
+    import head
+
+    import hair_addon
+
+    hair_addon.register()
+    head_object = head.build()
+    _guides, hair = head.grow(head_object)
+    head.light()
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.vellus.apply_preset(preset="AUBURN")
+    hair.data.vellus.appearance.mode = "energy"
+    bpy.ops.vellus.render_picture(filepath=str(MANUAL / "hair.png"), width=400, height=270)
+    bpy.ops.vellus.delete_hair()
+    bpy.ops.vellus.add_hair(density_group="scalp", length=0.1, gravity=0.8, strand_count=5000)
+    bpy.data.hair_curves["Hair"].vellus.marschner.size = 64
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+
+
+class Window:
+    """A window of Blender whose sidebar shows our panels."""
+
+    def __init__(self):
+        import bpy
+
+        self.bpy = bpy
+        self.window = bpy.context.window_manager.windows[0]
+        self.area = next(area for area in self.window.screen.areas if area.type == "VIEW_3D")
+        self.region = next(region for region in self.area.regions if region.type == "WINDOW")
+        self.sidebar = next(region for region in self.area.regions if region.type == "UI")
+        self.blender = sys.modules[f"{MODULE}.hair_addon.blender"]
+
+    def run(self, operator, *arguments, **properties):
+        """Call an operator with the mouse in the 3D view."""
+        with self.bpy.context.temp_override(window=self.window, area=self.area, region=self.region):
+            return operator(*arguments, **properties)
+
+    def screen(self):
+        """(height, width, 4) colors of the screen as they are seen, first row at the top."""
+        self.run(self.bpy.ops.wm.redraw_timer, type="DRAW_WIN_SWAP", iterations=2)
+        time.sleep(0.5)
+        path = Path(self.bpy.app.tempdir) / "screen.png"
+        subprocess.run(["import", "-window", "root", path], check=True)
+        return read(path)
+
+    def write(self, name, pixels):
+        """Colors as docs/manual/NAME.png."""
+        write(MANUAL / f"{name}.png", pixels)
+
+    def narrow(self):
+        """Drag the sidebar's edge until the sidebar has its width."""
+        for _try in range(8):
+            offset = self.sidebar.width - SIDEBAR_WIDTH
+            if offset == 0:
+                return
+            x, y = self.sidebar.x + 1, self.sidebar.y + self.sidebar.height // 4
+            yield from self.drag(x, y, x + offset)
+        raise RuntimeError(f"The sidebar has {self.sidebar.width} pixels.")
+
+    def drag(self, x, y, end):
+        """The left mouse button, from a place to the same height at another."""
+        self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+        yield
+        self.window.event_simulate(type="LEFTMOUSE", value="PRESS", x=x, y=y)
+        yield
+        for step in range(1, 9):
+            self.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x + (end - x) * step // 8, y=y)
+            yield
+        self.window.event_simulate(type="LEFTMOUSE", value="RELEASE", x=end, y=y)
+        yield from pause(0.5)
+
+    def show_panels(self, names):
+        """Show these panels of the tab and no others, all of them open."""
+        pictured = {f"VELLUS_PT_{name}" for shown in PANELS.values() for name in shown}
+        panels = [panel for panel in self.blender.panels.CLASSES if panel.bl_idname in pictured]
+        for panel in reversed(panels):
+            if panel.is_registered:
+                self.bpy.utils.unregister_class(panel)
+        for panel in panels:
+            if panel.bl_idname.removeprefix("VELLUS_PT_") in names:
+                panel.bl_options = set()
+                self.bpy.utils.register_class(panel)
+
+
+def pause(seconds):
+    """Leave Blender to itself for a while."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        yield
+
+
+def panel_picture(screen, sidebar):
+    """The part of a screen's picture that the panels of a sidebar take, without the empty rest below them."""
+    top = len(screen) - sidebar.y - sidebar.height
+    column = screen[top : top + sidebar.height, sidebar.x : sidebar.x + sidebar.width]
+    is_panel = abs(column[:, 14, :3] - column[-40, 14, :3]).max(axis=1) > 0.02  # 14: left of all rows
+    return column[: is_panel[:-40].nonzero()[0][-1] + 8]
+
+
+def take(pictures):
+    """Every picture; between steps Blender handles its events and redraws."""
+    import bpy
+
+    window = Window()
+    bpy.context.preferences.view.show_splash = False
+    space = window.area.spaces.active
+    bpy.context.preferences.system.use_region_overlap = False  # nothing shines through
+    every = [name for names in PANELS.values() for name in names]
+    window.show_panels(every)  # before any is drawn: whether a panel is open is decided then
+    space.show_region_ui = True
+    space.show_object_viewport_curves = False  # software drivers take their time for hair
+    window.run(bpy.ops.wm.redraw_timer, type="DRAW_WIN_SWAP", iterations=1)
+    window.sidebar.active_panel_category = "Hair"
+    yield from pause(0.5)
+    yield from window.narrow()
+    for active in ("Head", "Guides", "Hair") if "windows" in pictures else ():
+        bpy.context.view_layer.objects.active = bpy.data.objects[active]
+        for part, names in enumerate((every[:8], every[8:])):
+            window.show_panels(names)
+            yield from pause(0.3)
+            window.write(f"../../build/manual/window_{active}_{part}", window.screen())
+    bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
+    for name, panels in PANELS.items():
+        if name in pictures or not pictures:
+            window.show_panels(panels)
+            yield from pause(0.3)
+            window.write(name, panel_picture(window.screen(), window.sidebar))
+    others = {"looks": take_looks, "rendering": take_rendering, "redo": take_redo, "use_as_guides": take_foreign}
+    for name, taking in others.items():
+        if name in pictures or not pictures:
+            yield from taking(window)
+    window.show_panels(every)
+
+
+def take_looks(window):
+    """The menu of looks, where it opens."""
+    import bpy
+
+    window.show_panels(PANELS["shading"])
+    x, y = window.sidebar.x - 250, window.sidebar.y + 700
+    window.window.event_simulate(type="MOUSEMOVE", value="NOTHING", x=x, y=y)
+    yield from pause(0.3)
+    before = window.screen()
+    window.run(bpy.ops.wm.call_panel, "INVOKE_DEFAULT", name="VELLUS_PT_looks", keep_open=True)
+    yield from pause(2.0)  # previews are loaded beside
+    after = window.screen()
+    changed = abs(after - before).max(axis=2) > 0.02
+    changed[:, window.sidebar.x :] = False
+    rows, columns = changed.any(axis=1).nonzero()[0], changed.any(axis=0).nonzero()[0]
+    window.write("looks", after[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1])
+    window.window.event_simulate(type="ESC", value="PRESS", x=x, y=y)
+    yield from pause(0.3)
+
+
+def take_redo(window):
+    """The redo panel of strands, opened by a click on its header."""
+    import bpy
+
+    settings = {"strand_count": 5000, "density_group": "scalp"}
+    window.run(bpy.ops.vellus.interpolate_hair, "EXEC_DEFAULT", True, **settings)
+    window.screen()
+    panel = next(region for region in window.area.regions if region.type == "HUD")
+    x, y = panel.x + panel.width // 2, panel.y + panel.height // 2
+    yield from window.drag(x, y, x)
+    window.screen()
+    yield from pause(1.0)  # the panel grows while it is redrawn
+    screen = window.screen()
+    top = len(screen) - panel.y - panel.height
+    window.write("../../build/manual/window_redo", screen)
+    window.write("redo", screen[top : top + panel.height, panel.x : panel.x + panel.width])
+
+
+def take_foreign(window):
+    """The Surface panel where curves that Vellus did not make are active."""
+    import bpy
+
+    window.run(bpy.ops.object.curves_random_add)
+    window.show_panels(PANELS["surface"])
+    yield from pause(0.3)
+    window.write("use_as_guides", panel_picture(window.screen(), window.sidebar))
+
+
+def take_rendering(window):
+    """The Render properties where Vellus renders."""
+    import bpy
+
+    bpy.context.scene.render.engine = "VELLUS"
+    properties = next(area for area in window.window.screen.areas if area.type == "PROPERTIES")
+    properties.spaces.active.context = "RENDER"
+    yield from pause(0.5)
+    screen = window.screen()
+    top = len(screen) - properties.y - properties.height
+    window.write("rendering", screen[top : top + 330, properties.x : properties.x + properties.width])
+
+
+def main(zip_path, sample, *pictures):
+    """Inside Blender: install the extension, open the sample, and take the pictures."""
+    import bpy
+
+    bpy.ops.extensions.package_install_files(filepath=zip_path, repo="user_default", enable_on_install=True)
+    bpy.ops.wm.open_mainfile(filepath=sample, load_ui=False)
+    taking = take(pictures)
+
+    def advance():
+        try:
+            next(taking)
+            return 0.05
+        except StopIteration:
+            pass
+        except Exception:
+            traceback.print_exc()
+        bpy.ops.wm.quit_blender()
+        return None
+
+    bpy.app.timers.register(advance, first_interval=1.0, persistent=True)
+
+
+if __name__ == "__main__":
+    if "--" in sys.argv:
+        main(*sys.argv[sys.argv.index("--") + 1 :])
+    else:
+        sys.exit(start())
