@@ -32,6 +32,7 @@ class Param:
     choices: tuple[tuple[str, str, str], ...] = ()  # (value, label, tooltip) of an enumeration
     typical: float | None = None  # of a setting that is None, and follows from the surface, unless it is given
     diameter: tuple[str, str] | None = None  # of a radius: property that shows it in mm, and its description
+    is_structural: bool = False  # changes which strands belong together: cannot be keyed, as strands would jump
 
 
 def param(default: Any, description: str, **details: Any) -> Any:

@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Styles: trim, clump, curl, frizz and others, applied in order to strands that are made."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import base, bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
+else:
+    __getattr__ = submodules(__name__)

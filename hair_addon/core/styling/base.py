@@ -1,0 +1,95 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What all styles share: the settings of how much of a style a strand takes, and where along it.
+
+The amount of a style at point i of strand s, with x_i the part of the strand's length from its root:
+
+    A_si = amount · mask_s · (1 - vary · h_s) · profile(x_i)
+    profile(x) = root + (tip - root) · g(clamp((x - start) / (1 - start), 0, 1))
+
+h_s is a random number of the strand (random_numbers.py) and g the curve of Blender's hair nodes with their Shape σ:
+x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)).
+"""
+
+import math
+from dataclasses import dataclass, fields, replace
+
+from ..params import Settings, param
+
+
+@dataclass(frozen=True)
+class StyleSettings(Settings):
+    """How much of a style a strand takes: settings of every style."""
+
+    is_on: bool = param(True, "Apply this style", label="Enabled")
+    amount: float = param(1.0, "Strength of the style; at 0 the hair is unchanged", low=0.0, high=1.0, subtype="FACTOR")
+    vary: float = param(
+        0.0,
+        "Random variation of the amount between strands; higher values leave some strands with less of the style",
+        label="Variation",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    seed: int = param(0, "Random seed; each value gives another random distribution", low=0, high=2**31 - 1)
+    mask: str = param(
+        "", "Vertex group, or attribute of the surface or of the guides, that multiplies the amount at the roots"
+    )
+    mask_image: str = param("", "Image that multiplies the amount through the UV map", label="Mask image")
+    invert_mask: bool = param(False, "Apply the style where the mask is zero", label="Invert mask")
+
+
+@dataclass(frozen=True)
+class ProfiledSettings(StyleSettings):
+    """A style whose amount changes from root to tip."""
+
+    root: float = param(0.0, "Part of the amount at the roots", label="At root", low=0.0, high=1.0, subtype="FACTOR")
+    tip: float = param(1.0, "Part of the amount at the tips", label="At tip", low=0.0, high=1.0, subtype="FACTOR")
+    shape: float = param(
+        0.5,
+        "Course from root to tip; higher values move the change toward the tip",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    start: float = param(
+        0.0, "Part of the length that keeps the amount of the root", low=0.0, high=0.99, subtype="FACTOR"
+    )
+
+
+@dataclass(frozen=True)
+class Profile:
+    """The numbers of a profile as a kernel reads them."""
+
+    root: float = 1.0
+    tip: float = 1.0
+    exponent: float = 1.0
+    is_flipped: bool = False  # whether the Shape is above one half
+    start: float = 0.0
+
+
+EVERYWHERE = Profile()
+
+
+def profile_of(settings: StyleSettings) -> Profile:
+    """The `Profile` of a style's settings; all of the amount everywhere where it has none."""
+    if not isinstance(settings, ProfiledSettings):
+        return EVERYWHERE
+    shape = settings.shape
+    exponent = -math.log2(1.0 - min(shape, 1.0 - shape))
+    return Profile(settings.root, settings.tip, exponent, shape > 0.5, settings.start)
+
+
+def has_effect(settings: StyleSettings) -> bool:
+    """Whether a style can change any strand: it is enabled, and its amount and profile are not zero everywhere."""
+    is_profile_zero = isinstance(settings, ProfiledSettings) and settings.root == settings.tip == 0.0
+    return settings.is_on and settings.amount > 0.0 and not is_profile_zero
+
+
+def scaled[S: StyleSettings](settings: S, factor: float) -> S:
+    """Style settings with all lengths multiplied by a factor, within their ranges."""
+    changes = {}
+    for field in fields(settings):
+        details = field.metadata["param"]
+        if details.unit == "LENGTH":
+            changes[field.name] = min(max(getattr(settings, field.name) * factor, details.low), details.high)
+    return replace(settings, **changes)

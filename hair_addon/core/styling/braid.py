@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Braid: the strands of a lock gather into tresses that weave around the lock's centre; two tresses are a rope.
+
+    ρ = R (sin(φ + 2πg/n), b sin 2(φ + 2πg/n)) for three tresses,    ρ = R (cos(φ + πg), sin(φ + πg)) for two
+
+g is the tress that a strand belongs to, by its place in the lock. Centre lines of three tresses stay 0.90 R apart for
+a pitch of 6 R, so a tress may have half of that as its radius.
+"""
+
+from dataclasses import dataclass
+
+from ..params import param, param_of
+from .base import ProfiledSettings
+
+LABEL = "Braid"
+DESCRIPTION = "Braid or twist the strands of a lock"
+
+PATTERNS = (
+    ("BRAID", "Braid", "Three tresses, each over the next in turn"),
+    ("ROPE", "Rope", "Two tresses around each other"),
+)
+
+
+@dataclass(frozen=True)
+class Settings(ProfiledSettings):
+    """Size of a braid and of its tresses."""
+
+    pattern: str = param("BRAID", "How tresses weave", choices=PATTERNS)
+    size: float = param(
+        0.05,
+        "Distance between the centres of the braids on the surface",
+        above=0.0,
+        high=1e3,
+        soft_high=0.2,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        is_structural=True,
+    )
+    radius: float = param(
+        0.006,
+        "Distance of the tresses from the centre of the braid",
+        low=0.0,
+        high=1e3,
+        soft_high=0.05,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+    )
+    pitch: float = param(
+        0.04,
+        "Distance along the braid after which the tresses repeat",
+        low=1e-4,
+        high=1e4,
+        soft_high=0.2,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+    )
+    flatness: float = param(0.5, "Flatten a braid of three tresses", low=0.0, high=1.0, subtype="FACTOR")
+    thickness: float = param(
+        0.1,
+        "Distance between the strands of a tress at full strength, as a part of the distance before",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    start: float = param_of(ProfiledSettings, "start", 0.1)
+    shape: float = param_of(ProfiledSettings, "shape", 0.1)

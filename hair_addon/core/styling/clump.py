@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Clump: strands gather around centre strands, which stand evenly on the surface and are not part of the hair.
+
+At the arc length s_i of a point p_i, with C the centre strand of level k after the levels before, and c = C(s_i):
+
+    q_i = c + (1 - B_ki (1 - thickness)) Rot(t_c, 2π twist · profile(x_i)) (p_i - c)
+
+and the strand's segments point from q_(i-1) to q_i, as long as they were. clump_trees.py has sites and levels.
+"""
+
+import math
+from dataclasses import dataclass
+
+from ..params import param, param_of
+from .base import ProfiledSettings
+
+LABEL = "Clump"
+DESCRIPTION = "Gather strands into locks, and locks into larger ones"
+
+MOST_LEVELS = 4
+
+
+@dataclass(frozen=True)
+class Settings(ProfiledSettings):
+    """Size and strength of locks."""
+
+    size: float = param(
+        0.012,
+        "Distance between the centres of the largest locks",
+        above=0.0,
+        high=1e3,
+        soft_high=0.1,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+        is_structural=True,
+    )
+    levels: int = param(
+        2,
+        "Levels of locks: each lock is made of smaller ones",
+        low=1,
+        high=MOST_LEVELS,
+        is_structural=True,
+    )
+    ratio: float = param(
+        0.4,
+        "Size of a level's locks as a part of the size of the level above",
+        label="Size ratio",
+        low=0.1,
+        high=0.9,
+        subtype="FACTOR",
+        is_structural=True,
+    )
+    fine_amount: float = param(
+        0.8,
+        "Strength of the smallest locks relative to the largest; levels between are in between",
+        label="Fine strength",
+        low=0.0,
+        high=10.0,
+        soft_high=2.0,
+    )
+    thickness: float = param(
+        0.12,
+        "Distance between the strands of a lock at full strength, as a part of the distance before",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    twist: float = param(0.0, "Turns of a lock about its centre from root to tip", low=-10.0, high=10.0)
+    crossover: float = param(
+        0.05,
+        "Part of the strands that belongs to the second nearest lock",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+        is_structural=True,
+    )
+    stray: float = param(0.03, "Part of the strands that joins no lock", low=0.0, high=1.0, subtype="FACTOR")
+    tip_level: int = param(
+        0,
+        "Level of locks whose strands curl alike in the styles below; 0 is the largest",
+        label="Coherent level",
+        low=0,
+        high=MOST_LEVELS - 1,
+    )
+    shape: float = param_of(ProfiledSettings, "shape", 0.32)
+
+
+def sizes(settings: Settings) -> list[float]:
+    """Distance [m] between the centres of each level's locks, the largest first."""
+    return [settings.size * settings.ratio**level for level in range(settings.levels)]
+
+
+def amounts(settings: Settings) -> list[float]:
+    """Strength of each level's locks, the largest first. All are zero where the amount is."""
+    parts = [level / max(settings.levels - 1, 1) for level in range(settings.levels)]
+    return [min(settings.amount * (1.0 - part + part * settings.fine_amount), 1.0) for part in parts]
+
+
+def packed_thickness(strand_density: float, radius: float) -> float:
+    """The thickness at which the strands of a lock touch; strand_density: per m² of surface, radius: of a strand [m].
+
+    Discs are packed to 0.9 of an area at most.
+    """
+    return min(math.sqrt(strand_density * math.pi * radius**2 / 0.9), 1.0)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Curl: strands wind around their own old path, as helices or flat waves.
+
+With the arc of a turn ℓ = sqrt((2πR)² + h²) and κ = keep_length:
+
+    R_i = A_si · radius · smoothstep(2 s_i / ℓ),    h_i = pitch · (1 + stretch (1 - x_i))
+    φ_i = φ_(i-1) + 2π d_i ((1 - κ) / h_i + κ / sqrt((2πR)² (1 + (1 - flatness)²) / 2 + h_i²))
+    φ_0 = 2π (h_clump + (1 - coherence) (h_s - ½)),    ρ_i = R_i (cos φ_i, ± (1 - flatness) sin φ_i)
+
+A straight strand of length L reaches L pitch / ℓ. It is the curve of curvature R / (R² + (h/2π)²) and torsion
+(h/2π) / (R² + (h/2π)²). Coils whose handedness flips along the strand (switchbacks, or perversions) turn φ back where
+a one-dimensional noise of the lock changes sign.
+"""
+
+import math
+from dataclasses import dataclass
+
+from ..params import param, param_of
+from .base import ProfiledSettings
+
+LABEL = "Curl"
+DESCRIPTION = "Wind strands into coils or waves"
+
+POINTS_A_TURN = 8  # below, coils look angular
+
+
+@dataclass(frozen=True)
+class Settings(ProfiledSettings):
+    """Size and course of coils."""
+
+    radius: float = param(
+        0.006,
+        "Radius of the coils",
+        low=0.0,
+        high=1e3,
+        soft_high=0.05,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+    )
+    pitch: float = param(
+        0.03,
+        "Distance along the strand's path between two turns",
+        low=1e-4,
+        high=1e4,
+        soft_high=0.2,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+    )
+    flatness: float = param(
+        0.0, "Flatten coils into waves: 0 is a round coil, 1 a flat wave", low=0.0, high=1.0, subtype="FACTOR"
+    )
+    coherence: float = param(
+        0.85,
+        "How alike the strands of a lock curl; at 0 each has a phase of its own",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    stretch: float = param(0.0, "Lengthen the coils near the roots by this factor", low=0.0, high=4.0)
+    left_handed: float = param(
+        0.5, "Part of the locks that winds to the left", label="Left-handed", low=0.0, high=1.0, subtype="FACTOR"
+    )
+    switchback: float = param(
+        0.0,
+        "Distance along the strand between changes of handedness, as in coily hair; 0 is none",
+        low=0.0,
+        high=1e3,
+        soft_high=0.2,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+    keep_length: float = param(
+        1.0,
+        "Preserve the length of strands, so that curls shorten the hair; at 0 the hair reaches as far as before",
+        label="Preserve length",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    root: float = param_of(ProfiledSettings, "root", 0.4)
+    shape: float = param_of(ProfiledSettings, "shape", 0.4)
+    start: float = param_of(ProfiledSettings, "start", 0.02)
+
+
+WAVE = {"flatness": 1.0, "coherence": 0.9}  # as added from the menu under the name Wave
+
+
+def turn_length(settings: Settings) -> float:
+    """Length [m] of strand that one turn takes at full strength."""
+    radius = 2.0 * math.pi * settings.radius * settings.amount
+    return math.sqrt(radius**2 * (1.0 + (1.0 - settings.flatness) ** 2) / 2.0 + settings.pitch**2)
+
+
+def points_wanted(settings: Settings, length: float) -> int:
+    """Points a strand of a length [m] needs for smooth coils."""
+    return math.ceil(POINTS_A_TURN * length / turn_length(settings)) + 1

@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frizz: strands depart from their path by band-limited noise, six waves an octave that turn left and right in turns.
+
+    f_m = 2^((m + ½)/6 - ½) · 2^octave / wavelength,    g_m = gain^octave
+    ρ_i = A_si · amplitude · (½ Σ g²)^(-½) Σ_m g_m c_m (cos θ_m, ± sin θ_m)
+    θ_m = 2π f_m s_i + (1 - coherence) 2π h_sm + coherence k_m · X_s
+
+X_s is the root at rest in the surface's axes and |k_m| about 2π / spread. c_m fades out waves that the strand's points
+cannot carry.
+"""
+
+from dataclasses import dataclass
+
+from ..params import param
+from .base import ProfiledSettings
+
+LABEL = "Frizz"
+DESCRIPTION = "Ruffle strands by smooth noise"
+
+WAVES_AN_OCTAVE = 6
+MOST_OCTAVES = 4
+
+
+@dataclass(frozen=True)
+class Settings(ProfiledSettings):
+    """Size and course of the noise."""
+
+    amplitude: float = param(
+        0.003,
+        "Root mean square distance of strands from their path",
+        low=0.0,
+        high=1e3,
+        soft_high=0.02,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+    )
+    wavelength: float = param(
+        0.03,
+        "Length of the longest waves along a strand; to animate frizz, key the amount",
+        above=0.0,
+        high=1e4,
+        soft_high=0.2,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+    )
+    octaves: int = param(2, "Octaves of noise; each is half as long as the one before", low=1, high=MOST_OCTAVES)
+    gain: float = param(
+        0.5, "Amplitude of each octave as a part of the one before", low=0.0, high=1.0, subtype="FACTOR"
+    )
+    coherence: float = param(
+        0.0, "How alike neighbouring strands move; at 0 each has noise of its own", low=0.0, high=1.0, subtype="FACTOR"
+    )
+    spread: float = param(
+        0.02,
+        "Distance over which coherent noise changes",
+        above=0.0,
+        high=1e4,
+        soft_high=0.2,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+    stray: float = param(0.03, "Part of the strands that fly away", low=0.0, high=1.0, subtype="FACTOR")
+    stray_gain: float = param(
+        3.0, "Amplitude of strands that fly away, as a multiple of the others'", low=0.0, high=20.0
+    )
+    keep_length: float = param(
+        1.0,
+        "Preserve the length of strands, so that frizz shortens the hair; at 0 the hair reaches as far as before",
+        label="Preserve length",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )

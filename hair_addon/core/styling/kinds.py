@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The kinds of styles by their names in files and in Blender, and what the menu offers."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import HairError
+from ..params import described
+from . import bend, braid, clump, curl, frizz, lean, smooth, trim, wet
+from .base import StyleSettings
+
+_MODULES = {
+    "TRIM": trim,
+    "CLUMP": clump,
+    "CURL": curl,
+    "FRIZZ": frizz,
+    "BEND": bend,
+    "SMOOTH": smooth,
+    "LEAN": lean,
+    "BRAID": braid,
+    "WET": wet,
+}
+
+KINDS: dict[str, type[StyleSettings]] = {kind: module.Settings for kind, module in _MODULES.items()}
+LABELS = {kind: module.LABEL for kind, module in _MODULES.items()}
+DESCRIPTIONS = {kind: module.DESCRIPTION for kind, module in _MODULES.items()}
+
+MOST_STYLES = 64  # on one hair
+
+
+@dataclass(frozen=True)
+class Offer:
+    """An entry of the menu of new styles: a kind, and settings that depart from its defaults."""
+
+    label: str
+    kind: str
+    changes: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def settings(self) -> StyleSettings:
+        """The settings that a style is added with, except its seed."""
+        return KINDS[self.kind](**self.changes)
+
+
+OFFERS = {
+    "TRIM": Offer("Trim", "TRIM"),
+    "CLUMP": Offer("Clump", "CLUMP"),
+    "CURL": Offer("Curl", "CURL"),
+    "WAVE": Offer("Wave", "CURL", curl.WAVE),
+    "FRIZZ": Offer("Frizz", "FRIZZ"),
+    "BEND": Offer("Bend", "BEND"),
+    "ROLL": Offer("Roll", "BEND", bend.ROLL),
+    "SMOOTH": Offer("Smooth", "SMOOTH"),
+    "STRAIGHTEN": Offer("Straighten", "SMOOTH", smooth.STRAIGHTEN),
+    "LEAN": Offer("Lean", "LEAN"),
+    "LIFT": Offer("Lift", "LEAN", lean.LIFT),
+    "BRAID": Offer("Braid", "BRAID"),
+    "ROPE": Offer("Rope", "BRAID", {"pattern": "ROPE"}),
+    "WET": Offer("Wet", "WET"),
+}
+
+
+def kind_of(settings: StyleSettings) -> str:
+    """The kind of a style's settings, such as CURL. Raises `HairError` for anything else."""
+    for kind, settings_class in KINDS.items():
+        if type(settings) is settings_class:
+            return kind
+    raise HairError(f"A style must be the settings of a style, not {described(settings)}.")

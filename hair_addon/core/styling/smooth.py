@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Smooth: each segment takes the direction of the chord over a length around it, twice. Straighten does so over all.
+
+What is left of a wave is sinc²(length / wavelength): 0.41 of one twice as long, nothing of one that is as long.
+"""
+
+from dataclasses import dataclass
+
+from ..params import param, param_of
+from .base import ProfiledSettings
+
+LABEL = "Smooth"
+DESCRIPTION = "Smooth or straighten strands"
+
+
+@dataclass(frozen=True)
+class Settings(ProfiledSettings):
+    """Length that is smoothed over."""
+
+    length: float = param(
+        0.02,
+        "Length of strand that is averaged; beyond twice a strand's length it becomes straight",
+        above=0.0,
+        high=1e4,
+        soft_high=0.2,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+    root: float = param_of(ProfiledSettings, "root", 1.0)
+
+
+STRAIGHTEN = {"length": 10.0}  # as added from the menu under the name Straighten

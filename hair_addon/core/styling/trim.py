@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Trim: shorter strands, by a factor, to a length, by an undercoat or at a plane.
+
+    L' = min(L · factor · (1 - random · h), to_length or ∞), times undercoat_length for the part `undercoat` of strands
+
+A strand takes L + amount (L' - L): a mask of lengths is the mask of the style.
+"""
+
+from dataclasses import dataclass
+
+from ..params import param
+from .base import StyleSettings
+
+LABEL = "Trim"
+DESCRIPTION = "Cut or scale strands to a length"
+
+METHODS = (
+    ("CUT", "Cut", "Cut strands off; the rest keeps its place"),
+    ("SCALE", "Scale", "Scale strands down; their shape stays"),
+)
+
+
+@dataclass(frozen=True)
+class Settings(StyleSettings):
+    """Lengths of strands."""
+
+    factor: float = param(1.0, "Part of its length that a strand keeps; values above 1 lengthen it", low=0.0, high=4.0)
+    random: float = param(
+        0.0,
+        "Random variation of the length; higher values make some strands shorter",
+        label="Random length",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    to_length: float = param(
+        0.0,
+        "Length that no strand exceeds; 0 is no limit",
+        label="Maximum length",
+        low=0.0,
+        high=1e6,
+        soft_high=1.0,
+        unit="LENGTH",
+        subtype="DISTANCE",
+    )
+    undercoat: float = param(
+        0.0, "Part of the strands that is an undercoat of shorter ones", low=0.0, high=1.0, subtype="FACTOR"
+    )
+    undercoat_length: float = param(
+        0.5, "Length of the undercoat as a part of the other strands' length", low=0.0, high=1.0, subtype="FACTOR"
+    )
+    method: str = param("CUT", "How strands become shorter", choices=METHODS)
+    cutter: str = param("", "Empty object that cuts off what lies on the side of its Z axis")
