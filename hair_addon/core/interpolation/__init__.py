@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         interpolation,
         part_lines,
         regions,
+        root_binder,
     )
 else:
     __getattr__ = submodules(__name__)

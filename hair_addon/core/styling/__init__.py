@@ -6,6 +6,26 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import base, bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
+    from . import (
+        base,
+        bend,
+        braid,
+        clump,
+        clump_trees,
+        curl,
+        frizz,
+        guide_lean,
+        guide_styles,
+        kinds,
+        lean,
+        masks,
+        program,
+        random_numbers,
+        smooth,
+        stack,
+        steps,
+        trim,
+        wet,
+    )
 else:
     __getattr__ = submodules(__name__)
