@@ -41,6 +41,7 @@ class ClumpTrees:
     area: float
     _levels: dict[TreeSettings, list[HairBinding]] = field(default_factory=dict)
     _members: dict[tuple, list[np.ndarray]] = field(default_factory=dict)
+    _parents: dict[tuple, np.ndarray] = field(default_factory=dict)
 
     def levels(self, tree: TreeSettings) -> list[HairBinding]:
         """The centres of each level, the coarsest first, bound to guides."""
@@ -57,7 +58,9 @@ class ClumpTrees:
             tree: [interpolation.hair_binding.weigh_again(binding, settings) for binding in levels]
             for tree, levels in self._levels.items()
         }
-        return ClumpTrees(self.binder.with_settings(settings), self.place, self.area, weighed, self._members)
+        return ClumpTrees(
+            self.binder.with_settings(settings), self.place, self.area, weighed, self._members, self._parents
+        )
 
     def members(self, owner: object, strands: HairBinding, tree: TreeSettings) -> list[np.ndarray]:
         """(S,) int32 per level, the coarsest first: the place of each strand's centre in its level.
@@ -66,17 +69,29 @@ class ClumpTrees:
         """
         key = owner, tree
         if key not in self._members:
-            levels = self.levels(tree)
-            nearest = self._nearest(strands, levels[-1])
+            nearest = self._nearest(strands, self.levels(tree)[-1])
             if tree.crossover > 0.0:
                 crosses = random_numbers(strands.identities[0], tree.seed, CROSSOVER) < tree.crossover
                 crosses &= nearest[:, 1] >= 0
                 nearest[crosses, 0] = nearest[crosses, 1]
-            found = [nearest[:, 0]]
-            for finer, coarser in zip(levels[:0:-1], levels[-2::-1], strict=True):
-                found.insert(0, self._nearest(finer, coarser)[found[0], 0])
-            self._members[key] = found
+            self._members[key] = self._upward(tree, nearest[:, 0], len(tree.sizes) - 1)
         return self._members[key]
+
+    def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
+        """(K,) int32 per coarser level: the centres that those of one level belong to."""
+        own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
+        return self._upward(tree, own, level)[:-1]
+
+    def _upward(self, tree, places, level):
+        """Places in a level and in all coarser ones, the coarsest first."""
+        found = [places]
+        levels = self.levels(tree)
+        for finer in range(level, 0, -1):
+            key = tree, finer
+            if key not in self._parents:
+                self._parents[key] = self._nearest(levels[finer], levels[finer - 1])[:, 0]
+            found.insert(0, self._parents[key][found[0]])
+        return found
 
     def forget(self, owner: object) -> None:
         """Drop the members that some strands are of: they have other roots now."""

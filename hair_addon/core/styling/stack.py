@@ -119,8 +119,10 @@ class Styling:
         return np.flatnonzero(is_moved)
 
     def clumps(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """(S,) int32 and (S,) float32 in [0, 1): the finest clump of each strand in the first style that gathers strands,
-        and a random number of that clump; None without one."""
+        """(S,) int32 and (S,) float32 in [0, 1): the finest clump of each strand and a random number of that clump.
+
+        Of the first style that gathers strands; None without one.
+        """
         if not self.tree_levels:
             return None
         row = len(self.tree_levels[0][0].sizes) - 1
@@ -178,7 +180,8 @@ def bind(
         rows = np.zeros((len(levels) + 1, len(bound.roots)), np.int32)
         for row in range(known):
             tree, level = levels[row]
-            rows[row] = trees.members(owner, bound, tree)[level] if owner != (tree, level) else 0
+            is_own = owner != HAIR and owner[0] == tree
+            rows[row] = (trees.parents(tree, owner[1]) if is_own else trees.members(owner, bound, tree))[level]
         # Without guides near, as in a region of its own, a strand counts to the first.
         rows[-1] = np.maximum(bound.guide_weights.indices.numpy()[:, 0], 0)
         weights = np.array([inputs.masks[key].of_strands(bound) for key in keys], np.float32)

@@ -13,7 +13,6 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import native_code, parallel
 from ..kernels.checks import require_count, require_indices
-from ..kernels.parallel import Rows
 from . import frizz
 from .random_numbers import PURPOSES
 
@@ -171,18 +170,19 @@ def _check(points, program, data, chosen):
     require_count("strands", len(points), strand_count if chosen is None else len(chosen))
     require_count("identities", len(data.identities), strand_count)
     require_count("clump identities", len(data.centre_identities), centre_count)
-    require_count("clump points", len(data.centre_points), centre_count)
     for name, array in (("masks", data.masks), ("clump members", data.members)):
         if len(array):
             require_count(name, array.shape[1], strand_count)
     require_count("choices of a step", program.choices.shape[1], CHOICES)
     require_count("numbers of a step", program.numbers.shape[1], NUMBERS)
     require_count("steps", len(program.numbers), len(program))
-    kinds, _seeds, masks, levels, _first = program.choices.T
+    kinds, _seeds, masks, levels, first_centres = program.choices.T
     require_indices("kinds of steps", kinds, WEAVE + 1)
     require_indices("masks", masks[masks >= 0], len(data.masks))
     require_indices("clump levels", levels[levels >= 0], len(data.members))
     needs_points = (kinds == CLUMP) | (kinds == WEAVE)
     require_indices("clump levels", levels[needs_points], len(data.members))
     if needs_points.any():
+        # The last centres may be guides, which have no points here.
+        require_indices("clump centres", first_centres[needs_points], min(len(data.centre_points), centre_count))
         require_count("points of a centre strand", data.centre_points.shape[1], point_count)
