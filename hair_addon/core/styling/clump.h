@@ -1,41 +1,56 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Clump (clump.py): segments take the directions between points that are drawn to the centre strand.
+// Clump (clump.py): the strand follows the curve of points q that are drawn to the centre strand. Each segment points
+// from where the strand is to q at its own progress along the centre, so what is drawn onto the centre lies on it.
 
 const float thickness = number[8], twist = number[9], stray = number[10];
-const lanes joined = stray > 0.0f ? clamped((random(STRAY) - stray) * 10.0f + 1.0f, lanes(0.0f), lanes(1.0f)) : lanes(1.0f);
+const lanes joined =
+    stray > 0.0f ? clamped((random(STRAY) - 1.1f * stray) * 10.0f + 1.0f, lanes(0.0f), lanes(1.0f)) : lanes(1.0f);
 const auto* centre_of = reinterpret_cast<const float*>(centre_points.data);
 marks at;
-for (int lane = 0; lane < LANES; ++lane) at[lane] = 0;
-vector point = root, drawn_before = root;
-lanes arc = 0.0f;
+vector low, high;
+lanes below, above;
+const auto take_place = [&](int lane) {
+  const float* entry = centre_of + (size_t(centre[lane]) * point_count + at[lane]) * 4;
+  set_lane(low.x, lane, entry[0]);
+  set_lane(low.y, lane, entry[1]);
+  set_lane(low.z, lane, entry[2]);
+  set_lane(below, lane, entry[3]);
+  set_lane(high.x, lane, entry[4]);
+  set_lane(high.y, lane, entry[5]);
+  set_lane(high.z, lane, entry[6]);
+  set_lane(above, lane, entry[7]);
+};
+for (int lane = 0; lane < LANES; ++lane) {
+  at[lane] = 0;
+  take_place(lane);
+}
+// Roots stay: what the profile asks for at the root is reached over twice the distance to the centre.
+const vector root_away = root - low;
+const lanes root_distance = 2.0f * sqrt_of(dot(root_away, root_away));
+const auto is_apart = root_distance > 1.0e-9f;
+const lanes per_root_distance = is_apart ? 1.0f / (is_apart ? root_distance : lanes(1.0f)) : lanes(1.0e9f);
+vector point = root, place = root;
+lanes arc = 0.0f, progress = 0.0f, rate = 1.0f;
 for (int i = 1; i < point_count; ++i) {
   const lanes d = length[i];
   arc += d;
   point = point + t[i] * d;
-  vector low, high;
-  lanes below, above;
+  const lanes ahead = progress + d * rate;
   for (int lane = 0; lane < LANES; ++lane) {
-    const float* row = centre_of + size_t(centre[lane]) * point_count * 4;
-    const float place = get_lane(arc, lane);
-    while (at[lane] < point_count - 2 && row[4 * (at[lane] + 1) + 3] <= place) ++at[lane];
-    const float* entry = row + 4 * at[lane];
-    set_lane(low.x, lane, entry[0]);
-    set_lane(low.y, lane, entry[1]);
-    set_lane(low.z, lane, entry[2]);
-    set_lane(below, lane, entry[3]);
-    set_lane(high.x, lane, entry[4]);
-    set_lane(high.y, lane, entry[5]);
-    set_lane(high.z, lane, entry[6]);
-    set_lane(above, lane, entry[7]);
+    const float* arcs = centre_of + size_t(centre[lane]) * point_count * 4 + 3;
+    const float wanted = get_lane(ahead, lane);
+    while (at[lane] < point_count - 2 && arcs[4 * (at[lane] + 1)] <= wanted) ++at[lane];
+    take_place(lane);
   }
   const lanes range = above - below;
   const auto has_range = range > 1.0e-12f;
   // Past the centre's tip straight on.
-  const lanes part = has_range ? (arc - below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f);
+  const lanes part = has_range ? (ahead - below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f);
   const vector way = high - low, middle = low + way * part;
-  const lanes course = profile(arc * per_total);
-  vector away = point - middle;
+  const lanes x = arc * per_total;
+  lanes course = profile(x);
+  vector away = point - t[i] * (arc - ahead) - middle;
   if (twist != 0.0f) {
     // Rodrigues' rotation about the centre's direction.
     const vector axis = unit_or(way, lanes(1.0e-12f), t[i]);
@@ -43,7 +58,16 @@ for (int i = 1; i < point_count; ++i) {
     sine_and_cosine(twist * course * base, sine, cosine);
     away = away * cosine + cross(axis, away) * sine + axis * (dot(axis, away) * (1.0f - cosine));
   }
+  if (at_root > 0.0f) course = course - at_root * (1.0f - smoothstep(arc * per_root_distance));
   const vector drawn = middle + away * (1.0f - base * joined * course * (1.0f - thickness));
-  t[i] = unit_or(drawn - drawn_before, 1.0e-3f * d, t[i]);
-  drawn_before = drawn;
+  const vector there = drawn - place;
+  const lanes distance = sqrt_of(dot(there, there));
+  const auto is_far = distance > 1.0e-3f * d;
+  t[i] = chosen(is_far, there * (1.0f / (is_far ? distance : lanes(1.0f))), t[i]);
+  place = place + t[i] * d;
+  // The strand has come as far as its length goes.
+  const auto has_length = d > 1.0e-12f;
+  const lanes come = clamped(rate * (2.0f * d - distance), 0.25f * d, 2.0f * d);
+  rate = has_length ? come / (has_length ? d : lanes(1.0f)) : rate;
+  progress += come;
 }

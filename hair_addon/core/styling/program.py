@@ -174,7 +174,7 @@ def _of_curl(settings):
 
 def _of_frizz(settings):
     gains = settings.gain ** np.arange(settings.octaves)
-    # ρ has the amplitude as its root mean square: of two coordinates with half of each wave's square.
+    # Each coordinate of ρ has the amplitude as its root mean square: the square of a wave is one half.
     per_size = (0.5 * frizz.WAVES_AN_OCTAVE * np.sum(gains**2)) ** -0.5
     wave = np.arange(frizz.WAVES_AN_OCTAVE)
     frequencies = 2.0 ** ((wave + 0.5) / frizz.WAVES_AN_OCTAVE - 0.5)

@@ -38,6 +38,9 @@ const int left = points.shape[0] - first;
 const int lane_count = left < LANES ? left : LANES;
 lanes length[MOST], along[MOST];
 vector t[MOST], u[MOST], next[MOST];
+constexpr int MOST_KEPT = LANES == 1 ? 1 : MOST;
+lanes kept_length[MOST_KEPT];
+vector kept_t[MOST_KEPT];
 
 // Number `lane` of an entry of such an array.
 const auto lane_of = [](const lanes& values, int lane) { return reinterpret_cast<const float*>(&values)[lane]; };
@@ -108,6 +111,14 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   }
   if (!any_of(base > 0.0f)) continue;
   is_touched = is_touched | (base > 0.0f);
+  // Strands that a mask leaves out, beside others: they keep their bits.
+  const bool is_partial = LANES > 1 && any_of(base <= 0.0f);
+  if (is_partial) {
+    for (int i = 1; i < point_count; ++i) {
+      kept_t[i] = t[i];
+      kept_length[i] = length[i];
+    }
+  }
   const float at_root = number[2], at_tip = number[3], exponent = number[4], from = number[6];
   const bool is_even = at_root == at_tip, is_linear = exponent == 1.0f, is_flipped = number[5] != 0.0f;
   const auto profile = [&](lanes x) {
@@ -160,6 +171,13 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
     case WEAVE: {
 #include "weave.h"
     } break;
+  }
+  if (is_partial) {
+    const auto is_styled = base > 0.0f;
+    for (int i = 1; i < point_count; ++i) {
+      t[i] = chosen(is_styled, t[i], kept_t[i]);
+      length[i] = is_styled ? length[i] : kept_length[i];
+    }
   }
 }
 
