@@ -155,27 +155,27 @@ def apply_steps(
     data: StrandData,
     axes: np.ndarray,
     chosen: wp.array[int] | None = None,
-    variant: Variant | None = None,
+    version: Variant | None = None,
 ) -> None:
     """Style strands in place: points (M, P) [m]. One launch for the whole program; none for an empty one.
 
     data: `StrandData` of S strands, of which chosen (M,) int32 are styled, all where it is None; axes: (3, 3), a
-    rotation from the coordinates of points to the surface's own axes; variant: of the kernel, None for the fastest.
+    rotation from the coordinates of points to the surface's own axes; version: of the kernel, None for the fastest.
     Raises `HairError` where counts or indices do not match.
     """
     if not len(program) or not len(points):
         return
     device = points.device
-    variant = variant_for(points.shape[1], device) if variant is None else variant
-    _check(points, program, data, chosen, variant.most_points)
+    version = variant_for(points.shape[1], device) if version is None else version
+    _check(points, program, data, chosen, version.most_points)
     rows = wp.empty(0, dtype=int, device=device) if chosen is None else chosen
-    lanes = variant.width if device.is_cpu else 1
+    lanes = version.width if device.is_cpu else 1
     block_count = -(-len(points) // lanes)
     there = [wp.array(array, dtype=kind, device=device) for array, kind in _program_arrays(program)]
     inputs = [points, rows, data.normals, data.identities, data.masks, data.members]
     inputs += [data.centre_points, data.centre_normals, data.centre_identities, *there, wp.mat33(axes)]
     share_count = parallel.share_count(block_count, device, LEAST_BLOCKS)
-    parallel.launch_shares(variant.kernel, block_count, inputs, [[] for _ in range(share_count)], device)
+    parallel.launch_shares(version.kernel, block_count, inputs, [[] for _ in range(share_count)], device)
 
 
 def _program_arrays(program):
