@@ -11,7 +11,7 @@
 //   array_t<vec3> normals               (S,) unit normals of the surface at the roots
 //   array_t<int> identities             (S,) what strands are known by
 //   array_t<float> masks                (masks, S) weights
-//   array_t<int> members                (levels, S) the clump centre that each strand belongs to, per level
+//   array_t<int> members                (levels, S) the clump centre that each strand belongs to, per level; -1: none
 //   array_t<vec4> centre_points         (K, P) points of centre strands [m], and the arc length from the root
 //   array_t<vec3> centre_normals        (K,)
 //   array_t<int> centre_identities      (K,)
@@ -109,6 +109,26 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
       set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
     }
   }
+  // The clump centre of each lane: its identity, and the reference of frames by its normal, which every strand of a
+  // clump shares. A strand without a centre stands for itself.
+  int centre[LANES];
+  vector centre_normal = normal;
+  ints lock = identity;
+  if (level >= 0) {
+    for (int lane = 0; lane < LANES; ++lane) {
+      const int member = members.data[size_t(level) * members.shape[1] + strand[lane]];
+      centre[lane] = first_centre + (member < 0 ? 0 : member);
+      if (member < 0) {
+        if (kind == CLUMP || kind == WEAVE) set_lane(base, lane, 0.0f);
+        continue;
+      }
+      set_lane(lock, lane, centre_identities.data[centre[lane]]);
+      set_lane(centre_normal.x, lane, centre_normals.data[centre[lane]][0]);
+      set_lane(centre_normal.y, lane, centre_normals.data[centre[lane]][1]);
+      set_lane(centre_normal.z, lane, centre_normals.data[centre[lane]][2]);
+    }
+  }
+
   if (!any_of(base > 0.0f)) continue;
   is_touched = is_touched | (base > 0.0f);
   // Strands that a mask leaves out, beside others: they keep their bits.
@@ -130,21 +150,6 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   lanes total = 0.0f;
   for (int i = 1; i < point_count; ++i) total += length[i];
   const lanes per_total = 1.0f / higher_of(total, lanes(1.0e-20f));
-
-  // The clump centre of each lane: its identity, and the reference of frames by its normal, which every strand of a
-  // clump shares.
-  int centre[LANES];
-  vector centre_normal = normal;
-  ints lock = identity;
-  if (level >= 0) {
-    for (int lane = 0; lane < LANES; ++lane) {
-      centre[lane] = first_centre + members.data[size_t(level) * members.shape[1] + strand[lane]];
-      set_lane(lock, lane, centre_identities.data[centre[lane]]);
-      set_lane(centre_normal.x, lane, centre_normals.data[centre[lane]][0]);
-      set_lane(centre_normal.y, lane, centre_normals.data[centre[lane]][1]);
-      set_lane(centre_normal.z, lane, centre_normals.data[centre[lane]][2]);
-    }
-  }
 
 #include "frames.h"
 #include "across.h"

@@ -39,7 +39,7 @@ class StrandData:
     normals: "wp.array[wp.vec3]"  # (S,) unit
     identities: "wp.array[int]"  # (S,)
     masks: "wp.array2d[float]"  # (masks, S)
-    members: "wp.array2d[int]"  # (levels, S) place of the strand's centre among those of its level
+    members: "wp.array2d[int]"  # (levels, S) place of the strand's centre among those of its level, -1: none
     centre_points: "wp.array2d[wp.vec4]"  # (K, P) x, y, z [m] and the arc length [m]
     centre_normals: "wp.array[wp.vec3]"  # (K,)
     centre_identities: "wp.array[int]"  # (K,)
