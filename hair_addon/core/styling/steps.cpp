@@ -143,7 +143,8 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const bool is_even = at_root == at_tip, is_linear = exponent == 1.0f, is_flipped = number[5] != 0.0f;
   const auto profile = [&](lanes x) {
     if (is_even) return lanes(at_root);
-    lanes y = clamped((x - from) / (1.0f - from), lanes(0.0f), lanes(1.0f));
+    // x of the tip is 1 but for rounding, which steep profiles are sensitive to.
+    lanes y = clamped((1.000001f * x - from) / (1.0f - from), lanes(0.0f), lanes(1.0f));
     if (!is_linear) y = is_flipped ? 1.0f - power(1.0f - y, lanes(exponent)) : power(y, lanes(exponent));
     return lanes(at_root + (at_tip - at_root) * y);
   };

@@ -2,13 +2,14 @@
 """Laws of Clump: strands gather on their centre's line, in locks of whole smaller locks."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from hair_addon.core.styling import clump, program
 from hair_addon.core.styling.stack import HAIR
-from tests.support.stepped import curved_strands, largest_move, straight_strands, stepped
+from tests.support.stepped import curved_strands, largest_move, stepped, straight_strands
 from tests.support.styled import head
 
 FULL = clump.Settings(thickness=0.0, stray=0.0, root=1.0, tip=1.0, levels=1)
@@ -119,7 +120,7 @@ def test_locks_are_made_of_whole_smaller_locks(hair):
     settings = clump.Settings(levels=3, size=0.03, ratio=0.5)
     bound = hair.bound(settings)
     members = bound.data.members.numpy()[:3]
-    for coarse, fine in zip(members[:-1], members[1:], strict=True):
+    for coarse, fine in pairwise(members):
         assert len(np.unique(np.stack([coarse, fine]), axis=1).T) == len(np.unique(fine))
     assert len(np.unique(members[0])) < len(np.unique(members[1])) < len(np.unique(members[2]))
 

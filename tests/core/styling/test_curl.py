@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import curl
-from tests.support.stepped import straight_strands, stepped
+from tests.support.stepped import stepped, straight_strands
 
 ALL = {"root": 1.0, "tip": 1.0, "start": 0.0}
 

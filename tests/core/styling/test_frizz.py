@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import frizz
-from tests.support.stepped import straight_strands, stepped
+from tests.support.stepped import stepped, straight_strands
 
 LENGTH, POINTS = 0.3, 129
 

@@ -226,7 +226,9 @@ def test_a_mask_of_guides_is_mixed_as_strands_are(hair, rng):
     weights = rng.random(60).astype(np.float32)
     found = Mask(guides=weights).of_strands(hair.binding)
     indices, shares = hair.binding.guide_weights.indices.numpy(), hair.binding.guide_weights.weights.numpy()
-    mixed = [sum(weights[i] * w for i, w in zip(*row, strict=True) if i >= 0) for row in zip(indices, shares)]
+    mixed = [
+        sum(weights[i] * w for i, w in zip(*row, strict=True) if i >= 0) for row in zip(indices, shares, strict=True)
+    ]
     np.testing.assert_allclose(found, mixed, atol=1e-6)
 
 

@@ -12,7 +12,7 @@ from hair_addon.core.styling import bend, clump, curl, frizz, kinds, lean, progr
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.stack import Inputs
 from tests.support.devices import DEVICE
-from tests.support.stepped import curved_strands, largest_move, rotation, stepped
+from tests.support.stepped import UP, curved_strands, largest_move, rotation, stepped
 from tests.support.styled import head
 
 STYLES = {name: offer.settings for name, offer in kinds.OFFERS.items()}
@@ -94,9 +94,7 @@ def test_half_a_mask_is_half_the_amount(hair, style):
     settings, inputs = masked(style, np.full(len(hair.mesh.vertices), 0.5), hair)
     if isinstance(style, wet.Settings | trim.Settings | clump.Settings):
         pytest.skip("Its amount is not a factor of one step")
-    np.testing.assert_allclose(
-        hair.styled(settings, inputs=inputs), hair.styled(replace(style, amount=0.5)), atol=2e-5
-    )
+    np.testing.assert_allclose(hair.styled(settings, inputs=inputs), hair.styled(replace(style, amount=0.5)), atol=2e-5)
 
 
 def test_same_seed_same_strands(hair, style):
@@ -158,7 +156,7 @@ def test_the_processor_and_a_gpu_agree(rng, point_count):
 def test_turned_moved_and_scaled_before_or_after(rng, name):
     """With lengths scaled as well, and the surface's own axes turned with it."""
     strands = curved_strands(rng, 48)
-    normals = rng.normal(0.0, 0.2, (48, 3)) + (0.0, 0.0, 1.0)
+    normals = rng.normal(UP, 0.2, (48, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     members = np.arange(48) // 8
     turn, scale, shift = rotation(rng), 3.0, np.array([0.4, -0.2, 0.3])
