@@ -150,9 +150,8 @@ def _steps_of(settings, cutters):
         return [step(steps.SMOOTH, (settings.length,))]
     if isinstance(settings, braid.Settings):
         tress_count = 3 if settings.pattern == "BRAID" else 2
-        woven = settings.radius, settings.pitch, 1.0 - settings.flatness, float(tress_count)
-        gathered = step(steps.CLUMP, (settings.thickness, 0.0, 0.0), level=0)
-        return [gathered, step(steps.WEAVE, woven, level=0)]
+        size = settings.radius, settings.pitch, 1.0 - settings.flatness
+        return [step(steps.WEAVE, (*size, float(tress_count), settings.thickness), level=0)]
     if isinstance(settings, wet.Settings):
         return _of_wet(settings, step)
     return []  # a style of guides

@@ -24,7 +24,7 @@ from .clump_trees import ClumpTrees
 from .guide_styles import FollowedGuides, leans
 from .masks import Mask
 from .program import Cutter, TreeSettings, mask_key
-from .steps import CLUMP, Program, StrandData
+from .steps import CLUMP, WEAVE, Program, StrandData
 
 # Nothing differentiates these kernels.
 wp.set_module_options({"enable_backward": False})
@@ -214,8 +214,8 @@ def bind(
 
 
 def _steps_before(program, made, level):
-    """The steps above the one that draws strands to the centres of a level."""
-    row = next(row for row, step in enumerate(made) if step.kind == CLUMP and step.level == level)
+    """The steps above the one that gathers strands around the centres of a level."""
+    row = next(row for row, step in enumerate(made) if step.kind in {CLUMP, WEAVE} and step.level == level)
     return program.before(row)
 
 

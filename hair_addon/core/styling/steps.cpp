@@ -154,6 +154,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
 
 #include "frames.h"
 #include "across.h"
+#include "gather.h"
 
   switch (kind) {
     case TRIM: {

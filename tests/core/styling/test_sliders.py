@@ -29,8 +29,8 @@ RANGES = {
     (bend.Settings, "angle"): (-6.0, 6.0),
     (smooth.Settings, "length"): (0.002, 0.1),
     (wet.Settings, "amount"): (0.1, 1.0),  # small locks join by its square root
-    (braid.Settings, "pitch"): (0.02, 0.1),
-    (braid.Settings, "radius"): (0.0, 0.01),
+    (braid.Settings, "pitch"): (0.15, 0.4),
+    (braid.Settings, "radius"): (0.0, 0.03),
 }
 WITH = {
     (trim.Settings, "undercoat_length"): {"undercoat": 0.5},
@@ -53,7 +53,7 @@ MORE_STEPS = {
     (frizz.Settings, "spread"): 25600,
     (curl.Settings, "pitch"): 1600,
     (curl.Settings, "switchback"): 3200,
-    (braid.Settings, "pitch"): 1600,
+    (braid.Settings, "pitch"): 3200,
     (lean.Settings, "amount"): 6400,
     (lean.Settings, "tip"): 6400,
     (lean.Settings, "start"): 3200,
@@ -66,6 +66,7 @@ DEFAULTS = {
     bend.Settings: {"random_turn": 0.2},
     clump.Settings: {"size": 0.03},
     wet.Settings: {"lock": 0.2},
+    braid.Settings: {"size": 0.3, "radius": 0.03, "pitch": 0.2},
     lean.Settings: {"clearance": 0.02},
 }
 # Of all styles: a profile that begins vertically moves by a power of the step where its beginning passes a point.
@@ -94,14 +95,14 @@ def hair():
 
 @pytest.fixture(scope="module")
 def fur():
-    """For what keeps off the surface: the nearest point of a head's changes by jumps."""
+    """For what keeps off the surface, where the nearest point of a head's jumps, and for braids, which need long curves."""
     return ball(160)
 
 
 @pytest.mark.parametrize("settings_class, name", sliders(), ids=lambda value: getattr(value, "__module__", value))
 def test_half_a_step_moves_strands_half_as_far(hair, fur, settings_class, name):
     key = settings_class, name
-    hair = fur if settings_class in {lean.Settings, wet.Settings} else hair
+    hair = fur if settings_class in {lean.Settings, wet.Settings, braid.Settings} else hair
     details = settings_class.__dataclass_fields__[name].metadata["param"]
     limits, others = PROFILES.get(name, ((details.low, min(details.high, details.soft_high)), {}))
     low, high = RANGES.get(key, limits)
