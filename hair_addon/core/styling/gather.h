@@ -37,7 +37,7 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
     const lanes d = length[i];
     arc += d;
     point = point + t[i] * d;
-    const lanes advance = d + (clamped(rate * (d - lead), 0.25f * d, 2.0f * d) - d) * weight;
+    const lanes advance = d + (clamped(rate * (d - 0.5f * lead), 0.25f * d, 1.25f * d) - d) * weight;
     ahead += advance;
     for (int lane = 0; lane < LANES; ++lane) {
       const float* arcs = centre_of + size_t(centre[lane]) * point_count * 4 + 3;
@@ -87,12 +87,13 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
     const lanes square = dot(beside, beside), most = 0.25f * d * d;
     const auto is_off = square > most;
     const lanes held = is_off ? sqrt_of(most / (is_off ? square : lanes(1.0f))) : lanes(1.0f);
-    t[i] = chosen(is_far, unit_or(way_on + beside * (held * weight), lanes(1.0e-30f), t[i]), t[i]);
+    t[i] = chosen(is_far, unit_or(way_on + beside * (0.7f * held * weight), lanes(1.0e-30f), t[i]), t[i]);
     place = place + t[i] * d;
     drawn_before = drawn;
     // The strand's progress along the centre: as far as its length goes along the curve.
     const auto has_moved = distance > 0.5f * advance;
-    rate = has_moved ? advance / (has_moved ? distance : lanes(1.0f)) : lanes(2.0f);
+    const lanes rate_here = has_moved ? advance / (has_moved ? distance : lanes(1.0f)) : lanes(2.0f);
+    rate = 0.5f * (rate + lower_of(rate_here, lanes(1.25f)));
     lead = dot(drawn - place, forwards);
   }
 };
