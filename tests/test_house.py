@@ -258,8 +258,8 @@ def test_core_imports_without_blender():
 
 
 def test_register_is_light():
-    """Blender registers add-ons while an artist waits for it to start: no Warp, so no compiling, and less work than Warp."""
-    printed = run_python(
+    """Blender registers add-ons while an artist waits for it to start: no Warp, so no compiling, and less work."""
+    source = (
         "import bpy, sys, time\n"
         "start = time.process_time()\n"
         "import hair_addon\n"
@@ -272,7 +272,8 @@ def test_register_is_light():
         "import warp\n"
         "print(ours / (time.process_time() - start))\n"
     )
-    assert float(printed.split()[-1]) < 0.8
+    run_python(source)  # so that Python has compiled all files
+    assert min(float(run_python(source).split()[-1]) for _ in range(3)) < 0.8
 
 
 # RELIABILITY: somebody hostile supplies the .blend; and an extension has no business on the network.

@@ -3,7 +3,8 @@
 // Clump (clump.py): segments take the directions between points that are drawn to the centre strand.
 
 const float thickness = number[8], twist = number[9], stray = number[10];
-const lanes joined = stray > 0.0f ? clamped((random(STRAY) - stray) * 10.0f + 1.0f, lanes(0.0f), lanes(1.0f)) : lanes(1.0f);
+lanes joined = 1.0f;
+if (stray > 0.0f) joined = clamped((random(STRAY) - stray) * 10.0f + 1.0f, lanes(0.0f), lanes(1.0f));
 const auto* centre_of = reinterpret_cast<const float*>(centre_points.data);
 marks at;
 for (int lane = 0; lane < LANES; ++lane) at[lane] = 0;
