@@ -44,7 +44,7 @@ def follow_guides(hair, depsgraph):
     if moved is None:
         make_again(hair, depsgraph)
     elif len(moved):
-        hair_cache.move(hair.session_uid, moved)
+        hair_cache.move(hair.session_uid, moved, bound.growing)
         _write_soon(hair)
 
 

@@ -355,7 +355,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
     ]
     on_device += [
         placement.voronoi,
-        interpolation.cpu_interpolation if device == "cpu" else interpolation.gpu_interpolation,
+        interpolation.interpolation if device == "cpu" else interpolation.gpu_interpolation,
     ]
     on_processor = [
         placement.farthest,
