@@ -247,7 +247,7 @@ def test_any_order_of_changes_leaves_each_key_with_its_style(steps):
     state = curves.vellus
     style_items.assign(state, [bend.Settings(angle=0.1 * place) for place in range(5)])
     curves.animation_data_create()
-    for place, item in enumerate(state.styles):
+    for item in state.styles:
         item.bend.keyframe_insert("angle", frame=1)
     wanted = {item.name: item.bend.angle for item in state.styles}
     for step, a, b in steps:
