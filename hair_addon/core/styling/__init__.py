@@ -6,6 +6,6 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import base, bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
+    from . import base, bend, braid, clump, curl, fitting, frizz, kinds, lean, smooth, trim, wet
 else:
     __getattr__ = submodules(__name__)
