@@ -244,9 +244,9 @@ def text(name, description):
     return bpy.props.StringProperty(name=name, description=description, translation_context=CONTEXT)
 
 
-def choice(name, description, labels):
-    """An enumeration that is not a setting; labels: {identifier: label}."""
-    items = [(identifier, label, "") for identifier, label in labels.items()]
+def choice(name, description, labels, tooltips=None):
+    """An enumeration that is not a setting; labels: {identifier: label}; tooltips: {identifier: tooltip}, or None."""
+    items = [(identifier, label, (tooltips or {}).get(identifier, "")) for identifier, label in labels.items()]
     return bpy.props.EnumProperty(name=name, description=description, items=items, translation_context=CONTEXT)
 
 

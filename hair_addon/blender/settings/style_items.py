@@ -4,6 +4,8 @@
 A change marks the Curves as any other setting does. Keys follow their style (style_keys.py).
 """
 
+from dataclasses import replace
+
 import bpy
 
 from ...core.errors import HairError
@@ -118,6 +120,12 @@ def add(state, settings, name="", place=None):
     style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state)))
     state.active_style = place
     mark_both(state, None)
+
+
+def duplicate(state, place):
+    """Add a copy of a style after it, without keys and with a seed of its own. Raises `HairError`."""
+    item = state.styles[place]
+    add(state, replace(settings_of(item), seed=new_seed(state)), item.name, place + 1)
 
 
 def move(state, place, to):
