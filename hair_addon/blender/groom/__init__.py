@@ -14,11 +14,13 @@ if TYPE_CHECKING:
         edits,
         foreign_curves,
         groom_settings,
+        hair_styles,
         hair_systems,
         hand_made_guides,
         pipeline,
         selection,
         staleness,
+        style_notes,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         clump,
         clump_trees,
         curl,
+        fitting,
         frizz,
         guide_lean,
         guide_styles,
