@@ -21,10 +21,12 @@ if TYPE_CHECKING:
         lean,
         masks,
         program,
+        program_rows,
         random_numbers,
         smooth,
         stack,
         steps,
+        style_inputs,
         trim,
         wet,
     )
