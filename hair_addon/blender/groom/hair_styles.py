@@ -23,17 +23,22 @@ from . import groom_settings, pipeline
 _HEAD_LENGTH = next(length for name, length, _details in declared(GuideSettings) if name == "length")  # [m]
 
 
-def add(hair: Curves, settings: StyleSettings, name: str = "", is_fitted: bool = False) -> str:
-    """Add a style to a hair Curves datablock, with a seed that none of its styles has; returns the style's name.
+def add(
+    hair: Curves, settings: StyleSettings, name: str = "", is_fitted: bool = False, has_seed: bool = False
+) -> StyleSettings:
+    """Add a style to a hair Curves datablock, after its other styles; returns its settings.
 
-    is_fitted: whether lengths are for a human head, and fitted to the surface. Raises `HairError` before any change.
+    is_fitted: whether lengths are for a human head, and fitted to the surface; has_seed: whether the seed is the one in
+    `settings`, else it is one that no other style of the hair has. Raises `HairError` before any change.
     """
     curves.require_editable(hair)
     style_items.require_room(len(hair.vellus.styles) + 1)
     if is_fitted:
         settings = fitting.fitted(settings, *surface_fit(hair))
-    style_items.add(hair.vellus, replace(settings, seed=style_items.new_seed(hair.vellus)), name)
-    return style_items.active_of(hair.vellus).name
+    if not has_seed:
+        settings = replace(settings, seed=style_items.new_seed(hair.vellus))
+    style_items.add(hair.vellus, settings, name)
+    return style_items.settings_of(style_items.active_of(hair.vellus))
 
 
 def assign(hair: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> None:

@@ -153,7 +153,7 @@ def test_styles_are_saved_appended_and_copied_with_their_hair(styled, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=path)
     assert (styles(), names()) == wanted
     bpy.ops.wm.read_homefile(use_empty=True)
-    with bpy.data.libraries.load(path) as (source, target):
+    with bpy.data.libraries.load(path) as (_source, target):
         target.objects = ["Hair"]
     assert (styles(), names()) == wanted
     assert bpy.data.hair_curves["Hair"].animation_data.action is not None
@@ -230,7 +230,7 @@ def test_curls_get_the_points_they_want(hair):
     operate(bpy.ops.vellus.use_points)
     assert state().hair.point_count == curl.points_wanted(styles()[0], 0.5)
     assert "vellus.use_points" not in draw(bpy.types.VELLUS_PT_styles).drawn
-    state().styles[0].curl.pitch = 1e-3
+    state().styles[0].curl.pitch = state().styles[0].curl.radius = 1e-3
     operate(bpy.ops.vellus.use_points)
     assert state().hair.point_count == 257
     state().styles[0].curl.pitch = 1.0
