@@ -5,14 +5,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bpy.types import Curves
+from bpy.types import Curves, Object
 
 from ...core.errors import HairError
 from ...core.files import style_presets
 from ...core.files.settings_file import PartialSettings
 from ...core.geometry import strands
 from ...core.grooming import groom_defaults
-from ...core.grooming.groom import GuideSettings
+from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import declared
 from ...core.styling import curl, fitting
 from ...core.styling.base import StyleSettings, has_effect
@@ -69,12 +69,16 @@ def surface_fit(hair: Curves) -> tuple[float, float]:
     Raises `HairError`.
     """
     guides, settings = pipeline.inputs_of(hair)
-    of_guides = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
-    open_guides, open_hair = replace(of_guides, length=None), replace(settings, influence_distance=None)
-    known_guides, known_hair = pipeline.complete(guides.surface, open_guides, open_hair, scene.present_depsgraph())
+    return fit_of(guides.surface, setting_properties.to_settings(guides.vellus.guides, GuideSettings), settings)
+
+
+def fit_of(surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings) -> tuple[float, float]:
+    """The same for hair of these settings on a mesh object."""
+    open_guides, open_hair = replace(guide_settings, length=None), replace(hair_settings, influence_distance=None)
+    known_guides, known_hair = pipeline.complete(surface_object, open_guides, open_hair, scene.present_depsgraph())
     # Found by `complete`, which leaves none open.
     length, influence = known_guides.length or _HEAD_LENGTH, known_hair.influence_distance or 0.0
-    spacing = influence / groom_defaults.INFLUENCE * math.sqrt(of_guides.guide_count / settings.strand_count)
+    spacing = influence / groom_defaults.INFLUENCE * math.sqrt(guide_settings.guide_count / hair_settings.strand_count)
     return length / _HEAD_LENGTH, spacing
 
 
