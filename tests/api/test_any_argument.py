@@ -16,7 +16,7 @@ import numpy as np
 from hair_addon import api
 from hair_addon.blender.live import live_hair
 from hair_addon.core.files import settings_file
-from hair_addon.core.imaging.pixel_sampling import FrameSettings, PictureSettings
+from hair_addon.core.imaging.pixel_sampling import DRAWING_FIELDS, FRAME_FIELDS, PictureSettings
 from hair_addon.core.params import declared
 from hair_addon.core.shading.tables import lookup_tables
 from hair_addon.core.styling.kinds import KINDS, OFFERS
@@ -87,8 +87,9 @@ def value_for(dice, name, default, details):
     return COSTLY[name] if name in COSTLY and is_number and value > COSTLY[name] else value
 
 
-def changes(dice, settings_class, cheap):
-    declarations = {name: (default, details) for name, default, details in declared(settings_class)}
+def changes(dice, settings_class, cheap, skip=()):
+    known = [(name, *declaration) for name, *declaration in declared(settings_class) if name not in skip]
+    declarations = {name: (default, details) for name, default, details in known}
     chosen = dice.sample(sorted(declarations), dice.randint(0, 2))
     found = {name: value for name, value in COSTLY.items() if name in declarations and name in cheap}
     return found | {name: value_for(dice, name, *declarations[name]) for name in chosen}
@@ -150,12 +151,12 @@ CALLS = {
     "bake_tables": lambda d: api.bake_tables(
         anything(d, "tables"), has_plots=anything(d, False), **changes(d, lookup_tables.Settings, COSTLY)
     ),
-    "draw": lambda d: api.draw(**changes(d, PictureSettings, COSTLY)),
+    "draw": lambda d: api.draw(**changes(d, PictureSettings, COSTLY, FRAME_FIELDS)),
     "render": lambda d: api.render(
         anything(d, "a.png", "b_##.exr"),
         frame=anything(d, None, 1, 5),
         engine=anything(d, "vellus"),
-        **changes(d, FrameSettings, COSTLY),
+        **changes(d, PictureSettings, COSTLY, DRAWING_FIELDS),
     ),
     "add_style": add_style,
     "styles_of": lambda d: api.styles_of(target(d, "HAIR")),

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         selection,
         staleness,
         style_notes,
+        styled_hair,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -13,7 +13,7 @@ from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError
 from ...core.geometry import strands
-from ...core.grooming import groom, groom_defaults
+from ...core.grooming import following, groom, groom_defaults, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
@@ -22,8 +22,9 @@ from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..materials import looks
 from ..settings import preferences, setting_properties
-from . import bindings, staleness
+from . import bindings, staleness, styled_hair
 from .bindings import BoundHair
+from .styled_hair import ReadStyles
 
 # Of the guides' own Curves, by their length: so they are seen on a surface of any size.
 _GUIDE_RADIUS = 1.0 / 300.0
@@ -106,22 +107,31 @@ def _binding_hair(guide_curves, settings, depsgraph, target):
     settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture, len(guides.roots))
     key = staleness.root_key(settings, density, None if texture is None else texture.values)
     parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
-    found = _found_guides(target, settings, key, parting.key, guides, surface)
-    roots = _kept_roots(target, surface, key, settings.strand_count) if found is None else None
+    read = styled_hair.read_styles(target, guide_curves.surface, surface, guide_curves, depsgraph)
+    known = _known_binding(target, settings, key, parting.key, guides, surface)
+    roots = _kept_roots(target, surface, key, settings.strand_count) if known is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
 
+    ground = _ground(surface, (density, texture), parting, device)
+
     def compute(progress):
-        if found is None:
-            binding = _bind(surface, guides, settings, (density, texture), parting, roots, device, progress)
+        if known is None:
+            binding = _bind(surface, guides, settings, ground, roots, progress)
+            make_trees = _trees_on(surface, guides, settings, ground)
         else:
-            binding = hair_binding.weigh_again(found, settings)
-        return _growing(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface), progress)
+            binding = hair_binding.weigh_again(known.binding, settings)
+
+            def make_trees():
+                return known.styles.trees.weigh_again(settings)
+
+        styles = styled_hair.bind(read, binding, guides, settings, surface, make_trees)
+        return _growing(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles), progress)
 
     return (yield compute)
 
 
-def _found_guides(target, settings, key, parting_key, guides, surface):
-    """Return the `HairBinding` if a search would find the same guides; otherwise None.
+def _known_binding(target, settings, key, parting_key, guides, surface):
+    """Return the `BoundHair` whose guides a search would find again; otherwise None.
 
     So changes of weights, limits and widths need no search.
     """
@@ -130,7 +140,7 @@ def _found_guides(target, settings, key, parting_key, guides, surface):
         return None
     most = bound.binding.candidates.indices.shape[1] - 1
     is_same = bound.surface.is_at_rest_as(surface) and bound.guides.roots.is_same(guides.roots)
-    return bound.binding if is_same and settings.neighbour_limit <= most else None
+    return bound if is_same and settings.neighbour_limit <= most else None
 
 
 def complete(
@@ -182,8 +192,10 @@ def adding_hair(
         )
         guides = _as_written(grown, surface, device)
         progress = part_of(progress, 0.5, 1.0)
-        binding = _bind(surface, guides, hair_settings, of_hair, parting, None, device, progress)
-        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface)
+        ground = _ground(surface, of_hair, parting, device)
+        binding = _bind(surface, guides, hair_settings, ground, None, progress)
+        styles = _unstyled(binding, guides, hair_settings, surface, ground)
+        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface, styles)
         return grown, _growing(bound, progress)
 
     grown, bound = yield compute
@@ -207,8 +219,10 @@ def hair_between(
         density = painted if density is None else density
         completed = groom_defaults.complete(settings, surface.posed_mesh, density, guide_count=len(guides))
         key = staleness.root_key(completed, density)
-        binding = _bind(surface, guides, completed, (density, None), parting, None, device, progress)
-        return _growing(BoundHair(binding, completed, key, parting.key, guides, None, surface), progress)
+        ground = _ground(surface, (density, None), parting, device)
+        binding = _bind(surface, guides, completed, ground, None, progress)
+        styles = _unstyled(binding, guides, completed, surface, ground)
+        return _growing(BoundHair(binding, completed, key, parting.key, guides, None, surface, styles), progress)
 
     return compute
 
@@ -225,23 +239,34 @@ def _as_written(guides, surface, device):
     return strands.from_numpy(surface.from_local(points), guides.roots, device)
 
 
-def _bind(surface, guides, settings, mask, parting, roots, device, progress):
+def _ground(surface, mask, parting, device):
+    """What strands and clump sites stand on: arguments of `groom.bind_hair`. mask: (density, texture)."""
     density, texture = mask
-    return groom.bind_hair(
-        surface.mesh,
-        guides,
-        settings,
-        density=density,
-        texture=texture,
-        regions=parting.regions,
-        lines=parting.lines,
-        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
-        shape=surface.shape,
-        roots=roots,
-        is_mirrored=surface.is_mirrored,
-        device=device,
-        progress=part_of(progress, 0.0, 0.8),
-    )
+    return {
+        "density": density,
+        "texture": texture,
+        "regions": parting.regions,
+        "lines": parting.lines,
+        "drawn_on": surface.from_local(surface.posed) if surface.is_deformed else None,
+        "shape": surface.shape,
+        "is_mirrored": surface.is_mirrored,
+        "device": device,
+    }
+
+
+def _bind(surface, guides, settings, ground, roots, progress):
+    return groom.bind_hair(surface.mesh, guides, settings, roots=roots, progress=part_of(progress, 0.0, 0.8), **ground)
+
+
+def _trees_on(surface, guides, settings, ground):
+    """A function that makes the `ClumpTrees` of hair."""
+    return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **ground)
+
+
+def _unstyled(binding, guides, settings, surface, ground):
+    """The `StyledHair` of hair that is new: it has no styles yet."""
+    make_trees = _trees_on(surface, guides, settings, ground)
+    return styled_hair.bind(ReadStyles(), binding, guides, settings, surface, make_trees)
 
 
 def _growing(bound, progress):
@@ -297,6 +322,7 @@ def write_hair(target: Curves) -> None:
             written_radii=bound.written_radii,
         )
         bound.written_radii = radii
+        curves.write_clumps(target, bound.styles.clumps)
     if not bound.is_map_written:
         curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
     curves.write_points(target, bound.growing)
@@ -328,6 +354,26 @@ def _kept_roots(target, surface, key, count):
     return curves.stored_roots(target, surface, is_complete=True)
 
 
+def restyle(target: Curves, depsgraph: Depsgraph) -> bool:
+    """Apply the styles of bound hair as they are set now, if nothing else of it has changed; whether that is so.
+
+    Nothing is searched; nothing at all is computed where the styles are those that it has. Raises `HairError`.
+    """
+    bound = bindings.of(target)
+    guide_curves, settings = inputs_of(target)
+    if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
+        return False
+    guides = curves.read_guides(guide_curves, bound.surface, bound.binding.positions.device, bound.guides)
+    combed = following.combed(guides, bound.guides)
+    if combed is None or len(combed):
+        return False
+    read = styled_hair.read_styles(target, target.surface, bound.surface, guide_curves, depsgraph)
+    if not read.is_same(bound.styles.read):
+        styles = bound.styles
+        bound.restyle(styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: styles.trees))
+    return True
+
+
 def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
     """Make Curves again from the settings and inputs they keep. What is wrong becomes their status.
 
@@ -340,10 +386,18 @@ def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
         if state.kind == "GUIDES":
             settings = setting_properties.to_settings(state.guides, groom.GuideSettings)
             distribute_guides(target.surface, settings, depsgraph, target, keeps_roots=True)
-        elif state.kind == "HAIR":
+        elif state.kind == "HAIR" and not _is_restyled(target, depsgraph):
             interpolate_hair(*inputs_of(target), depsgraph, target)
     except HairError as error:
         state.status = str(error)
+
+
+def _is_restyled(target, depsgraph):
+    if not restyle(target, depsgraph):
+        return False
+    write_hair(target)
+    target.vellus.status = ""
+    return True
 
 
 def require_uncombed(target: Curves) -> None:

@@ -14,15 +14,17 @@ from .translations import CONTEXT
 _SMALL_WORDS = {"in", "of", "per", "to"}  # stay lower case in titles
 
 
-def annotations(settings_class, update=None, skip=(), unkeyed=()):
+def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None):
     """{name: bpy property} for the fields of a `Settings` class but those of `skip`; `update` as in bpy.props.
 
     A radius has its diameter beside it, which is shown in its place. Operators have no `update`. Structural settings,
-    and those of `unkeyed`, take no keys.
+    and those of `unkeyed`, take no keys. high: {name: largest value} of fields whose range is shorter here.
     """
+    highs = high or {}
     made = {}
     for name, default, details in declared(settings_class):
         if name not in skip:
+            details = replace(details, high=highs.get(name, details.high))
             made[name] = _property(name, default, details, update, details.is_structural or name in unkeyed)
             if details.diameter is not None:
                 shown, description = details.diameter

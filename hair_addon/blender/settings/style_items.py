@@ -88,6 +88,13 @@ def wetness_of(state):
     return max((item.wet.amount for item in state.styles if item.kind == "WET" and item.wet.is_on), default=0.0)
 
 
+def objects_named(state):
+    """Names of the objects that a hair's styles read."""
+    cutters = {item.trim.cutter for item in state.styles if item.kind == "TRIM"}
+    targets = {item.lean.target for item in state.styles if item.kind == "LEAN" and item.lean.direction == "OBJECT"}
+    return (cutters | targets) - {""}
+
+
 def unique_name(name, others):
     """A name, numbered as Blender numbers if another has it: Curl, Curl.001."""
     if name not in others:

@@ -6,6 +6,6 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import cost, following, groom, groom_defaults, guide_growth, rooted_curves
+    from . import cost, following, groom, groom_defaults, guide_growth, hair_styles, rooted_curves
 else:
     __getattr__ = submodules(__name__)

@@ -8,22 +8,25 @@ strands of it, and is what combing repeats. The stages need Warp, which takes lo
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import geometry, grooming, interpolation, placement
+from .. import geometry, grooming, interpolation, placement, styling
 from ..errors import HairError
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, positions
 from ..geometry.strands import Strands
 from ..geometry.texture import Texture
-from ..interpolation import hair_binding
 from ..interpolation.hair_binding import HairBinding
 from ..interpolation.regions import Regions
 from ..kernels import kernel_setup
 from ..long_work import Progress, no_progress, part_of
 from ..params import Settings, param, param_from_surface
 from . import groom_defaults
+
+if TYPE_CHECKING:
+    from ..interpolation.part_lines import PartLines
 
 CONTROL_POINT_COUNT = 6  # [Report12] section 5
 POINT_COUNT = 41  # [Report12] section 2.2
@@ -131,6 +134,15 @@ class HairSettings(Settings):
         label="Max guides per strand",
         low=1,
         high=32,
+    )
+    point_count: int = param(
+        POINT_COUNT,
+        "Number of points along a strand; curls need 8 for each turn",
+        label="Points per strand",
+        low=3,
+        high=257,
+        soft_high=129,
+        is_structural=True,
     )
     keep_length: float = param(
         1.0,
@@ -292,10 +304,7 @@ def bind_hair(
     check_points(mesh, guides.roots)
     load_kernels(device, part_of(progress, 0.0, 0.1))
 
-    laid = None
-    if lines is not None:
-        _load_kernels(device, [interpolation.part_lines], part_of(progress, 0.0, 0.1))
-        laid = interpolation.part_lines.lay(mesh, lines, device, drawn_on)
+    laid = laid_lines(mesh, lines, drawn_on, device, part_of(progress, 0.0, 0.1))
     progress("Placing strands", 0.1)
     settings = groom_defaults.complete(settings, mesh, density, texture, len(guides.roots))
     if roots is None:
@@ -306,20 +315,24 @@ def bind_hair(
         else:
             roots = placement.textured_roots.sample_textured(*where, texture)
 
-    guide_positions, guide_normals = geometry.root_frames.rooted(mesh, guides.roots, device)
-    root_positions, root_normals = geometry.root_frames.rooted(mesh, roots, device)
     progress("Finding guides", 0.4)
-    candidates = interpolation.guide_weights.find_candidates(
-        root_positions,
-        root_normals,
-        guide_positions,
-        guide_normals,
-        settings.neighbour_limit,
-        regions=interpolation.regions.kept_apart(regions, roots, guides.roots),
-        lines=laid,
+    return interpolation.root_binder.RootBinder(mesh, guides.roots, settings, regions, laid, is_mirrored, device).bind(
+        roots
     )
-    at_roots, at_guides = (root_positions, root_normals), (positions(mesh, guides.roots), guide_normals)
-    return hair_binding.weighed(roots, at_roots, at_guides, candidates, settings, is_mirrored)
+
+
+def laid_lines(
+    mesh: TriMesh,
+    lines: np.ndarray | None,
+    drawn_on: np.ndarray | None = None,
+    device: str = "cpu",
+    progress: Progress = no_progress,
+) -> "PartLines | None":
+    """`PartLines` of segments near a surface, None for none; arguments as in `bind_hair`."""
+    if lines is None:
+        return None
+    _load_kernels(device, [interpolation.part_lines], progress)
+    return interpolation.part_lines.lay(mesh, lines, device, drawn_on)
 
 
 def load_kernels(device: str, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS) -> None:
@@ -339,10 +352,12 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         placement.sampled_cells,
         placement.preconditioner,
         geometry.closest_point,
+        styling.steps,
+        styling.stack,
     ]
     on_device += [
         placement.voronoi,
-        interpolation.cpu_interpolation if device == "cpu" else interpolation.gpu_interpolation,
+        interpolation.interpolation if device == "cpu" else interpolation.gpu_interpolation,
     ]
     on_processor = [
         placement.farthest,
@@ -351,6 +366,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         interpolation.clump_centers,
         geometry.sampling,
         geometry.transform,
+        styling.guide_lean,
     ]
     if device == "cpu":
         _load_kernels(device, on_device + on_processor, progress, most_threads)
@@ -365,10 +381,10 @@ def _load_kernels(device, modules, progress, most_threads=kernel_setup.MOST_THRE
     kernel_setup.load([wp.get_module(module.__name__) for module in modules], device, progress, most_threads)
 
 
-def strand_radii(settings: HairSettings, point_count: int = POINT_COUNT) -> np.ndarray:
+def strand_radii(settings: HairSettings) -> np.ndarray:
     """(point_count,) float32 [m]: radius along every strand, from `radius` at the root to its `tip_taper` part."""
     radius = _known(settings.radius)
-    return np.linspace(radius, radius * settings.tip_taper, point_count, dtype=np.float32)
+    return np.linspace(radius, radius * settings.tip_taper, settings.point_count, dtype=np.float32)
 
 
 def _known(value: float | None) -> float:

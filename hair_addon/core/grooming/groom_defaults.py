@@ -70,6 +70,11 @@ def hair_size(
     )
 
 
+def grown_area(mesh: TriMesh, density: np.ndarray | None = None, texture: Texture | None = None) -> float:
+    """The area [m²] that hair grows on; arguments as in `hair_size`."""
+    return float(_mean_weights(mesh, density, texture) @ mesh.areas)
+
+
 def complete[S: Settings](
     settings: S,
     mesh: TriMesh,

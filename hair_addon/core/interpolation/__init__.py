@@ -8,7 +8,6 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         clump_centers,
-        cpu_interpolation,
         cpu_weights,
         gpu_interpolation,
         guide_weights,
@@ -16,6 +15,7 @@ if TYPE_CHECKING:
         interpolation,
         part_lines,
         regions,
+        root_binder,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -15,7 +15,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 NUMBERS = 8  # that are known of a guide
 
 
-@wp.func_native(native_code.body(__file__, "weigh.cpp"))
+@wp.func_native(native_code.body(__file__, "weigh.cpp", WIDTH=NUMBERS))
 def weigh(
     strand: int,
     nearest: float,
@@ -34,7 +34,7 @@ def weigh(
     """Guides, weights and turns of a strand. frames: (G, 8), the tangent and the normal of each guide."""
 
 
-@wp.func_native(native_code.body(__file__, "limit.cpp"))
+@wp.func_native(native_code.body(__file__, "limit.cpp", WIDTH=NUMBERS))
 def limit(
     strand: int,
     indices: wp.array2d[int],

@@ -16,6 +16,7 @@
 //   array_t<float> out_weights          (S, K) weights of sum 1
 
 #include "lanes.h"
+#include "guide_rows.h"
 
 // 0 up to the first value, 1 from a range further on, a smooth step between.
 const auto fade = [](float first, float per_range, lanes value) {

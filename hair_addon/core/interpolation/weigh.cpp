@@ -17,6 +17,7 @@
 //   array_t<vec2> out_turns             (S, K) cosine and sine of the turn from a guide's frame to the strand's
 
 #include "lanes.h"
+#include "guide_rows.h"
 
 const int slot_count = out_indices.shape[1];
 const int* candidate = candidates.data + size_t(strand) * candidates.shape[1];

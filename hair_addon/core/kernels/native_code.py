@@ -15,12 +15,14 @@ def body(module_file: str, name: str, **constants: int | float) -> str:
     """Return the source of a function's body for `wp.func_native`.
 
     module_file: the `__file__` of the module that declares it; name: of the file beside it. constants (int or float)
-    stand before it under their names, as `constexpr`. `#include "x.h"` is replaced by that file.
+    stand before it under their names, as `constexpr`. `#include "x.h"` is replaced by that file, of the module's folder
+    or of this one.
     """
-    folder = Path(module_file).parent
+    folders = Path(module_file).parent, Path(__file__).parent
 
     def read(name):
-        return (folder / name).read_text(encoding="utf-8")
+        path = next((path for path in (folder / name for folder in folders) if path.is_file()), folders[0] / name)
+        return path.read_text(encoding="utf-8")
 
     source = _INCLUDE.sub(lambda include: read(include[1]), read(name))
     return "\n".join([*(_declaration(*constant) for constant in constants.items()), source])

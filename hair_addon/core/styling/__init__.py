@@ -6,6 +6,29 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import base, bend, braid, clump, curl, fitting, frizz, kinds, lean, smooth, trim, wet
+    from . import (
+        base,
+        bend,
+        braid,
+        clump,
+        clump_trees,
+        curl,
+        fitting,
+        frizz,
+        guide_lean,
+        guide_styles,
+        kinds,
+        lean,
+        masks,
+        program,
+        program_rows,
+        random_numbers,
+        smooth,
+        stack,
+        steps,
+        style_inputs,
+        trim,
+        wet,
+    )
 else:
     __getattr__ = submodules(__name__)

@@ -13,6 +13,8 @@ x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)).
 import math
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
 from ..params import Settings, param
 
 
@@ -68,6 +70,17 @@ class Profile:
 
 
 EVERYWHERE = Profile()
+
+
+def evaluated(profile: Profile, x: np.ndarray) -> np.ndarray:
+    """The profile at x, parts of the length from 0 to 1; any shape."""
+    y = np.clip((x - profile.start) / (1.0 - profile.start), 0.0, 1.0)
+    y = 1.0 - _power(1.0 - y, profile.exponent) if profile.is_flipped else _power(y, profile.exponent)
+    return profile.root + (profile.tip - profile.root) * y
+
+
+def _power(x, exponent):
+    return np.where(x > 0.0, np.maximum(x, 1e-30) ** exponent, 0.0)
 
 
 def profile_of(settings: StyleSettings) -> Profile:

@@ -14,6 +14,8 @@ from .base import StyleSettings
 LABEL = "Wet"
 DESCRIPTION = "Soak hair: it clings, joins into locks and darkens"
 
+CLEARANCE = 0.15  # of wet guides from the surface, by the size of locks
+
 
 @dataclass(frozen=True)
 class Settings(StyleSettings):

@@ -1,38 +1,14 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Vectors that one source is compiled with for both kinds of device: eight numbers in Clang's vectors on a processor,
-// whose threads are few; one number on a GPU, whose threads are lanes of a vector already.
-//
-// Included at the head of a function's body, so all of it is local to that function. Operators and `?:` act on each
-// lane.
+// Numbers of guides as vectors of eight lanes, and shares of weights. Stands after lanes.h in a function's body.
 
 #if defined(__CUDA_ARCH__)
-  constexpr int LANES = 1;
-  using lanes = float;
-  using ints = int;
-  const auto get_lane = [](auto vector, int) { return vector; };
-  const auto set_lane = [](auto& vector, int, auto value) { vector = value; };
-  const auto floor_of = [](lanes value) { return floorf(value); };
-  const auto sqrt_of = [](lanes value) { return sqrtf(value); };
-  const auto abs_of = [](lanes value) { return fabsf(value); };
-  const auto to_ints = [](lanes value) { return static_cast<int>(value); };
-  const auto lanes_of_bits = [](ints bits) { return __int_as_float(bits); };
   // Reads the eight numbers of each lane's guide, number i into columns[i]. numbers: (G, 8); guides below zero are
   // none, and read as guide 0.
   const auto read_columns = [](lanes (&columns)[8], ints guides, const float* numbers) {
     for (int i = 0; i < 8; ++i) columns[i] = numbers[size_t(guides < 0 ? 0 : guides) * 8 + i];
   };
 #else
-  constexpr int LANES = 8;
-  typedef float lanes __attribute__((ext_vector_type(8)));
-  typedef int ints __attribute__((ext_vector_type(8)));
-  const auto get_lane = [](auto vector, int lane) { return vector[lane]; };
-  const auto set_lane = [](auto& vector, int lane, auto value) { vector[lane] = value; };
-  const auto floor_of = [](lanes value) { return __builtin_elementwise_floor(value); };
-  const auto sqrt_of = [](lanes value) { return __builtin_elementwise_sqrt(value); };
-  const auto abs_of = [](lanes value) { return __builtin_elementwise_abs(value); };
-  const auto to_ints = [](lanes value) { return __builtin_convertvector(value, ints); };
-  const auto lanes_of_bits = [](ints bits) { return __builtin_bit_cast(lanes, bits); };
   // As above: each guide's eight numbers are read as a row, and the rows transposed in three steps of swapped halves.
   const auto read_columns = [](lanes (&row)[8], ints guides, const float* numbers) {
     for (int lane = 0; lane < 8; ++lane) {

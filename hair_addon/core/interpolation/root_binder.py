@@ -1,0 +1,80 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Binding of roots on one surface to its guides, and search among roots, within regions and beside part lines."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .. import geometry, interpolation
+from ..geometry.mesh import SurfacePoints, TriMesh, positions
+from .hair_binding import HairBinding, weighed
+from .regions import Regions
+
+if TYPE_CHECKING:
+    from .part_lines import PartLines
+
+
+@dataclass(frozen=True)
+class RootBinder:
+    """A surface with guides, as strands are bound to it.
+
+    mesh: `TriMesh` [m]; settings: `HairSettings`; regions: that no strand blends guides of two of; lines: `PartLines`
+    that no strand blends guides across, or None; is_mirrored: whether triangles are wound the other way than where
+    roots are stored.
+    """
+
+    mesh: TriMesh
+    guide_roots: SurfacePoints
+    settings: Any
+    regions: Sequence[Regions] = ()
+    lines: "PartLines | None" = None
+    is_mirrored: bool = False
+    device: str = "cpu"
+
+    def bind(self, roots: SurfacePoints) -> HairBinding:
+        """The `HairBinding` of strands at roots."""
+        guide_positions, guide_normals = self._guide_frames
+        root_positions, root_normals = geometry.root_frames.rooted(self.mesh, roots, self.device)
+        candidates = interpolation.guide_weights.find_candidates(
+            root_positions,
+            root_normals,
+            guide_positions,
+            guide_normals,
+            self.settings.neighbour_limit,
+            regions=interpolation.regions.kept_apart(self.regions, roots, self.guide_roots),
+            lines=self.lines,
+        )
+        at_roots, at_guides = (root_positions, root_normals), (positions(self.mesh, self.guide_roots), guide_normals)
+        return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
+
+    def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:
+        """(S, 2) int32: the two centres nearest to each strand on its side of part lines, -1 where there is one alone.
+
+        Those in the strand's region, where there are any.
+        """
+        regions = self._with_guide_regions(strands, centres)
+        found = interpolation.guide_weights.find_candidates(
+            strands.positions, strands.normals, centres.positions, centres.normals, 1, regions=regions, lines=self.lines
+        )
+        return found.indices.numpy().copy()
+
+    def with_settings(self, settings: Any) -> "RootBinder":
+        """The same with other `HairSettings`."""
+        return replace(self, settings=settings)
+
+    @cached_property
+    def _guide_frames(self):
+        return geometry.root_frames.rooted(self.mesh, self.guide_roots, self.device)
+
+    def _with_guide_regions(self, strands, centres):
+        """Regions (S,) and (K,) of strands and of centres, as of the guide that each follows first; None for none."""
+        kept_apart = interpolation.regions.kept_apart(self.regions, self.guide_roots, self.guide_roots)
+        if kept_apart is None:
+            return None
+        of_guides = kept_apart[1]
+        first_guides = (binding.guide_weights.indices.numpy()[:, 0] for binding in (strands, centres))
+        of_strands, of_centres = (of_guides[guides] for guides in first_guides)
+        return of_strands, of_centres

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Vectors that one source is compiled with for both kinds of device: WIDTH numbers in Clang's vectors on a processor,
+// whose threads are few; one number on a GPU, whose threads are lanes of a vector already.
+//
+// Included at the head of a function's body, so all of it is local to that function. Operators and `?:` act on each
+// lane. WIDTH, of numbers in a vector, stands before it.
+
+#if defined(__CUDA_ARCH__)
+  constexpr int LANES = 1;
+  using lanes = float;
+  using ints = int;
+  using uints = unsigned;
+  const auto get_lane = [](auto vector, int) { return vector; };
+  const auto set_lane = [](auto& vector, int, auto value) { vector = value; };
+  const auto floor_of = [](lanes value) { return floorf(value); };
+  const auto sqrt_of = [](lanes value) { return sqrtf(value); };
+  const auto abs_of = [](lanes value) { return fabsf(value); };
+  const auto to_ints = [](lanes value) { return static_cast<int>(value); };
+  const auto to_lanes = [](uints value) { return static_cast<float>(value); };
+  const auto lanes_of_bits = [](ints bits) { return __int_as_float(bits); };
+  const auto bits_of_lanes = [](lanes value) { return __float_as_int(value); };
+  const auto any_of = [](auto condition) { return static_cast<bool>(condition); };
+#else
+  constexpr int LANES = WIDTH;
+  typedef float lanes __attribute__((ext_vector_type(WIDTH)));
+  typedef int ints __attribute__((ext_vector_type(WIDTH)));
+  typedef unsigned uints __attribute__((ext_vector_type(WIDTH)));
+  const auto get_lane = [](auto vector, int lane) { return vector[lane]; };
+  const auto set_lane = [](auto& vector, int lane, auto value) { vector[lane] = value; };
+  const auto floor_of = [](lanes value) { return __builtin_elementwise_floor(value); };
+  const auto sqrt_of = [](lanes value) { return __builtin_elementwise_sqrt(value); };
+  const auto abs_of = [](lanes value) { return __builtin_elementwise_abs(value); };
+  const auto to_ints = [](lanes value) { return __builtin_convertvector(value, ints); };
+  const auto to_lanes = [](uints value) { return __builtin_convertvector(value, lanes); };
+  const auto lanes_of_bits = [](ints bits) { return __builtin_bit_cast(lanes, bits); };
+  const auto bits_of_lanes = [](lanes value) { return __builtin_bit_cast(ints, value); };
+  const auto any_of = [](ints condition) { return __builtin_reduce_or(condition) != 0; };
+#endif

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Points that a style moves across their strand: given ρ_i in the frames, of which differences alone count,
+//
+//   w_i = ρ_i - ρ_(i-1), held to 0.98 d_i;  e_i = sqrt(d_i² - |w_i|²);  o'_i = e_i t(a) + w_i,u u(a) + w_i,v v(a)
+//
+// where a is the strand's own progress Σ e_j, so it goes around the head where the strand did before, and every
+// segment is as long as it was. With `keep_length` κ below 1 the progress is (1 - κ) d_i + κ e_i, and the strand
+// becomes longer.
+// offset(i, s, x, out u, out v) gives ρ_i [m] at the arc length s [m], x of the strand's length.
+
+const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
+  const float keep_length = number[7];
+  put_frames();
+  // Where the middles of segments are along the strand: there their frames hold.
+  lanes arc = 0.0f;
+  for (int i = 1; i < point_count; ++i) {
+    along[i] = arc + 0.5f * length[i];
+    arc += length[i];
+  }
+  marks at;
+  for (int lane = 0; lane < LANES; ++lane) at[lane] = 1;
+  const int ahead = point_count > 2 ? 1 : 0;
+  lanes progress = 0.0f;
+  arc = 0.0f;
+  for (int i = 1; i < point_count; ++i) {
+    const lanes d = length[i];
+    arc += d;
+    lanes to_u, to_v;
+    offset(i, arc, arc * per_total, to_u, to_v);
+    lanes w_u = to_u - before_u, w_v = to_v - before_v;
+    before_u = to_u;
+    before_v = to_v;
+    const lanes square = w_u * w_u + w_v * w_v, most = 0.9604f * d * d;
+    const auto is_far = square > most;
+    const lanes held = is_far ? sqrt_of(most / (is_far ? square : lanes(1.0f))) : lanes(1.0f);
+    w_u *= held;
+    w_v *= held;
+    const lanes advance = sqrt_of(higher_of(d * d - (w_u * w_u + w_v * w_v), lanes(0.0f)));
+    const lanes forward = keep_length == 1.0f ? advance : (1.0f - keep_length) * d + keep_length * advance;
+    const lanes middle = progress + 0.5f * forward;
+    progress += forward;
+    // The frame at `middle`, between those of the segments around it.
+    lanes below, above;
+    for (int lane = 0; lane < LANES; ++lane) {
+      const float place = get_lane(middle, lane);
+      while (at[lane] < point_count - 2 && lane_of(along[at[lane] + 1], lane) <= place) ++at[lane];
+      set_lane(below, lane, lane_of(along[at[lane]], lane));
+      set_lane(above, lane, lane_of(along[at[lane] + ahead], lane));
+    }
+    const lanes range = above - below;
+    const auto is_between = range > 1.0e-12f;
+    const lanes part = clamped(
+        is_between ? (middle - below) / (is_between ? range : lanes(1.0f)) : lanes(0.0f), lanes(0.0f), lanes(1.0f)
+    );
+    const vector t_below = gathered(t, at, 0), u_below = gathered(u, at, 0);
+    const vector t_between = t_below + (gathered(t, at, ahead) - t_below) * part;
+    const vector u_between = u_below + (gathered(u, at, ahead) - u_below) * part;
+    // Segments that turn back cancel each other: there the frame of the first holds.
+    const auto is_facing = dot(t_between, t_between) > 0.01f;
+    const vector forwards = unit_or(chosen(is_facing, t_between, t_below), lanes(1.0e-6f), t_below);
+    const vector flat = u_between - forwards * dot(u_between, forwards);
+    const auto is_flat = dot(flat, flat) > 0.01f;
+    const vector sideways = unit_or(
+        chosen(is_flat, flat, u_below - forwards * dot(u_below, forwards)), lanes(1.0e-6f), u_below
+    );
+    const vector made = forwards * forward + sideways * w_u + cross(forwards, sideways) * w_v;
+    const lanes size = sqrt_of(dot(made, made));
+    const auto has_length = d > 1.0e-12f;
+    const auto is_made = has_length && size > 1.0e-14f;
+    next[i] = chosen(is_made, made * (1.0f / (is_made ? size : lanes(1.0f))), t[i]);
+    if (keep_length != 1.0f) length[i] = is_made ? size : d;
+  }
+  for (int i = 1; i < point_count; ++i) t[i] = next[i];
+};

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sites of clumps in levels, and the strands that belong to each.
+
+Sites are evenly placed on the surface and are not roots of the hair: a strand's clump depends on its own root alone,
+whichever other strands there are. A strand belongs to the nearest site of the finest level, and a site to the nearest
+one of the next coarser level, so locks are made of whole smaller locks.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from .. import interpolation
+from ..geometry.mesh import SurfacePoints
+from ..interpolation.hair_binding import HairBinding
+from ..interpolation.root_binder import RootBinder
+from ..kernels.checks import require_indices
+from .program import TreeSettings
+from .random_numbers import CROSSOVER, random_numbers
+
+MOST_SITES = 50_000  # of a level: more take minutes to place
+_HEXAGON = 0.866  # area of a site's cell by the square of the distance between sites
+
+
+def site_count(area: float, size: float) -> int:
+    """Number of sites at a distance [m] from each other on an area [m²]."""
+    return int(np.clip(round(area / (_HEXAGON * size**2)), 1, MOST_SITES))
+
+
+@dataclass
+class ClumpTrees:
+    """The clump trees of one hair, each searched for once, while its surface, guides' roots and density stay.
+
+    binder: binds sites to guides; place(count, seed): `SurfacePoints` of evenly placed sites; area: that hair grows on
+    [m²].
+    """
+
+    binder: RootBinder
+    place: Callable[[int, int], SurfacePoints]
+    area: float
+    _levels: dict[TreeSettings, list[HairBinding]] = field(default_factory=dict)
+    _members: dict[tuple, list[np.ndarray]] = field(default_factory=dict)
+    _parents: dict[tuple, np.ndarray] = field(default_factory=dict)
+
+    def levels(self, tree: TreeSettings) -> list[HairBinding]:
+        """The centres of each level, the coarsest first, bound to guides."""
+        if tree not in self._levels:
+            self._levels[tree] = [
+                self.binder.bind(self.place(site_count(self.area, size), tree.seed + level))
+                for level, size in enumerate(tree.sizes)
+            ]
+        return self._levels[tree]
+
+    def weigh_again(self, settings: Any) -> "ClumpTrees":
+        """The same trees where weights, limits or lengths of `HairSettings` changed: nothing is searched."""
+        weighed = {
+            tree: [interpolation.hair_binding.weigh_again(binding, settings) for binding in levels]
+            for tree, levels in self._levels.items()
+        }
+        return ClumpTrees(
+            self.binder.with_settings(settings), self.place, self.area, weighed, self._members, self._parents
+        )
+
+    def members(self, owner: object, strands: HairBinding, tree: TreeSettings) -> list[np.ndarray]:
+        """(S,) int32 per level, the coarsest first: the place of each strand's centre in its level.
+
+        owner: what the strands are known by.
+        """
+        key = owner, tree
+        if key not in self._members:
+            nearest = self._nearest(strands, self.levels(tree)[-1])
+            if tree.crossover > 0.0:
+                crosses = random_numbers(strands.identities[0], tree.seed, CROSSOVER) < tree.crossover
+                crosses &= nearest[:, 1] >= 0
+                nearest[crosses, 0] = nearest[crosses, 1]
+            self._members[key] = self._upward(tree, nearest[:, 0], len(tree.sizes) - 1)
+        return self._members[key]
+
+    def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
+        """(K,) int32 per coarser level: the centres that those of one level belong to."""
+        own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
+        return self._upward(tree, own, level)[:-1]
+
+    def _upward(self, tree, places, level):
+        """Places in a level and in all coarser ones, the coarsest first."""
+        found = [places]
+        levels = self.levels(tree)
+        for finer in range(level, 0, -1):
+            key = tree, finer
+            if key not in self._parents:
+                self._parents[key] = self._nearest(levels[finer], levels[finer - 1])[:, 0]
+            found.insert(0, self._parents[key][found[0]])
+        return found
+
+    def forget(self, owner: object) -> None:
+        """Drop the members that some strands are of: they have other roots now."""
+        self._members = {key: found for key, found in self._members.items() if key[0] != owner}
+
+    def _nearest(self, strands, centres):
+        nearest = self.binder.nearest(strands, centres)
+        require_indices("clump centres", nearest[:, 0], len(centres.roots))
+        return nearest

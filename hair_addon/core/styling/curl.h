@@ -1,0 +1,41 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Curl (curl.py): a helix or a wave around the strand's own path.
+
+const float radius = number[8], pitch = number[9], roundness = number[10], coherence = number[11];
+const float stretch = number[12], left_handed = number[13], switchback = number[14], keep = number[7];
+const float two_pi = 6.28318530718f;
+const float turn = sqrtf(two_pi * radius * two_pi * radius + pitch * pitch);
+const float per_square = 0.5f * two_pi * two_pi * (1.0f + roundness * roundness);
+const lanes hand = random_number(lock, seed, ints(CLUMP_HAND)) < left_handed ? lanes(-1.0f) : lanes(1.0f);
+lanes turns = random_number(lock, seed, ints(CLUMP_PHASE)) + (1.0f - coherence) * (random(PHASE) - 0.5f);
+const lanes shift = random_number(lock, seed, ints(CLUMP_SHIFT));
+lanes before = 0.0f, radius_before = 0.0f;
+move_across(
+    [&](int, lanes s, lanes x, lanes& to_u, lanes& to_v) {
+      const lanes wound = base * radius * profile(x) * smoothstep(s * (2.0f / turn));
+      const lanes middle = 0.5f * (wound + radius_before);
+      const lanes rise = pitch * (1.0f + stretch * (1.0f - x));
+      lanes rate = 1.0f / sqrt_of(per_square * middle * middle + rise * rise);
+      if (keep != 1.0f) rate = (1.0f - keep) / rise + keep * rate;
+      if (switchback > 0.0f) {
+        // The sense of winding is a noise of the lock: -1 or 1 in each cell, and a short passage from cell to cell.
+        const lanes place = s * (1.0f / switchback) + shift;
+        const lanes cell = floor_of(place);
+        const auto sense_of = [&](lanes which) {
+          return random_number(lock, seed, to_ints(which) + CLUMP_CELLS) < 0.5f ? lanes(-1.0f) : lanes(1.0f);
+        };
+        const lanes here = sense_of(cell);
+        rate *= here + (sense_of(cell + 1.0f) - here) * smoothstep((place - cell - 0.7f) * (1.0f / 0.3f));
+      }
+      turns += (s - before) * rate;
+      before = s;
+      radius_before = wound;
+      lanes sine, cosine;
+      sine_and_cosine(turns, sine, cosine);
+      to_u = wound * cosine;
+      to_v = wound * sine * roundness * hand;
+    },
+    lanes(0.0f),
+    lanes(0.0f)
+);

@@ -1,0 +1,31 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Frames of a strand's segments, by least rotations [Bishop75]: from the centre's reference to the strand's normal, to
+// its first segment, and from each segment to the next. u and t × u are across segment i.
+
+const auto put_frames = [&]() {
+  // r(n), in the surface's own axes, is continuous everywhere but straight below.
+  const auto to_axes = [&](const vector& v) {
+    return vector{
+        axes.data[0][0] * v.x + axes.data[0][1] * v.y + axes.data[0][2] * v.z,
+        axes.data[1][0] * v.x + axes.data[1][1] * v.y + axes.data[1][2] * v.z,
+        axes.data[2][0] * v.x + axes.data[2][1] * v.y + axes.data[2][2] * v.z,
+    };
+  };
+  const auto from_axes = [&](const vector& v) {
+    return vector{
+        axes.data[0][0] * v.x + axes.data[1][0] * v.y + axes.data[2][0] * v.z,
+        axes.data[0][1] * v.x + axes.data[1][1] * v.y + axes.data[2][1] * v.z,
+        axes.data[0][2] * v.x + axes.data[1][2] * v.y + axes.data[2][2] * v.z,
+    };
+  };
+  const vector n = to_axes(centre_normal);
+  const lanes above = higher_of(1.0f + n.z, lanes(1.0e-6f));
+  const vector reference = from_axes({1.0f - n.x * n.x / above, -n.x * n.y / above, -n.x});
+  vector across = turned(turned(reference, centre_normal, normal), normal, t[1]);
+  u[1] = across;
+  for (int i = 2; i < point_count; ++i) {
+    across = turned(across, t[i - 1], t[i]);
+    u[i] = across;
+  }
+};

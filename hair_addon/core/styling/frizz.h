@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Frizz (frizz.py): band-limited noise across the strand, WAVES an octave.
+
+const float amplitude = number[8], wavelength = number[9], gain = number[11], coherence = number[12];
+const float per_spread = number[13], stray = number[14], stray_gain = number[15];
+const int octave_count = static_cast<int>(number[10]);
+const lanes per_spacing = (point_count - 1) * per_total;
+// Strands with the lowest numbers fly away, by degrees: so the part may be a slider.
+const lanes is_stray = stray > 0.0f ? clamped((stray - random(STRAY)) * 10.0f, lanes(0.0f), lanes(1.0f)) : lanes(0.0f);
+const lanes size = base * amplitude * (1.0f + (stray_gain - 1.0f) * is_stray);
+lanes phase[WAVES * MOST_OCTAVES], weight[WAVES * MOST_OCTAVES];
+float frequency[WAVES * MOST_OCTAVES];
+float octave_gain = 1.0f;
+for (int wave = 0; wave < WAVES * octave_count; ++wave) {
+  frequency[wave] = number[16 + wave % WAVES] * static_cast<float>(1 << (wave / WAVES)) / wavelength;
+  const lanes points_a_wave = per_spacing / frequency[wave];
+  weight[wave] = octave_gain * smoothstep((points_a_wave - 2.0f) * 0.5f);
+  phase[wave] = (1.0f - coherence) * random(WAVE_PHASES + wave);
+  if (coherence > 0.0f) {
+    // k_m has a random direction and a random size about 1 / spread turns.
+    const auto pick = [&](int part) { return random_number(ints(wave), seed, ints(WAVE_VECTORS + part)); };
+    const lanes z = 2.0f * pick(0) - 1.0f, flat = sqrt_of(higher_of(1.0f - z * z, lanes(0.0f)));
+    lanes sine, cosine;
+    sine_and_cosine(pick(1), sine, cosine);
+    const vector direction = {flat * cosine, flat * sine, z};
+    const vector rest = {
+        axes.data[0][0] * root.x + axes.data[0][1] * root.y + axes.data[0][2] * root.z,
+        axes.data[1][0] * root.x + axes.data[1][1] * root.y + axes.data[1][2] * root.z,
+        axes.data[2][0] * root.x + axes.data[2][1] * root.y + axes.data[2][2] * root.z,
+    };
+    phase[wave] += coherence * per_spread * (0.7f + 0.6f * pick(2)) * dot(direction, rest) + coherence * pick(3);
+  }
+  if (wave % WAVES == WAVES - 1) octave_gain *= gain;
+}
+const auto noise = [&](lanes s, lanes x, lanes& to_u, lanes& to_v) {
+  to_u = 0.0f;
+  to_v = 0.0f;
+  for (int wave = 0; wave < WAVES * octave_count; ++wave) {
+    lanes sine, cosine;
+    sine_and_cosine(phase[wave] + frequency[wave] * s, sine, cosine);
+    to_u += weight[wave] * cosine;
+    to_v += wave % 2 ? -weight[wave] * sine : weight[wave] * sine;
+  }
+  const lanes amount = size * profile(x);
+  to_u *= amount;
+  to_v *= amount;
+};
+lanes root_u, root_v;
+noise(lanes(0.0f), lanes(0.0f), root_u, root_v);
+move_across([&](int, lanes s, lanes x, lanes& to_u, lanes& to_v) { noise(s, x, to_u, to_v); }, root_u, root_v);

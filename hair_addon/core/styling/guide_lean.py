@@ -1,0 +1,105 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that lean, kept off the surface: the styles Lean and Wet (lean.py, wet.py) on guides.
+
+t'_i = unit((1 - A) t_i + A D), t_i where that is shorter than 1e-3. A segment that would end nearer to the surface than
+the clearance points at the place above it instead; lengths stay.
+"""
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..geometry.closest_point import SurfaceQuery
+from ..kernels import kernel_cache
+from ..kernels.checks import require_count
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+
+@wp.kernel
+def _lean(
+    surface: wp.uint64,
+    vertex_normals: wp.array[wp.vec3],
+    points: wp.array2d[wp.vec3],
+    amounts: wp.array2d[float],
+    directions: wp.array[wp.vec3],
+    clearance: float,
+    # outputs
+    out_points: wp.array2d[wp.vec3],
+):
+    guide = wp.tid()
+    indices = wp.mesh_get(surface).indices
+    position = points[guide, 0]
+    out_points[guide, 0] = position
+    arc = float(0.0)
+    has_leaned = bool(False)
+    for i in range(1, points.shape[1]):
+        segment = points[guide, i] - points[guide, i - 1]
+        size = wp.length(segment)
+        arc += size
+        amount = amounts[guide, i]
+        if amount > 0.0:
+            has_leaned = True
+        if not has_leaned or size < 1.0e-12:
+            position += segment
+            out_points[guide, i] = position
+            continue
+        forward = segment / size
+        leaned = (1.0 - amount) * forward + amount * directions[guide]
+        if wp.length(leaned) >= 1.0e-3:
+            forward = wp.normalize(leaned)
+        ahead = position + size * forward
+        # A guide leaves the surface by degrees.
+        wanted = wp.min(clearance, 0.5 * arc)
+        query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * clearance + size)
+        if query.result:
+            face = query.face
+            u = query.u
+            v = query.v
+            w = 1.0 - u - v
+            normal = wp.normalize(
+                u * vertex_normals[indices[3 * face]]
+                + v * vertex_normals[indices[3 * face + 1]]
+                + w * vertex_normals[indices[3 * face + 2]]
+            )
+            away = ahead - wp.mesh_eval_position(surface, face, u, v)
+            height = wp.dot(away, normal)
+            # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
+            if height < wanted and wp.length(away - height * normal) < 0.5 * wanted + 1.0e-6 * size:
+                forward = wp.normalize(ahead + (wanted - height) * normal - position)
+        position += size * forward
+        out_points[guide, i] = position
+
+
+def leaned(
+    points: np.ndarray,
+    amounts: np.ndarray,
+    directions: np.ndarray,
+    surface: SurfaceQuery,
+    vertex_normals: np.ndarray,
+    clearance: float,
+) -> np.ndarray:
+    """(G, P, 3) float32 [m]: guides whose segments turn towards directions.
+
+    points: (G, P, 3) [m]; amounts: (G, P) in [0, 1]; directions: (G, 3) unit; surface: that guides keep off;
+    vertex_normals: (V, 3) of its mesh; clearance [m]. A guide whose amounts are all zero stays to the last bit.
+    """
+    require_count("amounts", len(amounts), len(points))
+    require_count("directions", len(directions), len(points))
+    require_count("points", amounts.shape[1], points.shape[1])
+    require_count("normals", len(vertex_normals), len(surface.mesh.points))
+    if not (np.isfinite(points).all() and np.isfinite(directions).all()):
+        raise HairError("Guides with non-finite coordinates cannot lean.")
+    device = surface.mesh.device
+    there = [
+        wp.array(np.ascontiguousarray(array, np.float32), dtype=kind, device=device)
+        for array, kind in ((vertex_normals, wp.vec3), (points, wp.vec3), (amounts, float), (directions, wp.vec3))
+    ]
+    made = wp.empty(points.shape[:2], dtype=wp.vec3, device=device)
+    inputs = [surface.mesh.id, *there, clearance]
+    kernel_cache.launch(_lean, len(points), inputs=inputs, outputs=[made], device=device)
+    result = made.numpy()
+    is_still = ~(amounts > 0.0).any(axis=1)
+    result[is_still] = points[is_still]
+    return result

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The styles of a stack that act on guides, and the number of points a strand: guides as strands follow them.
+
+What is combed stays as it was combed. Only guides that changed are computed again, so a stroke costs what it moves.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from .. import geometry, styling
+from ..geometry.mesh import SurfacePoints, TriMesh, normals
+from ..geometry.strands import Strands, from_numpy
+from ..geometry.strands import segment_lengths as lengths_of
+from . import base, lean, wet
+from .base import Profile, StyleSettings, has_effect
+from .random_numbers import VARY, random_numbers
+
+_WET_ROOT = 0.3  # part of the length over which wet hair begins to lean
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Lean:
+    """One style on guides.
+
+    amounts (G,): of each guide; course(x): its profile; directions (G, 3): unit; clearance [m].
+    """
+
+    amounts: np.ndarray
+    course: Callable[[np.ndarray], np.ndarray]
+    directions: np.ndarray
+    clearance: float
+
+
+def leans(
+    styles: Sequence[StyleSettings],
+    mesh: TriMesh,
+    roots: SurfacePoints,
+    masks: dict[Any, np.ndarray],
+    targets: dict[str, np.ndarray],
+    mask_key: Callable[[StyleSettings], Any],
+) -> list[Lean]:
+    """The `Lean` of each style that acts on guides, in order.
+
+    roots: of the guides; masks: (G,) weights by their keys; targets: unit (3,) directions by objects' names.
+    """
+    found = []
+    identities = geometry.root_frames.identities(roots)[0]
+    for settings in filter(has_effect, styles):
+        if not isinstance(settings, lean.Settings | wet.Settings):
+            continue
+        amounts = settings.amount * (1.0 - settings.vary * random_numbers(identities, settings.seed, VARY))
+        key = mask_key(settings)
+        amounts = amounts if key is None else amounts * masks[key]
+        if isinstance(settings, wet.Settings):
+            directions = np.tile(DOWN, (len(roots), 1))
+            clearance = settings.lock * wet.CLEARANCE
+            found.append(Lean(amounts * settings.cling, _wet_course, directions, clearance))
+            continue
+        directions = _directions(settings, mesh, roots, targets)
+        if directions is not None:
+            found.append(Lean(amounts, _course(base.profile_of(settings)), directions, settings.clearance))
+    return found
+
+
+def _directions(settings, mesh, roots, targets):
+    if settings.direction == "NORMAL":
+        return normals(mesh, roots)
+    if settings.direction == "DOWN":
+        return np.tile(DOWN, (len(roots), 1))
+    target = targets.get(settings.target)
+    return None if target is None else np.tile(target, (len(roots), 1))
+
+
+def _wet_course(x):
+    return np.clip(x / _WET_ROOT, 0.0, 1.0)
+
+
+def _course(profile: Profile):
+    return lambda x: base.evaluated(profile, x)
+
+
+class FollowedGuides:
+    """Guides as strands follow them: leaned, and with as many points as strands have."""
+
+    def __init__(self, mesh: TriMesh, leans: Sequence[Lean], point_count: int) -> None:
+        """mesh: that guides keep off."""
+        self._mesh, self._leans, self._point_count = mesh, leans, point_count
+        self._before, self._after = np.empty((0, 0, 3), np.float32), np.empty((0, 0, 3), np.float32)
+
+    @cached_property
+    def _surface(self):
+        return geometry.closest_point.SurfaceQuery(self._mesh)
+
+    def of(self, guides: Strands) -> Strands:
+        """The `Strands` that hair follows, for guides as they are combed."""
+        if not self._leans and guides.point_count == self._point_count:
+            return guides
+        points = guides.numpy()
+        if self._before.shape != points.shape:
+            after = self._made(points, np.arange(len(points)))
+        else:
+            changed = np.flatnonzero((points != self._before).any(axis=(1, 2)))
+            after = self._after
+            if len(changed):
+                after = after.copy()
+                after[changed] = self._made(points[changed], changed)
+        self._before, self._after = points.copy(), after
+        return from_numpy(after, guides.roots, str(guides.points.device))
+
+    def _made(self, points, chosen):
+        """(M, point_count, 3) for the points (M, P, 3) of some guides; chosen: (M,) which."""
+        count, own_count = len(points), points.shape[1]
+        if own_count != self._point_count and count:
+            starts = np.arange(count + 1) * own_count
+            is_smooth = np.ones(count, bool)
+            points = geometry.resampling.resample(points.reshape(-1, 3), starts, self._point_count, is_smooth)
+        for style in self._leans:
+            x = np.cumsum(lengths_of(points), axis=1)
+            x = np.concatenate([np.zeros((count, 1)), x / np.maximum(x[:, -1:], 1e-20)], axis=1)
+            amounts = style.amounts[chosen][:, None] * style.course(x)
+            points = styling.guide_lean.leaned(
+                points, amounts, style.directions[chosen], self._surface, self._mesh.vertex_normals, style.clearance
+            )
+        return points

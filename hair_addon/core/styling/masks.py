@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Masks: weights at roots, by which the amount of a style is multiplied."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.mesh import SurfacePoints
+from ..geometry.texture import Texture
+from ..interpolation.hair_binding import HairBinding
+from ..kernels.checks import require_count, require_indices
+
+
+@dataclass(frozen=True)
+class Mask:
+    """Weights of a surface and of guides, which multiply each other; each None where there is none.
+
+    corners: (F, 3) float32 at the corners of triangles; texture: `Texture`; guides: (G,) float32, which strands mix by
+    the weights of their guides.
+    """
+
+    corners: np.ndarray | None = None
+    texture: Texture | None = None
+    guides: np.ndarray | None = None
+    is_inverted: bool = False
+
+    def of_strands(self, binding: HairBinding) -> np.ndarray:
+        """(S,) float32 in [0, 1] of bound strands."""
+        weights = self._on_surface(binding.roots)
+        if self.guides is not None:
+            indices, shares = binding.guide_weights.indices.numpy(), binding.guide_weights.weights.numpy()
+            require_indices("guides", indices[indices >= 0], len(self.guides))
+            mixed = np.where(indices >= 0, self.guides[np.maximum(indices, 0)] * shares, 0.0)
+            weights = weights * mixed.sum(axis=1)
+        return self._finished(weights)
+
+    def of_guides(self, roots: SurfacePoints) -> np.ndarray:
+        """(G,) float32 in [0, 1] of guides rooted at `SurfacePoints`."""
+        weights = self._on_surface(roots)
+        if self.guides is not None:
+            require_count("guides", len(self.guides), len(roots))
+            weights = weights * self.guides
+        return self._finished(weights)
+
+    def _on_surface(self, roots):
+        weights = np.ones(len(roots))
+        if self.corners is not None:
+            require_indices("triangles", roots.triangle, len(self.corners))
+            weights = weights * np.einsum("nc,nc->n", self.corners[roots.triangle], roots.barycentric)
+        if self.texture is not None:
+            weights = weights * self.texture.at(roots)
+        return weights
+
+    def _finished(self, weights):
+        weights = np.clip(np.where(np.isfinite(weights), weights, 0.0), 0.0, 1.0)
+        return (1.0 - weights if self.is_inverted else weights).astype(np.float32)

@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A stack of styles on one hair: its program, clump trees and masks, and the order in which they are applied.
+
+Centre strands of clumps come first, level by level: each is styled by the steps above its own, and by the levels
+before. Then all strands take the whole program in one launch.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .. import geometry, interpolation
+from ..geometry.strands import Strands
+from ..interpolation.hair_binding import HairBinding
+from ..kernels import kernel_cache
+from ..kernels.checks import require_count
+from . import program as programs
+from . import steps
+from .base import StyleSettings
+from .clump_trees import ClumpTrees
+from .guide_styles import FollowedGuides, leans
+from .program import TreeSettings, mask_key
+from .program_rows import CLUMP, Program
+from .steps import StrandData
+from .style_inputs import Inputs
+
+# Nothing differentiates these kernels.
+wp.set_module_options({"enable_backward": False})
+
+HAIR = "hair"  # what the strands are known by to the clump trees
+
+# Points of strands (N, P) [m] of a binding, for guides as they are followed now.
+StrandsOf = Callable[[HairBinding], "wp.array2d[wp.vec3]"]
+
+
+@dataclass
+class _Level:
+    """Centre strands of one level of a clump tree."""
+
+    binding: HairBinding
+    first: int  # of its centres among all
+    steps: Program  # that style them
+    data: StrandData
+
+
+@dataclass
+class Styling:
+    """Styles bound to the strands of one hair. `stack.bind` makes it."""
+
+    styles: tuple[StyleSettings, ...]
+    inputs: Inputs
+    trees: ClumpTrees
+    program: Program
+    data: StrandData
+    axes: np.ndarray  # (3, 3)
+    followed: FollowedGuides
+    point_count: int
+    tree_levels: list[tuple[TreeSettings, int]]
+    levels: list[_Level]
+
+    def guides(self, guides: Strands) -> Strands:
+        """Guides as strands follow them: styles of guides applied, with the points of the hair."""
+        return self.followed.of(guides)
+
+    def apply(
+        self, points: "wp.array2d[wp.vec3]", strands_of: StrandsOf, chosen: "wp.array[int] | None" = None
+    ) -> None:
+        """Style strands in place: points (M, P) [m] of all strands, or of (M,) chosen ones."""
+        if not len(self.program):
+            return
+        for level in self.levels:
+            centres = strands_of(level.binding)
+            steps.apply_steps(centres, level.steps, level.data, self.axes)
+            self._keep_centres(centres, level.first)
+        steps.apply_steps(points, self.program, self.data, self.axes, chosen)
+
+    def _keep_centres(self, centres, first):
+        """Write the points of a level's centres, and their arc lengths, where the kernel reads them."""
+        count = len(centres)
+        into = self.data.centre_points[first : first + count]
+        require_count("clump points", len(into), count)
+        require_count("points of a centre strand", into.shape[1], centres.shape[1])
+        kernel_cache.launch(_with_arcs, count, inputs=[centres], outputs=[into], device=centres.device)
+
+    def reached(self, combed: np.ndarray, moved: np.ndarray) -> np.ndarray:
+        """Indices (M,), rising, of the strands that move when some guides are combed.
+
+        combed: (C,) indices of guides; moved: indices of the strands that follow them. Strands whose clump centres
+        follow them move too.
+        """
+        if not self.levels:
+            return moved
+        guide_count = len(self.levels[0].binding.guide_positions)
+        is_moved = np.zeros(len(self.data.normals), bool)
+        is_moved[moved] = True
+        changed: list[np.ndarray] = []
+        for level in self.levels:
+            is_changed = np.zeros(len(level.binding.roots), bool)
+            reach = interpolation.guide_weights.reach(level.binding.guide_weights, guide_count)
+            is_changed[reach.of(combed)] = True
+            members = level.data.members.numpy()
+            for row, of_row in enumerate(changed):
+                is_changed |= of_row[members[row]]
+            changed.append(is_changed)
+        members = self.data.members.numpy()
+        for row, of_row in enumerate(changed):
+            is_moved |= of_row[members[row]]
+        return np.flatnonzero(is_moved)
+
+    def clumps(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """(S,) int32 and (S,) float32 in [0, 1): the finest clump of each strand and a random number of that clump.
+
+        Of the first style that gathers strands; None without one.
+        """
+        if not self.tree_levels:
+            return None
+        row = len(self.tree_levels[0][0].sizes) - 1
+        members = self.data.members.numpy()[row]
+        return members, self.levels[row].binding.identities[1][members]
+
+
+@wp.kernel
+def _with_arcs(
+    points: wp.array2d[wp.vec3],
+    # outputs
+    out_points: wp.array2d[wp.vec4],
+):
+    strand = wp.tid()
+    before = points[strand, 0]
+    arc = float(0.0)
+    for i in range(points.shape[1]):
+        point = points[strand, i]
+        arc += wp.length(point - before)
+        out_points[strand, i] = wp.vec4(point[0], point[1], point[2], arc)
+        before = point
+
+
+def bind(
+    binding: HairBinding,
+    guides: Strands,
+    styles: Sequence[StyleSettings],
+    inputs: Inputs,
+    trees: ClumpTrees,
+    axes: np.ndarray,
+    point_count: int,
+) -> Styling:
+    """Bind styles to strands; sites are placed and searched for where `trees` does not have them yet.
+
+    binding: of the strands; guides: that they follow; inputs: `Inputs` with all that the styles name; axes: (3, 3),
+    from the coordinates of strands to the surface's own axes, a rotation; point_count: of a strand.
+    """
+    device = binding.positions.device
+    levels = programs.tree_levels(styles)
+    keys = programs.mask_keys(styles)
+    bindings = [trees.levels(tree)[level] for tree, level in levels]
+    counts = [len(bound.roots) for bound in bindings]
+    first_centres = [0, *np.cumsum(counts).tolist()]
+    made = programs.strand_steps(styles, inputs.cutters)
+    program = programs.compiled(made, keys, first_centres)
+    guide_identities = geometry.root_frames.identities(guides.roots)[0]
+    shared = {
+        "centre_points": wp.zeros((sum(counts), point_count), dtype=wp.vec4, device=device),
+        "centre_normals": _joined([*(bound.normals for bound in bindings), binding.guide_normals], wp.vec3, device),
+        "centre_identities": _joined([*(bound.identities[0] for bound in bindings), guide_identities], int, device),
+    }
+
+    def data_of(owner: Any, bound: HairBinding, known: int) -> StrandData:
+        """The `StrandData` of strands that may belong to centres of the first `known` levels."""
+        rows = np.zeros((len(levels) + 1, len(bound.roots)), np.int32)
+        for row in range(known):
+            tree, level = levels[row]
+            is_own = owner != HAIR and owner[0] == tree
+            rows[row] = (trees.parents(tree, owner[1]) if is_own else trees.members(owner, bound, tree))[level]
+        # Without guides near, as in a region of its own, a strand counts to the first.
+        rows[-1] = np.maximum(bound.guide_weights.indices.numpy()[:, 0], 0)
+        weights = np.array([inputs.masks[key].of_strands(bound) for key in keys], np.float32)
+        return StrandData(
+            bound.normals,
+            wp.array(bound.identities[0], dtype=int, device=device),
+            wp.array(weights.reshape(len(keys), len(bound.roots)), dtype=float, device=device),
+            wp.array(rows, dtype=int, device=device),
+            **shared,
+        )
+
+    centres = [
+        _Level(bound, first_centres[row], _steps_before(program, made, row), data_of(levels[row], bound, row))
+        for row, bound in enumerate(bindings)
+    ]
+    of_guides = {key: inputs.masks[key].of_guides(guides.roots) for key in keys}
+    leaning = leans(styles, trees.binder.mesh, guides.roots, of_guides, dict(inputs.targets), mask_key)
+    return Styling(
+        tuple(styles),
+        inputs,
+        trees,
+        program,
+        data_of(HAIR, binding, len(levels)),
+        np.asarray(axes, np.float64),
+        FollowedGuides(trees.binder.mesh, leaning, point_count),
+        point_count,
+        levels,
+        centres,
+    )
+
+
+def _steps_before(program, made, level):
+    """The steps above the one that draws strands to the centres of a level."""
+    row = next(row for row, step in enumerate(made) if step.kind == CLUMP and step.level == level)
+    return program.before(row)
+
+
+def _joined(parts, kind, device):
+    parts = [part if isinstance(part, np.ndarray) else part.numpy() for part in parts]
+    return wp.array(np.concatenate(parts), dtype=kind, device=device)

@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A program of styles on LANES strands at once: on a processor the lanes of its vectors, on a GPU one strand a thread.
+//
+// The body of `_apply_steps` in steps.py. Parameters, for S strands in all of which M are styled, P points a strand, N
+// steps and K clump centres of all levels together:
+//
+//   int block                           which LANES of the M strands
+//   array_t<vec3> points                (M, P) [m], styled in place
+//   array_t<int> chosen_rows            (M,) their rows among S; empty where M is S
+//   array_t<vec3> normals               (S,) unit normals of the surface at the roots
+//   array_t<int> identities             (S,) what strands are known by
+//   array_t<float> masks                (masks, S) weights
+//   array_t<int> members                (levels, S) the clump centre that each strand belongs to, per level
+//   array_t<vec4> centre_points         (K, P) points of centre strands [m], and the arc length from the root
+//   array_t<vec3> centre_normals        (K,)
+//   array_t<int> centre_identities      (K,)
+//   array_t<int> choices                (N, CHOICES) of steps.py
+//   array_t<float> numbers              (N, NUMBERS) of steps.py
+//   mat33 axes                          from the coordinates of points to the surface's own axes
+//
+// Constants: WIDTH, MOST points a strand, CHOICES, NUMBERS; the kinds and purposes of steps.py.
+//
+// A strand is held as its root, unit directions t_i and lengths d_i of its segments, i = 1 … P - 1. So a style that
+// turns segments keeps roots and lengths.
+
+{
+#if !defined(__CUDA_ARCH__)
+  #pragma clang fp contract(fast)
+#endif
+#include "lanes.h"
+#include "vectors.h"
+
+using marks = int[LANES];  // a place along the strand of each lane
+const int point_count = points.shape[1];
+const int first = block * LANES;
+const int left = points.shape[0] - first;
+const int lane_count = left < LANES ? left : LANES;
+lanes length[MOST], along[MOST];
+vector t[MOST], u[MOST], next[MOST];
+
+// Number `lane` of an entry of such an array.
+const auto lane_of = [](const lanes& values, int lane) { return reinterpret_cast<const float*>(&values)[lane]; };
+const auto gathered = [&](const vector* from, const marks& index, int ahead) {
+  vector found;
+  for (int lane = 0; lane < LANES; ++lane) {
+    const vector& entry = from[index[lane] + ahead];
+    set_lane(found.x, lane, lane_of(entry.x, lane));
+    set_lane(found.y, lane, lane_of(entry.y, lane));
+    set_lane(found.z, lane, lane_of(entry.z, lane));
+  }
+  return found;
+};
+
+int strand[LANES];
+vector root, normal;
+ints identity;
+for (int lane = 0; lane < LANES; ++lane) {
+  const int row = first + (lane < lane_count ? lane : lane_count - 1);
+  strand[lane] = chosen_rows.shape[0] > 0 ? chosen_rows.data[row] : row;
+  const float* from = reinterpret_cast<const float*>(points.data) + size_t(row) * point_count * 3;
+  for (int i = 0; i < point_count; ++i) {
+    set_lane(next[i].x, lane, from[3 * i]);
+    set_lane(next[i].y, lane, from[3 * i + 1]);
+    set_lane(next[i].z, lane, from[3 * i + 2]);
+  }
+  set_lane(normal.x, lane, normals.data[strand[lane]][0]);
+  set_lane(normal.y, lane, normals.data[strand[lane]][1]);
+  set_lane(normal.z, lane, normals.data[strand[lane]][2]);
+  set_lane(identity, lane, identities.data[strand[lane]]);
+}
+root = next[0];
+
+// Directions and lengths of the segments between points in `next`. A segment without length goes on as the one before.
+const auto take_segments = [&]() {
+  vector before = normal;
+  for (int i = 1; i < point_count; ++i) {
+    const vector segment = next[i] - next[i - 1];
+    length[i] = sqrt_of(dot(segment, segment));
+    before = unit_or(segment, lanes(1.0e-12f), before);
+    t[i] = before;
+  }
+};
+// Points into `next`, and their arc lengths into `along`.
+const auto put_points = [&]() {
+  next[0] = root;
+  along[0] = 0.0f;
+  for (int i = 1; i < point_count; ++i) {
+    next[i] = next[i - 1] + t[i] * length[i];
+    along[i] = along[i - 1] + length[i];
+  }
+};
+take_segments();
+ints is_touched = 0;
+
+for (int step = 0; step < numbers.shape[0]; ++step) {
+  const int* choice = choices.data + size_t(step) * CHOICES;
+  const float* number = numbers.data + size_t(step) * NUMBERS;
+  const int kind = choice[0], seed = choice[1], mask = choice[2], level = choice[3], first_centre = choice[4];
+  const auto random = [&](int purpose) { return random_number(identity, seed, ints(purpose)); };
+
+  // A_si = base · profile(x_i).
+  lanes base = number[0] * (1.0f - number[1] * random(VARY));
+  if (mask >= 0) {
+    for (int lane = 0; lane < LANES; ++lane) {
+      set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
+    }
+  }
+  if (!any_of(base > 0.0f)) continue;
+  is_touched = is_touched | (base > 0.0f);
+  const float at_root = number[2], at_tip = number[3], exponent = number[4], from = number[6];
+  const bool is_even = at_root == at_tip, is_linear = exponent == 1.0f, is_flipped = number[5] != 0.0f;
+  const auto profile = [&](lanes x) {
+    if (is_even) return lanes(at_root);
+    lanes y = clamped((x - from) / (1.0f - from), lanes(0.0f), lanes(1.0f));
+    if (!is_linear) y = is_flipped ? 1.0f - power(1.0f - y, lanes(exponent)) : power(y, lanes(exponent));
+    return lanes(at_root + (at_tip - at_root) * y);
+  };
+  lanes total = 0.0f;
+  for (int i = 1; i < point_count; ++i) total += length[i];
+  const lanes per_total = 1.0f / higher_of(total, lanes(1.0e-20f));
+
+  // The clump centre of each lane: its identity, and the reference of frames by its normal, which every strand of a
+  // clump shares.
+  int centre[LANES];
+  vector centre_normal = normal;
+  ints lock = identity;
+  if (level >= 0) {
+    for (int lane = 0; lane < LANES; ++lane) {
+      centre[lane] = first_centre + members.data[size_t(level) * members.shape[1] + strand[lane]];
+      set_lane(lock, lane, centre_identities.data[centre[lane]]);
+      set_lane(centre_normal.x, lane, centre_normals.data[centre[lane]][0]);
+      set_lane(centre_normal.y, lane, centre_normals.data[centre[lane]][1]);
+      set_lane(centre_normal.z, lane, centre_normals.data[centre[lane]][2]);
+    }
+  }
+
+#include "frames.h"
+#include "across.h"
+
+  switch (kind) {
+    case TRIM: {
+#include "trim.h"
+    } break;
+    case CLUMP: {
+#include "clump.h"
+    } break;
+    case CURL: {
+#include "curl.h"
+    } break;
+    case FRIZZ: {
+#include "frizz.h"
+    } break;
+    case BEND: {
+#include "bend.h"
+    } break;
+    case SMOOTH: {
+#include "smooth.h"
+    } break;
+    case WEAVE: {
+#include "weave.h"
+    } break;
+  }
+}
+
+put_points();
+for (int lane = 0; lane < lane_count; ++lane) {
+  if (!get_lane(is_touched, lane)) continue;  // the same bits as before
+  float* to = reinterpret_cast<float*>(points.data) + size_t(first + lane) * point_count * 3;
+  for (int i = 1; i < point_count; ++i) {
+    to[3 * i] = lane_of(next[i].x, lane);
+    to[3 * i + 1] = lane_of(next[i].y, lane);
+    to[3 * i + 2] = lane_of(next[i].z, lane);
+  }
+}
+}

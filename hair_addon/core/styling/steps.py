@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The kernel that applies a program of styles to strands: one launch for all steps.
+
+steps.cpp and the files it includes are compiled for both kinds of device. A program is two arrays of rows, one a step:
+whole numbers (`CHOICES`) and numbers (`NUMBERS`), as program_rows.py says. program.py writes them.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..kernels import native_code, parallel
+from ..kernels.checks import require_count, require_indices
+from . import frizz
+from .program_rows import BEND, CHOICES, CLUMP, CURL, FRIZZ, NUMBERS, SMOOTH, TRIM, WEAVE, Program
+from .random_numbers import PURPOSES
+
+# Nothing differentiates these kernels.
+wp.set_module_options({"enable_backward": False})
+
+LEAST_BLOCKS = 64  # fewer are not worth a thread
+WIDTH = 16  # strands that a thread of the processor styles at once: 8 take a fifth longer
+MOST_POINTS = 257  # of a strand
+
+
+@dataclass(frozen=True)
+class StrandData:
+    """What a program needs to know of S strands beside their points: arrays on one device.
+
+    Clump centres of all levels, K, follow each other in the arrays of centres.
+    """
+
+    normals: "wp.array[wp.vec3]"  # (S,) unit
+    identities: "wp.array[int]"  # (S,)
+    masks: "wp.array2d[float]"  # (masks, S)
+    members: "wp.array2d[int]"  # (levels, S) place of the strand's centre among those of its level
+    centre_points: "wp.array2d[wp.vec4]"  # (K, P) x, y, z [m] and the arc length [m]
+    centre_normals: "wp.array[wp.vec3]"  # (K,)
+    centre_identities: "wp.array[int]"  # (K,)
+
+
+@wp.func_native(
+    native_code.body(
+        __file__,
+        "steps.cpp",
+        WIDTH=WIDTH,
+        MOST=MOST_POINTS,
+        CHOICES=CHOICES,
+        NUMBERS=NUMBERS,
+        TRIM=TRIM,
+        CLUMP=CLUMP,
+        CURL=CURL,
+        FRIZZ=FRIZZ,
+        BEND=BEND,
+        SMOOTH=SMOOTH,
+        WEAVE=WEAVE,
+        WAVES=frizz.WAVES_AN_OCTAVE,
+        MOST_OCTAVES=frizz.MOST_OCTAVES,
+        **PURPOSES,
+    )
+)
+def _apply_steps(
+    block: int,
+    points: wp.array2d[wp.vec3],
+    chosen_rows: wp.array[int],
+    normals: wp.array[wp.vec3],
+    identities: wp.array[int],
+    masks: wp.array2d[float],
+    members: wp.array2d[int],
+    centre_points: wp.array2d[wp.vec4],
+    centre_normals: wp.array[wp.vec3],
+    centre_identities: wp.array[int],
+    choices: wp.array2d[int],
+    numbers: wp.array2d[float],
+    axes: wp.mat33,
+): ...
+
+
+@wp.kernel
+def _style_blocks(
+    points: wp.array2d[wp.vec3],
+    chosen_rows: wp.array[int],
+    normals: wp.array[wp.vec3],
+    identities: wp.array[int],
+    masks: wp.array2d[float],
+    members: wp.array2d[int],
+    centre_points: wp.array2d[wp.vec4],
+    centre_normals: wp.array[wp.vec3],
+    centre_identities: wp.array[int],
+    choices: wp.array2d[int],
+    numbers: wp.array2d[float],
+    axes: wp.mat33,
+    first: int,
+):
+    _apply_steps(
+        first + wp.tid(),
+        points,
+        chosen_rows,
+        normals,
+        identities,
+        masks,
+        members,
+        centre_points,
+        centre_normals,
+        centre_identities,
+        choices,
+        numbers,
+        axes,
+    )
+
+
+def apply_steps(
+    points: wp.array2d[wp.vec3],
+    program: Program,
+    data: StrandData,
+    axes: np.ndarray,
+    chosen: wp.array[int] | None = None,
+) -> None:
+    """Style strands in place: points (M, P) [m]. One launch for the whole program; none for an empty one.
+
+    data: `StrandData` of S strands, of which chosen (M,) int32 are styled, all where it is None; axes: (3, 3), a
+    rotation from the coordinates of points to the surface's own axes. Raises `HairError` where counts or indices do
+    not match.
+    """
+    if not len(program) or not len(points):
+        return
+    _check(points, program, data, chosen)
+    device = points.device
+    rows = wp.empty(0, dtype=int, device=device) if chosen is None else chosen
+    lanes = WIDTH if device.is_cpu else 1
+    block_count = -(-len(points) // lanes)
+    there = [wp.array(array, dtype=kind, device=device) for array, kind in _program_arrays(program)]
+    inputs = [points, rows, data.normals, data.identities, data.masks, data.members]
+    inputs += [data.centre_points, data.centre_normals, data.centre_identities, *there, wp.mat33(axes)]
+    share_count = parallel.share_count(block_count, device, LEAST_BLOCKS)
+    parallel.launch_shares(_style_blocks, block_count, inputs, [[] for _ in range(share_count)], device)
+
+
+def _program_arrays(program):
+    choices = np.ascontiguousarray(program.choices, np.int32), int
+    numbers = np.ascontiguousarray(program.numbers, np.float32), float
+    return choices, numbers
+
+
+def _check(points, program, data, chosen):
+    """Raise `HairError` unless all that the kernel reads is there."""
+    point_count, strand_count, centre_count = points.shape[1], len(data.normals), len(data.centre_normals)
+    if not 2 <= point_count <= MOST_POINTS:
+        raise HairError(f"Strands need 2 to {MOST_POINTS} points to be styled, not {point_count}.")
+    require_count("strands", len(points), strand_count if chosen is None else len(chosen))
+    require_count("identities", len(data.identities), strand_count)
+    require_count("clump identities", len(data.centre_identities), centre_count)
+    for name, array in (("masks", data.masks), ("clump members", data.members)):
+        if len(array):
+            require_count(name, array.shape[1], strand_count)
+    require_count("choices of a step", program.choices.shape[1], CHOICES)
+    require_count("numbers of a step", program.numbers.shape[1], NUMBERS)
+    require_count("steps", len(program.numbers), len(program))
+    kinds, _seeds, masks, levels, first_centres = program.choices.T
+    require_indices("kinds of steps", kinds, WEAVE + 1)
+    require_indices("masks", masks[masks >= 0], len(data.masks))
+    require_indices("clump levels", levels[levels >= 0], len(data.members))
+    needs_points = (kinds == CLUMP) | (kinds == WEAVE)
+    require_indices("clump levels", levels[needs_points], len(data.members))
+    if needs_points.any():
+        # The last centres may be guides, which have no points here.
+        require_indices("clump centres", first_centres[needs_points], min(len(data.centre_points), centre_count))
+        require_count("points of a centre strand", data.centre_points.shape[1], point_count)

@@ -1,0 +1,95 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Vectors, angles and random numbers of the styles. Stands after lanes.h in a function's body.
+
+struct vector {
+  lanes x, y, z;
+  CUDA_CALLABLE vector operator+(const vector& b) const { return {x + b.x, y + b.y, z + b.z}; }
+  CUDA_CALLABLE vector operator-(const vector& b) const { return {x - b.x, y - b.y, z - b.z}; }
+  CUDA_CALLABLE vector operator*(lanes factor) const { return {x * factor, y * factor, z * factor}; }
+};
+const auto dot = [&](const vector& a, const vector& b) { return a.x * b.x + a.y * b.y + a.z * b.z; };
+const auto cross = [&](const vector& a, const vector& b) {
+  return vector{a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+};
+const auto chosen = [&](auto condition, const vector& a, const vector& b) {
+  return vector{condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z};
+};
+const auto lower_of = [&](lanes a, lanes b) { return a < b ? a : b; };
+const auto higher_of = [&](lanes a, lanes b) { return a > b ? a : b; };
+const auto clamped = [&](lanes value, lanes low, lanes high) { return lower_of(higher_of(value, low), high); };
+const auto smoothstep = [&](lanes value) {
+  const lanes x = clamped(value, lanes(0.0f), lanes(1.0f));
+  return x * x * (3.0f - 2.0f * x);
+};
+// A direction as a unit vector; another one where it is shorter than `least`.
+const auto unit_or = [&](const vector& direction, lanes least, const vector& other) {
+  const lanes size = sqrt_of(dot(direction, direction));
+  const auto is_long = size > least;
+  return chosen(is_long, direction * (1.0f / (is_long ? size : lanes(1.0f))), other);
+};
+
+// u, perpendicular to the unit vector a, by the least rotation from a to the unit vector b [Bishop75]. Opposite
+// directions have none: u stays.
+const auto turned = [&](const vector& u, const vector& a, const vector& b) {
+  const lanes facing = 1.0f + dot(a, b);
+  const auto is_facing = facing > 1.0e-6f;
+  const lanes lean = is_facing ? dot(u, b) / (is_facing ? facing : lanes(1.0f)) : lanes(0.0f);
+  return u - (a + b) * lean;
+};
+
+// Sine and cosine of whole turns; polynomials of [Moshier92] over an eighth of a turn.
+const auto sine_and_cosine = [&](lanes turns, lanes& sine, lanes& cosine) {
+  const lanes part = turns - floor_of(turns + 0.5f);
+  const lanes quarter = floor_of(part * 4.0f + 0.5f);  // -2 to 2
+  const lanes x = (part - quarter * 0.25f) * 6.28318530718f;
+  const lanes x2 = x * x;
+  const lanes s = x + x * x2 * (-1.6666654611e-1f + x2 * (8.3321608736e-3f - 1.9515295891e-4f * x2));
+  const lanes c = 1.0f - 0.5f * x2
+      + x2 * x2 * (4.166664568298827e-2f + x2 * (-1.388731625493765e-3f + 2.443315711809948e-5f * x2));
+  const auto is_odd = abs_of(quarter) == 1.0f;
+  const auto is_half = abs_of(quarter) == 2.0f;
+  sine = is_odd ? quarter * c : is_half ? -s : s;
+  cosine = is_odd ? -quarter * s : is_half ? -c : c;
+};
+
+// x to the power e, for x and e from 0 to 1; 0 for x = 0.
+const auto power = [&](lanes x, lanes e) {
+  const auto is_positive = x > 1.0e-30f;
+  const ints bits = bits_of_lanes(is_positive ? x : lanes(1.0f));
+  // x = m 2ⁿ, m from √½ to √2; log2(m) by the series of the inverse hyperbolic tangent.
+  const ints shifted = bits - 0x3f3504f3;
+  const ints n = shifted >> 23;
+  const lanes m = lanes_of_bits((shifted & 0x007fffff) + 0x3f3504f3);
+  const lanes z = (m - 1.0f) / (m + 1.0f);
+  const lanes z2 = z * z;
+  const lanes series = z * (2.8853900818f + z2 * (0.9617966939f + z2 * (0.5770780164f + z2 * 0.4121985831f)));
+  lanes whole;
+  for (int lane = 0; lane < LANES; ++lane) set_lane(whole, lane, static_cast<float>(get_lane(n, lane)));
+  const lanes y = higher_of(e * (whole + series), lanes(-126.0f));
+  const lanes nearest = floor_of(y + 0.5f);
+  const lanes f = y - nearest;
+  lanes result = 1.5403530e-4f * f + 1.3333558e-3f;
+  result = result * f + 9.6181291e-3f;
+  result = result * f + 5.5504109e-2f;
+  result = result * f + 2.4022651e-1f;
+  result = result * f + 6.9314718e-1f;
+  result = result * f + 1.0f;
+  result *= lanes_of_bits((to_ints(nearest) + 127) << 23);
+  return is_positive ? result : lanes(0.0f);
+};
+
+// Random numbers in [0, 1) that follow from an identity, a seed and a purpose (random_numbers.py is its twin).
+const auto random_number = [&](ints identity, int seed, auto purpose) {
+  uints x;
+  for (int lane = 0; lane < LANES; ++lane) set_lane(x, lane, static_cast<unsigned>(get_lane(identity, lane)));
+  uints which;
+  for (int lane = 0; lane < LANES; ++lane) set_lane(which, lane, static_cast<unsigned>(get_lane(purpose, lane)));
+  x = (x ^ (static_cast<unsigned>(seed) * 0x9e3779b9u)) + which * 0x85ebca6bu;
+  x ^= x >> 16u;
+  x *= 0x7feb352du;
+  x ^= x >> 15u;
+  x *= 0x846ca68bu;
+  x ^= x >> 16u;
+  return to_lanes(x >> 8u) * 5.9604644775390625e-8f;
+};

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands with styles, as arrays: on a head, and straight ones on a plane."""
+
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+
+from hair_addon.core.grooming import following, groom, hair_styles
+from hair_addon.core.grooming.groom import GuideSettings, HairSettings
+from tests.support.devices import DEVICE
+from tests.support.meshes import HEAD, flat_grid, read_obj, subdivided_sphere
+
+
+class Groom:
+    """Hair without styles, to which styles are applied: `styled(*styles)` are points (S, P, 3)."""
+
+    def __init__(self, mesh, guide_settings, hair_settings, device=DEVICE, axes=None, **ground):
+        self.mesh, self.settings, self.device, self.axes = mesh, hair_settings, device, axes
+        self.guides = groom.distribute_guides(mesh, guide_settings, device=device)
+        self.binding = groom.bind_hair(mesh, self.guides, hair_settings, device=device, **ground)
+        self.trees = hair_styles.clump_trees(mesh, self.guides.roots, hair_settings, device=device, **ground)
+
+    @property
+    def plain(self):
+        """(S, 41, 3): strands without styles."""
+        return following.follow_guides(self.binding, self.guides).numpy()
+
+    def bound(self, *styles, inputs=None, point_count=None):
+        """The `Styling` of styles."""
+        settings = self.settings if point_count is None else replace(self.settings, point_count=point_count)
+        return hair_styles.bind_styles(self.binding, self.guides, settings, styles, self.trees, inputs, self.axes)
+
+    def styled(self, *styles, inputs=None, point_count=None, guides=None, chosen=None):
+        """(S, P, 3), or (M, P, 3) of some strands."""
+        guides = self.guides if guides is None else guides
+        styling = self.bound(*styles, inputs=inputs, point_count=point_count)
+        if styling is None:
+            return following.follow_guides(self.binding, guides).numpy()
+        followed = styling.guides(guides)
+
+        def strands_of(binding, rows=None):
+            weights = following.weights_now(binding, followed, rows)
+            places = None if rows is None else wp.array(rows, dtype=int, device=self.device)
+            return following.strands_now(binding, followed, weights, places)
+
+        points = strands_of(self.binding, chosen)
+        rows = None if chosen is None else wp.array(chosen, dtype=int, device=self.device)
+        styling.apply(points, strands_of, rows)
+        return points.numpy()
+
+
+def head(strand_count=1500, guide_count=120, device=DEVICE, **hair):
+    """Long hair that hangs, on the sample head's upper half."""
+    mesh = read_obj(HEAD)
+    height = mesh.vertices[:, 2]
+    density = (height > np.quantile(height, 0.6)).astype(np.float32)
+    guides = GuideSettings(guide_count=guide_count, length=0.2, gravity=0.7)
+    return Groom(mesh, guides, HairSettings(strand_count=strand_count, radius=4e-5, **hair), device, density=density)
+
+
+def straight(strand_count=400, length=0.2, size=0.1, device=DEVICE):
+    """Straight strands that stand on a square."""
+    guides = GuideSettings(guide_count=40, length=length, length_variation=0.0, tilt=0.0, gravity=0.0)
+    return Groom(flat_grid(8, size), guides, HairSettings(strand_count=strand_count, radius=4e-5), device)
+
+
+def ball(strand_count=800, device=DEVICE, **hair):
+    """Fur on a sphere."""
+    guides = GuideSettings(guide_count=60, length=0.3, gravity=0.5)
+    return Groom(
+        subdivided_sphere(3, 0.5), guides, HairSettings(strand_count=strand_count, radius=1e-3, **hair), device
+    )
