@@ -31,6 +31,22 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .api_styles import (
+    Bend,
+    Braid,
+    Clump,
+    Curl,
+    Frizz,
+    Lean,
+    Smooth,
+    Trim,
+    Wet,
+    add_style,
+    apply_style_preset,
+    set_styles,
+    styles_of,
+)
+from .api_tables import bake_tables, table_settings
 from .core import geometry, grooming, imaging, lazy
 from .core.errors import HairError
 from .core.files import settings_file
@@ -41,9 +57,8 @@ from .core.grooming import following, groom
 from .core.grooming.groom import GuideSettings, HairSettings
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, plain_value, require_class
-from .core.shading import appearance, presets
+from .core.shading import presets
 from .core.shading.appearance import Appearance
-from .core.shading.tables import lookup_tables
 
 blender = lazy.Package(".blender", __package__)
 
@@ -54,12 +69,23 @@ Arrays = TriMesh | tuple[ArrayLike, ArrayLike]  # vertices (V, 3) [m] and triang
 
 __all__ = [
     "Appearance",
+    "Bend",
+    "Braid",
+    "Clump",
+    "Curl",
+    "Frizz",
     "GroomSettings",
     "GuideSettings",
     "HairError",
     "HairSettings",
+    "Lean",
+    "Smooth",
+    "Trim",
+    "Wet",
     "add_hair",
+    "add_style",
     "apply_settings",
+    "apply_style_preset",
     "bake_tables",
     "distribute_guides",
     "draw",
@@ -68,8 +94,10 @@ __all__ = [
     "points",
     "render",
     "save_settings",
+    "set_styles",
     "settings_of",
     "shade",
+    "styles_of",
     "table_settings",
     "use_as_guides",
 ]
@@ -243,39 +271,6 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     blender.groom.groom_settings.assign_look(target, wanted)
     if model is not None:
         target.vellus.model = model
-
-
-def table_settings(settings: GroomSettings, **changes: Any) -> lookup_tables.Settings:
-    """Return the `lookup_tables.Settings` of the tables for hair with these `GroomSettings`.
-
-    >>> settings = api.GroomSettings(appearance=api.Appearance(roughness=0.2))
-    >>> api.table_settings(settings, size=64).roughness
-    0.2
-    """
-    require_class(settings, GroomSettings, "settings")
-    found = appearance.table_settings(settings.appearance, settings.tables)
-    return changed(lookup_tables.Settings, found, changes)
-
-
-def bake_tables(
-    folder: str | os.PathLike,
-    settings: lookup_tables.Settings | None = None,
-    *,
-    has_plots: bool = False,
-    progress: Progress = no_progress,
-    **changes: Any,
-) -> list[Path]:
-    """Bake the tables of the Marschner model and of dual scattering to OpenEXR in a folder; returns the file paths.
-
-    settings: `lookup_tables.Settings`; has_plots: whether to write a plot of each table.
-
-    >>> [path.name for path in api.bake_tables("tables", size=32)][:3]
-    ['m.exr', 'n.exr', 'n_trt.exr']
-    """
-
-    settings = changed(lookup_tables.Settings, settings, changes)
-    has_plots = plain_value("has_plots", has_plots, False, _ANY)
-    return run_now(blender.io.table_files.baking_tables(settings, path_of(folder), has_plots), heard(progress))
 
 
 # Pictures.

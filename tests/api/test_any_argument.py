@@ -8,7 +8,6 @@ number of calls.
 import math
 import os
 import random
-from dataclasses import fields
 from fractions import Fraction
 
 import bpy
@@ -16,9 +15,11 @@ import numpy as np
 
 from hair_addon import api
 from hair_addon.blender.live import live_hair
+from hair_addon.core.files import settings_file
 from hair_addon.core.imaging.pixel_sampling import DRAWING_FIELDS, FRAME_FIELDS, PictureSettings
 from hair_addon.core.params import declared
 from hair_addon.core.shading.tables import lookup_tables
+from hair_addon.core.styling.kinds import KINDS, OFFERS
 from tests.support.following import update
 from tests.support.reading import everything, points
 
@@ -106,11 +107,26 @@ def settings(dice):
     if dice.random() < 0.1:
         return dice.choice(OTHERS)
     parts = {}
-    for section in fields(api.GroomSettings):
+    for section, settings_class in settings_file.SECTIONS.items():
         if dice.random() < 0.3:
-            parts[section.name] = section.type(**changes(dice, section.type, COSTLY))
+            parts[section] = settings_class(**changes(dice, settings_class, COSTLY))
+    if dice.random() < 0.3:
+        parts["styles"] = anything(dice, [style(dice) for _ in range(dice.randint(0, 3))])
     few = {"guides": api.GuideSettings(guide_count=20), "hair": api.HairSettings(strand_count=50)}
     return api.GroomSettings(**(few | parts))
+
+
+def style(dice):
+    """Settings of a style."""
+    settings_class = dice.choice([*KINDS.values()])
+    return settings_class(**changes(dice, settings_class, ()))
+
+
+def add_style(dice):
+    kind = dice.choice([*OFFERS])
+    details = {"name": anything(dice, "", "A"), "fit": anything(dice, False, True)}
+    changed = changes(dice, KINDS[OFFERS[kind].kind], ())
+    return api.add_style(target(dice, "HAIR"), anything(dice, kind), **details, **changed)
 
 
 def anything(dice, *often):
@@ -141,6 +157,12 @@ CALLS = {
         frame=anything(d, None, 1, 5),
         engine=anything(d, "vellus"),
         **changes(d, PictureSettings, COSTLY, DRAWING_FIELDS),
+    ),
+    "add_style": add_style,
+    "styles_of": lambda d: api.styles_of(target(d, "HAIR")),
+    "set_styles": lambda d: api.set_styles(target(d, "HAIR"), anything(d, [], [style(d)], [style(d), style(d)])),
+    "apply_style_preset": lambda d: api.apply_style_preset(
+        target(d, "HAIR"), anything(d, "CURLY", "BUZZ"), fit=anything(d, True), keep_styles=anything(d, False, True)
     ),
     "settings_of": lambda d: api.settings_of(target(d, "HAIR")),
     "save_settings": lambda d: api.save_settings(anything(d, "a.json"), settings(d)),

@@ -5,14 +5,14 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from bpy.types import Curves
+from bpy.types import Curves, Object
 
 from ...core.errors import HairError
 from ...core.files import style_presets
 from ...core.files.settings_file import PartialSettings
 from ...core.geometry import strands
 from ...core.grooming import groom_defaults
-from ...core.grooming.groom import GuideSettings
+from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import declared
 from ...core.styling import curl, fitting
 from ...core.styling.base import StyleSettings, has_effect
@@ -23,17 +23,22 @@ from . import groom_settings, pipeline
 _HEAD_LENGTH = next(length for name, length, _details in declared(GuideSettings) if name == "length")  # [m]
 
 
-def add(hair: Curves, settings: StyleSettings, name: str = "", is_fitted: bool = False) -> str:
-    """Add a style to a hair Curves datablock, with a seed that none of its styles has; returns the style's name.
+def add(
+    hair: Curves, settings: StyleSettings, name: str = "", is_fitted: bool = False, has_seed: bool = False
+) -> StyleSettings:
+    """Add a style to a hair Curves datablock, after its other styles; returns its settings.
 
-    is_fitted: whether lengths are for a human head, and fitted to the surface. Raises `HairError` before any change.
+    is_fitted: whether lengths are for a human head, and fitted to the surface; has_seed: whether the seed is the one in
+    `settings`, else it is one that no other style of the hair has. Raises `HairError` before any change.
     """
     curves.require_editable(hair)
     style_items.require_room(len(hair.vellus.styles) + 1)
     if is_fitted:
         settings = fitting.fitted(settings, *surface_fit(hair))
-    style_items.add(hair.vellus, replace(settings, seed=style_items.new_seed(hair.vellus)), name)
-    return style_items.active_of(hair.vellus).name
+    if not has_seed:
+        settings = replace(settings, seed=style_items.new_seed(hair.vellus))
+    style_items.add(hair.vellus, settings, name)
+    return style_items.settings_of(style_items.active_of(hair.vellus))
 
 
 def assign(hair: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> None:
@@ -64,12 +69,16 @@ def surface_fit(hair: Curves) -> tuple[float, float]:
     Raises `HairError`.
     """
     guides, settings = pipeline.inputs_of(hair)
-    of_guides = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
-    open_guides, open_hair = replace(of_guides, length=None), replace(settings, influence_distance=None)
-    known_guides, known_hair = pipeline.complete(guides.surface, open_guides, open_hair, scene.present_depsgraph())
+    return fit_of(guides.surface, setting_properties.to_settings(guides.vellus.guides, GuideSettings), settings)
+
+
+def fit_of(surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings) -> tuple[float, float]:
+    """The same for hair of these settings on a mesh object."""
+    open_guides, open_hair = replace(guide_settings, length=None), replace(hair_settings, influence_distance=None)
+    known_guides, known_hair = pipeline.complete(surface_object, open_guides, open_hair, scene.present_depsgraph())
     # Found by `complete`, which leaves none open.
     length, influence = known_guides.length or _HEAD_LENGTH, known_hair.influence_distance or 0.0
-    spacing = influence / groom_defaults.INFLUENCE * math.sqrt(of_guides.guide_count / settings.strand_count)
+    spacing = influence / groom_defaults.INFLUENCE * math.sqrt(guide_settings.guide_count / hair_settings.strand_count)
     return length / _HEAD_LENGTH, spacing
 
 

@@ -159,8 +159,9 @@ def assign(state, styles, names=None):
     A style that stays, by name and kind, keeps its keys. Nothing is marked where nothing changes. Raises `HairError`.
     """
     require_room(len(styles))
+    styles = [setting_properties.as_stored(settings) for settings in styles]
     before = [(item.name, item.kind) for item in state.styles]
-    wanted = _named([kind_of(settings) for settings in styles], names, before)
+    wanted = _named(state, styles, names)
     if wanted != before:
         order = [before.index(pair) if pair in before else None for pair in wanted]
         state.styles.clear()
@@ -169,7 +170,7 @@ def assign(state, styles, names=None):
         _follow(state, [name for name, _kind in before], order)
         state.active_style = min(state.active_style, max(len(styles) - 1, 0))
     for item, settings in zip(state.styles, styles, strict=True):
-        if settings_of(item) != setting_properties.as_stored(settings):
+        if settings_of(item) != settings:
             setting_properties.assign(group_of(item), settings)
 
 
@@ -180,16 +181,21 @@ def _append(state, settings, name):
     setting_properties.assign(group_of(item), settings)
 
 
-def _named(kinds, names, before):
-    """[(name, kind)], each name once."""
-    free = list(before)
-    taken = []
-    for kind, name in zip(kinds, names or [""] * len(kinds), strict=True):
-        if not name:
-            reserved = {*taken, *(names or ())}
-            name = next((n for n, k in free if k == kind and n not in reserved), LABELS[kind])
-        taken.append(unique_name(name, taken))
-    return list(zip(taken, kinds, strict=True))
+def _named(state, styles, names):
+    """[(name, kind)] of styles, each name once; those without a name are, if they can be, styles that are there now."""
+    present = dict(zip(names_of(state), styles_of(state), strict=True))
+    taken = list(names or [""] * len(styles))
+    for is_same in (lambda a, b: a == b, lambda a, b: type(a) is type(b)):
+        for place, style in enumerate(styles):
+            if not taken[place]:
+                free = (name for name in present if name not in taken and is_same(present[name], style))
+                taken[place] = next(free, "")
+    named = []
+    for style, name in zip(styles, taken, strict=True):
+        kind = kind_of(style)
+        others = [other for other, _kind in named] + ([] if name else taken)
+        named.append((unique_name(name or LABELS[kind], others), kind))
+    return named
 
 
 def _follow(state, names, order):
