@@ -261,7 +261,7 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     """
 
     target = _curves(hair, "HAIR")
-    present = blender.settings.properties.look_of(target.vellus)
+    present = blender.settings.properties.own_look_of(target.vellus)
     if isinstance(look, str):
         preset = presets.PRESETS[choice(look, "preset", presets.PRESETS)]
         look = replace(preset[1], mode=present.mode)  # the mode is not part of a preset

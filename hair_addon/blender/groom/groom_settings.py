@@ -19,7 +19,7 @@ def settings_of(hair: Curves) -> GroomSettings:
     """The `GroomSettings` of a hair Curves datablock and its guides. Raises `HairError`."""
     guides, hair_settings = pipeline.inputs_of(hair)
     guide_settings = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
-    look, tables = properties.look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
+    look, tables = properties.own_look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
     styles, names = style_items.styles_of(hair.vellus), style_items.names_of(hair.vellus)
     return GroomSettings(guide_settings, hair_settings, look, tables, styles, names)
 

@@ -62,7 +62,7 @@ def _hair(datablock):
         "is_combed": curves.is_combed(datablock),
         "model": state.model,
         "settings": _settings(lambda: setting_properties.to_settings(state.hair, HairSettings)),
-        "appearance": _settings(lambda: properties.look_of(state)),
+        "appearance": _settings(lambda: properties.own_look_of(state)),
         "styles": [_style(item) for item in state.styles],
         "warnings": _warnings(datablock),
     }

@@ -28,9 +28,15 @@ MODELS = (
 )
 
 
-def look_of(state):
-    """The `Appearance` of a hair; state: its `VellusCurves`. Raises `HairError`."""
+def own_look_of(state):
+    """The `Appearance` of a hair as it is set; state: its `VellusCurves`. Raises `HairError`."""
     return setting_properties.to_settings(state.appearance, Appearance)
+
+
+def look_of(state):
+    """The dry `Appearance` that a hair is shaded with, which is as wet as its look or its wettest style."""
+    look = own_look_of(state)
+    return appearance.wetted(look, max(look.wetness, setting_properties.shortest(style_items.wetness_of(state))))
 
 
 def own_table_settings_of(state):

@@ -86,7 +86,7 @@ def _millimeters_of(radius):
 
 
 def _radius_of(millimeters):
-    return _shortest(millimeters) / (2e3 * _unit_length())
+    return shortest(millimeters) / (2e3 * _unit_length())
 
 
 def _unit_length():
@@ -131,7 +131,7 @@ def plain(value, default, details):
         for meant in (default, details.low, details.high):
             if np.float32(meant) == np.float32(value):
                 return meant
-        return _shortest(value)
+        return shortest(value)
     if isinstance(default, tuple):
         return tuple(plain(float(part), meant, details) for part, meant in zip(value, default, strict=True))
     return value
@@ -143,7 +143,7 @@ def as_stored(settings):
     return replace(settings, **values)
 
 
-def _shortest(value):
+def shortest(value):
     """The shortest decimal that equals a value in single precision, as it was typed."""
     return float(str(np.float32(value)))
 
@@ -167,7 +167,7 @@ def show(operator, group, settings_class):
     for name in from_surface(settings_class):
         setattr(operator, name, getattr(group, name))
     for radius, diameter in _diameters(settings_class):
-        setattr(operator, diameter, _shortest(_millimeters_of(_shortest(getattr(group, radius)))))
+        setattr(operator, diameter, shortest(_millimeters_of(shortest(getattr(group, radius)))))
 
 
 def _diameters(settings_class):
