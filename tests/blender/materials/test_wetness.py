@@ -36,7 +36,7 @@ def sockets_of(look):
 def test_the_wetter_of_look_and_style_is_seen(hair, wetness, amounts, wanted, model):
     state = hair.data.vellus
     state.model, state.appearance.wetness, state.marschner.size = model, wetness, 32
-    style_items.assign(state, [wet.Settings(amount=amount) for amount in amounts])
+    style_items.assign(state, [wet.Settings(amount=amount, seed=seed) for seed, amount in enumerate(amounts)])
     bpy.context.view_layer.update()
     soaked = appearance.wetted(Appearance(), wanted)
     assert properties.look_of(state) == soaked
