@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         staleness,
         style_notes,
         styled_hair,
+        writing,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -6,9 +6,7 @@ and their inputs, so `evaluate` can regenerate them.
 """
 
 from collections.abc import Callable
-from concurrent.futures import Future
 
-import numpy as np
 from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError
@@ -20,14 +18,10 @@ from ...core.long_work import Work, part_of, run_now
 from ..data import curves, curves_objects, masks, partings, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
-from ..materials import looks
 from ..settings import preferences, setting_properties
-from . import bindings, staleness, styled_hair
+from . import bindings, staleness, styled_hair, writing
 from .bindings import BoundHair
 from .styled_hair import ReadStyles
-
-# Of the guides' own Curves, by their length: so they are seen on a surface of any size.
-_GUIDE_RADIUS = 1.0 / 300.0
 
 
 def distribute_guides(
@@ -70,7 +64,7 @@ def distributing_guides(
         device=device,
         progress=progress,
     )
-    return _write_guides(target.find(), place.find(), surface, guides, settings, key)
+    return writing.write_guides(target.find(), place.find(), surface, guides, settings, key)
 
 
 def interpolate_hair(
@@ -89,7 +83,7 @@ def interpolating_hair(
     """`interpolate_hair` as work in steps."""
     place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
     bound = yield from _binding_hair(guide_curves, settings, depsgraph, target)
-    return _write_bound(its_target.find(), place.find(), its_guides.find(), bound)
+    return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
 
 
 def bind_hair(
@@ -200,7 +194,7 @@ def adding_hair(
 
     grown, bound = yield compute
     key = staleness.root_key(guide_settings, density, None if texture is None else texture.values)
-    guide_curves = _write_guides(None, place.find(), surface, grown, guide_settings, key)
+    guide_curves = writing.write_guides(None, place.find(), surface, grown, guide_settings, key)
     return guide_curves, write_between(guide_curves, bound)
 
 
@@ -230,7 +224,7 @@ def hair_between(
 def write_between(guide_curves: Curves, bound: BoundHair) -> Curves:
     """The Curves of new hair that `hair_between` computed, when its guides are written."""
     bound.guide_uid = guide_curves.session_uid
-    return _write_bound(None, guide_curves.surface, guide_curves, bound)
+    return writing.write_strands(None, guide_curves.surface, guide_curves, bound)
 
 
 def _as_written(guides, surface, device):
@@ -275,71 +269,6 @@ def _growing(bound, progress):
     _ = bound.binding.leaders, bound.binding.identities  # now, and not while other threads need the CPU
     bound.grow()
     return bound
-
-
-def _write_guides(target, surface_object, surface, guides, settings, key):
-    target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
-    _keep_settings(target, "GUIDES", target.vellus.guides, settings)
-    target.vellus.root_key = key
-    radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * settings.length / surface.scale, np.float32)
-    points = Future()
-    points.set_result(surface.to_local(guides.numpy()))
-    curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
-    curves.write_points(target, points)
-    curves.keep_surface(target, surface)
-    return target
-
-
-def _write_bound(target, surface_object, guide_curves, bound):
-    target = target or curves_objects.new_object("Hair", surface_object).data
-    curves.require_editable(target)
-    target.vellus.guide_curves = guide_curves
-    bindings.keep(target, bound)
-    write_hair(target)
-    looks.evaluate_shading(target)
-    looks.evaluate_guides(guide_curves)
-    return target
-
-
-def write_hair(target: Curves) -> None:
-    """Bring a hair Curves datablock up to what it is bound to, if it is: the one place where hair is written."""
-    bound, state = bindings.of(target), target.vellus
-    if bound is None:
-        return
-    if not bound.has_moved_only:
-        _keep_settings(target, "HAIR", state.hair, bound.settings)
-        state.root_key, state.parting_key = bound.root_key, bound.parting_key
-        binding, radii = bound.binding, bound.radii
-        normals = binding.normals.numpy()
-        curves.make_strands(
-            target,
-            bound.surface,
-            binding.roots,
-            radii,
-            binding.identities,
-            leaders=binding.leaders,
-            normals=normals,
-            written_radii=bound.written_radii,
-        )
-        bound.written_radii = radii
-        curves.write_clumps(target, bound.styles.clumps)
-    if not bound.is_map_written:
-        curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
-    curves.write_points(target, bound.growing)
-    state.is_stale = False  # as another choice of guides marks it
-    state.followed = staleness.guides_digest(state.guide_curves)
-    bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
-    _store_roots(state.guide_curves, bound)
-
-
-def _store_roots(guide_curves, bound):
-    """Store the roots of guides that were drawn or slid by a brush, so that they follow their surface."""
-    if guide_curves is None or guide_curves.library is not None or guide_curves.session_uid != bound.guide_uid:
-        return
-    roots, surface = bound.guides.roots, bound.surface
-    stored = curves.read_root_places(guide_curves, len(surface.rest))
-    if stored is None or not all(map(np.array_equal, stored, surface.places(roots))):
-        curves.write_roots(guide_curves, surface, roots)
 
 
 def _kept_roots(target, surface, key, count):
@@ -395,7 +324,7 @@ def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
 def _is_restyled(target, depsgraph):
     if not restyle(target, depsgraph):
         return False
-    write_hair(target)
+    writing.write_hair(target)
     target.vellus.status = ""
     return True
 
@@ -436,11 +365,3 @@ def _check_surface(surface_object):
     if surface_object is None or surface_object.type != "MESH":
         raise HairError("Hair needs a mesh object to grow on: select one.")
     curves.require_editable(surface_object)
-
-
-def _keep_settings(target, kind, group, settings):
-    curves.require_editable(target)
-    setting_properties.assign(group, settings)
-    target.vellus.kind = kind
-    target.vellus.is_stale = False
-    target.vellus.status = ""

@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, masks
-from ..groom import bindings, edited_surfaces, pipeline, staleness
+from ..groom import bindings, edited_surfaces, pipeline, staleness, writing
 from ..render import hair_cache
 from ..settings import style_items
 from . import invalidation, reported
@@ -115,7 +115,7 @@ def write_all(*_args):
 def _write(hair):
     """Write hair that is newer than its datablock. An error becomes its status, so that other hair is written."""
     try:
-        pipeline.write_hair(hair)
+        writing.write_hair(hair)
     except HairError as error:
         bindings.invalidate(hair)
         hair.vellus.status = str(error)
