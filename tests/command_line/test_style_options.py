@@ -109,7 +109,7 @@ def test_settings_have_the_styles_of_the_words():
 
 
 def test_info_lists_styles(hair, tmp_path):
-    blend, styles = tmp_path / "a.blend", (clump.Settings(), curl.Settings(radius=0.04))
+    blend, styles = tmp_path / "a.blend", (clump.Settings(size=0.5), curl.Settings(radius=0.04))
     api.set_styles(hair, styles)
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     told = run_here("info", blend, "--json").results[0]["hair"][0]["styles"]
