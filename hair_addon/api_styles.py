@@ -84,7 +84,7 @@ def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:
 def set_styles(hair: Curves, styles: Sequence[StyleSettings]) -> None:
     """Replace the styles of hair Curves; a style keeps the name and the keys of one of its kind.
 
-    >>> api.set_styles(bpy.data.objects["Hair"], [api.Clump(size=0.02), api.Curl(radius=0.006), api.Frizz()])
+    >>> api.set_styles(bpy.data.objects["Hair"], [api.Clump(size=0.5), api.Curl(radius=0.006), api.Frizz()])
     >>> len(api.styles_of(bpy.data.objects["Hair"]))
     3
     """

@@ -203,6 +203,6 @@ def test_styles_are_what_a_script_says(hair):
 
 def test_new_hair_has_the_styles_of_its_settings(sphere):
     few = api.GuideSettings(guide_count=20), api.HairSettings(strand_count=50)
-    _guides, hair = api.add_hair(sphere, api.GroomSettings(*few, styles=[api.Clump(), api.Curl(), api.Curl()]))
-    assert api.styles_of(hair) == (api.Clump(), api.Curl(), api.Curl())
+    _guides, hair = api.add_hair(sphere, api.GroomSettings(*few, styles=[api.Clump(size=0.5), api.Curl(), api.Curl()]))
+    assert api.styles_of(hair) == (api.Clump(size=0.5), api.Curl(), api.Curl())
     assert api.settings_of(hair).style_names == ("Clump", "Curl", "Curl.001")

@@ -14,14 +14,13 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.io import frames
-from hair_addon.core.files import settings_file, style_presets, table_exr
+from hair_addon.core.files import settings_file, table_exr
 from hair_addon.core.files.settings_file import GroomSettings
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.shading import appearance
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.presets import PRESETS
 from hair_addon.core.shading.tables import lookup_tables
-from hair_addon.core.styling import clump, curl, frizz, lean, trim, wet
 from tests.support.commands import HEAD, ROOT, TETRAHEDRON, load, run, run_here, write_obj
 
 SMALL = ("--guides", 20, "--strands", 100)
@@ -115,35 +114,6 @@ def test_options_come_before_the_file_of_settings(scene, mesh, tmp_path):
     assert grown(out)[0].appearance == replace(PRESETS["BLOND"][1], coat=0.1)
 
 
-def test_styles_are_applied_in_the_order_of_the_words(scene, mesh, tmp_path):
-    out = tmp_path / "out.blend"
-    groom = ("groom", mesh, *SMALL, "--out", out)
-    styles = ("--style", "clump:size=0.5,levels=3", "--style", "Wave:radius=0.04,seed=7", "--style=trim:method=scale")
-    assert run_here(*groom, *styles, "--style", "lean:is_on=no").status == 0
-    settings = grown(out)[0]
-    wave = curl.Settings(radius=0.04, seed=7, **curl.WAVE)
-    first = clump.Settings(size=0.5, levels=3)
-    assert settings.styles[:2] == (first, wave)
-    assert settings.styles[2:] == (trim.Settings(method="SCALE", seed=1), lean.Settings(is_on=False, seed=2))
-    assert settings.style_names == ("Clump", "Wave", "Trim", "Lean")
-    settings_file.write(tmp_path / "groom.json", GroomSettings(styles=[frizz.Settings()]))
-    assert run_here(*groom, "--settings", tmp_path / "groom.json", "--style", "curl").status == 0
-    assert grown(out)[0].styles == (frizz.Settings(), curl.Settings(seed=1))
-
-
-def test_style_presets_fit_the_surface(scene, mesh, tmp_path):
-    out = tmp_path / "out.blend"
-    groom = ("groom", mesh, *SMALL, "--out", out, "--style-preset", "CURLY")
-    assert run_here(*groom, "--no-style-fit").status == 0
-    plain = grown(out)[0]
-    assert plain.styles == style_presets.read("CURLY").styles
-    assert run_here(*groom, "--style", "wet:lock=0.01", "--tip-taper", 0.9).status == 0
-    settings = grown(out)[0]
-    factor = settings.guides.length / 0.12  # the length of new hair on a head
-    assert settings.styles[1].radius / plain.styles[1].radius == pytest.approx(factor, rel=0.01)
-    assert settings.styles[3] == wet.Settings(lock=0.01, seed=3) and settings.hair.tip_taper == 0.9
-
-
 def test_existing_objects_of_a_file_are_kept(lit, tmp_path):
     """A .blend keeps all that it held, beside new hair, and finds what it names by a path relative to itself."""
     (tmp_path / "from").mkdir()
@@ -206,16 +176,12 @@ def test_settings_are_printed_or_written_to_begin_with(tmp_path):
     assert ended.out == (tmp_path / "a.json").read_text()
     expected = GroomSettings(GuideSettings(gravity=0.25), HairSettings(strand_count=77))
     assert settings_file.read(tmp_path / "a.json") == expected
-    styled = json.loads(run_here("settings", "--style", "curl:radius=0.01", "--style-preset", "WET").out)
-    assert [(style["kind"], style["seed"]) for style in styled["styles"]] == [("WET", 0), ("CURL", 1)]
     assert written.results == [{"verb": "settings", "out": str(tmp_path / "a.json")}]
     assert json.loads(run_here("settings", "--schema").out) == settings_file.schema()
 
 
 def test_info_shows_the_content_of_a_file(lit, tmp_path):
     blend = tmp_path / "lit.blend"
-    styles = (clump.Settings(), curl.Settings(radius=0.04))
-    api.set_styles(bpy.data.objects["Hair"], styles)
     bpy.ops.wm.save_as_mainfile(filepath=str(blend))
     told = run("info", blend, "--json").results[0]
     assert [(s["name"], s["uv_map"]) for s in told["surfaces"]] == [("Sphere", "UVMap")]
@@ -225,16 +191,6 @@ def test_info_shows_the_content_of_a_file(lit, tmp_path):
     assert settings_file.from_object(
         {"format": settings_file.FORMAT, "version": 2, "guides": guides["settings"], "hair": hair["settings"]}, blend
     ).hair == HairSettings(strand_count=500, radius=0.004, influence_distance=0.03)
-    assert settings_file.from_object(
-        {"format": settings_file.FORMAT, "version": settings_file.VERSION, "styles": hair["styles"]}, blend
-    ) == GroomSettings(styles=styles, style_names=("Clump", "Curl"))
-    settings_file.write(tmp_path / "a.json", GroomSettings(styles=styles))
-    assert [
-        style["kind"] for style in run_here("info", tmp_path / "a.json", "--json").results[0]["settings"]["styles"]
-    ] == [
-        "CLUMP",
-        "CURL",
-    ]
     assert hair["bytes"] > 500 * 41 * 16
     said = run_here("info", blend).out
     assert "strands: 500" in said and f"melanin: {Appearance().melanin}" in said

@@ -114,8 +114,11 @@ class PartialSettings:
     def changed(self, settings: GroomSettings) -> GroomSettings:
         """`GroomSettings` with these."""
         sections = {name: replace(getattr(settings, name), **values) for name, values in self.values.items()}
-        styles = {} if self.styles is None else {"styles": self.styles, "style_names": self.style_names}
-        return replace(settings, **sections, **styles)
+        settings = replace(settings, **sections)
+        return settings if self.styles is None else self._styled(settings, self.styles)
+
+    def _styled(self, settings, styles):
+        return replace(settings, styles=styles, style_names=self.style_names)
 
 
 def read(path: str | Path) -> GroomSettings:

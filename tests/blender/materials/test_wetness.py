@@ -36,7 +36,7 @@ def sockets_of(look):
 def test_the_wetter_of_look_and_style_is_seen(hair, wetness, amounts, wanted, model):
     state = hair.data.vellus
     state.model, state.appearance.wetness, state.marschner.size = model, wetness, 32
-    style_items.assign(state, [wet.Settings(amount=amount) for amount in amounts])
+    style_items.assign(state, [wet.Settings(amount=amount, lock=0.5, seed=seed) for seed, amount in enumerate(amounts)])
     bpy.context.view_layer.update()
     soaked = appearance.wetted(Appearance(), wanted)
     assert properties.look_of(state) == soaked
@@ -50,7 +50,7 @@ def test_the_wetter_of_look_and_style_is_seen(hair, wetness, amounts, wanted, mo
 
 def test_a_style_that_is_off_is_dry(hair):
     state = hair.data.vellus
-    style_items.assign(state, [wet.Settings()])
+    style_items.assign(state, [wet.Settings(lock=0.5)])
     bpy.context.view_layer.update()
     np.testing.assert_allclose(sockets(hair), sockets_of(Appearance(wetness=1.0)), rtol=1e-6)
     state.styles[0].wet.is_on = False
@@ -60,7 +60,7 @@ def test_a_style_that_is_off_is_dry(hair):
 
 def test_keyed_water_is_seen_in_each_frame(hair):
     state = hair.data.vellus
-    style_items.assign(state, [wet.Settings()])
+    style_items.assign(state, [wet.Settings(lock=0.5)])
     for frame, amount in ((1, 0.0), (11, 1.0)):
         state.styles[0].wet.amount = amount
         hair.data.keyframe_insert("vellus.styles[0].wet.amount", frame=frame)
@@ -77,7 +77,7 @@ def test_hair_that_shares_a_material_and_is_wetter_gets_its_own(hair):
     copy.data = hair.data.copy()
     bpy.context.scene.collection.objects.link(copy)
     assert copy.data.materials[0] == hair.data.materials[0]
-    style_items.assign(copy.data.vellus, [wet.Settings(amount=0.5)])
+    style_items.assign(copy.data.vellus, [wet.Settings(amount=0.5, lock=0.5)])
     bpy.context.view_layer.update()
     np.testing.assert_allclose(sockets(copy), sockets_of(Appearance(wetness=0.5)), rtol=1e-6)
     np.testing.assert_allclose(sockets(hair), sockets_of(Appearance()), rtol=1e-6)
@@ -85,7 +85,7 @@ def test_hair_that_shares_a_material_and_is_wetter_gets_its_own(hair):
 
 def test_a_look_is_saved_as_it_is_set(hair):
     api.shade(hair, "BLOND", wetness=0.5)
-    api.add_style(hair, "WET")
+    api.add_style(hair, "WET", fit=True)
     assert api.settings_of(hair).appearance.wetness == 0.5
     api.shade(hair, roughness=0.5)
     assert api.settings_of(hair).appearance.roughness == 0.5 and properties.look_of(hair.data.vellus).roughness == 0.16

@@ -12,12 +12,13 @@ from hair_addon.core.params import declared
 from hair_addon.core.styling import bend, clump, curl, frizz, wet
 from hair_addon.core.styling.kinds import KINDS, LABELS, MOST_STYLES, OFFERS, kind_of
 
-CURL, FRIZZ, CLUMP = curl.Settings(radius=0.004), frizz.Settings(amplitude=0.002), clump.Settings(size=0.02)
+CURL, FRIZZ, CLUMP = curl.Settings(radius=0.004), frizz.Settings(amplitude=0.002), clump.Settings(size=0.5)
 
 
 @pytest.fixture
 def state(hair):
-    """A hair's settings, without styles."""
+    """A hair's settings, without styles; its strands are not followed."""
+    hair.data.vellus.is_live = False
     return hair.data.vellus
 
 
