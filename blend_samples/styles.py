@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The gallery of styles: `python blend_samples/styles.py` draws docs/styles.png, docs/wet.png and the presets' pictures.
+"""The gallery of styles: `python blend_samples/styles.py` draws docs/styles.png and docs/wet.png.
 
 One head and one light for all of them. Vellus draws each picture, so all take two minutes.
 """
@@ -13,14 +13,14 @@ import bpy
 import gpu
 import numpy as np
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import head  # beside this file
 
 import hair_addon
 from hair_addon import api
 
+ROOT = Path(__file__).resolve().parent.parent
 GALLERY = ("STRAIGHT", "WAVY", "CURLY", "COILY", "FRIZZY", "WET", "PIXIE", "BUZZ")
 WETNESS = (0.0, 0.25, 0.5, 0.75, 1.0)
 STRAND_COUNT = 30_000

@@ -22,7 +22,7 @@ In the installed extension this is bl_ext.user_default.vellus.hair_addon.api.
 """
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -44,21 +44,23 @@ from .api_styles import (
     add_style,
     apply_style_preset,
     set_styles,
+    styled_strands,
     styles_of,
 )
 from .api_tables import bake_tables, table_settings
 from .core import geometry, grooming, imaging, lazy
 from .core.errors import HairError
 from .core.files import settings_file
-from .core.files.settings_file import GroomSettings
+from .core.files.settings_file import GroomSettings, require_styles
 from .core.geometry.mesh import TriMesh
 from .core.geometry.strands import Strands, check_strands, curve_offsets, from_numpy
-from .core.grooming import following, groom
+from .core.grooming import groom
 from .core.grooming.groom import GuideSettings, HairSettings
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, plain_value, require_class
 from .core.shading import presets
 from .core.shading.appearance import Appearance
+from .core.styling.base import StyleSettings
 
 blender = lazy.Package(".blender", __package__)
 
@@ -188,15 +190,18 @@ def interpolate_hair(
     settings: HairSettings | None = None,
     *,
     mesh: Arrays | None = None,
+    styles: Sequence[StyleSettings] = (),
+    masks: Mapping[str, ArrayLike] | None = None,
     progress: Progress = no_progress,
     **changes: Any,
 ) -> Curves | Strands:
-    """Interpolate strands between guides.
+    """Interpolate strands between guides, and style them.
 
     guides: guide Curves, whose new hair Curves are returned; or the `Strands` of guides on a `mesh` of arrays, whose
     `Strands` are. settings: `HairSettings`; changes and progress as above. Radius and influence distance are computed
     from the surface unless they are given. Strands use the mask of their guides, unless `density_group` names another
-    group; with plain arrays, they cover the whole mesh.
+    group; with plain arrays, they cover the whole mesh. styles: in the order in which they are applied; masks: of plain
+    arrays, weights (V,) of the vertices by the names that styles use.
 
     >>> hair = api.interpolate_hair(bpy.data.objects["Guides"], strand_count=2000, radius=0.001)
     >>> hair.vellus.hair.strand_count
@@ -208,10 +213,14 @@ def interpolate_hair(
         if mesh is None:
             raise HairError("Guides given as arrays need their surface: pass its arrays as mesh=.")
         require_no_names(settings)
-        binding = groom.bind_hair(mesh_of(mesh), guides, settings, progress=progress)
-        return following.follow_guides(binding, guides)
+        return styled_strands(mesh_of(mesh), guides, settings, styles, masks, progress)
 
-    return run_now(blender.groom.pipeline.interpolating_hair(_guides(guides), settings, _depsgraph()), progress)
+    if masks is not None:
+        raise HairError("masks are for plain arrays: name a vertex group of the surface in the style.")
+    styles, _names = require_styles(styles)
+    hair = run_now(blender.groom.pipeline.interpolating_hair(_guides(guides), settings, _depsgraph()), progress)
+    blender.groom.hair_styles.assign(hair, styles)  # strands take them with Blender's next update
+    return hair
 
 
 def add_hair(

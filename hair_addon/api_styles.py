@@ -1,13 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Python interface's functions of styles; api.py offers them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
 
 from .api_arguments import changed, choice
 from .core import lazy
+from .core.errors import HairError
 from .core.files import style_presets
 from .core.files.settings_file import require_styles
+from .core.geometry.mesh import TriMesh
+from .core.geometry.strands import Strands
+from .core.grooming import following, groom, hair_styles
+from .core.grooming.groom import HairSettings
+from .core.long_work import Progress
 from .core.params import Param, plain_value
 from .core.styling.base import StyleSettings
 from .core.styling.bend import Settings as Bend
@@ -17,7 +26,10 @@ from .core.styling.curl import Settings as Curl
 from .core.styling.frizz import Settings as Frizz
 from .core.styling.kinds import OFFERS, kind_of
 from .core.styling.lean import Settings as Lean
+from .core.styling.masks import Mask
+from .core.styling.program import mask_keys
 from .core.styling.smooth import Settings as Smooth
+from .core.styling.style_inputs import Inputs
 from .core.styling.trim import Settings as Trim
 from .core.styling.wet import Settings as Wet
 
@@ -106,3 +118,39 @@ def apply_style_preset(hair: Curves, preset: str, *, fit: bool = True, keep_styl
     fit, keep = plain_value("fit", fit, False, _SWITCH), plain_value("keep_styles", keep_styles, False, _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
     blender.groom.hair_styles.apply_preset(target, found, is_fitted=fit, keeps_styles=keep)
+
+
+def styled_strands(
+    mesh: TriMesh,
+    guides: Strands,
+    settings: HairSettings,
+    styles: Sequence[StyleSettings],
+    masks: Mapping[str, ArrayLike] | None,
+    progress: Progress,
+) -> Strands:
+    """Strands between guides on a mesh of arrays, with styles; arguments as in `api.interpolate_hair`."""
+    styles, _names = require_styles(styles)
+    inputs = Inputs({key: _mask(mesh, masks or {}, key) for key in mask_keys(styles)})
+    for style in styles:
+        _require_arrays(style)
+    binding = groom.bind_hair(mesh, guides, settings, progress=progress)
+    trees = hair_styles.clump_trees(mesh, guides.roots, settings)
+    styling = hair_styles.bind_styles(binding, guides, settings, styles, trees, inputs)
+    return following.follow_guides(binding, guides, styling)
+
+
+def _mask(mesh, masks, key):
+    name, image, is_inverted = key
+    if image:
+        raise HairError("Images mask styles in Blender only: pass weights of vertices as masks={name: weights}.")
+    if name not in masks:
+        raise HairError(f"There is no mask {name!r}: pass weights of vertices as masks={{name: weights}}.")
+    weights = np.asarray(masks[name], np.float32)
+    if weights.shape != (len(mesh.vertices),) or not np.isfinite(weights).all():
+        raise HairError(f"The mask {name!r} must have a finite weight for each of {len(mesh.vertices)} vertices.")
+    return Mask(weights[mesh.triangles], is_inverted=is_inverted)
+
+
+def _require_arrays(style):
+    if (isinstance(style, Trim) and style.cutter) or (isinstance(style, Lean) and style.direction == "OBJECT"):
+        raise HairError("Plain arrays have no objects: styles can name objects in Blender only.")
