@@ -22,7 +22,7 @@ In the installed extension this is bl_ext.user_default.vellus.hair_addon.api.
 """
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,19 +31,36 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .api_styles import (
+    Bend,
+    Braid,
+    Clump,
+    Curl,
+    Frizz,
+    Lean,
+    Smooth,
+    Trim,
+    Wet,
+    add_style,
+    apply_style_preset,
+    set_styles,
+    styled_strands,
+    styles_of,
+)
+from .api_tables import bake_tables, table_settings
 from .core import geometry, grooming, imaging, lazy
 from .core.errors import HairError
 from .core.files import settings_file
-from .core.files.settings_file import GroomSettings
+from .core.files.settings_file import GroomSettings, require_styles
 from .core.geometry.mesh import TriMesh
 from .core.geometry.strands import Strands, check_strands, curve_offsets, from_numpy
-from .core.grooming import following, groom
+from .core.grooming import groom
 from .core.grooming.groom import GuideSettings, HairSettings
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, plain_value, require_class
-from .core.shading import appearance, presets
+from .core.shading import presets
 from .core.shading.appearance import Appearance
-from .core.shading.tables import lookup_tables
+from .core.styling.base import StyleSettings
 
 blender = lazy.Package(".blender", __package__)
 
@@ -54,12 +71,23 @@ Arrays = TriMesh | tuple[ArrayLike, ArrayLike]  # vertices (V, 3) [m] and triang
 
 __all__ = [
     "Appearance",
+    "Bend",
+    "Braid",
+    "Clump",
+    "Curl",
+    "Frizz",
     "GroomSettings",
     "GuideSettings",
     "HairError",
     "HairSettings",
+    "Lean",
+    "Smooth",
+    "Trim",
+    "Wet",
     "add_hair",
+    "add_style",
     "apply_settings",
+    "apply_style_preset",
     "bake_tables",
     "distribute_guides",
     "draw",
@@ -68,8 +96,10 @@ __all__ = [
     "points",
     "render",
     "save_settings",
+    "set_styles",
     "settings_of",
     "shade",
+    "styles_of",
     "table_settings",
     "use_as_guides",
 ]
@@ -160,15 +190,18 @@ def interpolate_hair(
     settings: HairSettings | None = None,
     *,
     mesh: Arrays | None = None,
+    styles: Sequence[StyleSettings] = (),
+    masks: Mapping[str, ArrayLike] | None = None,
     progress: Progress = no_progress,
     **changes: Any,
 ) -> Curves | Strands:
-    """Interpolate strands between guides.
+    """Interpolate strands between guides, and style them.
 
     guides: guide Curves, whose new hair Curves are returned; or the `Strands` of guides on a `mesh` of arrays, whose
     `Strands` are. settings: `HairSettings`; changes and progress as above. Radius and influence distance are computed
     from the surface unless they are given. Strands use the mask of their guides, unless `density_group` names another
-    group; with plain arrays, they cover the whole mesh.
+    group; with plain arrays, they cover the whole mesh. styles: in the order in which they are applied; masks: of plain
+    arrays, weights (V,) of the vertices by the names that styles use.
 
     >>> hair = api.interpolate_hair(bpy.data.objects["Guides"], strand_count=2000, radius=0.001)
     >>> hair.vellus.hair.strand_count
@@ -180,10 +213,14 @@ def interpolate_hair(
         if mesh is None:
             raise HairError("Guides given as arrays need their surface: pass its arrays as mesh=.")
         require_no_names(settings)
-        binding = groom.bind_hair(mesh_of(mesh), guides, settings, progress=progress)
-        return following.follow_guides(binding, guides)
+        return styled_strands(mesh_of(mesh), guides, settings, styles, masks, progress)
 
-    return run_now(blender.groom.pipeline.interpolating_hair(_guides(guides), settings, _depsgraph()), progress)
+    if masks is not None:
+        raise HairError("masks are for plain arrays: name a vertex group of the surface in the style.")
+    styles, _names = require_styles(styles)
+    hair = run_now(blender.groom.pipeline.interpolating_hair(_guides(guides), settings, _depsgraph()), progress)
+    blender.groom.hair_styles.assign(hair, styles)  # strands take them with Blender's next update
+    return hair
 
 
 def add_hair(
@@ -233,7 +270,7 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     """
 
     target = _curves(hair, "HAIR")
-    present = blender.settings.properties.look_of(target.vellus)
+    present = blender.settings.properties.own_look_of(target.vellus)
     if isinstance(look, str):
         preset = presets.PRESETS[choice(look, "preset", presets.PRESETS)]
         look = replace(preset[1], mode=present.mode)  # the mode is not part of a preset
@@ -245,52 +282,21 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
         target.vellus.model = model
 
 
-def table_settings(settings: GroomSettings, **changes: Any) -> lookup_tables.Settings:
-    """Return the `lookup_tables.Settings` of the tables for hair with these `GroomSettings`.
-
-    >>> settings = api.GroomSettings(appearance=api.Appearance(roughness=0.2))
-    >>> api.table_settings(settings, size=64).roughness
-    0.2
-    """
-    require_class(settings, GroomSettings, "settings")
-    found = appearance.table_settings(settings.appearance, settings.tables)
-    return changed(lookup_tables.Settings, found, changes)
-
-
-def bake_tables(
-    folder: str | os.PathLike,
-    settings: lookup_tables.Settings | None = None,
-    *,
-    has_plots: bool = False,
-    progress: Progress = no_progress,
-    **changes: Any,
-) -> list[Path]:
-    """Bake the tables of the Marschner model and of dual scattering to OpenEXR in a folder; returns the file paths.
-
-    settings: `lookup_tables.Settings`; has_plots: whether to write a plot of each table.
-
-    >>> [path.name for path in api.bake_tables("tables", size=32)][:3]
-    ['m.exr', 'n.exr', 'n_trt.exr']
-    """
-
-    settings = changed(lookup_tables.Settings, settings, changes)
-    has_plots = plain_value("has_plots", has_plots, False, _ANY)
-    return run_now(blender.io.table_files.baking_tables(settings, path_of(folder), has_plots), heard(progress))
-
-
 # Pictures.
 
 
 def draw(*, progress: Progress = no_progress, **settings: Any) -> np.ndarray:
     """Draw the scene's hair and meshes from its camera: (height, width, 4) float32.
 
-    Scene-linear and premultiplied, the first row at the bottom; settings: fields of `PictureSettings`.
+    Scene-linear and premultiplied, the first row at the bottom; settings: fields of `PictureSettings`
+    (width, height, samples_per_side, is_transparent).
 
     >>> api.draw(width=64, height=48).shape
     (48, 64, 4)
     """
 
-    wanted = changed(imaging.pixel_sampling.PictureSettings, None, settings)
+    sampling = imaging.pixel_sampling
+    wanted = changed(sampling.PictureSettings, None, settings, sampling.FRAME_FIELDS)
     return run_now(blender.render.offscreen.drawing_picture(wanted), heard(progress))
 
 
@@ -304,15 +310,17 @@ def render(
 ) -> Path:
     """Render a frame of the scene, the current one for None, and write it atomically as .png or .exr.
 
-    engine: "vellus", "cycles" or "eevee"; settings: fields of `FrameSettings`, width and height
-    default to the scene's. Returns the path, in which ### is replaced with the frame number.
+    engine: "vellus", "cycles" or "eevee"; settings: fields of `PictureSettings` (width, height, sample_count,
+    is_transparent, has_passes), width and height default to the scene's. Returns the path, in which ### is
+    replaced with the frame number.
 
     >>> api.render("frame_####.png", frame=3, width=64, height=48).name
     'frame_0003.png'
     """
 
     path, engine, progress = path_of(path), choice(engine, "engine", blender.io.frames.ENGINES), heard(progress)
-    wanted = changed(imaging.pixel_sampling.FrameSettings, None, blender.io.frames.scene_size() | settings)
+    sampling, settings = imaging.pixel_sampling, blender.io.frames.scene_size() | settings
+    wanted = changed(sampling.PictureSettings, None, settings, sampling.DRAWING_FIELDS)
     frame = plain_value("frame", blender.host.scene_time.present_frame() if frame is None else frame, 1, _FRAMES)
     blender.io.frames.require_pattern(path, 1)
     target = blender.io.frames.path_of(path, frame)

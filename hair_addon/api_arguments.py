@@ -20,9 +20,14 @@ blender = lazy.Package(".blender", __package__)
 _OF_BLENDER = ("density_group", "density_image", "region_group", "region_attribute", "part_lines")
 
 
-def changed[S: Settings](settings_class: type[S], settings: S | None, changes: dict[str, Any]) -> S:
-    """Return `Settings` with some fields changed, based on the defaults if None. Raises `HairError`."""
-    known = [name for name, _default, _details in declared(settings_class)]
+def changed[S: Settings](
+    settings_class: type[S], settings: S | None, changes: dict[str, Any], skip: Collection[str] = ()
+) -> S:
+    """Return `Settings` with some fields changed, based on the defaults if None. Raises `HairError`.
+
+    skip: names of fields that do not apply.
+    """
+    known = [name for name, _default, _details in declared(settings_class) if name not in skip]
     unknown = next((name for name in changes if name not in known), None)
     if unknown is not None:
         raise HairError(f'Unknown setting "{unknown}": choose from {", ".join(known)}.')

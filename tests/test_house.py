@@ -202,7 +202,7 @@ def test_native_code_fits_the_columns_of_python(path):
 
 
 # Files of these folders that others are made of stand beside the others.
-BASES = {"blender/ui/operators": {"base", "modal", "file_browser"}}
+BASES = {"blender/ui/operators": {"base", "modal", "file_browser"}, "blender/ui/operators/styles": {"base"}}
 
 
 @pytest.mark.parametrize("folder", BASES)
@@ -258,9 +258,12 @@ def test_core_imports_without_blender():
 
 
 def test_register_is_light():
-    """Blender registers add-ons while an artist waits for it to start: no Warp, so no compiling, and less work than Warp."""
-    printed = run_python(
-        "import bpy, sys, time\n"
+    """Blender registers add-ons while an artist waits for it to start: a part of its own time, and without Warp."""
+    source = (
+        "import sys, time\n"
+        "start = time.process_time()\n"
+        "import bpy\n"
+        "blender = time.process_time() - start\n"
         "start = time.process_time()\n"
         "import hair_addon\n"
         "hair_addon.register()\n"
@@ -268,11 +271,10 @@ def test_register_is_light():
         "heavy = [name for name in ('warp', 'scipy') if name in sys.modules]\n"
         "assert not heavy, heavy\n"
         "hair_addon.unregister()\n"
-        "start = time.process_time()\n"
-        "import warp\n"
-        "print(ours / (time.process_time() - start))\n"
+        "print(ours / blender)\n"
     )
-    assert float(printed.split()[-1]) < 0.8
+    run_python(source)  # so that Python has compiled all files
+    assert min(float(run_python(source).split()[-1]) for _ in range(3)) < 0.75
 
 
 # RELIABILITY: somebody hostile supplies the .blend; and an extension has no business on the network.

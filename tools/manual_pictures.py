@@ -35,6 +35,7 @@ PANELS = {
     "surface": ("surface", "surface_uvs"),
     "guides": ("guides", "guides_growth", "guides_placement"),
     "strands": ("interpolation", "interpolation_parting", "interpolation_advanced"),
+    "styles": ("styles", "styles_profile", "styles_mask"),
     "shading": ("shading", "shading_color", "shading_fibre", "shading_variation"),
     "lookup_tables": ("tables",),
     "output": ("output",),

@@ -12,6 +12,7 @@ from .live import first_setup, handlers, invalidation
 from .render import engine, viewport
 from .settings import preferences, properties, translations
 from .ui import engine_panels, keymap, look_previews, menus, operators, panels
+from .ui.operators import styles
 
 CLASSES = (
     preferences.VellusPreferences,
@@ -19,6 +20,7 @@ CLASSES = (
     *hair_systems.CLASSES,
     engine.VellusRenderEngine,
     *operators.CLASSES,
+    *styles.CLASSES,
     *panels.LISTS,
     *panels.CLASSES,
     *menus.CLASSES,

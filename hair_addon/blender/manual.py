@@ -10,13 +10,15 @@ from pathlib import Path
 import bpy
 
 from .groom import hair_systems
-from .settings import preferences, properties
+from .settings import preferences, properties, style_items
 from .ui import operators
+from .ui.operators import styles
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
 _CLASSES = {
     "guides": (properties.VellusGuideSettings,),
     "strands": (properties.VellusHairSettings, properties.VellusCurves),
+    "styles": style_items.CLASSES,
     "shading": (properties.VellusAppearance,),
     "lookup_tables": (properties.VellusMarschnerSettings,),
     "rendering": (properties.VellusRenderSettings, properties.VellusPassSettings),
@@ -35,6 +37,10 @@ _OPERATORS = {
     ),
     "guides": ("distribute_guides",),
     "strands": ("interpolate_hair",),
+    "styles": (
+        *("add_style", "remove_style", "move_style", "duplicate_style", "use_points"),
+        *("apply_style_preset", "apply_saved_style", "save_style_preset", "remove_style_preset"),
+    ),
     "shading": ("apply_preset", "apply_saved_look", "save_look", "remove_look", "toggle_drawing"),
     "lookup_tables": ("bake_tables",),
     "systems": ("delete_system",),
@@ -75,7 +81,7 @@ def _properties():
 
 def _operators():
     """Of an operator's properties too, which Blender looks up by their operator."""
-    labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in operators.CLASSES}
+    labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in (*operators.CLASSES, *styles.CLASSES)}
     for page, names in _OPERATORS.items():
         for name in names:
             yield f"bpy.ops.vellus.{name}", page, labels[name]

@@ -11,7 +11,7 @@ from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.long_work import run_now
 from ..core.params import declared
 from ..core.shading.presets import PRESETS
-from . import opening, options
+from . import opening, options, style_options
 
 blender = lazy.Package("..blender", __package__)
 
@@ -31,6 +31,7 @@ def add(verbs):
         "--guides-from", metavar="FILE", help="use the curves of a .blend, .usd*, .abc or .npz as guides"
     )
     parser.add_argument("--guides-object", default="", metavar="NAME", help="curves object in that file")
+    style_options.add_styles(parser, has_surface=True)
     options.add_scripts(parser)
     options.add_groom_settings(parser)
     options.add_common(parser)
@@ -52,6 +53,7 @@ def run(given, console):
     blender.io.groom_files.require_writable(given.out)
     file_axes = opening.open_file(given, console)
     surface = blender.io.mesh_files.find_surface(given.surface)
+    settings = _styled(given, settings, surface)
     started = time.perf_counter()
     if given.guides_from:
         guides, hair = _follow_curves(given, surface, settings, file_axes, console)
@@ -65,6 +67,18 @@ def run(given, console):
     values |= {"points": len(hair.points), "seconds": round(seconds, 3), "bytes": given.out.stat().st_size}
     made = f"{counts['guides']} guides, {counts['strands']} strands on {surface.name}"
     console.result(values, f"{made} in {seconds:.2f} s: {given.out}")
+
+
+def _styled(given, settings, surface):
+    """`GroomSettings` with the styles that options give, for a mesh object."""
+
+    def fit():
+        return blender.groom.hair_styles.fit_of(surface, settings.guides, settings.hair)
+
+    if given.no_style_fit and not given.style_preset:
+        raise HairError("--no-style-fit needs --style-preset.")
+    styled = style_options.styled(given, settings, None if given.no_style_fit else fit)
+    return options.changed_groom(styled, given)
 
 
 def _follow_curves(given, surface, settings, file_axes, console):

@@ -37,7 +37,8 @@ def run(given, console):
 
 
 def _settings(path):
-    return {"settings": settings_file.sections_of(settings_file.read(path))}
+    settings = settings_file.read(path)
+    return {"settings": settings_file.sections_of(settings) | {"styles": settings_file.list_of_styles(settings)}}
 
 
 def _tables(path):

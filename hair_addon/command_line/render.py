@@ -5,7 +5,7 @@ import time
 
 from ..core import lazy
 from ..core.files.whole_file import partial_of
-from ..core.imaging.pixel_sampling import FrameSettings
+from ..core.imaging.pixel_sampling import DRAWING_FIELDS, PictureSettings
 from ..core.params import declared
 from . import helpers, opening, options
 
@@ -68,7 +68,8 @@ def run(given, console):
 
 
 def _make_sequence(given, console, numbers, settings):
-    values = {name: getattr(settings, name) for name, _default, _details in declared(FrameSettings)}
+    names = [name for name, _default, _details in declared(PictureSettings) if name not in DRAWING_FIELDS]
+    values = {name: getattr(settings, name) for name in names}
     described = blender.io.sequence.description(given.input, given.engine, values | {"scripts": given.enable_scripts})
     blender.io.sequence.begin(given.out, numbers, described, given.overwrite)
     if given.jobs > 1:
@@ -107,8 +108,8 @@ def _sentence(values):
 
 
 def _frame_settings(given, size):
-    """Return the requested `FrameSettings`. Raises `HairError`."""
+    """Return the requested `PictureSettings`. Raises `HairError`."""
     asked = size | {name: getattr(given, name) for name in _SETTINGS if getattr(given, name) is not None}
     if given.samples is not None:
         asked["sample_count"] = given.samples
-    return FrameSettings(**asked, is_transparent=given.transparent, has_passes=given.passes)
+    return PictureSettings(**asked, is_transparent=given.transparent, has_passes=given.passes)

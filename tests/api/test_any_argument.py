@@ -8,7 +8,6 @@ number of calls.
 import math
 import os
 import random
-from dataclasses import fields
 from fractions import Fraction
 
 import bpy
@@ -16,9 +15,11 @@ import numpy as np
 
 from hair_addon import api
 from hair_addon.blender.live import live_hair
-from hair_addon.core.imaging.pixel_sampling import FrameSettings, PictureSettings
+from hair_addon.core.files import settings_file
+from hair_addon.core.imaging.pixel_sampling import DRAWING_FIELDS, FRAME_FIELDS, PictureSettings
 from hair_addon.core.params import declared
 from hair_addon.core.shading.tables import lookup_tables
+from hair_addon.core.styling.kinds import KINDS, OFFERS
 from tests.support.following import update
 from tests.support.reading import everything, points
 
@@ -86,8 +87,9 @@ def value_for(dice, name, default, details):
     return COSTLY[name] if name in COSTLY and is_number and value > COSTLY[name] else value
 
 
-def changes(dice, settings_class, cheap):
-    declarations = {name: (default, details) for name, default, details in declared(settings_class)}
+def changes(dice, settings_class, cheap, skip=()):
+    known = [(name, *declaration) for name, *declaration in declared(settings_class) if name not in skip]
+    declarations = {name: (default, details) for name, default, details in known}
     chosen = dice.sample(sorted(declarations), dice.randint(0, 2))
     found = {name: value for name, value in COSTLY.items() if name in declarations and name in cheap}
     return found | {name: value_for(dice, name, *declarations[name]) for name in chosen}
@@ -105,11 +107,26 @@ def settings(dice):
     if dice.random() < 0.1:
         return dice.choice(OTHERS)
     parts = {}
-    for section in fields(api.GroomSettings):
+    for section, settings_class in settings_file.SECTIONS.items():
         if dice.random() < 0.3:
-            parts[section.name] = section.type(**changes(dice, section.type, COSTLY))
+            parts[section] = settings_class(**changes(dice, settings_class, COSTLY))
+    if dice.random() < 0.3:
+        parts["styles"] = anything(dice, [style(dice) for _ in range(dice.randint(0, 3))])
     few = {"guides": api.GuideSettings(guide_count=20), "hair": api.HairSettings(strand_count=50)}
     return api.GroomSettings(**(few | parts))
+
+
+def style(dice):
+    """Settings of a style."""
+    settings_class = dice.choice([*KINDS.values()])
+    return settings_class(**changes(dice, settings_class, ()))
+
+
+def add_style(dice):
+    kind = dice.choice([*OFFERS])
+    details = {"name": anything(dice, "", "A"), "fit": anything(dice, False, True)}
+    changed = changes(dice, KINDS[OFFERS[kind].kind], ())
+    return api.add_style(target(dice, "HAIR"), anything(dice, kind), **details, **changed)
 
 
 def anything(dice, *often):
@@ -134,12 +151,18 @@ CALLS = {
     "bake_tables": lambda d: api.bake_tables(
         anything(d, "tables"), has_plots=anything(d, False), **changes(d, lookup_tables.Settings, COSTLY)
     ),
-    "draw": lambda d: api.draw(**changes(d, PictureSettings, COSTLY)),
+    "draw": lambda d: api.draw(**changes(d, PictureSettings, COSTLY, FRAME_FIELDS)),
     "render": lambda d: api.render(
         anything(d, "a.png", "b_##.exr"),
         frame=anything(d, None, 1, 5),
         engine=anything(d, "vellus"),
-        **changes(d, FrameSettings, COSTLY),
+        **changes(d, PictureSettings, COSTLY, DRAWING_FIELDS),
+    ),
+    "add_style": add_style,
+    "styles_of": lambda d: api.styles_of(target(d, "HAIR")),
+    "set_styles": lambda d: api.set_styles(target(d, "HAIR"), anything(d, [], [style(d)], [style(d), style(d)])),
+    "apply_style_preset": lambda d: api.apply_style_preset(
+        target(d, "HAIR"), anything(d, "CURLY", "BUZZ"), fit=anything(d, True), keep_styles=anything(d, False, True)
     ),
     "settings_of": lambda d: api.settings_of(target(d, "HAIR")),
     "save_settings": lambda d: api.save_settings(anything(d, "a.json"), settings(d)),

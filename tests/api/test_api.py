@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import warp
 
-from hair_addon import api
+from hair_addon import api, api_styles, api_tables
 from tests.support.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
@@ -22,8 +22,12 @@ WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'):
 
 
 def examples():
-    """The doctests of the functions, in the order of the file; the module's own is the first."""
-    found = doctest.DocTestFinder(exclude_empty=True).find(api, "api")
+    """The doctests of the functions, in the order of the files; the module's own is the first."""
+    return [*examples_of(api), *examples_of(api_styles), *examples_of(api_tables)]
+
+
+def examples_of(module):
+    found = doctest.DocTestFinder(exclude_empty=True).find(module, "api")
     return sorted((test for test in found if test.examples), key=lambda test: test.lineno)
 
 
@@ -98,10 +102,26 @@ def test_examples_of_the_readme_run(tmp_path):
         (lambda: api.points(bpy.data.objects["Sphere"]), "is not Vellus guides or hair"),
         (lambda: api.draw(width=0), "Width must be"),
         (lambda: api.draw(), "no camera"),
+        (lambda: api.draw(height=16385), "exceed 16384 a side"),
+        (lambda: api.draw(has_passes=True), "choose from width, height, samples_per_side, is_transparent"),
+        (lambda: api.render("a.png", samples_per_side=2), 'Unknown setting "samples_per_side"'),
         (lambda: api.render("a.png"), "no camera"),
         (lambda: api.render("a.gif"), "saved as .png or .exr"),
         (lambda: api.render("a.png", engine="pencil"), "Unknown engine"),
         (lambda: api.load_settings("missing.json"), "does not exist"),
+        (lambda: api.add_style(bpy.data.objects["Hair"], "PERM"), "Unknown style 'PERM': choose from TRIM"),
+        (lambda: api.add_style(bpy.data.objects["Hair"], api.Appearance()), "A style must be the settings of a style"),
+        (lambda: api.add_style(bpy.data.objects["Hair"], "CURL", radios=1), 'Unknown setting "radios"'),
+        (lambda: api.add_style(bpy.data.objects["Hair"], "CURL", radius=-1), "Radius must be between"),
+        (lambda: api.add_style(bpy.data.objects["Hair"], "CURL", fit="no"), "fit must be True or False"),
+        (lambda: api.add_style(bpy.data.objects["Hair"], "CURL", name=3), "name must be text"),
+        (lambda: api.add_style(bpy.data.objects["Guides"], "CURL"), "is not Vellus hair"),
+        (lambda: api.styles_of(bpy.data.objects["Sphere"]), "is not Vellus"),
+        (lambda: api.set_styles(bpy.data.objects["Hair"], api.Curl()), "styles must be a list"),
+        (lambda: api.set_styles(bpy.data.objects["Hair"], [api.Curl()] * 65), "at most 64 styles"),
+        (lambda: api.set_styles(bpy.data.objects["Guides"], []), "is not Vellus hair"),
+        (lambda: api.apply_style_preset(bpy.data.objects["Hair"], "PERM"), "Unknown style preset 'PERM'"),
+        (lambda: api.apply_style_preset(bpy.data.objects["Hair"], None), "Unknown style preset None"),
         (lambda: api.save_settings("pyproject.toml/a.json", api.GroomSettings()), "cannot be written"),
     ],
 )
@@ -163,3 +183,26 @@ def test_settings_of_combed_guides_leave_them(guides):
     update()
     assert np.array_equal(points(guides), moved)
     assert "Regenerate Guides" in guides.data.vellus.status
+
+
+def test_styles_are_what_a_script_says(hair):
+    added = api.add_style(hair, "WAVE", radius=0.004)
+    assert added.flatness == 1.0 and api.styles_of(hair) == (added,)
+    again = api.add_style(hair, api.Curl(pitch=0.05, seed=9), name="Ends")
+    assert again == api.Curl(pitch=0.05, seed=9) and hair.data.vellus.styles[1].name == "Ends"
+    third = api.add_style(hair, "FRIZZ", seed=9, fit=True)
+    assert third.seed == 9 and third.amplitude > api.Frizz().amplitude  # a sphere of two meters
+    api.set_styles(hair, api.styles_of(hair)[::-1])
+    assert api.styles_of(hair) == (third, again, added)
+    assert [item.name for item in hair.data.vellus.styles] == ["Frizz", "Ends", "Wave"]
+    settings = api.settings_of(hair)
+    api.set_styles(hair, [])
+    api.apply_settings(hair, settings)
+    assert api.settings_of(hair) == settings and settings.styles == (third, again, added)
+
+
+def test_new_hair_has_the_styles_of_its_settings(sphere):
+    few = api.GuideSettings(guide_count=20), api.HairSettings(strand_count=50)
+    _guides, hair = api.add_hair(sphere, api.GroomSettings(*few, styles=[api.Clump(size=0.5), api.Curl(), api.Curl()]))
+    assert api.styles_of(hair) == (api.Clump(size=0.5), api.Curl(), api.Curl())
+    assert api.settings_of(hair).style_names == ("Clump", "Curl", "Curl.001")

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import bpy
 
 from hair_addon.blender.data import curves
-from hair_addon.blender.groom import pipeline
+from hair_addon.blender.groom import pipeline, writing
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.core.grooming import groom
 from tests.support.meshes import HEAD
@@ -109,7 +109,7 @@ class Ours(Way):
 
     def write(self):
         """No strand is made: points that are there are written, and Blender takes note."""
-        pipeline.write_hair(self.hair.data)
+        writing.write_hair(self.hair.data)
         bpy.context.view_layer.update()
 
     def drop(self):

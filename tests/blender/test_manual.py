@@ -30,7 +30,8 @@ def documented():
             found |= {f"{category.upper()}_OT_{name}.{entry.identifier}": cls.bl_label for entry in entries}
         elif issubclass(cls, (bpy.types.PropertyGroup, bpy.types.AddonPreferences)):
             found |= {f"{cls.__name__}.{entry.identifier}": entry.name for entry in entries}
-    return found
+    # Blender looks up the name of any item in a list as that of a PropertyGroup.
+    return {doc_id: label for doc_id, label in found.items() if doc_id != "VellusStyle.name"}
 
 
 def address(doc_id):

@@ -67,14 +67,14 @@ def test_other_hair_is_written(two, reader, tmp_path, capfd):
 def test_other_hair_follows_its_guides(two, monkeypatch, capfd):
     bad, good = two
     before = points(good)
-    write = live_hair.pipeline.write_hair
+    write = live_hair.writing.write_hair
 
     def write_some(hair):
         if hair == bad.data:
             raise HairError("This hair cannot be written.")
         write(hair)
 
-    monkeypatch.setattr(live_hair.pipeline, "write_hair", write_some)
+    monkeypatch.setattr(live_hair.writing, "write_hair", write_some)
     guides = bpy.data.objects["Guides"]
     write_points(guides, points(guides) + np.float32((0.0, 0.0, 0.1)) * np.linspace(0.0, 1.0, 41)[None, :, None])
     assert np.abs(points(good) - before).max() > 0.05

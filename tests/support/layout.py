@@ -47,8 +47,11 @@ class Layout:
         self.drawn["template_list"] += 1
         drawing = SimpleNamespace(bitflag_filter_item=1)
         list_class = next(cls for cls in panels.LISTS if cls.bl_idname == list_type)
-        shown, _order = list_class.filter_items(drawing, Context(), owner, name)
-        for item, is_shown in zip(getattr(owner, name), shown, strict=True):
+        items = getattr(owner, name)
+        shown = [1] * len(items)  # Blender's own filter is empty at first
+        if "filter_items" in vars(list_class):
+            shown, _order = list_class.filter_items(drawing, Context(), owner, name)
+        for item, is_shown in zip(items, shown, strict=True):
             if is_shown:
                 list_class.draw_item(drawing, Context(), self, owner, item, 0, active_owner, active_name)
 
@@ -74,11 +77,11 @@ class Layout:
         self.buttons.append(text or getattr(getattr(bpy.ops, category), operator).get_rna_type().name)
         return SimpleNamespace()
 
-    def operator_menu_enum(self, name, choice):
+    def operator_menu_enum(self, name, choice, text="", icon="NONE"):
         category, operator = name.split(".")
         choices = getattr(getattr(bpy.ops, category), operator).get_rna_type().properties[choice].enum_items
         assert len(choices) > 1
-        return self.operator(name)
+        return self.operator(name, text=text)
 
     def menu(self, name, icon="NONE"):
         assert hasattr(bpy.types, name)

@@ -46,7 +46,8 @@ def properties_of(cls):
         category, name = cls.bl_idname.split(".")
         rna = getattr(getattr(bpy.ops, category), name).get_rna_type()
     own = getattr(cls, "__annotations__", {})
-    return [entry for entry in rna.properties if entry.identifier in own]
+    # A property of Blender's own base, such as the name of an item, comes before the one that replaces it.
+    return list({entry.identifier: entry for entry in rna.properties if entry.identifier in own}.values())
 
 
 def strings_of_sources():

@@ -50,16 +50,9 @@ class Groom:
         if styling is None:
             return following.follow_guides(self.binding, guides).numpy()
         followed = styling.guides(guides)
-
-        def strands_of(binding, rows=None):
-            weights = following.weights_now(binding, followed, rows)
-            places = None if rows is None else wp.array(rows, dtype=int, device=self.device)
-            return following.strands_now(binding, followed, weights, places)
-
-        points = strands_of(self.binding, chosen)
+        weights = following.weights_now(self.binding, followed, chosen)
         rows = None if chosen is None else wp.array(chosen, dtype=int, device=self.device)
-        styling.apply(points, strands_of, rows)
-        return points.numpy()
+        return following.strands_now(self.binding, followed, weights, styling, rows).numpy()
 
 
 def head(strand_count=1500, guide_count=120, device=DEVICE, **hair):

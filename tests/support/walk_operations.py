@@ -9,7 +9,6 @@ walk the same ways; a run that fails prints how to walk it again.
 
 import contextlib
 import faulthandler
-import functools
 import math
 import sys
 import tempfile
@@ -20,7 +19,7 @@ import gpu
 import numpy as np
 from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis import strategies as st
-from hypothesis.stateful import RuleBasedStateMachine, get_state_machine_test, invariant, rule
+from hypothesis.stateful import RuleBasedStateMachine, get_state_machine_test, invariant
 
 import hair_addon
 from hair_addon.blender.data import curves as curves_door
@@ -29,42 +28,13 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support import always
 from tests.support.always import activate, changed, chosen, nothing_is_left_listening, objects, operate, ours
+from tests.support.walk_steps import needs_room, odd_numbers, pick, step
+from tests.support.walk_styles import StyleSteps
 
-MOST_OBJECTS = 14
 GUIDE_COUNT, STRAND_COUNT = 12, 40
 
-pick = st.integers(0, 10_000)
-odd_numbers = st.sampled_from([math.nan, math.inf, -math.inf, 0.0, -1.0, 1e30, 0.02, 0.3])
 
-
-def step(**arguments):
-    """A `rule` that is said before it is taken: after a crash the last lines tell the way."""
-
-    def said(function):
-        @functools.wraps(function)
-        def say_and_do(self, **values):
-            print(
-                f"{function.__name__}({', '.join(f'{name}={value!r}' for name, value in values.items())})", flush=True
-            )
-            function(self, **values)
-
-        return rule(**arguments)(say_and_do)
-
-    return said
-
-
-def needs_room(function):
-    """A step left out once there are many objects. No precondition: what is drawn must not follow from Blender."""
-
-    @functools.wraps(function)
-    def in_room(self, **values):
-        if len(bpy.data.objects) < MOST_OBJECTS:
-            function(self, **values)
-
-    return in_room
-
-
-class Artist(RuleBasedStateMachine):
+class Artist(StyleSteps, RuleBasedStateMachine):
     """The state is Blender's own."""
 
     def __init__(self):

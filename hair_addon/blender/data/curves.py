@@ -83,6 +83,15 @@ def write_guide_map(curves, guide_map):
             attributes.write(curves, f"{name}_{slot}", data_type, "CURVE", values[:, slot])
 
 
+def write_clumps(curves, clumps):
+    """Store (S,) int32 clumps of strands and (S,) float32 random numbers of these, for shaders; None: remove them."""
+    for name, data_type, place in (("clump_index", "INT", 0), ("clump_random", "FLOAT", 1)):
+        if clumps is not None:
+            attributes.write(curves, name, data_type, "CURVE", clumps[place])
+        elif (attribute := curves.attributes.get(name)) is not None:
+            curves.attributes.remove(attribute)
+
+
 def write_roots(curves, surface, roots, normals=None):
     """Store the roots of strands: for Vellus, for the nodes that deform them, and for Blender's tools."""
     stored = surface.swap_winding(roots)

@@ -5,7 +5,6 @@ import os
 import re
 import tempfile
 from contextlib import suppress
-from functools import wraps
 from pathlib import Path
 
 import gpu
@@ -46,17 +45,7 @@ def expand(name, skipped=()):
 
 
 program_cache = Cache()  # (function decorated by `kept`, its arguments) → program
-
-
-def kept(make):
-    """Decorate what makes a program: it is compiled once, and kept until Python ends."""
-
-    @wraps(make)
-    def program(*arguments, **options):
-        return program_cache.get((make, arguments, *options.items()), lambda: make(*arguments, **options))
-
-    return program
-
+kept = program_cache.keeping  # decorates what makes a program: it is compiled once, and kept until Python ends
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
 VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z")  # see shaders/world_visibility.frag
@@ -276,21 +265,6 @@ def resolve_program():
     info.push_constant("INT", "samples_per_side")
     info.sampler(0, "FLOAT_2D", "picture")
     return compile_drawing(info, "cover.vert", "resolve.frag")
-
-
-MOVE_GROUP_SIZE = 64  # points that one work group of `move_program` brings to their places
-
-
-@kept
-def move_program():
-    """The compute program that writes the points of some strands into the texture of all."""
-    info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(MOVE_GROUP_SIZE)
-    info.sampler(0, "FLOAT_2D", "moved_strands")
-    info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
-    for name in ("moved_count", "point_count", "row_strands", "moved_row_strands"):
-        info.push_constant("INT", name)
-    return compile_compute(info, "move_strands.comp")
 
 
 @kept

@@ -16,6 +16,8 @@ TEXTURE_WIDTH = 16384
 
 _AT_ONCE = 400  # strands that are brought into the order of texels
 
+_MOVE_GROUP_SIZE = 64  # points that one work group of `_move_program` brings to their places
+
 
 @dataclass(frozen=True)
 class StrandsOnGPU:
@@ -118,7 +120,7 @@ def move_strands(strands, moved, points):
     texture = places_texture(
         np.concatenate([heads, points], axis=1), np.pad(strands.radii[moved], ((0, 0), (1, 0))), row_strands
     )
-    program = shaders.move_program()
+    program = _move_program()
     program.bind()
     program.image("strands", strands.texture)
     program.uniform_sampler("moved_strands", texture)
@@ -126,7 +128,19 @@ def move_strands(strands, moved, points):
     program.uniform_int("point_count", strands.point_count)
     program.uniform_int("row_strands", strands.row_strands)
     program.uniform_int("moved_row_strands", row_strands)
-    gpu.compute.dispatch(program, -(-len(moved) * strands.point_count // shaders.MOVE_GROUP_SIZE), 1, 1)
+    gpu.compute.dispatch(program, -(-len(moved) * strands.point_count // _MOVE_GROUP_SIZE), 1, 1)
+
+
+@shaders.kept
+def _move_program():
+    """The compute program that writes the points of some strands into the texture of all."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(_MOVE_GROUP_SIZE)
+    info.sampler(0, "FLOAT_2D", "moved_strands")
+    info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
+    for name in ("moved_count", "point_count", "row_strands", "moved_row_strands"):
+        info.push_constant("INT", name)
+    return shaders.compile_compute(info, "move_strands.comp")
 
 
 def vertex_count(strand_count, drawn_points):

@@ -14,11 +14,15 @@ if TYPE_CHECKING:
         edits,
         foreign_curves,
         groom_settings,
+        hair_styles,
         hair_systems,
         hand_made_guides,
         pipeline,
         selection,
         staleness,
+        style_notes,
+        styled_hair,
+        writing,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -20,6 +20,7 @@ from ...core.grooming.groom import HairSettings
 from ...core.interpolation.hair_binding import HairBinding
 from ..data.scene import Surface
 from ..host.caches import Cache
+from .styled_hair import StyledHair
 
 if TYPE_CHECKING:
     from ...core.interpolation.guide_weights import Reach
@@ -36,6 +37,7 @@ class BoundHair:
     guides: Strands  # as they were when the hair followed them last
     guide_uid: int | None  # session_uid of their Curves, None until these are made
     surface: Surface
+    styles: StyledHair
     shares: np.ndarray | None = None  # (S, k) float32, the weights of each strand's guides as they are combed now
     growing: Future | None = None  # of `points`
     is_written: bool = False  # whether the datablock holds these points
@@ -52,7 +54,7 @@ class BoundHair:
     @property
     def radii(self) -> np.ndarray:
         """(P,) float32 along every strand, in the surface's local units."""
-        return groom.strand_radii(self.settings, self.guides.point_count) / np.float32(self.surface.scale)
+        return self.styles.radius_factor * groom.strand_radii(self.settings) / np.float32(self.surface.scale)
 
     @property
     def guide_map(self) -> tuple[np.ndarray, np.ndarray]:
@@ -76,7 +78,7 @@ class BoundHair:
             return None
         self.guides = guides
         strand_count = len(_grown(self.shares))
-        moved = np.arange(strand_count) if len(combed) == len(guides) else self.reach.of(combed)
+        moved = np.arange(strand_count) if len(combed) == len(guides) else self._reached(combed)
         if len(moved):
             # Beyond a half, selecting the moved ones would take longer.
             self.grow(moved if len(moved) <= strand_count // 2 else None)
@@ -84,17 +86,30 @@ class BoundHair:
             self.is_written = False
         return moved
 
+    def _reached(self, combed):
+        """Indices (M,) of the strands that move with some guides, and of those whose clumps do."""
+        moved, styling = self.reach.of(combed), self.styles.styling
+        return moved if styling is None or not len(combed) else styling.reached(combed, moved)
+
     def grow(self, chosen: np.ndarray | None = None) -> None:
         """Compute strands for `guides`, in other threads or, where they are (M,) indices of some, at once."""
-        binding, guides, axes = self.binding, self.guides, self.surface.to_local_axes
+        binding, styling, axes = self.binding, self.styles.styling, self.surface.to_local_axes
+        guides = self.guides if styling is None else styling.guides(self.guides)
         weights = following.weights_now(binding, guides, chosen)
         if chosen is None:
             out = None if self.growing is None else self.points
-            self.growing = following.growing_points(binding, guides, weights, axes, out)
+            out = out if out is not None and out.shape[1] == guides.point_count else None
+            self.growing = following.growing_points(binding, guides, weights, axes, out, styling)
             self._take_shares(weights.weights.numpy())
         else:
-            self.points[chosen] = following.follow_some(binding, guides, chosen, weights, axes)
+            self.points[chosen] = following.follow_some(binding, guides, chosen, weights, axes, styling)
             self._take_shares(weights.weights.numpy(), chosen)
+
+    def restyle(self, styles: StyledHair) -> None:
+        """Apply other styles to the same strands: nothing is searched."""
+        self.styles = styles
+        self.grow()
+        self.is_written = self.has_moved_only = False
 
     def _take_shares(self, shares, moved=slice(None)):
         """Bring the guide map up to guides that were combed: the weights of strands, or of (M,) indices of them."""

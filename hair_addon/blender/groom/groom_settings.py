@@ -11,7 +11,7 @@ from ...core.long_work import Work
 from ...core.shading.appearance import TABLE_FIELDS, Appearance
 from ..data import curves, scene
 from ..materials import looks
-from ..settings import properties, setting_properties
+from ..settings import properties, setting_properties, style_items
 from . import hand_made_guides, pipeline
 
 
@@ -19,8 +19,9 @@ def settings_of(hair: Curves) -> GroomSettings:
     """The `GroomSettings` of a hair Curves datablock and its guides. Raises `HairError`."""
     guides, hair_settings = pipeline.inputs_of(hair)
     guide_settings = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
-    look, tables = properties.look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
-    return GroomSettings(guide_settings, hair_settings, look, tables)
+    look, tables = properties.own_look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
+    styles, names = style_items.styles_of(hair.vellus), style_items.names_of(hair.vellus)
+    return GroomSettings(guide_settings, hair_settings, look, tables, styles, names)
 
 
 def apply_settings(hair: Curves, settings: GroomSettings) -> None:
@@ -39,7 +40,7 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
         # Otherwise everything would be regenerated without need.
         if setting_properties.to_settings(group, type(wanted)) != wanted:
             setting_properties.assign(group, wanted)
-    _assign_shading(hair, settings)
+    _assign_rest(hair, settings)
 
 
 def assign_look(hair: Curves, look: Appearance) -> None:
@@ -52,7 +53,7 @@ def assign_look(hair: Curves, look: Appearance) -> None:
 def adding_hair(surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph) -> Work[tuple[Curves, Curves]]:
     """Guides and hair of some `GroomSettings` on a mesh object, as work in steps; returns the Curves of both."""
     guides, hair = yield from pipeline.adding_hair(surface_object, settings.guides, settings.hair, depsgraph)
-    _assign_shading(hair, settings)
+    _assign_rest(hair, settings)
     return guides, hair
 
 
@@ -63,10 +64,12 @@ def using_as_guides(
     made = yield from hand_made_guides.using_as_guides(
         curves_object, surface_object, depsgraph, hair_settings=settings.hair
     )
-    _assign_shading(made.hair, settings)
+    _assign_rest(made.hair, settings)
     return made
 
 
-def _assign_shading(hair, settings):
+def _assign_rest(hair, settings):
+    """What is computed after the strands: styles, and shading."""
+    style_items.assign(hair.vellus, settings.styles, settings.style_names)
     setting_properties.assign(hair.vellus.marschner, settings.tables, skip=TABLE_FIELDS)
     assign_look(hair, settings.appearance)

@@ -6,27 +6,22 @@ and their inputs, so `evaluate` can regenerate them.
 """
 
 from collections.abc import Callable
-from concurrent.futures import Future
 
-import numpy as np
 from bpy.types import Curves, Depsgraph, Object
 
 from ...core.errors import HairError
 from ...core.geometry import strands
-from ...core.grooming import groom, groom_defaults
+from ...core.grooming import following, groom, groom_defaults, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
 from ..data import curves, curves_objects, masks, partings, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
-from ..materials import looks
 from ..settings import preferences, setting_properties
-from . import bindings, staleness
+from . import bindings, staleness, styled_hair, writing
 from .bindings import BoundHair
-
-# Of the guides' own Curves, by their length: so they are seen on a surface of any size.
-_GUIDE_RADIUS = 1.0 / 300.0
+from .styled_hair import ReadStyles
 
 
 def distribute_guides(
@@ -69,7 +64,7 @@ def distributing_guides(
         device=device,
         progress=progress,
     )
-    return _write_guides(target.find(), place.find(), surface, guides, settings, key)
+    return writing.write_guides(target.find(), place.find(), surface, guides, settings, key)
 
 
 def interpolate_hair(
@@ -88,7 +83,7 @@ def interpolating_hair(
     """`interpolate_hair` as work in steps."""
     place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
     bound = yield from _binding_hair(guide_curves, settings, depsgraph, target)
-    return _write_bound(its_target.find(), place.find(), its_guides.find(), bound)
+    return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
 
 
 def bind_hair(
@@ -106,22 +101,31 @@ def _binding_hair(guide_curves, settings, depsgraph, target):
     settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture, len(guides.roots))
     key = staleness.root_key(settings, density, None if texture is None else texture.values)
     parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
-    found = _found_guides(target, settings, key, parting.key, guides, surface)
-    roots = _kept_roots(target, surface, key, settings.strand_count) if found is None else None
+    read = styled_hair.read_styles(target, guide_curves.surface, surface, guide_curves, depsgraph)
+    known = _known_binding(target, settings, key, parting.key, guides, surface)
+    roots = _kept_roots(target, surface, key, settings.strand_count) if known is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
 
+    ground = _ground(surface, (density, texture), parting, device)
+
     def compute(progress):
-        if found is None:
-            binding = _bind(surface, guides, settings, (density, texture), parting, roots, device, progress)
+        if known is None:
+            binding = _bind(surface, guides, settings, ground, roots, progress)
+            make_trees = _trees_on(surface, guides, settings, ground)
         else:
-            binding = hair_binding.weigh_again(found, settings)
-        return _growing(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface), progress)
+            binding = hair_binding.weigh_again(known.binding, settings)
+
+            def make_trees():
+                return known.styles.trees.weigh_again(settings)
+
+        styles = styled_hair.bind(read, binding, guides, settings, surface, make_trees)
+        return _growing(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles), progress)
 
     return (yield compute)
 
 
-def _found_guides(target, settings, key, parting_key, guides, surface):
-    """Return the `HairBinding` if a search would find the same guides; otherwise None.
+def _known_binding(target, settings, key, parting_key, guides, surface):
+    """Return the `BoundHair` whose guides a search would find again; otherwise None.
 
     So changes of weights, limits and widths need no search.
     """
@@ -130,7 +134,7 @@ def _found_guides(target, settings, key, parting_key, guides, surface):
         return None
     most = bound.binding.candidates.indices.shape[1] - 1
     is_same = bound.surface.is_at_rest_as(surface) and bound.guides.roots.is_same(guides.roots)
-    return bound.binding if is_same and settings.neighbour_limit <= most else None
+    return bound if is_same and settings.neighbour_limit <= most else None
 
 
 def complete(
@@ -182,13 +186,15 @@ def adding_hair(
         )
         guides = _as_written(grown, surface, device)
         progress = part_of(progress, 0.5, 1.0)
-        binding = _bind(surface, guides, hair_settings, of_hair, parting, None, device, progress)
-        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface)
+        ground = _ground(surface, of_hair, parting, device)
+        binding = _bind(surface, guides, hair_settings, ground, None, progress)
+        styles = _unstyled(binding, guides, hair_settings, surface, ground)
+        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface, styles)
         return grown, _growing(bound, progress)
 
     grown, bound = yield compute
     key = staleness.root_key(guide_settings, density, None if texture is None else texture.values)
-    guide_curves = _write_guides(None, place.find(), surface, grown, guide_settings, key)
+    guide_curves = writing.write_guides(None, place.find(), surface, grown, guide_settings, key)
     return guide_curves, write_between(guide_curves, bound)
 
 
@@ -207,8 +213,10 @@ def hair_between(
         density = painted if density is None else density
         completed = groom_defaults.complete(settings, surface.posed_mesh, density, guide_count=len(guides))
         key = staleness.root_key(completed, density)
-        binding = _bind(surface, guides, completed, (density, None), parting, None, device, progress)
-        return _growing(BoundHair(binding, completed, key, parting.key, guides, None, surface), progress)
+        ground = _ground(surface, (density, None), parting, device)
+        binding = _bind(surface, guides, completed, ground, None, progress)
+        styles = _unstyled(binding, guides, completed, surface, ground)
+        return _growing(BoundHair(binding, completed, key, parting.key, guides, None, surface, styles), progress)
 
     return compute
 
@@ -216,7 +224,7 @@ def hair_between(
 def write_between(guide_curves: Curves, bound: BoundHair) -> Curves:
     """The Curves of new hair that `hair_between` computed, when its guides are written."""
     bound.guide_uid = guide_curves.session_uid
-    return _write_bound(None, guide_curves.surface, guide_curves, bound)
+    return writing.write_strands(None, guide_curves.surface, guide_curves, bound)
 
 
 def _as_written(guides, surface, device):
@@ -225,23 +233,34 @@ def _as_written(guides, surface, device):
     return strands.from_numpy(surface.from_local(points), guides.roots, device)
 
 
-def _bind(surface, guides, settings, mask, parting, roots, device, progress):
+def _ground(surface, mask, parting, device):
+    """What strands and clump sites stand on: arguments of `groom.bind_hair`. mask: (density, texture)."""
     density, texture = mask
-    return groom.bind_hair(
-        surface.mesh,
-        guides,
-        settings,
-        density=density,
-        texture=texture,
-        regions=parting.regions,
-        lines=parting.lines,
-        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
-        shape=surface.shape,
-        roots=roots,
-        is_mirrored=surface.is_mirrored,
-        device=device,
-        progress=part_of(progress, 0.0, 0.8),
-    )
+    return {
+        "density": density,
+        "texture": texture,
+        "regions": parting.regions,
+        "lines": parting.lines,
+        "drawn_on": surface.from_local(surface.posed) if surface.is_deformed else None,
+        "shape": surface.shape,
+        "is_mirrored": surface.is_mirrored,
+        "device": device,
+    }
+
+
+def _bind(surface, guides, settings, ground, roots, progress):
+    return groom.bind_hair(surface.mesh, guides, settings, roots=roots, progress=part_of(progress, 0.0, 0.8), **ground)
+
+
+def _trees_on(surface, guides, settings, ground):
+    """A function that makes the `ClumpTrees` of hair."""
+    return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **ground)
+
+
+def _unstyled(binding, guides, settings, surface, ground):
+    """The `StyledHair` of hair that is new: it has no styles yet."""
+    make_trees = _trees_on(surface, guides, settings, ground)
+    return styled_hair.bind(ReadStyles(), binding, guides, settings, surface, make_trees)
 
 
 def _growing(bound, progress):
@@ -250,70 +269,6 @@ def _growing(bound, progress):
     _ = bound.binding.leaders, bound.binding.identities  # now, and not while other threads need the CPU
     bound.grow()
     return bound
-
-
-def _write_guides(target, surface_object, surface, guides, settings, key):
-    target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
-    _keep_settings(target, "GUIDES", target.vellus.guides, settings)
-    target.vellus.root_key = key
-    radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * settings.length / surface.scale, np.float32)
-    points = Future()
-    points.set_result(surface.to_local(guides.numpy()))
-    curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
-    curves.write_points(target, points)
-    curves.keep_surface(target, surface)
-    return target
-
-
-def _write_bound(target, surface_object, guide_curves, bound):
-    target = target or curves_objects.new_object("Hair", surface_object).data
-    curves.require_editable(target)
-    target.vellus.guide_curves = guide_curves
-    bindings.keep(target, bound)
-    write_hair(target)
-    looks.evaluate_shading(target)
-    looks.evaluate_guides(guide_curves)
-    return target
-
-
-def write_hair(target: Curves) -> None:
-    """Bring a hair Curves datablock up to what it is bound to, if it is: the one place where hair is written."""
-    bound, state = bindings.of(target), target.vellus
-    if bound is None:
-        return
-    if not bound.has_moved_only:
-        _keep_settings(target, "HAIR", state.hair, bound.settings)
-        state.root_key, state.parting_key = bound.root_key, bound.parting_key
-        binding, radii = bound.binding, bound.radii
-        normals = binding.normals.numpy()
-        curves.make_strands(
-            target,
-            bound.surface,
-            binding.roots,
-            radii,
-            binding.identities,
-            leaders=binding.leaders,
-            normals=normals,
-            written_radii=bound.written_radii,
-        )
-        bound.written_radii = radii
-    if not bound.is_map_written:
-        curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
-    curves.write_points(target, bound.growing)
-    state.is_stale = False  # as another choice of guides marks it
-    state.followed = staleness.guides_digest(state.guide_curves)
-    bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
-    _store_roots(state.guide_curves, bound)
-
-
-def _store_roots(guide_curves, bound):
-    """Store the roots of guides that were drawn or slid by a brush, so that they follow their surface."""
-    if guide_curves is None or guide_curves.library is not None or guide_curves.session_uid != bound.guide_uid:
-        return
-    roots, surface = bound.guides.roots, bound.surface
-    stored = curves.read_root_places(guide_curves, len(surface.rest))
-    if stored is None or not all(map(np.array_equal, stored, surface.places(roots))):
-        curves.write_roots(guide_curves, surface, roots)
 
 
 def _kept_roots(target, surface, key, count):
@@ -328,6 +283,26 @@ def _kept_roots(target, surface, key, count):
     return curves.stored_roots(target, surface, is_complete=True)
 
 
+def restyle(target: Curves, depsgraph: Depsgraph) -> bool:
+    """Apply the styles of bound hair as they are set now, if nothing else of it has changed; whether that is so.
+
+    Nothing is searched; nothing at all is computed where the styles are those that it has. Raises `HairError`.
+    """
+    bound = bindings.of(target)
+    guide_curves, settings = inputs_of(target)
+    if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
+        return False
+    guides = curves.read_guides(guide_curves, bound.surface, bound.binding.positions.device, bound.guides)
+    combed = following.combed(guides, bound.guides)
+    if combed is None or len(combed):
+        return False
+    read = styled_hair.read_styles(target, target.surface, bound.surface, guide_curves, depsgraph)
+    if not read.is_same(bound.styles.read):
+        styles = bound.styles
+        bound.restyle(styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: styles.trees))
+    return True
+
+
 def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
     """Make Curves again from the settings and inputs they keep. What is wrong becomes their status.
 
@@ -340,10 +315,18 @@ def evaluate(target: Curves, depsgraph: Depsgraph) -> None:
         if state.kind == "GUIDES":
             settings = setting_properties.to_settings(state.guides, groom.GuideSettings)
             distribute_guides(target.surface, settings, depsgraph, target, keeps_roots=True)
-        elif state.kind == "HAIR":
+        elif state.kind == "HAIR" and not _is_restyled(target, depsgraph):
             interpolate_hair(*inputs_of(target), depsgraph, target)
     except HairError as error:
         state.status = str(error)
+
+
+def _is_restyled(target, depsgraph):
+    if not restyle(target, depsgraph):
+        return False
+    writing.write_hair(target)
+    target.vellus.status = ""
+    return True
 
 
 def require_uncombed(target: Curves) -> None:
@@ -382,11 +365,3 @@ def _check_surface(surface_object):
     if surface_object is None or surface_object.type != "MESH":
         raise HairError("Hair needs a mesh object to grow on: select one.")
     curves.require_editable(surface_object)
-
-
-def _keep_settings(target, kind, group, settings):
-    curves.require_editable(target)
-    setting_properties.assign(group, settings)
-    target.vellus.kind = kind
-    target.vellus.is_stale = False
-    target.vellus.status = ""

@@ -4,6 +4,8 @@
 Every cache of the add-on stands in blender/live/invalidation.py, which says what makes it stale.
 """
 
+from functools import wraps
+
 
 class Cache:
     """Values by key, of which none is None.
@@ -31,6 +33,15 @@ class Cache:
         while self._capacity is not None and len(self._values) > self._capacity:
             del self._values[next(iter(self._values))]
         return value
+
+    def keeping(self, make):
+        """Decorate a function: it is called once with the same arguments, and what it returns is kept."""
+
+        @wraps(make)
+        def kept(*arguments, **options):
+            return self.get((make, arguments, *options.items()), lambda: make(*arguments, **options))
+
+        return kept
 
     def values(self):
         """All values, the one used longest ago first."""

@@ -78,8 +78,8 @@ def _number_width(pattern):
 def write_frame(path, frame, engine, settings, partial=None, progress=no_progress):
     """Render a frame of the open scene and write it; the file appears whole or not at all. Raises `HairError`.
 
-    engine: of `ENGINES`; settings: `FrameSettings`; partial: of `whole_file`; progress(step, part): told how far
-    it is, and may raise to stop it: Vellus after any pass, others before the file is written.
+    engine: of `ENGINES`; settings: `PictureSettings`, but `DRAWING_FIELDS`; partial: of `whole_file`; progress(step,
+    part): told how far it is, and may raise to stop it: Vellus after any pass, others before the file is written.
     """
     blender_scene = bpy.context.scene
     if not FIRST_FRAME <= frame <= LAST_FRAME:

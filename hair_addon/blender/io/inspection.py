@@ -12,7 +12,7 @@ from ..data import curves, scene
 from ..data.curves import followers
 from ..groom import diagnostics
 from ..host.notices import name_of
-from ..settings import properties, setting_properties
+from ..settings import properties, setting_properties, style_items
 from . import strand_arrays
 
 
@@ -62,9 +62,14 @@ def _hair(datablock):
         "is_combed": curves.is_combed(datablock),
         "model": state.model,
         "settings": _settings(lambda: setting_properties.to_settings(state.hair, HairSettings)),
-        "appearance": _settings(lambda: properties.look_of(state)),
+        "appearance": _settings(lambda: properties.own_look_of(state)),
+        "styles": [_style(item) for item in state.styles],
         "warnings": _warnings(datablock),
     }
+
+
+def _style(item):
+    return {"kind": item.kind, "name": name_of(item)} | _settings(lambda: style_items.settings_of(item))
 
 
 def _settings(read):

@@ -39,6 +39,7 @@ def after_depsgraph_update(_scene, depsgraph):
             live_hair.follow_surface(surface_object, depsgraph, surface_object.data in changed)
     moved = [u.id.original for u in depsgraph.updates if u.is_updated_geometry or u.is_updated_transform]
     live_hair.follow_partings(moved, depsgraph)
+    live_hair.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
     reported.remember_axes()
     if _is_undone:
         _is_undone = False
@@ -57,6 +58,16 @@ def after_depsgraph_update(_scene, depsgraph):
     bindings.is_reported()
     animated.follow(depsgraph)
     _evaluate(depsgraph, combed)
+    if running.job() is None:
+        live_hair.follow_masks(_painted(depsgraph), depsgraph)
+
+
+def _painted(depsgraph):
+    """The mesh objects in a paint mode whose colors or weights may have changed."""
+    images = any(isinstance(update.id, bpy.types.Image) for update in depsgraph.updates)
+    modes = {"WEIGHT_PAINT", "VERTEX_PAINT"}
+    found = {o for o in _deformed(depsgraph) if o.mode in modes}
+    return found | {o for o in depsgraph.view_layer.objects if images and o.mode == "TEXTURE_PAINT"}
 
 
 def _is_hair_only(depsgraph):

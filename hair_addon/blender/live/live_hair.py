@@ -11,8 +11,9 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, masks
-from ..groom import bindings, edited_surfaces, pipeline, staleness
+from ..groom import bindings, edited_surfaces, pipeline, staleness, writing
 from ..render import hair_cache
+from ..settings import style_items
 from . import invalidation, reported
 
 # Seconds without a change after which an interaction is over, unless its operator still runs.
@@ -44,7 +45,7 @@ def follow_guides(hair, depsgraph):
     if moved is None:
         make_again(hair, depsgraph)
     elif len(moved):
-        hair_cache.move(hair.session_uid, moved)
+        hair_cache.move(hair.session_uid, moved, bound.growing)
         _write_soon(hair)
 
 
@@ -60,10 +61,23 @@ def make_again(hair, depsgraph):
         known = bindings.of(hair)
         if known is None or known.is_written:
             pipeline.require_uncombed(hair)
+        if pipeline.restyle(hair, depsgraph):
+            _restyled(hair)
+            return
         bindings.keep(hair, pipeline.bind_hair(guide_curves, settings, depsgraph, hair))
     except HairError as error:
         hair.vellus.is_stale = False
         hair.vellus.status = str(error)
+        return
+    invalidation.strands_made(hair)
+    _write_soon(hair)
+
+
+def _restyled(hair):
+    """Show and write soon what `pipeline.restyle` has made."""
+    state = hair.vellus
+    if bindings.of(hair).is_written:  # with the same styles as before
+        state.is_stale = False
         return
     invalidation.strands_made(hair)
     _write_soon(hair)
@@ -78,7 +92,9 @@ def is_ahead(hair):
         guide_curves, settings = pipeline.inputs_of(hair)
     except HairError:
         return False  # `make_again` handles it
-    return bound.settings == settings and bound.guide_uid == guide_curves.session_uid
+    if bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
+        return False
+    return bound.styles.read.styles == style_items.styles_of(hair.vellus)
 
 
 def is_left_by_undo(hair):
@@ -99,7 +115,7 @@ def write_all(*_args):
 def _write(hair):
     """Write hair that is newer than its datablock. An error becomes its status, so that other hair is written."""
     try:
-        pipeline.write_hair(hair)
+        writing.write_hair(hair)
     except HairError as error:
         bindings.invalidate(hair)
         hair.vellus.status = str(error)
@@ -162,6 +178,8 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         try:
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
                 _mark(hair)
+            elif _has_masks(state):
+                state.is_stale = True
         except HairError as error:
             state.status = str(error)
 
@@ -204,6 +222,36 @@ def _parts_by(state, changed):
     # Read with each step of a stroke: so only if guides have regions of their own.
     guides = state.guide_curves
     return guides is not None and guides in changed and state.hair.region_attribute in guides.attributes
+
+
+def follow_masks(surfaces, depsgraph):
+    """Style hair again while masks of its styles are painted; surfaces: mesh objects in a paint mode that changed."""
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR" or not state.is_live or hair.surface not in surfaces or not _has_masks(state):
+            continue
+        try:
+            if bindings.of(hair) is not None and pipeline.restyle(hair, depsgraph):
+                _restyled(hair)
+                state.status = ""
+        except HairError as error:
+            state.status = str(error)
+
+
+def _has_masks(state):
+    groups = (style_items.group_of(item) for item in state.styles)
+    return any(group.mask or group.mask_image for group in groups)
+
+
+def follow_styles(changed):
+    """Mark hair as stale whose styles read some of the objects that changed, or whose surface moved among them."""
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR" or not state.is_live or not state.styles:
+            continue
+        named = style_items.objects_named(state)
+        if named and (hair.surface in changed or any(bpy.data.objects.get(name) in changed for name in named)):
+            state.is_stale = True
 
 
 def mark_followers(guide_curves):

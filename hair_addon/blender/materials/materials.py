@@ -6,7 +6,7 @@ import bpy
 from ...core.shading import appearance
 from ..data import curves as curves_door
 from ..host.notices import name_of
-from ..settings import properties, setting_properties
+from ..settings import properties, setting_properties, style_items
 from . import strand_nodes
 
 HAIR_NODE = "ShaderNodeBsdfHairPrincipled"
@@ -51,13 +51,14 @@ def _fill_first_slot(curves, material):
 
 def _shows_another_look(material, curves):
     """Whether a material is that of other hair too, as Blender has it after a duplication, and they look different."""
-    look = _values(curves.vellus.appearance)
+    look = _values(curves.vellus)
     others = (c for c in bpy.data.hair_curves if c != curves and c.vellus.kind == "HAIR")
-    return any(material in {*c.materials} and _values(c.vellus.appearance) != look for c in others)
+    return any(material in {*c.materials} and _values(c.vellus) != look for c in others)
 
 
-def _values(group):
-    return setting_properties.values_of(group, setting_properties.names_of(appearance.Appearance))
+def _values(state):
+    values = setting_properties.values_of(state.appearance, setting_properties.names_of(appearance.Appearance))
+    return values | {"wetness": max(values["wetness"], style_items.wetness_of(state))}
 
 
 def is_hair_material(material):

@@ -6,7 +6,7 @@ random numbers and roots are read and replaced together.
 """
 
 import sys
-from concurrent.futures import wait
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -37,8 +37,9 @@ class _KeptStrands:
     points: np.ndarray  # (S, P, 3) float32 in local coordinates
     radii: np.ndarray  # (S, P) float32
     randoms: np.ndarray  # (S,) float32
-    places: tuple | None  # roots as `curves.read_root_places` returns them; None for none, or those of a binding
+    places: tuple | None  # roots as `curves.read_root_places` returns them, None for none
     rooted_on: tuple  # (session_uid of the surface, its topology)
+    growing: Future | None = None  # of these points, which other threads may be computing; None where they are read
     on_gpu: strand_textures.StrandsOnGPU | None = None  # where `pose` carried them
     pose: posed_strands.Pose | None = None  # None where no surface carries them
     moved: list = field(default_factory=list)  # [(M,) indices of strands] that moved since then
@@ -66,37 +67,28 @@ def strands_on_gpu(datablock):
 
     None where the datablock was refused. Raises `HairError`.
     """
-    uid, bound = datablock.session_uid, bindings.of(datablock)
-    if bound is not None:
-        wait([bound.growing])  # in the memory of the points that are known here
-    kept = strand_cache.get(uid)
+    kept = strand_cache.get(datablock.session_uid)
     if kept is _REFUSED:
         return None
-    if kept is None or (bound is not None and kept.points is not bound.points):
-        kept = strand_cache.keep(uid, _read(datablock, bound))
+    if kept is None or (kept.growing is not None and kept.growing.result() is not kept.points):
+        kept = strand_cache.keep(datablock.session_uid, _read(datablock, bindings.of(datablock)))
     pose = _pose_of(datablock.surface)
     moved, kept.moved = kept.moved, []
     if kept.on_gpu is None or kept.pose is not pose:
-        points = _carried(kept, pose, bound)
+        points = _carried(kept, pose)
         kept.on_gpu, kept.pose = strand_textures.upload_strands(points, kept.radii, kept.randoms), pose
     elif moved:
         chosen = np.unique(np.concatenate(moved))
         require_indices("strands", chosen, len(kept.points))
-        strand_textures.move_strands(kept.on_gpu, chosen, _carried(kept, pose, bound, chosen))
+        strand_textures.move_strands(kept.on_gpu, chosen, _carried(kept, pose, chosen))
     return kept.on_gpu
 
 
-def _carried(kept, pose, bound, chosen=slice(None)):
-    """Points (M, P, 3) of some kept strands where a pose carries them; at rest where nothing deforms the surface.
-
-    bound: what the strands are bound by, None for nothing.
-    """
+def _carried(kept, pose, chosen=slice(None)):
+    """Points (M, P, 3) of some kept strands where a pose carries them; at rest where nothing deforms the surface."""
     if pose is None or pose.motion is None:
         return kept.points[chosen]
-    topology, places = kept.rooted_on[1], kept.places
-    if bound is not None:  # the datablock may store data of earlier strands
-        topology, places = bound.surface.topology, bound.surface.places(bound.binding.roots)
-    return pose.carry(kept.points, topology, places, chosen)
+    return pose.carry(kept.points, kept.rooted_on[1], kept.places, chosen)
 
 
 def _pose_of(surface_object):
@@ -113,10 +105,14 @@ def refuse(datablock, error):
     print(f"Vellus: {error}", file=sys.stderr)
 
 
-def move(session_uid, moved):
-    """Some strands of bound hair have moved, (M,) indices: with the next redraw they alone are uploaded."""
+def move(session_uid, moved, growing):
+    """Some strands of bound hair have moved, (M,) indices: with the next redraw they alone are uploaded.
+
+    growing: a future of the points of all its strands, for which that redraw waits.
+    """
     kept = _strands_of(session_uid)
-    if kept is not None and kept.on_gpu is not None:
+    if kept is not None:
+        kept.growing = growing
         kept.moved.append(moved)
 
 
@@ -168,14 +164,14 @@ def _is_same(datablock, kept, bound):
         is_known
         and np.array_equal(kept.radii.ravel(), curves.read_radii(datablock))
         and np.array_equal(kept.randoms, curves.read_randoms(datablock))
-        and kept.rooted_on == _rooted_on(datablock)
+        and kept.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
         and (bound is not None or _are_places(kept.places, curves.read_root_places(datablock, np.inf)))
     )
 
 
-def _rooted_on(datablock):
+def _rooted_on(datablock, topology):
     surface = datablock.surface
-    return None if surface is None else surface.session_uid, datablock.vellus.topology
+    return None if surface is None else surface.session_uid, topology
 
 
 def _are_places(places, others):
@@ -193,13 +189,15 @@ def _read(datablock, bound):
     """`_KeptStrands` of a datablock as it is now, or of what it is bound by."""
     if bound is None:
         places = None if datablock.surface is None else curves.read_root_places(datablock, np.inf)
-        return _KeptStrands(*read_strands(datablock), places, _rooted_on(datablock))
+        return _KeptStrands(*read_strands(datablock), places, _rooted_on(datablock, datablock.vellus.topology))
     if bound.is_written or bound.has_moved_only:
         randoms = curves.read_randoms(datablock)
     else:
         _identities, randoms = bound.binding.identities
+    # Roots too are those of the binding: the datablock may store those of earlier strands.
+    places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
     radii = np.tile(bound.radii, (len(bound.points), 1))
-    return _KeptStrands(bound.points, radii, randoms, None, _rooted_on(datablock))
+    return _KeptStrands(bound.points, radii, randoms, places, rooted_on, bound.growing)
 
 
 def read_strands(datablock):

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ...core.files.whole_file import whole_file
+from ...core.imaging.pixel_sampling import MOST_DRAWN
 from ...core.long_work import Stage, run_now
 from ..data import scene
 from ..gpu import drawing, visibility_buffer, world_texture
@@ -18,13 +19,17 @@ from . import drawn_scene
 def draw_picture(settings):
     """(height, width, 4) float32 of the context's scene: scene-linear, premultiplied, first row at the bottom.
 
-    Raises `HairError`.
+    settings: `PictureSettings`, but `FRAME_FIELDS`. Raises `HairError`.
     """
     return run_now(drawing_picture(settings))
 
 
 def drawing_picture(settings):
     """`draw_picture` as work in stages (core/long_work.py), all of which run where the graphics are."""
+    if max(settings.width, settings.height) > MOST_DRAWN:
+        raise HairError(
+            f"{settings.width} × {settings.height} pixels exceed {MOST_DRAWN} a side: use fewer, or render a frame."
+        )
     _start_gpu()
     samples = settings.samples_per_side
     width, height = settings.width * samples, settings.height * samples

@@ -11,7 +11,7 @@ from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables
 from ..host import scene_time
 from ..host.caches import Cache
-from . import setting_properties
+from . import setting_properties, style_items
 
 _GROUPS = {
     "guides": setting_properties.names_of(GuideSettings),
@@ -48,10 +48,11 @@ def follow(depsgraph):
             continue
         value_cache.keep(datablock.session_uid, values)
         is_outdated = True
-        for group in _GROUPS:
-            for name, value in values[group].items():
-                if value != before[group][name]:
-                    setattr(getattr(state, group), name, value)  # whose `update` marks it
+        for key, group in _groups(state).items():
+            known = before.get(key, values[key])
+            for name, value in values[key].items():
+                if value != known[name]:
+                    setattr(group, name, value)  # whose `update` marks it
     return is_outdated
 
 
@@ -60,4 +61,16 @@ def _keyed():
 
 
 def _values(state):
-    return {group: setting_properties.values_of(getattr(state, group), names) for group, names in _GROUPS.items()}
+    values = {name: setting_properties.values_of(getattr(state, name), names) for name, names in _GROUPS.items()}
+    return values | {_key(item): style_items.values_of(item) for item in state.styles}
+
+
+def _groups(state):
+    """{key in `_values`: property group}."""
+    groups = {name: getattr(state, name) for name in _GROUPS}
+    return groups | {_key(item): style_items.group_of(item) for item in state.styles}
+
+
+def _key(item):
+    """Of a style, wherever it is in the list."""
+    return item.kind, item.name

@@ -5,17 +5,15 @@ A change marks its Curves as stale and tags them; handlers.py is notified by the
 that sets ten properties costs one evaluation, and hair in an undo step always matches its settings.
 """
 
-from dataclasses import replace
-
 import bpy
 
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.imaging.pixel_sampling import PassSettings, RenderSettings
-from ...core.params import declared
 from ...core.shading import appearance
 from ...core.shading.appearance import Appearance
 from ...core.shading.tables import lookup_tables
-from . import setting_properties
+from . import setting_properties, style_items
+from .marks import mark_geometry, mark_shading
 from .translations import CONTEXT
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
@@ -30,9 +28,15 @@ MODELS = (
 )
 
 
-def look_of(state):
-    """The `Appearance` of a hair; state: its `VellusCurves`. Raises `HairError`."""
+def own_look_of(state):
+    """The `Appearance` of a hair as it is set; state: its `VellusCurves`. Raises `HairError`."""
     return setting_properties.to_settings(state.appearance, Appearance)
+
+
+def look_of(state):
+    """The dry `Appearance` that a hair is shaded with, which is as wet as its look or its wettest style."""
+    look = own_look_of(state)
+    return appearance.wetted(look, max(look.wetness, setting_properties.shortest(style_items.wetness_of(state))))
 
 
 def own_table_settings_of(state):
@@ -44,53 +48,35 @@ def table_settings_of(state):
     """The `lookup_tables.Settings` that the Marschner model shades a hair with. Raises `HairError`."""
     settings = appearance.table_settings(look_of(state), own_table_settings_of(state))
     # Rounded as in an operator's properties, so that tables baked with these settings match.
-    return replace(
-        settings,
-        **{
-            name: setting_properties.plain(getattr(settings, name), default, details)
-            for name, default, details in declared(lookup_tables.Settings)
-        },
-    )
-
-
-def _mark_geometry(group, _context):
-    group.id_data.vellus.is_stale = True
-    group.id_data.update_tag()
+    return setting_properties.as_stored(settings)
 
 
 def _renew_passes(_group, context):
     context.view_layer.update_render_passes()
 
 
-def _mark_shading(group, _context):
-    group.id_data.vellus.is_shading_stale = True
-    group.id_data.update_tag()
-
-
 class VellusGuideSettings(bpy.types.PropertyGroup):
     """Distribution and growth of guides"""
 
-    __annotations__ = setting_properties.annotations(GuideSettings, _mark_geometry)
+    __annotations__ = setting_properties.annotations(GuideSettings, mark_geometry)
 
 
 class VellusHairSettings(bpy.types.PropertyGroup):
     """Interpolation of hair between guides"""
 
-    __annotations__ = setting_properties.annotations(HairSettings, _mark_geometry)
+    __annotations__ = setting_properties.annotations(HairSettings, mark_geometry)
 
 
 class VellusAppearance(bpy.types.PropertyGroup):
     """Appearance of hair, in the viewport and in Cycles"""
 
-    __annotations__ = setting_properties.annotations(Appearance, _mark_shading)
+    __annotations__ = setting_properties.annotations(Appearance, mark_shading)
 
 
 class VellusMarschnerSettings(bpy.types.PropertyGroup):
     """Settings of the Marschner model's tables that are not in the appearance"""
 
-    __annotations__ = setting_properties.annotations(
-        lookup_tables.Settings, _mark_shading, skip=appearance.TABLE_FIELDS
-    )
+    __annotations__ = setting_properties.annotations(lookup_tables.Settings, mark_shading, skip=appearance.TABLE_FIELDS)
 
 
 class VellusCurves(bpy.types.PropertyGroup):
@@ -110,17 +96,19 @@ class VellusCurves(bpy.types.PropertyGroup):
         translation_context=CONTEXT,
         type=bpy.types.Curves,
         poll=lambda _group, curves: curves.vellus.kind == "GUIDES",
-        update=_mark_geometry,
+        update=mark_geometry,
     )
     guides: bpy.props.PointerProperty(type=VellusGuideSettings)
     hair: bpy.props.PointerProperty(type=VellusHairSettings)
+    styles: bpy.props.CollectionProperty(type=style_items.VellusStyle)
+    active_style: bpy.props.IntProperty(min=0, options=set())
     model: bpy.props.EnumProperty(
         name="Shading Model",
         description="Scattering model that shades the hair in the viewport",
         translation_context=CONTEXT,
         items=MODELS,
         default="MARSCHNER",
-        update=_mark_shading,
+        update=mark_shading,
     )
     appearance: bpy.props.PointerProperty(type=VellusAppearance)
     marschner: bpy.props.PointerProperty(type=VellusMarschnerSettings)
@@ -130,14 +118,14 @@ class VellusCurves(bpy.types.PropertyGroup):
         translation_context=CONTEXT,
         subtype="DIR_PATH",
         options=_RELATIVE,
-        update=_mark_shading,
+        update=mark_shading,
     )
     is_drawn: bpy.props.BoolProperty(
         name="Shaded in Viewport",
         description="Draw this hair with its shading model; when off, Blender draws it as curves",
         translation_context=CONTEXT,
         default=True,
-        update=_mark_shading,
+        update=mark_shading,
     )
     viewport_percentage: bpy.props.IntProperty(
         name="Strands in Viewport",
@@ -153,7 +141,7 @@ class VellusCurves(bpy.types.PropertyGroup):
         description="Show the guides in viewports while they are not selected; without hair they always are",
         translation_context=CONTEXT,
         default=False,
-        update=_mark_shading,
+        update=mark_shading,
     )
     is_live: bpy.props.BoolProperty(
         name="Auto Update",
@@ -186,6 +174,7 @@ class VellusPassSettings(bpy.types.PropertyGroup):
 
 
 CLASSES = (
+    *style_items.CLASSES,
     VellusGuideSettings,
     VellusHairSettings,
     VellusAppearance,
@@ -261,9 +250,9 @@ def text(name, description):
     return bpy.props.StringProperty(name=name, description=description, translation_context=CONTEXT)
 
 
-def choice(name, description, labels):
-    """An enumeration that is not a setting; labels: {identifier: label}."""
-    items = [(identifier, label, "") for identifier, label in labels.items()]
+def choice(name, description, labels, tooltips=None):
+    """An enumeration that is not a setting; labels: {identifier: label}; tooltips: {identifier: tooltip}, or None."""
+    items = [(identifier, label, (tooltips or {}).get(identifier, "")) for identifier, label in labels.items()]
     return bpy.props.EnumProperty(name=name, description=description, items=items, translation_context=CONTEXT)
 
 

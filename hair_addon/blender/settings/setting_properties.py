@@ -14,24 +14,29 @@ from .translations import CONTEXT
 _SMALL_WORDS = {"in", "of", "per", "to"}  # stay lower case in titles
 
 
-def annotations(settings_class, update=None, skip=()):
+def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None):
     """{name: bpy property} for the fields of a `Settings` class but those of `skip`; `update` as in bpy.props.
 
-    A radius has its diameter beside it, which is shown in its place. Operators have no `update`.
+    A radius has its diameter beside it, which is shown in its place. Operators have no `update`. Structural settings,
+    and those of `unkeyed`, take no keys. high: {name: largest value} of fields whose range is shorter here.
     """
+    highs = high or {}
     made = {}
     for name, default, details in declared(settings_class):
         if name not in skip:
-            made[name] = _property(name, default, details, update)
+            details = replace(details, high=highs.get(name, details.high))
+            made[name] = _property(name, default, details, update, details.is_structural or name in unkeyed)
             if details.diameter is not None:
                 shown, description = details.diameter
                 made[shown] = _diameter_property(name, shown, description, details, update)
     return made
 
 
-def _property(name, default, details, update):
+def _property(name, default, details, update, is_unkeyed):
     common = {"name": _title(label_of(name, details)), "description": details.description, "default": default}
     common["translation_context"] = CONTEXT
+    if is_unkeyed:
+        common["options"] = set()
     if update is not None:
         common["update"] = update
     elif details.diameter is not None:
@@ -81,7 +86,7 @@ def _millimeters_of(radius):
 
 
 def _radius_of(millimeters):
-    return _shortest(millimeters) / (2e3 * _unit_length())
+    return shortest(millimeters) / (2e3 * _unit_length())
 
 
 def _unit_length():
@@ -126,13 +131,19 @@ def plain(value, default, details):
         for meant in (default, details.low, details.high):
             if np.float32(meant) == np.float32(value):
                 return meant
-        return _shortest(value)
+        return shortest(value)
     if isinstance(default, tuple):
         return tuple(plain(float(part), meant, details) for part, meant in zip(value, default, strict=True))
     return value
 
 
-def _shortest(value):
+def as_stored(settings):
+    """`Settings` as properties give them back, in single precision."""
+    values = {n: plain(getattr(settings, n), default, details) for n, default, details in declared(type(settings))}
+    return replace(settings, **values)
+
+
+def shortest(value):
     """The shortest decimal that equals a value in single precision, as it was typed."""
     return float(str(np.float32(value)))
 
@@ -156,7 +167,7 @@ def show(operator, group, settings_class):
     for name in from_surface(settings_class):
         setattr(operator, name, getattr(group, name))
     for radius, diameter in _diameters(settings_class):
-        setattr(operator, diameter, _shortest(_millimeters_of(_shortest(getattr(group, radius)))))
+        setattr(operator, diameter, shortest(_millimeters_of(shortest(getattr(group, radius)))))
 
 
 def _diameters(settings_class):

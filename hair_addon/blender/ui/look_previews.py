@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Previews in the menu of looks: image files for built-in looks, color swatches for saved looks.
+"""Previews in menus: image files for built-in looks and style presets, color swatches for saved looks.
 
 Blender loads and keeps them as previews; nothing is loaded before the menu is drawn.
 """
@@ -12,6 +12,7 @@ import numpy as np
 from mathutils import Color
 
 from ...core.errors import HairError
+from ...core.files import style_presets
 from ...core.shading import appearance
 from ..settings import saved_looks
 
@@ -29,6 +30,18 @@ def picture(identifier):
     previews = _collection()
     if key not in previews:
         previews.load(key, str(FOLDER / f"{identifier}.png"), "IMAGE")
+    return previews[key].icon_id
+
+
+def style_picture(identifier):
+    """Icon of a style preset, None where there is no picture beside its file."""
+    path = style_presets.FOLDER / f"{identifier.lower()}.png"
+    key = f"style {identifier}"
+    previews = _collection()
+    if key not in previews:
+        if not path.is_file():
+            return None
+        previews.load(key, str(path), "IMAGE")
     return previews[key].icon_id
 
 

@@ -31,6 +31,8 @@ class VELLUS_MT_hair(bpy.types.Menu):
             layout.operator("vellus.toggle_drawing")
             layout.separator()
             layout.operator_menu_enum("vellus.apply_preset", "preset")
+            layout.operator_menu_enum("vellus.add_style", "style")
+            layout.operator_menu_enum("vellus.apply_style_preset", "preset")
         if parts_of(context.object):
             layout.separator()
             layout.operator("vellus.attach_to_surface")

@@ -5,6 +5,9 @@ import bpy
 
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import declared
+from ...core.styling.base import ProfiledSettings, StyleSettings
+from ...core.styling.kinds import KINDS
+from ..settings import setting_properties, style_items
 from ..settings.translations import interface_text
 
 # Blender's own property split gives names 40 % of the width, which cuts them in a sidebar of its default width.
@@ -20,6 +23,14 @@ _PARTING_LIMITS = ("angle_limit", "length_limit")
 _PARTING_REGIONS = ("region_group", "region_attribute", "part_lines")
 _INFLUENCE = ("automatic_influence", "influence_distance")
 _BLENDING = ("neighbour_limit", "keep_length", "guide_map", "seed")
+
+_MASK = ("mask", "mask_image", "invert_mask")
+_STYLE_OBJECTS = ("cutter", "target")
+_PROFILE = tuple(
+    name
+    for name in setting_properties.names_of(ProfiledSettings)
+    if name not in setting_properties.names_of(StyleSettings)
+)
 
 
 def row(layout, owner, name):
@@ -113,6 +124,37 @@ def blending_rows(layout, owner, skip=()):
 def _mask_row(layout, owner, name, surface):
     if surface is not None:
         search_row(layout, owner, name, surface, "vertex_groups")
+
+
+def style_rows(layout, item):
+    """Settings of a style but for its mask and profile; item: its properties."""
+    owner, settings_class = style_items.group_of(item), KINDS[item.kind]
+    row(layout, owner, "amount")
+    shared = setting_properties.names_of(StyleSettings)
+    rows(layout, owner, settings_class, others(settings_class, shared, _PROFILE, _STYLE_OBJECTS))
+    for name in _STYLE_OBJECTS:
+        if name in owner.bl_rna.properties:
+            column = layout.column()
+            column.active = name != "target" or owner.direction == "OBJECT"
+            search_row(column, owner, name, bpy.data, "objects")
+    rows(layout, owner, settings_class, others(StyleSettings, ("is_on", "amount"), _MASK))
+
+
+def profile_rows(layout, item):
+    """The course of a style's amount from root to tip."""
+    rows(layout, style_items.group_of(item), ProfiledSettings, _PROFILE)
+
+
+def style_mask_rows(layout, item, surface):
+    """Where on the surface a style acts; surface: object or None."""
+    owner = style_items.group_of(item)
+    if surface is None:
+        row(layout, owner, "mask")
+    else:
+        # Suggestions: attributes are not listed.
+        search_row(layout, owner, "mask", surface, "vertex_groups", results_are_suggestions=True)
+    search_row(layout, owner, "mask_image", bpy.data, "images")
+    row(layout, owner, "invert_mask")
 
 
 def all_guide_rows(layout, owner, surface):

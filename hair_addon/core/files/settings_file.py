@@ -1,25 +1,28 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Groom settings as a human-readable JSON file, with a section for each stage.
 
-Its keys are the fields of the `Settings` classes. Omitted settings have their defaults, or are computed from the
-surface; unknown keys are errors, as they would have no effect. Version 1 was a single look, the format of saved looks.
+Its keys are the fields of the `Settings` classes; styles are a list, in the order in which they are applied. Omitted
+settings have their defaults, or are computed from the surface; unknown keys are errors, as they would have no effect.
+Version 1 was a single look, the format of saved looks; version 2 had no styles.
 """
 
 import json
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
 from ..errors import HairError
 from ..grooming.groom import GuideSettings, HairSettings
-from ..params import Param, Settings, declared, given, label_of, like, require_class, unit_of
+from ..params import Param, Settings, declared, described, given, is_text, label_of, like, require_class, unit_of
 from ..shading.appearance import TABLE_FIELDS, Appearance
 from ..shading.tables import lookup_tables
+from ..styling.base import StyleSettings
+from ..styling.kinds import KINDS, LABELS, MOST_STYLES, kind_of
 from .whole_file import whole_file
 
 FORMAT = "Vellus groom settings"
-VERSION = 2
+VERSION = 3
 
 _LARGEST_FILE = 1_048_576  # bytes; all settings take some 2,000
 
@@ -32,13 +35,38 @@ class GroomSettings:
     hair: HairSettings = field(default_factory=HairSettings)
     appearance: Appearance = field(default_factory=Appearance)
     tables: lookup_tables.Settings = field(default_factory=lookup_tables.Settings)  # except those in the appearance
+    styles: tuple[StyleSettings, ...] = ()  # in the order in which they are applied; a list becomes a tuple
+    style_names: tuple[str, ...] = ()  # of each style, empty for any; or no names
 
     def __post_init__(self) -> None:
         for name, settings_class in SECTIONS.items():
             require_class(getattr(self, name), settings_class, name)
+        styles, names = require_styles(self.styles, self.style_names)
+        object.__setattr__(self, "styles", styles)  # the class is frozen
+        object.__setattr__(self, "style_names", names)
 
 
-SECTIONS: dict[str, type[Settings]] = get_type_hints(GroomSettings)
+def require_styles(styles: object, names: object = ()) -> tuple[tuple[StyleSettings, ...], tuple[str, ...]]:
+    """Styles and their names as tuples; no names where all are empty. Raises `HairError`."""
+    if not isinstance(styles, list | tuple):
+        raise HairError(f"styles must be a list of styles, not {described(styles)}.")
+    if len(styles) > MOST_STYLES:
+        raise HairError(f"Hair has at most {MOST_STYLES} styles, not {len(styles)}.")
+    for style in styles:
+        kind_of(style)
+    if not isinstance(names, list | tuple) or not all(isinstance(name, str) and is_text(name) for name in names):
+        raise HairError("style_names must be a list of strings.")
+    if not any(names):
+        return tuple(styles), ()
+    if len(names) != len(styles):
+        raise HairError(f"style_names needs {len(styles)} names, not {len(names)}.")
+    return tuple(styles), tuple(map(str, names))
+
+
+# Those of a single `Settings` class.
+SECTIONS: dict[str, type[Settings]] = {
+    name: found for name, found in get_type_hints(GroomSettings).items() if not name.startswith("style")
+}
 
 
 def declared_in(section: str) -> list[tuple[str, Any, Param]]:
@@ -54,7 +82,7 @@ def write(path: str | Path, settings: GroomSettings) -> None:
 
 def to_object(settings: GroomSettings) -> dict[str, Any]:
     """Convert `GroomSettings` to the object that `write` writes."""
-    return {"format": FORMAT, "version": VERSION, **sections_of(settings)}
+    return {"format": FORMAT, "version": VERSION, **sections_of(settings), "styles": list_of_styles(settings)}
 
 
 def sections_of(settings: GroomSettings) -> dict[str, dict[str, Any]]:
@@ -66,6 +94,33 @@ def sections_of(settings: GroomSettings) -> dict[str, dict[str, Any]]:
     }
 
 
+def list_of_styles(settings: GroomSettings) -> list[dict[str, Any]]:
+    """[{name: value}] of the styles of `GroomSettings`, each with its kind, and its name if it has one."""
+    names = settings.style_names or [""] * len(settings.styles)
+    return [
+        {"kind": kind_of(style), **({"name": name} if name else {}), **given(style)}
+        for name, style in zip(names, settings.styles, strict=True)
+    ]
+
+
+@dataclass(frozen=True)
+class PartialSettings:
+    """Some of the settings of a groom, as a file gives them; what it leaves out stays as it is."""
+
+    values: dict[str, dict[str, Any]]  # {section: {name: value}}
+    styles: tuple[StyleSettings, ...] | None = None  # None: styles stay
+    style_names: tuple[str, ...] = ()
+
+    def changed(self, settings: GroomSettings) -> GroomSettings:
+        """`GroomSettings` with these."""
+        sections = {name: replace(getattr(settings, name), **values) for name, values in self.values.items()}
+        settings = replace(settings, **sections)
+        return settings if self.styles is None else self._styled(settings, self.styles)
+
+    def _styled(self, settings, styles):
+        return replace(settings, styles=styles, style_names=self.style_names)
+
+
 def read(path: str | Path) -> GroomSettings:
     """Read `GroomSettings` from a file; omitted settings have their defaults. Raises `HairError`."""
     return from_object(read_object(path), path)
@@ -73,17 +128,55 @@ def read(path: str | Path) -> GroomSettings:
 
 def from_object(found: dict[str, Any], path: str | Path) -> GroomSettings:
     """Convert the result of `read_object` to `GroomSettings`. Raises `HairError`, which names the file."""
+    return partial_of_object(found, path).changed(GroomSettings())
+
+
+def read_partial(path: str | Path) -> PartialSettings:
+    """Read those settings that a file has. Raises `HairError`."""
+    return partial_of_object(read_object(path), path)
+
+
+def partial_of_object(found: dict[str, Any], path: str | Path) -> PartialSettings:
+    """Convert the result of `read_object` to `PartialSettings`. Raises `HairError`, which names the file."""
     sections = _migrated(found, path)
-    unknown = next((name for name in sections if name not in SECTIONS), None)
-    if unknown is not None:
-        raise HairError('{path}: unknown section "{key}".', path=path, key=unknown)
-    made: dict[str, Any] = {}
-    for name, settings_class in SECTIONS.items():
-        values = sections.get(name, {})
+    styles, names = None, ()
+    if "styles" in sections:
+        styles, names = _styles(sections.pop("styles"), path)
+    made = {}
+    for name, values in sections.items():
+        if name not in SECTIONS:
+            raise HairError('{path}: unknown section "{key}".', path=path, key=name)
         if not isinstance(values, dict):
             raise HairError('{path}: "{key}" must be a group of settings.', path=path, key=name)
-        made[name] = to_settings(values, settings_class, path, f"{name}.", declared_in(name))
-    return GroomSettings(**made)
+        settings = to_settings(values, SECTIONS[name], path, f"{name}.", declared_in(name))
+        made[name] = {setting: getattr(settings, setting) for setting in values}
+    return PartialSettings(made, styles, names)
+
+
+def _styles(found, path):
+    """(styles, their names) of a file's list."""
+    if not isinstance(found, list):
+        raise HairError('{path}: "styles" must be a list of styles.', path=path)
+    if len(found) > MOST_STYLES:
+        sentence = '{path}: "styles" has {count} styles: hair has at most {most}.'
+        raise HairError(sentence, path=path, count=len(found), most=MOST_STYLES)
+    read = [_style(values, path, f"styles[{place}]") for place, values in enumerate(found)]
+    names = tuple(name for name, _style in read)
+    return tuple(style for _name, style in read), names if any(names) else ()
+
+
+def _style(values, path, place):
+    """(name, `StyleSettings`)."""
+    if not isinstance(values, dict):
+        raise HairError('{path}: "{key}" must be a group of settings.', path=path, key=place)
+    values = dict(values)
+    kind, name = values.pop("kind", None), values.pop("name", "")
+    if not isinstance(kind, str) or kind not in KINDS:
+        known = ", ".join(KINDS)
+        raise HairError('{path}: "{key}" must be one of {known}.', path=path, key=f"{place}.kind", known=known)
+    if not isinstance(name, str) or not is_text(name):
+        raise HairError('{path}: "{key}" must be {kind}.', path=path, key=f"{place}.name", kind="a string")
+    return name, to_settings(values, KINDS[kind], path, f"{place}.")
 
 
 def to_settings[S: Settings](
@@ -145,7 +238,12 @@ def _sections_of_look(found):
     return {"appearance": {name: value for name, value in found.items() if name != "version"}}
 
 
-_MIGRATIONS = {1: _sections_of_look}  # from each version to the next
+def _without_styles(found):
+    """Version 2."""
+    return found | {"styles": []}
+
+
+_MIGRATIONS = {1: _sections_of_look, 2: _without_styles}  # from each version to the next
 
 
 # JSON.
@@ -211,7 +309,34 @@ def schema() -> dict[str, Any]:
         "type": "object",
         "required": ["format", "version"],
         "additionalProperties": False,
-        "properties": {"format": {"const": FORMAT}, "version": {"const": VERSION}, **sections},
+        "properties": {
+            "format": {"const": FORMAT},
+            "version": {"const": VERSION},
+            **sections,
+            "styles": _style_schema(),
+        },
+    }
+
+
+def _style_schema():
+    kinds = [
+        {
+            "title": LABELS[kind],
+            "type": "object",
+            "required": ["kind"],
+            "additionalProperties": False,
+            "properties": {
+                "kind": {"const": kind},
+                "name": {"type": "string", "title": "Name"},
+                **{setting[0]: _property(*setting) for setting in declared(settings_class)},
+            },
+        }
+        for kind, settings_class in KINDS.items()
+    ]
+    return {"title": "Styles, in the order of their application", "type": "array"} | {
+        "minItems": 0,
+        "maxItems": MOST_STYLES,
+        "items": {"anyOf": kinds},
     }
 
 

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import warp as wp
 
     from ..interpolation.guide_weights import GuideWeights
+    from ..styling.stack import Styling
 
 # Seconds for other threads to start their kernels, before this one takes the GIL again.
 HEAD_START = 0.001
@@ -31,18 +32,25 @@ def strands_now(
     binding: HairBinding,
     guides: Strands,
     weights: "GuideWeights",
+    styling: "Styling | None" = None,
     chosen: "wp.array[int] | None" = None,
     out: "wp.array2d[wp.vec3] | None" = None,
 ) -> "wp.array2d[wp.vec3]":
     """Return (M, P) vec3 [m] on the binding's device: strands for the guides as combed now. All updates call this.
 
-    It computes the weighted sum. Styles will be applied after it, in order, so that full, threaded and partial
-    updates all include them. A style reads per-strand data from `binding`: roots, normals, identities, leaders; lengths
-    are those of the points. A style rotates segments, so roots and lengths are preserved.
+    It computes the weighted sum, and applies styles to it.
 
-    weights: from `weights_now` for the same strands; chosen: (M,) int32 Warp array, their rows in `binding`, None for
-    all; out: array to fill and return, None for a new one.
+    guides: as strands follow them, which are those of `Styling.guides` for styled strands; weights: from `weights_now`
+    for the same strands and guides; chosen: (M,) int32 Warp array, their rows in `binding`, None for all; out: array to
+    fill and return, None for a new one.
     """
+    points = _weighted_sum(binding, guides, weights, chosen, out)
+    if styling is not None:
+        styling.apply(points, lambda other: _weighted_sum(other, guides, weights_now(other, guides)), chosen)
+    return points
+
+
+def _weighted_sum(binding, guides, weights, chosen=None, out=None):
     roots, normals = binding.positions, binding.normals
     if chosen is not None:
         roots, normals = (interpolation.guide_weights.rows(array, chosen) for array in (roots, normals))
@@ -60,9 +68,10 @@ def combed(guides: Strands, before: Strands) -> np.ndarray | None:
     return np.flatnonzero((guides.numpy() != before.numpy()).any(axis=(1, 2)))
 
 
-def follow_guides(binding: HairBinding, guides: Strands) -> Strands:
-    """Strands of a binding for the guides as they are combed now."""
-    return Strands(strands_now(binding, guides, weights_now(binding, guides)), binding.roots)
+def follow_guides(binding: HairBinding, guides: Strands, styling: "Styling | None" = None) -> Strands:
+    """Strands of a binding for the guides as they are combed now, with styles."""
+    guides = guides if styling is None else styling.guides(guides)
+    return Strands(strands_now(binding, guides, weights_now(binding, guides), styling), binding.roots)
 
 
 def growing_points(
@@ -71,11 +80,13 @@ def growing_points(
     weights: "GuideWeights",
     axes: np.ndarray = _AS_BOUND,
     out: np.ndarray | None = None,
+    styling: "Styling | None" = None,
 ) -> Future[np.ndarray]:
     """A future of the points of `follow_guides`, (S, P, 3) float32 in the processor's memory.
 
-    They are computed in other threads, so that this one can do what it has to do with something else. weights: what
-    `weights_now` gives; axes: (3, 3) by which points are multiplied; out: such an array to fill, None for a new one.
+    They are computed in other threads, so that this one can do what it has to do with something else. guides, weights
+    and styling: as in `strands_now`; axes: (3, 3) by which points are multiplied; out: such an array to fill, None for
+    a new one.
     """
     import warp as wp
 
@@ -89,9 +100,9 @@ def growing_points(
 
     def grow():
         if device.is_cpu:
-            strands_now(binding, guides, weights, out=there)
+            strands_now(binding, guides, weights, styling, out=there)
         else:
-            wp.copy(there, strands_now(binding, guides, weights))
+            wp.copy(there, strands_now(binding, guides, weights, styling))
             wp.synchronize_device(device)
         geometry.transform.transformed(out, axes, out)
         return out
@@ -104,14 +115,19 @@ def growing_points(
 
 
 def follow_some(
-    binding: HairBinding, guides: Strands, chosen: np.ndarray, weights: "GuideWeights", axes: np.ndarray = _AS_BOUND
+    binding: HairBinding,
+    guides: Strands,
+    chosen: np.ndarray,
+    weights: "GuideWeights",
+    axes: np.ndarray = _AS_BOUND,
+    styling: "Styling | None" = None,
 ) -> np.ndarray:
     """(M, P, 3) float32: the points that `growing_points` gives some strands, and no others are computed.
 
     chosen: (M,) indices of strands, such as `guide_weights.Reach` finds for the guides that moved; weights: theirs, as
     `weights_now` gives them.
     """
-    points = strands_now(binding, guides, weights, _rows(binding, chosen)).numpy()
+    points = strands_now(binding, guides, weights, styling, _rows(binding, chosen)).numpy()
     return geometry.transform.transformed(points, axes, points)
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .. import geometry, grooming, interpolation, placement
+from .. import geometry, grooming, interpolation, placement, styling
 from ..errors import HairError
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, positions
 from ..geometry.strands import Strands
@@ -352,10 +352,12 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         placement.sampled_cells,
         placement.preconditioner,
         geometry.closest_point,
+        styling.steps,
+        styling.stack,
     ]
     on_device += [
         placement.voronoi,
-        interpolation.cpu_interpolation if device == "cpu" else interpolation.gpu_interpolation,
+        interpolation.interpolation if device == "cpu" else interpolation.gpu_interpolation,
     ]
     on_processor = [
         placement.farthest,
@@ -364,6 +366,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         interpolation.clump_centers,
         geometry.sampling,
         geometry.transform,
+        styling.guide_lean,
     ]
     if device == "cpu":
         _load_kernels(device, on_device + on_processor, progress, most_threads)
@@ -378,10 +381,10 @@ def _load_kernels(device, modules, progress, most_threads=kernel_setup.MOST_THRE
     kernel_setup.load([wp.get_module(module.__name__) for module in modules], device, progress, most_threads)
 
 
-def strand_radii(settings: HairSettings, point_count: int = POINT_COUNT) -> np.ndarray:
+def strand_radii(settings: HairSettings) -> np.ndarray:
     """(point_count,) float32 [m]: radius along every strand, from `radius` at the root to its `tip_taper` part."""
     radius = _known(settings.radius)
-    return np.linspace(radius, radius * settings.tip_taper, point_count, dtype=np.float32)
+    return np.linspace(radius, radius * settings.tip_taper, settings.point_count, dtype=np.float32)
 
 
 def _known(value: float | None) -> float:

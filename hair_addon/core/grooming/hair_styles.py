@@ -2,6 +2,7 @@
 """Styles bound to the strands of a hair: where clump sites stand, and what is kept while sliders move."""
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +15,12 @@ from ..interpolation.regions import Regions
 from ..interpolation.root_binder import RootBinder
 from ..styling.base import StyleSettings
 from ..styling.clump_trees import ClumpTrees
-from ..styling.stack import Inputs, Styling
+from ..styling.style_inputs import Inputs
 from . import groom, groom_defaults
 from .groom import HairSettings
+
+if TYPE_CHECKING:
+    from ..styling.stack import Styling
 
 _ROUNDS = 2  # of relaxation: cells vary by 0.09, more evenly than locks do
 
@@ -54,7 +58,7 @@ def bind_styles(
     trees: ClumpTrees,
     inputs: Inputs | None = None,
     axes: np.ndarray | None = None,
-) -> Styling | None:
+) -> "Styling | None":
     """The `Styling` of strands; None where strands follow the guides as they are.
 
     axes: (3, 3) rotation to the surface's own axes, None for none.

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..params import Settings, param, param_of
+from ..params import Settings, param
 
 FIRST_FRAME, LAST_FRAME = -1_048_574, 1_048_574  # Blender's MINAFRAME and MAXFRAME
 
@@ -35,11 +35,14 @@ class RenderSettings(Settings):
 
 
 @dataclass(frozen=True)
-class FrameSettings(Settings):
-    """Of a frame that is rendered into a file."""
+class PictureSettings(Settings):
+    """Of a picture: drawn at once, in the memory of the graphics card, or a frame that is rendered into a file."""
 
-    width: int = param(1920, "Width of the image in pixels", low=1, high=65536)
-    height: int = param(1080, "Height of the image in pixels", low=1, high=65536)
+    width: int = param(1280, "Width of the image in pixels", low=1, high=65536)
+    height: int = param(720, "Height of the image in pixels", low=1, high=65536)
+    samples_per_side: int = param(
+        4, "Samples along each side of a pixel; 4 gives 16 samples per pixel", label="Samples per side", low=1, high=8
+    )
     sample_count: int = param(0, "Samples per pixel; 0 uses the scene's setting", low=0, high=65536)
     is_transparent: bool = param(
         False, "Leave the background transparent instead of filling it with the world color", label="Transparent"
@@ -47,16 +50,9 @@ class FrameSettings(Settings):
     has_passes: bool = param(False, "Write all passes as layers of a multilayer EXR")
 
 
-@dataclass(frozen=True)
-class PictureSettings(Settings):
-    """Of a picture that is drawn at once, in the memory of the graphics card."""
-
-    width: int = param_of(FrameSettings, "width", 1280, high=16384)
-    height: int = param_of(FrameSettings, "height", 720, high=16384)
-    samples_per_side: int = param(
-        4, "Samples along each side of a pixel; 4 gives 16 samples per pixel", label="Samples per side", low=1, high=8
-    )
-    is_transparent: bool = param_of(FrameSettings, "is_transparent")
+DRAWING_FIELDS = ("samples_per_side",)  # of a picture that is drawn at once, and not of frames
+FRAME_FIELDS = ("sample_count", "has_passes")  # of frames, and not of a picture that is drawn at once
+MOST_DRAWN = 16384  # pixels along a side of a picture that is drawn at once
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         clump_centers,
-        cpu_interpolation,
         cpu_weights,
         gpu_interpolation,
         guide_weights,

@@ -74,9 +74,11 @@ class RootBinder:
         return geometry.root_frames.rooted(self.mesh, self.guide_roots, self.device)
 
     def _with_guide_regions(self, strands, centres):
-        """Regions (S,) and (K,) of strands and of centres: those of the guide that each follows first."""
-        if not self.regions:
+        """Regions (S,) and (K,) of strands and of centres, as of the guide that each follows first; None for none."""
+        kept_apart = interpolation.regions.kept_apart(self.regions, self.guide_roots, self.guide_roots)
+        if kept_apart is None:
             return None
-        labels = interpolation.regions.kept_apart(self.regions, self.guide_roots, self.guide_roots)[1]
-        of_strands, of_centres = (labels[binding.guide_weights.indices.numpy()[:, 0]] for binding in (strands, centres))
+        of_guides = kept_apart[1]
+        first_guides = (binding.guide_weights.indices.numpy()[:, 0] for binding in (strands, centres))
+        of_strands, of_centres = (of_guides[guides] for guides in first_guides)
         return of_strands, of_centres

@@ -24,6 +24,10 @@ TABLE_FIELDS = ("mode", "eta", "sigma_a", "tilt", "roughness", "radial_roughness
 # What differs along strands and between them.
 STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint", "gradient_start", "gradient_end")
 
+# A film of water fills the gaps between the cuticle's scales, which gives a smooth surface (narrow highlights, no tilt,
+# a coat), and lowers the index of refraction that sends back as much light. Pigment stays as it is.
+_WET = {"roughness": 0.16, "coat": 0.4, "cuticle_angle": math.radians(0.5), "ior": 1.38}
+
 # What the colour follows from, by parametrization.
 COLOR_FIELDS = {"MELANIN": ("melanin", "redness", "tint"), "COLOR": ("color",), "ABSORPTION": ("absorption",)}
 
@@ -59,6 +63,9 @@ class Appearance(Settings):
     coat: float = param_of(marschner.Settings, "coat")
     ior: float = param_of(marschner.Settings, "eta")
     cuticle_angle: float = param_of(marschner.Settings, "tilt", math.radians(2.0))
+    wetness: float = param(
+        0.0, "Amount of water: strands gleam, and the hair darkens", low=0.0, high=1.0, subtype="FACTOR"
+    )
     random_color: float = param(
         0.0, "Random variation of the pigment between strands", low=0.0, high=1.0, subtype="FACTOR"
     )
@@ -86,6 +93,20 @@ class Appearance(Settings):
         high=1.0,
         subtype="FACTOR",
     )
+
+
+def wetted(look: Appearance, wetness: float) -> Appearance:
+    """The dry look that shows a look at a wetness from 0 to 1, in place of its own: linear to that of soaked hair."""
+    if wetness == 0.0:
+        return replace(look, wetness=0.0)
+    dry = {name: getattr(look, name) for name in _WET}
+    mixed = {name: (1.0 - wetness) * dry[name] + wetness * wet for name, wet in _WET.items()}
+    return replace(look, wetness=0.0, **mixed)
+
+
+def shaded(look: Appearance) -> Appearance:
+    """The dry look of a look that may be wet; what every model is made from."""
+    return wetted(look, look.wetness)
 
 
 def sigma_a(appearance: Appearance) -> tuple[float, ...]:
@@ -138,6 +159,7 @@ def table_settings(appearance: Appearance, base: lookup_tables.Settings | None =
 
     base: settings that the rest is taken from: size and axes of the tables, shifts, glints of the classic mode.
     """
+    appearance = shaded(appearance)
     return replace(
         base or lookup_tables.Settings(),
         mode=appearance.mode,
@@ -153,6 +175,7 @@ def table_settings(appearance: Appearance, base: lookup_tables.Settings | None =
 
 def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
     """`Appearance` → `kajiya_kay.Settings`: the groom's colour, and a highlight with R's width and R's energy."""
+    appearance = shaded(appearance)
     exponent = float(kajiya_kay.highlight_exponent((1.0 - appearance.coat) * appearance.roughness))
     peak = float(kajiya_kay.highlight_peak(_mean_reflectance(appearance.ior), exponent))
     color = color_from_sigma_a(np.array(sigma_a(appearance)), appearance.radial_roughness)
@@ -161,6 +184,7 @@ def kajiya_kay_settings(appearance: Appearance) -> kajiya_kay.Settings:
 
 def kajiya_kay_strand_settings(appearance: Appearance) -> kajiya_kay.StrandSettings:
     """`Appearance` → `kajiya_kay.StrandSettings`: the same for strands that differ."""
+    appearance = shaded(appearance)
     return kajiya_kay.StrandSettings(
         falloff=float(color_falloff(appearance.radial_roughness)),
         reflectance=_mean_reflectance(appearance.ior),
@@ -183,6 +207,7 @@ def principled_sockets(appearance: Appearance) -> dict[str, Any]:
 
     The absorption is that of an average strand at its root; `strand_settings` says how the others differ.
     """
+    appearance = shaded(appearance)
     return {
         "Absorption Coefficient": sigma_a(appearance),
         "Roughness": appearance.roughness,

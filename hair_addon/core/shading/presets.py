@@ -1,16 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Named looks of hair, as data: {identifier: (label, Appearance)} in the order of a menu.
-
-Water covers a wet fibre: it fills the gaps between the cuticle's scales, which gives a smooth surface (narrow
-highlights, no tilt, a coat), and lowers the relative index of refraction: 1.55 / 1.33.
-"""
+"""Named looks of hair, as data: {identifier: (label, Appearance)} in the order of a menu."""
 
 from dataclasses import replace
-from math import radians
 
-from .appearance import Appearance
-
-_WET = {"roughness": 0.16, "coat": 0.4, "cuticle_angle": radians(0.5), "ior": 1.38}
+from .appearance import Appearance, wetted
 
 _BLACK = Appearance(melanin=0.985, redness=0.1, roughness=0.25, random_color=0.02)
 _DARK_BROWN = Appearance(melanin=0.88, redness=0.25, random_color=0.05)
@@ -45,7 +38,7 @@ PRESETS = {
         "Pink Tips",
         Appearance(melanin=0.22, redness=0.3, tip_absorption=0.4, tip_tint=(0.8, 0.12, 0.35), gradient_end=0.8),
     ),
-    "WET_BLACK": ("Wet Black", replace(_BLACK, **_WET)),
-    "WET_BROWN": ("Wet Brown", replace(_BROWN, **_WET)),
-    "WET_BLOND": ("Wet Blond", replace(_BLOND, **_WET)),
+    "WET_BLACK": ("Wet Black", wetted(_BLACK, 1.0)),
+    "WET_BROWN": ("Wet Brown", wetted(_BROWN, 1.0)),
+    "WET_BLOND": ("Wet Blond", wetted(_BLOND, 1.0)),
 }

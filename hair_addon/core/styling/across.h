@@ -4,8 +4,9 @@
 //
 //   w_i = ρ_i - ρ_(i-1), held to 0.98 d_i;  e_i = sqrt(d_i² - |w_i|²);  o'_i = e_i t(a) + w_i,u u(a) + w_i,v v(a)
 //
-// where a is the strand's own progress Σ e_j, so it goes around the head where the strand did before, and every segment
-// is as long as it was. With `keep_length` κ below 1 the progress is (1 - κ) d_i + κ e_i, and the strand becomes longer.
+// where a is the strand's own progress Σ e_j, so it goes around the head where the strand did before, and every
+// segment is as long as it was. With `keep_length` κ below 1 the progress is (1 - κ) d_i + κ e_i, and the strand
+// becomes longer.
 // offset(i, s, x, out u, out v) gives ρ_i [m] at the arc length s [m], x of the strand's length.
 
 const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {

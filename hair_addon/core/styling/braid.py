@@ -28,7 +28,7 @@ class Settings(ProfiledSettings):
     pattern: str = param("BRAID", "How tresses weave", choices=PATTERNS)
     size: float = param(
         0.05,
-        "Distance between the centres of the braids on the surface",
+        "Distance between the centers of the braids on the surface",
         above=0.0,
         high=1e3,
         soft_high=0.2,
@@ -38,7 +38,7 @@ class Settings(ProfiledSettings):
     )
     radius: float = param(
         0.006,
-        "Distance of the tresses from the centre of the braid",
+        "Distance of the tresses from the center of the braid",
         low=0.0,
         high=1e3,
         soft_high=0.05,

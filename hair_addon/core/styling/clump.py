@@ -26,7 +26,7 @@ class Settings(ProfiledSettings):
 
     size: float = param(
         0.012,
-        "Distance between the centres of the largest locks",
+        "Distance between the centers of the largest locks",
         above=0.0,
         high=1e3,
         soft_high=0.1,
@@ -66,7 +66,7 @@ class Settings(ProfiledSettings):
         high=1.0,
         subtype="FACTOR",
     )
-    twist: float = param(0.0, "Turns of a lock about its centre from root to tip", low=-10.0, high=10.0)
+    twist: float = param(0.0, "Turns of a lock about its center from root to tip", low=-10.0, high=10.0)
     crossover: float = param(
         0.05,
         "Part of the strands that belongs to the second nearest lock",
@@ -87,7 +87,7 @@ class Settings(ProfiledSettings):
 
 
 def sizes(settings: Settings) -> list[float]:
-    """Distance [m] between the centres of each level's locks, the largest first."""
+    """Distance [m] between the centers of each level's locks, the largest first."""
     return [settings.size * settings.ratio**level for level in range(settings.levels)]
 
 

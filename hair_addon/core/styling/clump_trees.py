@@ -8,6 +8,7 @@ one of the next coarser level, so locks are made of whole smaller locks. One in 
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -52,7 +53,7 @@ class ClumpTrees:
             ]
         return self._levels[tree]
 
-    def weigh_again(self, settings) -> "ClumpTrees":
+    def weigh_again(self, settings: Any) -> "ClumpTrees":
         """The same trees where weights, limits or lengths of `HairSettings` changed: nothing is searched."""
         weighed = {
             tree: [interpolation.hair_binding.weigh_again(binding, settings) for binding in levels]

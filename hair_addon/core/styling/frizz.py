@@ -50,7 +50,7 @@ class Settings(ProfiledSettings):
         0.5, "Amplitude of each octave as a part of the one before", low=0.0, high=1.0, subtype="FACTOR"
     )
     coherence: float = param(
-        0.0, "How alike neighbouring strands move; at 0 each has noise of its own", low=0.0, high=1.0, subtype="FACTOR"
+        0.0, "How alike neighboring strands move; at 0 each has noise of its own", low=0.0, high=1.0, subtype="FACTOR"
     )
     spread: float = param(
         0.02,

@@ -6,6 +6,7 @@ What is combed stays as it was combed. Only guides that changed are computed aga
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -89,15 +90,18 @@ class FollowedGuides:
     def __init__(self, mesh: TriMesh, leans: Sequence[Lean], point_count: int) -> None:
         """mesh: that guides keep off."""
         self._mesh, self._leans, self._point_count = mesh, leans, point_count
-        self._before = self._after = None
-        self._surface = geometry.closest_point.SurfaceQuery(mesh) if leans else None
+        self._before, self._after = np.empty((0, 0, 3), np.float32), np.empty((0, 0, 3), np.float32)
+
+    @cached_property
+    def _surface(self):
+        return geometry.closest_point.SurfaceQuery(self._mesh)
 
     def of(self, guides: Strands) -> Strands:
         """The `Strands` that hair follows, for guides as they are combed."""
         if not self._leans and guides.point_count == self._point_count:
             return guides
         points = guides.numpy()
-        if self._before is None or self._before.shape != points.shape:
+        if self._before.shape != points.shape:
             after = self._made(points, np.arange(len(points)))
         else:
             changed = np.flatnonzero((points != self._before).any(axis=(1, 2)))

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from . import base, bend, braid, clump, curl, frizz, smooth, steps, trim, wet
+from . import base, bend, braid, clump, curl, frizz, program_rows, smooth, trim, wet
 from .base import EVERYWHERE, Profile, StyleSettings, has_effect, profile_of
-from .steps import Program
+from .program_rows import Program
 
 _WET_RATIO = 0.32  # of the small wet locks to the large ones
 _WET_THICKNESS = 0.10
@@ -110,8 +110,8 @@ def compiled(
 
     masks: those of `mask_keys`; first_centres: where the centres of each level begin, the guides' own last.
     """
-    choices = np.zeros((len(steps_made), steps.CHOICES), np.int32)
-    numbers = np.zeros((len(steps_made), steps.NUMBERS), np.float32)
+    choices = np.zeros((len(steps_made), program_rows.CHOICES), np.int32)
+    numbers = np.zeros((len(steps_made), program_rows.NUMBERS), np.float32)
     guides_level = len(first_centres) - 1
     for row, step in enumerate(steps_made):
         key = mask_key(step.settings)
@@ -136,22 +136,22 @@ def _steps_of(settings, cutters):
         return Step(kind, settings, amount, profile, own, level, keep_length)
 
     if isinstance(settings, trim.Settings):
-        return [step(steps.TRIM, _of_trim(settings, cutters.get(settings.cutter)))]
+        return [step(program_rows.TRIM, _of_trim(settings, cutters.get(settings.cutter)))]
     if isinstance(settings, clump.Settings):
         own = settings.thickness, settings.twist / settings.levels, settings.stray
-        return [step(steps.CLUMP, own, amount, level=k) for k, amount in enumerate(clump.amounts(settings))]
+        return [step(program_rows.CLUMP, own, amount, level=k) for k, amount in enumerate(clump.amounts(settings))]
     if isinstance(settings, curl.Settings):
-        return [step(steps.CURL, _of_curl(settings), keep_length=settings.keep_length)]
+        return [step(program_rows.CURL, _of_curl(settings), keep_length=settings.keep_length)]
     if isinstance(settings, frizz.Settings):
-        return [step(steps.FRIZZ, _of_frizz(settings), keep_length=settings.keep_length)]
+        return [step(program_rows.FRIZZ, _of_frizz(settings), keep_length=settings.keep_length)]
     if isinstance(settings, bend.Settings):
-        return [step(steps.BEND, (settings.angle / _TWO_PI, settings.turn / _TWO_PI, settings.random_turn))]
+        return [step(program_rows.BEND, (settings.angle / _TWO_PI, settings.turn / _TWO_PI, settings.random_turn))]
     if isinstance(settings, smooth.Settings):
-        return [step(steps.SMOOTH, (settings.length,))]
+        return [step(program_rows.SMOOTH, (settings.length,))]
     if isinstance(settings, braid.Settings):
         tress_count = 3 if settings.pattern == "BRAID" else 2
         size = settings.radius, settings.pitch, 1.0 - settings.flatness
-        return [step(steps.WEAVE, (*size, float(tress_count), settings.thickness), level=0)]
+        return [step(program_rows.WEAVE, (*size, float(tress_count), settings.thickness), level=0)]
     if isinstance(settings, wet.Settings):
         return _of_wet(settings, step)
     return []  # a style of guides
@@ -184,10 +184,10 @@ def _of_frizz(settings):
 def _of_wet(settings, step):
     wetness = settings.amount
     along = Profile(0.0, 1.0, base.profile_of(clump.Settings()).exponent)
-    smoothing = step(steps.SMOOTH, (settings.lock * _WET_SMOOTHING,), settings.relax * wetness, EVERYWHERE)
+    smoothing = step(program_rows.SMOOTH, (settings.lock * _WET_SMOOTHING,), settings.relax * wetness, EVERYWHERE)
     own = _WET_THICKNESS, 0.0, 0.0
-    large = step(steps.CLUMP, own, _WET_CLUMP * wetness**1.5, along, 0)
-    small = step(steps.CLUMP, own, _WET_CLUMP * wetness**0.5, along, 1)
+    large = step(program_rows.CLUMP, own, _WET_CLUMP * wetness**1.5, along, 0)
+    small = step(program_rows.CLUMP, own, _WET_CLUMP * wetness**0.5, along, 1)
     return [smoothing, large, small]
 
 

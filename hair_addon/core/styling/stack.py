@@ -5,8 +5,8 @@ Centre strands of clumps come first, level by level: each is styled by the steps
 before. Then all strands take the whole program in one launch.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,9 +22,10 @@ from . import steps
 from .base import StyleSettings
 from .clump_trees import ClumpTrees
 from .guide_styles import FollowedGuides, leans
-from .masks import Mask
-from .program import Cutter, TreeSettings, mask_key
-from .steps import CLUMP, WEAVE, Program, StrandData
+from .program import TreeSettings, mask_key
+from .program_rows import CLUMP, WEAVE, Program
+from .steps import StrandData
+from .style_inputs import Inputs
 
 # Nothing differentiates these kernels.
 wp.set_module_options({"enable_backward": False})
@@ -33,15 +34,6 @@ HAIR = "hair"  # what the strands are known by to the clump trees
 
 # Points of strands (N, P) [m] of a binding, for guides as they are followed now.
 StrandsOf = Callable[[HairBinding], "wp.array2d[wp.vec3]"]
-
-
-@dataclass(frozen=True)
-class Inputs:
-    """What styles name, as it was read: masks by `program.mask_key`, planes of cutters and directions by objects."""
-
-    masks: Mapping[tuple[str, str, bool], Mask] = field(default_factory=dict)
-    cutters: Mapping[str, Cutter] = field(default_factory=dict)
-    targets: Mapping[str, np.ndarray] = field(default_factory=dict)
 
 
 @dataclass

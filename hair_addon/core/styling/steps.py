@@ -2,7 +2,7 @@
 """The kernel that applies a program of styles to strands: one launch for all steps.
 
 steps.cpp and the files it includes are compiled for both kinds of device. A program is two arrays of rows, one a step:
-whole numbers (`CHOICES`) and numbers (`NUMBERS`). program.py writes them.
+whole numbers (`CHOICES`) and numbers (`NUMBERS`), as program_rows.py says. program.py writes them.
 """
 
 from dataclasses import dataclass
@@ -14,6 +14,7 @@ from ..errors import HairError
 from ..kernels import native_code, parallel
 from ..kernels.checks import require_count, require_indices
 from . import frizz
+from .program_rows import BEND, CHOICES, CLUMP, CURL, FRIZZ, NUMBERS, SMOOTH, TRIM, WEAVE, Program
 from .random_numbers import PURPOSES
 
 # Nothing differentiates these kernels.
@@ -23,10 +24,6 @@ LEAST_BLOCKS = 64  # fewer are not worth a thread
 WIDTH = 16  # strands that a thread of the processor styles at once: 8 take a fifth longer
 MOST_POINTS = 257  # of a strand
 SHORT_POINTS = 64  # of a strand that takes less memory of a GPU
-TRIM, CLUMP, CURL, FRIZZ, BEND, SMOOTH, WEAVE = range(1, 8)  # the kinds of steps
-
-CHOICES = 5  # kind, seed, row of masks or -1, row of members or -1, first of the centres that members count from
-NUMBERS = 24  # amount, vary; root, tip, exponent, whether flipped and start of the profile; keep_length; 16 of the step
 
 
 @dataclass(frozen=True)
@@ -43,21 +40,6 @@ class StrandData:
     centre_points: "wp.array2d[wp.vec4]"  # (K, P) x, y, z [m] and the arc length [m]
     centre_normals: "wp.array[wp.vec3]"  # (K,)
     centre_identities: "wp.array[int]"  # (K,)
-
-
-@dataclass(frozen=True)
-class Program:
-    """Steps as a kernel reads them: (N, CHOICES) int32 and (N, NUMBERS) float32."""
-
-    choices: np.ndarray
-    numbers: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.choices)
-
-    def before(self, step: int) -> "Program":
-        """The steps before one of them."""
-        return Program(self.choices[:step], self.numbers[:step])
 
 
 @dataclass(frozen=True)

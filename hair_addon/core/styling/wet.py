@@ -23,7 +23,7 @@ class Settings(StyleSettings):
 
     lock: float = param(
         0.015,
-        "Distance between the centres of the largest wet locks",
+        "Distance between the centers of the largest wet locks",
         label="Lock size",
         above=0.0,
         high=1e3,

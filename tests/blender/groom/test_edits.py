@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.groom import edits
-from hair_addon.blender.settings import saved_looks
+from hair_addon.blender.settings import preferences, saved_looks
 from hair_addon.core.errors import HairError
 from hair_addon.core.shading.appearance import Appearance
 from tests.support.reading import attribute, points, snapshot, vertex_positions, write_points
@@ -222,7 +222,7 @@ def test_hair_that_lost_its_surface_is_attached_to_another(hair):
 @pytest.fixture
 def user_folder(tmp_path, monkeypatch):
     """The add-on's own folder, as if it were installed."""
-    monkeypatch.setattr(saved_looks.preferences, "ADDON_MODULE", "bl_ext.user_default.vellus")
+    monkeypatch.setattr(preferences, "ADDON_MODULE", "bl_ext.user_default.vellus")
     monkeypatch.setattr(bpy.utils, "extension_path_user", lambda _module, *, path, create: str(tmp_path / path))
     (tmp_path / "looks").mkdir()
     return tmp_path / "looks"

@@ -32,6 +32,26 @@ def test_what_fails_to_be_made_is_not_kept():
             assert len(cache) == 0
 
 
+def test_a_function_is_called_once_with_the_same_arguments():
+    cache, called = Cache(), []
+
+    @cache.keeping
+    def one(*given):
+        """Say so."""
+        called.append(given)
+        return len(called)
+
+    @cache.keeping
+    def other(*given):
+        called.append(given)
+        return len(called)
+
+    assert [one(), one("a"), other("a"), one("a"), one(), other("a")] == [1, 2, 3, 2, 1, 3]
+    assert one.__doc__ == "Say so."
+    cache.clear()
+    assert one("a") == 4
+
+
 def test_what_was_used_longest_ago_gives_way():
     cache = Cache(capacity=2)
     cache.keep("a", 1), cache.keep("b", 2)

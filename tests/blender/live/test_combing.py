@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Combing: the picture follows at once, and Blender's data when the stroke is over; counted, not timed."""
 
+import threading
 from dataclasses import replace
 
 import bpy
@@ -75,6 +76,23 @@ def grown(hair):
     return following.follow_guides(
         bound.binding, curves.read_guides(hair.data.vellus.guide_curves, bound.surface, "cpu")
     ).numpy()
+
+
+def test_a_redraw_waits_for_strands_that_grow(hair, window, monkeypatch):
+    """In other threads, as all strands do that moved at once."""
+    go_on, strands_now = threading.Event(), following.strands_now
+    drawn(hair)
+    for _ in stroke(bpy.data.objects["Guides"], slice(None), steps=1):
+        drawn(hair)  # bound, and grown
+    monkeypatch.setattr(
+        following, "strands_now", lambda *given, **named: go_on.wait(60) and strands_now(*given, **named)
+    )
+    for _ in stroke(bpy.data.objects["Guides"], slice(None), steps=1):
+        letting_go = threading.Timer(0.1, go_on.set)
+        letting_go.start()
+        shown = drawn(hair)
+        letting_go.join()
+        np.testing.assert_allclose(shown, grown(hair), atol=1e-6)
 
 
 def test_only_strands_of_moved_guides_are_uploaded(hair, window, monkeypatch):

@@ -35,7 +35,7 @@ def comb(count):
 
 @pytest.mark.parametrize("count", [1, 60])
 def test_a_stroke_passes_few_files_and_comes_back_to_none(watched, count, monkeypatch):
-    """Printed: all of it. One call up is left: what is drawn is asked for, and not handed over."""
+    """Printed: all of it. What is drawn is handed over, and not asked for again."""
     way, follow_guides = Way(), live_hair.follow_guides
 
     def follow(*given):
@@ -48,6 +48,5 @@ def test_a_stroke_passes_few_files_and_comes_back_to_none(watched, count, monkey
     with way:
         hair_cache.strands_on_gpu(watched.data)
     print(f"\n{way}")
-    assert len(way.places) <= 14
-    returns = [call for call in way.returns if call[1] != ALONG]
-    assert returns == [("blender/render/hair_cache.py", "blender/groom/bindings.py")]
+    assert len(way.places) <= 12
+    assert not [call for call in way.returns if call[1] != ALONG]

@@ -94,6 +94,7 @@ def test_the_tab_follows_the_pipeline():
         "Surface",
         "Guides",
         "Strands",
+        "Styles",
         "Shading",
         "Advanced: Lookup Tables",
         "Output",
@@ -270,7 +271,7 @@ def test_looks_have_pictures_of_their_own(hair):
 
 def test_a_saved_look_has_a_swatch_of_its_color(hair, tmp_path, monkeypatch):
     """It follows the file, and a file that cannot be read has none. Icons have no numbers without a window."""
-    monkeypatch.setattr(saved_looks, "_folder", lambda create: tmp_path)
+    monkeypatch.setattr(saved_looks.FILES, "folder", lambda create: tmp_path)
     look_previews.unregister()
     red, blue = (Appearance(parametrization="COLOR", color=color) for color in ((0.5, 0.01, 0.01), (0.01, 0.01, 0.5)))
     saved_looks.write("Mine", red)

@@ -14,6 +14,7 @@ from hair_addon.core.grooming import groom_defaults
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.tables import lookup_tables
+from hair_addon.core.styling import clump, curl
 from tests.support.layout import draw_all
 from tests.support.reading import points, snapshot
 
@@ -22,6 +23,8 @@ WANTED = GroomSettings(
     HairSettings(strand_count=70, radius=0.003, influence_distance=0.4),
     Appearance(melanin=0.3, mode="classic"),
     lookup_tables.Settings(size=64, eccentricity=0.9),
+    (clump.Settings(size=0.02, levels=3), curl.Settings(radius=0.004), curl.Settings(is_on=False, seed=7)),
+    ("Locks", "Curl", "Curl.001"),
 )
 
 
@@ -81,7 +84,7 @@ def test_one_undo_reverts_the_settings(hair, path):
     ("text", "said"),
     [
         ("{", "invalid JSON"),
-        ('{"format": "Vellus groom settings", "version": 3}', "newer Vellus"),
+        ('{"format": "Vellus groom settings", "version": 99}', "newer Vellus"),
         (
             '{"format": "Vellus groom settings", "version": 2, "hair": {"radius": -1}}',
             'value for "hair.radius"',

@@ -17,6 +17,8 @@ from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.params import declared
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.presets import PRESETS
+from hair_addon.core.styling import curl, frizz
+from hair_addon.core.styling.kinds import KINDS
 
 
 def values_of(default, details):
@@ -41,7 +43,24 @@ def any_settings(section):
     return st.builds(SECTIONS[section], **{name: values_of(*rest) for name, *rest in declared_in(section)})
 
 
-GROOMS = st.builds(GroomSettings, **{name: any_settings(name) for name in SECTIONS})
+def any_style(kind):
+    return st.builds(KINDS[kind], **{name: values_of(*rest) for name, *rest in declared(KINDS[kind])})
+
+
+STYLES = st.lists(st.one_of(*map(any_style, KINDS)), max_size=5)
+
+
+@st.composite
+def grooms(draw):
+    """Any settings; some styles have names."""
+    styles = draw(STYLES)
+    text = st.text(st.characters(codec="utf-8", exclude_characters="\0"), max_size=20)
+    names = draw(st.one_of(st.just([]), st.lists(text, min_size=len(styles), max_size=len(styles))))
+    sections = {name: draw(any_settings(name)) for name in SECTIONS}
+    return GroomSettings(**sections, styles=styles, style_names=names)
+
+
+GROOMS = grooms()
 
 
 def write(path, values):
@@ -71,8 +90,11 @@ def test_what_is_written_keeps_to_the_schema(wanted):
 def check(value, schema):
     """Assert that a value keeps to a JSON Schema, of the words that ours is written in."""
     known = {"$schema", "title", "description", "default", "type", "required", "additionalProperties", "properties"}
-    known |= {"const", "enum", "items", "minItems", "maxItems", "minimum", "exclusiveMinimum", "maximum"}
+    known |= {"const", "enum", "items", "minItems", "maxItems", "minimum", "exclusiveMinimum", "maximum", "anyOf"}
     assert set(schema) <= known
+    if "anyOf" in schema:
+        fitting = [s for s in schema["anyOf"] if s["properties"]["kind"]["const"] == value["kind"]]
+        return check(value, *fitting)
     kinds = {"object": dict, "array": list, "string": str, "boolean": bool, "integer": int, "number": (int, float)}
     assert isinstance(value, kinds[schema.get("type", "object")]) or "const" in schema
     assert value == schema.get("const", value)
@@ -96,6 +118,12 @@ def test_the_schema_knows_every_setting():
         assert list(sections[name]["properties"]) == [setting for setting, *_ in declared_in(name)]
     named = [setting for name in SECTIONS for setting in sections[name]["properties"]]
     everything = {setting for section in SECTIONS.values() for setting, *_ in declared(section)}
+    of_styles = {
+        kinds["properties"]["kind"]["const"]: kinds["properties"] for kinds in sections["styles"]["items"]["anyOf"]
+    }
+    assert {kind: list(found)[2:] for kind, found in of_styles.items()} == {
+        kind: [name for name, *_ in declared(settings_class)] for kind, settings_class in KINDS.items()
+    }
     # What tables take from the appearance stands there, under the names that it has there.
     assert everything - {*named} == {"eta", "sigma_a", "beta_r"}
 
@@ -113,9 +141,75 @@ def test_a_look_as_it_was_saved_alone_is_read(tmp_path):
     assert settings_file.read(path) == GroomSettings(appearance=look)
 
 
+def test_styles_of_a_file_are_in_its_order(tmp_path):
+    listed = [
+        {"kind": "CURL", "radius": 0.004, "name": "Ringlets"},
+        {"kind": "FRIZZ"},
+        {"kind": "CURL", "is_on": False},
+    ]
+    read = settings_file.read(write(tmp_path / "a.json", head(styles=listed)))
+    assert read.styles == (curl.Settings(radius=0.004), frizz.Settings(), curl.Settings(is_on=False))
+    assert read.style_names == ("Ringlets", "", "")
+
+
+def test_files_of_version_2_have_no_styles(tmp_path):
+    path = write(tmp_path / "a.json", head(hair={"strand_count": 5}) | {"version": 2})
+    assert settings_file.read(path) == GroomSettings(hair=HairSettings(strand_count=5))
+
+
+@given(wanted=GROOMS, present=GROOMS, kept=st.sets(st.sampled_from([*SECTIONS, "styles"])))
+@settings(max_examples=30)
+def test_what_a_partial_file_leaves_out_stays(tmp_path_factory, wanted, present, kept):
+    values = settings_file.to_object(wanted)
+    path = tmp_path_factory.mktemp("partial") / "some.json"
+    write(path, {name: part for name, part in values.items() if name not in kept})
+    changed = settings_file.read_partial(path).changed(present)
+    for name in SECTIONS:
+        # What follows from the surface is in no file.
+        source = present if name in kept else wanted
+        names = [setting for setting, *_ in declared_in(name) if getattr(source, name) is not None]
+        found, expected = ({n: getattr(getattr(s, name), n) for n in names} for s in (changed, source))
+        assert {n: v for n, v in found.items() if expected[n] is not None} == {
+            n: v for n, v in expected.items() if v is not None
+        }
+    assert changed.styles == (present if "styles" in kept else wanted).styles
+
+
+@pytest.mark.parametrize(
+    ("given_styles", "said"),
+    [
+        (curl.Settings(), "styles must be a list of styles"),
+        ([HairSettings()], "A style must be the settings of a style"),
+        ([None], "A style must be the settings of a style, not None"),
+        ([curl.Settings()] * 65, "at most 64 styles"),
+    ],
+)
+def test_what_is_no_list_of_styles_is_refused(given_styles, said):
+    with pytest.raises(HairError, match=said):
+        GroomSettings(styles=given_styles)
+
+
+@pytest.mark.parametrize("names", ["ab", [1], ["a", "b"], ["\0"], None])
+def test_names_of_styles_are_as_many_strings(names):
+    with pytest.raises(HairError, match="style_names"):
+        GroomSettings(styles=[curl.Settings()], style_names=names)
+
+
 @pytest.mark.parametrize(
     ("values", "said"),
     [
+        (head(styles={}), '"styles" must be a list of styles'),
+        (head(styles=[{"kind": "CURL"}, 3]), '"styles[1]" must be a group of settings'),
+        (head(styles=[{}]), '"styles[0].kind" must be one of TRIM, CLUMP'),
+        (head(styles=[{"kind": "PERM"}]), '"styles[0].kind" must be one of TRIM, CLUMP'),
+        (head(styles=[{"kind": ["CURL"]}]), '"styles[0].kind" must be one of TRIM, CLUMP'),
+        (head(styles=[{"kind": "CURL", "radios": 1}]), 'unknown setting "styles[0].radios"'),
+        (head(styles=[{"kind": "CURL", "radius": "1"}]), '"styles[0].radius" must be a number'),
+        (head(styles=[{"kind": "CURL", "radius": -1}]), 'invalid value for "styles[0].radius": Radius must be between'),
+        (head(styles=[{"kind": "CLUMP", "levels": 1.5}]), '"styles[0].levels" must be a whole number'),
+        (head(styles=[{"kind": "CURL", "name": 1}]), '"styles[0].name" must be a string'),
+        (head(styles=[{"kind": "CURL", "name": "a\0"}]), '"styles[0].name" must be a string'),
+        (head(styles=[{"kind": "CURL"}] * 65), '"styles" has 65 styles: hair has at most 64'),
         (head(hair={"strand_cuont": 5}), 'unknown setting "hair.strand_cuont"'),
         (head(styling={}), 'unknown section "styling"'),
         (head(hair=[1]), '"hair" must be a group'),

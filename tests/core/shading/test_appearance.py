@@ -161,6 +161,54 @@ def test_wet_hair_differs_in_its_optics_and_not_in_its_pigment():
         assert wet.roughness < dry.roughness and wet.ior < dry.ior
 
 
+NATURAL = ("BLACK", "BROWN", "BLOND")
+STEPS = np.linspace(0.0, 1.0, 5)
+
+
+@given(appearances)
+def test_dry_is_dry_and_soaked_is_soaked_to_the_bit(look):
+    dry = replace(look, wetness=0.0)
+    assert appearance.wetted(look, 0.0) == dry
+    assert appearance.table_settings(dry) == appearance.table_settings(appearance.wetted(look, 0.0))
+    soaked = appearance.wetted(look, 1.0)
+    assert (soaked.roughness, soaked.coat, soaked.cuticle_angle, soaked.ior) == (0.16, 0.4, np.radians(0.5), 1.38)
+    # Of a look that is wet itself.
+    wet = replace(look, wetness=1.0)
+    for made in (
+        appearance.table_settings,
+        appearance.kajiya_kay_settings,
+        appearance.kajiya_kay_strand_settings,
+        appearance.principled_sockets,
+        appearance.strand_settings,
+    ):
+        assert made(wet) == made(soaked), made.__name__
+
+
+@pytest.mark.parametrize("name", NATURAL)
+def test_wet_presets_are_soaked_hair(name):
+    assert presets.PRESETS[f"WET_{name}"][1] == appearance.wetted(presets.PRESETS[name][1], 1.0)
+
+
+@pytest.mark.parametrize("name", NATURAL)
+def test_hair_darkens_with_each_step_of_wetness(name):
+    """What a fibre scatters and what it sends back, of all light; and R's share of it, for Kajiya and Kay's model."""
+    looks = [appearance.wetted(presets.PRESETS[name][1], wetness) for wetness in STEPS]
+    small = lookup_tables.Settings(size=32)
+    tables = [lookup_tables.bake(appearance.table_settings(look, small)) for look in looks]
+    total = np.array([albedo.mean_albedo(table) for table in tables])
+    back = total - [albedo.mean_forward(table) for table in tables]
+    assert (np.diff(total, axis=0) < 0.0).all() and (np.diff(back, axis=0) < 0.0).all()
+    assert (back[-1] < 0.85 * back[0]).all()
+    reflected = [appearance.kajiya_kay_strand_settings(look).reflectance for look in looks]
+    assert (np.diff(reflected) < 0.0).all()
+
+
+@pytest.mark.parametrize("name", NATURAL)
+def test_highlights_narrow_with_each_step_of_wetness(name):
+    looks = [appearance.wetted(presets.PRESETS[name][1], wetness) for wetness in STEPS]
+    assert (np.diff([appearance.kajiya_kay_settings(look).exponent for look in looks]) > 0.0).all()
+
+
 # From strand to strand and from root to tip
 
 

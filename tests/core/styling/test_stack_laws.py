@@ -10,7 +10,7 @@ import warp as wp
 from hair_addon.core.geometry.strands import segment_lengths
 from hair_addon.core.styling import bend, clump, curl, frizz, kinds, lean, program, smooth, steps, trim, wet
 from hair_addon.core.styling.masks import Mask
-from hair_addon.core.styling.stack import Inputs
+from hair_addon.core.styling.style_inputs import Inputs
 from tests.support.devices import DEVICE
 from tests.support.stepped import UP, curved_strands, largest_move, rotation, stepped
 from tests.support.styled import head

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ....core.imaging.pixel_sampling import PictureSettings
+from ....core.imaging.pixel_sampling import FRAME_FIELDS, MOST_DRAWN, PictureSettings
 from ....core.long_work import Stage
 from ...host import paths
 from ...render import offscreen
@@ -19,7 +19,9 @@ class VELLUS_OT_render_picture(BrowsedOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
     __annotations__ = {
         "filepath": properties.file("Image file to write, .png or .exr"),
-        **setting_properties.annotations(PictureSettings),
+        **setting_properties.annotations(
+            PictureSettings, skip=FRAME_FIELDS, high={"width": MOST_DRAWN, "height": MOST_DRAWN}
+        ),
     }
     asked = "filepath"
 
@@ -32,7 +34,7 @@ class VELLUS_OT_render_picture(BrowsedOperator, bpy.types.Operator):
         return float("inf")  # graphics drivers differ a hundredfold
 
     def work(self, context):
-        settings = setting_properties.to_settings(self, PictureSettings)
+        settings = setting_properties.to_settings(self, PictureSettings, skip=FRAME_FIELDS)
         path = paths.resolve(self.filepath)
         pixels = yield from offscreen.drawing_picture(settings)
         yield Stage("Writing the picture", 0.95)

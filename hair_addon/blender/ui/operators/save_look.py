@@ -25,5 +25,5 @@ class VELLUS_OT_save_look(HairOperator, bpy.types.Operator):
         return context.window_manager.invoke_props_dialog(self)
 
     def change(self, context):
-        saved_looks.write(self.name, properties.look_of(hair_of(context.object).vellus))
+        saved_looks.write(self.name, properties.own_look_of(hair_of(context.object).vellus))
         return "Look {name} saved", {"name": self.name}

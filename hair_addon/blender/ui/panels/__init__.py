@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Hair tab of the sidebar, in the order of the pipeline: layout only."""
 
-from . import guides, interpolation, output, progress, rendering, shading, surface, systems, tables
+from . import guides, interpolation, output, progress, rendering, shading, styles, surface, systems, tables
 
-LISTS = systems.LISTS
+LISTS = (*systems.LISTS, *styles.LISTS)
 
 CLASSES = (
     *progress.CLASSES,
@@ -11,6 +11,7 @@ CLASSES = (
     *surface.CLASSES,
     *guides.CLASSES,
     *interpolation.CLASSES,
+    *styles.CLASSES,
     *shading.CLASSES,
     *tables.CLASSES,
     *output.CLASSES,

@@ -2,7 +2,7 @@
 //
 // A strand as the weighted sum of its guides (interpolation.py), LANES segments at once in Clang's vectors.
 //
-// The body of `_sum_in_vectors` in cpu_interpolation.py. Parameters, for S strands of P points, K slots of guides a
+// The body of `_sum_in_vectors` in interpolation.py. Parameters, for S strands of P points, K slots of guides a
 // strand and G guides:
 //
 //   int strand                              the strand to make

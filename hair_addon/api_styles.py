@@ -1,0 +1,156 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python interface's functions of styles; api.py offers them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .api_arguments import changed, choice
+from .core import lazy
+from .core.errors import HairError
+from .core.files import style_presets
+from .core.files.settings_file import require_styles
+from .core.geometry.mesh import TriMesh
+from .core.geometry.strands import Strands
+from .core.grooming import following, groom, hair_styles
+from .core.grooming.groom import HairSettings
+from .core.long_work import Progress
+from .core.params import Param, plain_value
+from .core.styling.base import StyleSettings
+from .core.styling.bend import Settings as Bend
+from .core.styling.braid import Settings as Braid
+from .core.styling.clump import Settings as Clump
+from .core.styling.curl import Settings as Curl
+from .core.styling.frizz import Settings as Frizz
+from .core.styling.kinds import OFFERS, kind_of
+from .core.styling.lean import Settings as Lean
+from .core.styling.masks import Mask
+from .core.styling.program import mask_keys
+from .core.styling.smooth import Settings as Smooth
+from .core.styling.style_inputs import Inputs
+from .core.styling.trim import Settings as Trim
+from .core.styling.wet import Settings as Wet
+
+blender = lazy.Package(".blender", __package__)
+
+Curves = Any
+
+__all__ = [
+    "Bend",
+    "Braid",
+    "Clump",
+    "Curl",
+    "Frizz",
+    "Lean",
+    "Smooth",
+    "Trim",
+    "Wet",
+    "add_style",
+    "apply_style_preset",
+    "set_styles",
+    "styles_of",
+]
+
+_SWITCH = Param("")
+
+
+def add_style(
+    hair: Curves, style: str | StyleSettings, *, name: str = "", fit: bool = False, **changes: Any
+) -> StyleSettings:
+    """Add a style after the other styles of hair Curves; returns its settings.
+
+    style: a name of the menu such as "CURL" or "WAVE", or settings such as `Curl(…)`; name: in the list, by default the
+    menu's; fit: whether lengths are for a human head, and multiplied by the size of the surface; changes: fields of the
+    style's settings. Without a `seed` the style gets one that no other style of the hair has.
+
+    >>> hair = bpy.data.objects["Hair"]
+    >>> api.add_style(hair, "CURL", radius=0.004).radius
+    0.004
+    >>> [style.seed for style in api.styles_of(hair)]
+    [0]
+    """
+    if isinstance(style, str):
+        offer = OFFERS[choice(style, "style", OFFERS)]
+        settings, name = offer.settings, name or offer.label
+    else:
+        kind_of(style)
+        settings = style
+    settings = changed(type(settings), settings, changes)
+    fit, name = plain_value("fit", fit, False, _SWITCH), plain_value("name", name, "", _SWITCH)
+    target = blender.data.arguments.curves_of(hair, "HAIR")
+    has_seed = "seed" in changes or not isinstance(style, str)
+    return blender.groom.hair_styles.add(target, settings, name, is_fitted=fit, has_seed=has_seed)
+
+
+def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:
+    """Return the styles of hair Curves in order, disabled ones too.
+
+    >>> [type(style) is api.Curl for style in api.styles_of(bpy.data.objects["Hair"])]
+    [True]
+    """
+    return blender.settings.style_items.styles_of(blender.data.arguments.curves_of(hair, "HAIR").vellus)
+
+
+def set_styles(hair: Curves, styles: Sequence[StyleSettings]) -> None:
+    """Replace the styles of hair Curves; a style keeps the name and the keys of one of its kind.
+
+    >>> api.set_styles(bpy.data.objects["Hair"], [api.Clump(size=0.5), api.Curl(radius=0.006), api.Frizz()])
+    >>> len(api.styles_of(bpy.data.objects["Hair"]))
+    3
+    """
+    styles, _names = require_styles(styles)
+    blender.groom.hair_styles.assign(blender.data.arguments.curves_of(hair, "HAIR"), styles)
+
+
+def apply_style_preset(hair: Curves, preset: str, *, fit: bool = True, keep_styles: bool = False) -> None:
+    """Replace the styles of hair Curves by those of a preset such as "CURLY".
+
+    fit: whether lengths, which are for a human head, are multiplied by the size of the surface; keep_styles: whether
+    the preset's styles come after the present ones, in place of replacing them.
+
+    >>> api.apply_style_preset(bpy.data.objects["Hair"], "FRIZZY")
+    >>> [style.octaves for style in api.styles_of(bpy.data.objects["Hair"])]
+    [3]
+    """
+    found = style_presets.read(choice(preset, "style preset", style_presets.PRESETS))
+    fit, keep = plain_value("fit", fit, False, _SWITCH), plain_value("keep_styles", keep_styles, False, _SWITCH)
+    target = blender.data.arguments.curves_of(hair, "HAIR")
+    blender.groom.hair_styles.apply_preset(target, found, is_fitted=fit, keeps_styles=keep)
+
+
+def styled_strands(
+    mesh: TriMesh,
+    guides: Strands,
+    settings: HairSettings,
+    styles: Sequence[StyleSettings],
+    masks: Mapping[str, ArrayLike] | None,
+    progress: Progress,
+) -> Strands:
+    """Strands between guides on a mesh of arrays, with styles; arguments as in `api.interpolate_hair`."""
+    styles, _names = require_styles(styles)
+    inputs = Inputs({key: _mask(mesh, masks or {}, key) for key in mask_keys(styles)})
+    for style in styles:
+        _require_arrays(style)
+    binding = groom.bind_hair(mesh, guides, settings, progress=progress)
+    trees = hair_styles.clump_trees(mesh, guides.roots, settings)
+    styling = hair_styles.bind_styles(binding, guides, settings, styles, trees, inputs)
+    return following.follow_guides(binding, guides, styling)
+
+
+def _mask(mesh, masks, key):
+    name, image, is_inverted = key
+    if image:
+        raise HairError("Images mask styles in Blender only: pass weights of vertices as masks={name: weights}.")
+    if name not in masks:
+        raise HairError(f"There is no mask {name!r}: pass weights of vertices as masks={{name: weights}}.")
+    weights = np.asarray(masks[name], np.float32)
+    if weights.shape != (len(mesh.vertices),) or not np.isfinite(weights).all():
+        raise HairError(f"The mask {name!r} must have a finite weight for each of {len(mesh.vertices)} vertices.")
+    return Mask(weights[mesh.triangles], is_inverted=is_inverted)
+
+
+def _require_arrays(style):
+    if (isinstance(style, Trim) and style.cutter) or (isinstance(style, Lean) and style.direction == "OBJECT"):
+        raise HairError("Plain arrays have no objects: styles can name objects in Blender only.")

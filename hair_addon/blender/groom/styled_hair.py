@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The styles of bound hair: read from its Curves, bound to its strands, and bound again when they change."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from bpy.types import Curves, Depsgraph, Object
+
+from ...core import grooming
+from ...core.geometry.strands import Strands
+from ...core.grooming.groom import HairSettings
+from ...core.interpolation.hair_binding import HairBinding
+from ...core.styling import program
+from ...core.styling.base import StyleSettings, has_effect
+from ...core.styling.clump_trees import ClumpTrees
+from ...core.styling.style_inputs import Inputs
+from ..data import style_inputs
+from ..data.scene import Surface
+from ..settings import style_items
+
+if TYPE_CHECKING:
+    from ...core.styling.stack import Styling
+
+
+@dataclass(frozen=True)
+class ReadStyles:
+    """Styles of a hair, and what they name, as read."""
+
+    styles: tuple[StyleSettings, ...] = ()
+    inputs: Inputs = field(default_factory=Inputs)
+
+    def is_same(self, other: "ReadStyles") -> bool:
+        """Whether hair styled by one is hair styled by the other."""
+        return self._active == other._active and _are_same(self.inputs, other.inputs)
+
+    @property
+    def _active(self):
+        return [settings for settings in self.styles if has_effect(settings)]
+
+
+@dataclass(frozen=True)
+class StyledHair:
+    """Styles bound to strands.
+
+    styling: None where strands follow the guides as they are; trees: a function that makes the hair's `ClumpTrees`.
+    """
+
+    read: ReadStyles
+    styling: "Styling | None"
+    make_trees: Callable[[], ClumpTrees]
+
+    @property
+    def radius_factor(self) -> np.float32:
+        """By how much styles thicken strands."""
+        return np.float32(program.radius_factor(self.read.styles))
+
+    @property
+    def clumps(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """(S,) int32 and (S,) float32: as `Styling.clumps`."""
+        return None if self.styling is None else self.styling.clumps()
+
+    @cached_property
+    def trees(self) -> ClumpTrees:
+        """The clump trees of the hair; made when a style needs them."""
+        return self.make_trees() if self.styling is None else self.styling.trees
+
+
+def read_styles(
+    target: Curves | None,
+    surface_object: Object,
+    surface: Surface,
+    guide_curves: Curves | None,
+    depsgraph: Depsgraph,
+    styles: Sequence[StyleSettings] | None = None,
+) -> ReadStyles:
+    """The `ReadStyles` of a hair Curves datablock, none for None; styles: instead of its own. Raises `HairError`."""
+    if styles is None:
+        styles = () if target is None else style_items.styles_of(target.vellus)
+    if not styles:
+        return ReadStyles()
+    return ReadStyles(tuple(styles), style_inputs.read(surface_object, surface, guide_curves, styles, depsgraph))
+
+
+def bind(
+    read: ReadStyles,
+    binding: HairBinding,
+    guides: Strands,
+    settings: HairSettings,
+    surface: Surface,
+    make_trees: Callable[[], ClumpTrees],
+) -> StyledHair:
+    """Bind styles to strands; make_trees: called where a style needs clump trees, or a surface."""
+    if not any(map(has_effect, read.styles)) and settings.point_count == guides.point_count:
+        return StyledHair(read, None, make_trees)
+    styling = grooming.hair_styles.bind_styles(
+        binding,
+        guides,
+        settings,
+        read.styles,
+        make_trees(),
+        read.inputs,
+        grooming.hair_styles.rotation_of(surface.to_world_axes),
+    )
+    return StyledHair(read, styling, make_trees)
+
+
+def _are_same(inputs, others):
+    if (inputs.masks.keys(), inputs.cutters.keys(), inputs.targets.keys()) != (
+        others.masks.keys(),
+        others.cutters.keys(),
+        others.targets.keys(),
+    ):
+        return False
+    pairs = []
+    for key, mask in inputs.masks.items():
+        other = others.masks[key]
+        pairs += [(mask.corners, other.corners), (mask.guides, other.guides), (_values(mask), _values(other))]
+    pairs += [(cutter.point, others.cutters[name].point) for name, cutter in inputs.cutters.items()]
+    pairs += [(cutter.normal, others.cutters[name].normal) for name, cutter in inputs.cutters.items()]
+    pairs += [(target, others.targets[name]) for name, target in inputs.targets.items()]
+    return all(_equal(*pair) for pair in pairs)
+
+
+def _values(mask):
+    return None if mask.texture is None else mask.texture.values
+
+
+def _equal(one, other):
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides and hair written into Curves, with their settings and what tells later whether they are out of date."""
+
+from concurrent.futures import Future
+
+import numpy as np
+from bpy.types import Curves, Object
+
+from ...core.geometry.strands import Strands
+from ...core.grooming.groom import GuideSettings
+from ..data import curves, curves_objects
+from ..data.scene import Surface
+from ..materials import looks
+from ..settings import setting_properties
+from . import bindings, staleness
+from .bindings import BoundHair
+
+# Of the guides' own Curves, by their length: so they are seen on a surface of any size.
+_GUIDE_RADIUS = 1.0 / 300.0
+
+
+def write_guides(
+    target: Curves | None, surface_object: Object, surface: Surface, guides: Strands, settings: GuideSettings, key: str
+) -> Curves:
+    """Write guides into Curves, a new object's for None; returns them.
+
+    settings: completed for the surface, so with a length; key: `staleness.root_key`.
+    """
+    target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
+    _keep_settings(target, "GUIDES", target.vellus.guides, settings)
+    target.vellus.root_key = key
+    radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
+    points = Future()
+    points.set_result(surface.to_local(guides.numpy()))
+    curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
+    curves.write_points(target, points)
+    curves.keep_surface(target, surface)
+    return target
+
+
+def write_strands(target: Curves | None, surface_object: Object, guide_curves: Curves, bound: BoundHair) -> Curves:
+    """Write hair that was bound and grows into Curves, a new object's for None; returns them."""
+    target = target or curves_objects.new_object("Hair", surface_object).data
+    curves.require_editable(target)
+    target.vellus.guide_curves = guide_curves
+    bindings.keep(target, bound)
+    write_hair(target)
+    looks.evaluate_shading(target)
+    looks.evaluate_guides(guide_curves)
+    return target
+
+
+def write_hair(target: Curves) -> None:
+    """Bring a hair Curves datablock up to what it is bound to, if it is: the one place where hair is written."""
+    bound, state = bindings.of(target), target.vellus
+    if bound is None:
+        return
+    if not bound.has_moved_only:
+        _keep_settings(target, "HAIR", state.hair, bound.settings)
+        state.root_key, state.parting_key = bound.root_key, bound.parting_key
+        binding, radii = bound.binding, bound.radii
+        normals = binding.normals.numpy()
+        curves.make_strands(
+            target,
+            bound.surface,
+            binding.roots,
+            radii,
+            binding.identities,
+            leaders=binding.leaders,
+            normals=normals,
+            written_radii=bound.written_radii,
+        )
+        bound.written_radii = radii
+        curves.write_clumps(target, bound.styles.clumps)
+    if not bound.is_map_written:
+        curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
+    curves.write_points(target, bound.growing)
+    state.is_stale = False  # as another choice of guides marks it
+    state.followed = staleness.guides_digest(state.guide_curves)
+    bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
+    _store_roots(state.guide_curves, bound)
+
+
+def _store_roots(guide_curves, bound):
+    """Store the roots of guides that were drawn or slid by a brush, so that they follow their surface."""
+    if guide_curves is None or guide_curves.library is not None or guide_curves.session_uid != bound.guide_uid:
+        return
+    roots, surface = bound.guides.roots, bound.surface
+    stored = curves.read_root_places(guide_curves, len(surface.rest))
+    if stored is None or not all(map(np.array_equal, stored, surface.places(roots))):
+        curves.write_roots(guide_curves, surface, roots)
+
+
+def _keep_settings(target, kind, group, settings):
+    curves.require_editable(target)
+    setting_properties.assign(group, settings)
+    target.vellus.kind = kind
+    target.vellus.is_stale = False
+    target.vellus.status = ""

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""JSON files that users save under a name, for every .blend file, in a folder of the extension."""
+
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import HairError
+from . import preferences
+
+
+class SavedFiles:
+    """The files in one folder, such as looks."""
+
+    def __init__(self, folder_name):
+        self._folder_name = folder_name
+
+    def names(self):
+        """Names of all files, in alphabetical order; no file is read."""
+        folder = self.folder(create=False)
+        found = folder.glob("*.json") if folder is not None and folder.is_dir() else ()
+        return sorted((path.stem for path in found), key=str.casefold)
+
+    def change_time(self, name):
+        """When a file was last written [ns], 0 where there is none."""
+        try:
+            return self.path(name, create=False).stat().st_mtime_ns
+        except OSError:
+            return 0
+
+    def path(self, name, create):
+        """The file of a name; create: its folder. Raises `HairError`."""
+        folder = self.folder(create)
+        if folder is None:
+            raise HairError("Only the installed extension can save looks and styles: install it.")
+        stem = bpy.path.clean_name(name.strip())  # no separators, no paths out of the folder
+        if not stem.strip("_."):
+            raise HairError("The name is empty: type one.")
+        return folder / f"{stem}.json"
+
+    def remove(self, name):
+        """Delete a file permanently. Raises `HairError`."""
+        try:
+            self.path(name, create=False).unlink()
+        except OSError as error:
+            raise HairError("{name} cannot be removed: {cause}.", name=name, cause=error) from error
+
+    def folder(self, create):
+        """None where we are no extension."""
+        if not preferences.is_extension():
+            return None
+        folder = bpy.utils.extension_path_user(preferences.ADDON_MODULE, path=self._folder_name, create=create)
+        return Path(folder) if folder else None

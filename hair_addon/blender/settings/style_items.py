@@ -1,0 +1,210 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Styles of a hair ↔ Blender's properties: a list of items, each with a name, a kind and that kind's settings.
+
+A change marks the Curves as any other setting does. Keys follow their style (style_keys.py).
+"""
+
+from dataclasses import replace
+
+import bpy
+
+from ...core.errors import HairError
+from ...core.params import declared
+from ...core.styling.kinds import DESCRIPTIONS, KINDS, LABELS, MOST_STYLES, kind_of
+from . import setting_properties, style_keys
+from .marks import mark_both, mark_geometry
+from .translations import CONTEXT
+
+_UNKEYED = ("seed",)  # strands would jump
+
+
+def _group_class(kind):
+    """A property group of the settings of a kind. Water is seen in shading too."""
+    update = mark_both if kind == "WET" else mark_geometry
+    annotations = setting_properties.annotations(KINDS[kind], update, unkeyed=_UNKEYED)
+    contents = {"__doc__": DESCRIPTIONS[kind], "__annotations__": annotations, "__module__": __name__}
+    return type(f"Vellus{LABELS[kind]}", (bpy.types.PropertyGroup,), contents)
+
+
+_GROUPS = {kind: _group_class(kind) for kind in KINDS}
+
+
+def _renamed(item, name, present, _is_set):
+    """A name that no other style has; keys by name follow."""
+    state = item.id_data.vellus
+    others = [other.name for other in state.styles if other.name != present]
+    name = unique_name(name.strip() or LABELS[item.kind], others)
+    if present and name != present:
+        names = names_of(state)
+        renamed = [name if other == present else other for other in names]
+        style_keys.follow(item.id_data, style_keys.Rearrangement(names, range(len(names)), renamed))
+    return name
+
+
+class VellusStyle(bpy.types.PropertyGroup):
+    """A style of hair"""
+
+    __annotations__ = {
+        "name": bpy.props.StringProperty(
+            name="Name", description="Name of the style", translation_context=CONTEXT, set_transform=_renamed
+        ),
+        "kind": bpy.props.EnumProperty(
+            items=[(kind, LABELS[kind], DESCRIPTIONS[kind]) for kind in KINDS], options={"HIDDEN"}
+        ),
+        **{kind.lower(): bpy.props.PointerProperty(type=_GROUPS[kind]) for kind in KINDS},
+    }
+
+
+CLASSES = (*_GROUPS.values(), VellusStyle)
+
+
+def group_of(item):
+    """The property group with an item's settings."""
+    return getattr(item, item.kind.lower())
+
+
+def settings_of(item):
+    """The `StyleSettings` of an item. Raises `HairError`."""
+    return setting_properties.to_settings(group_of(item), KINDS[item.kind])
+
+
+def styles_of(state):
+    """The `StyleSettings` of a hair's styles in order, disabled ones too; state: its `VellusCurves`."""
+    return tuple(settings_of(item) for item in state.styles)
+
+
+def names_of(state):
+    """The names of a hair's styles in order."""
+    return tuple(item.name for item in state.styles)
+
+
+def active_of(state):
+    """The item that is active in the list, None in an empty list."""
+    return state.styles[state.active_style] if state.active_style < len(state.styles) else None
+
+
+def wetness_of(state):
+    """The amount of the wettest enabled style, from 0 to 1."""
+    return max((item.wet.amount for item in state.styles if item.kind == "WET" and item.wet.is_on), default=0.0)
+
+
+def objects_named(state):
+    """Names of the objects that a hair's styles read."""
+    cutters = {item.trim.cutter for item in state.styles if item.kind == "TRIM"}
+    targets = {item.lean.target for item in state.styles if item.kind == "LEAN" and item.lean.direction == "OBJECT"}
+    return (cutters | targets) - {""}
+
+
+def unique_name(name, others):
+    """A name, numbered as Blender numbers if another has it: Curl, Curl.001."""
+    if name not in others:
+        return name
+    stem, _, number = name.rpartition(".")
+    stem = stem if stem and number.isdigit() else name
+    return next(tried for tried in (f"{stem}.{number:03d}" for number in range(1, 10**6)) if tried not in others)
+
+
+def new_seed(state):
+    """A seed that none of a hair's styles has."""
+    taken = {group_of(item).seed for item in state.styles}
+    return next(seed for seed in range(len(taken) + 1) if seed not in taken)
+
+
+def require_room(count):
+    """Raise `HairError` for more styles than a hair may have."""
+    if count > MOST_STYLES:
+        raise HairError("Hair has at most {count} styles: remove one first.", count=MOST_STYLES)
+
+
+def add(state, settings, name="", place=None):
+    """Add a style, at the end or at an index of the list, and make it active. Raises `HairError`."""
+    require_room(len(state.styles) + 1)
+    names = names_of(state)
+    place = len(names) if place is None else place
+    _append(state, settings, name)
+    state.styles.move(len(names), place)
+    places = [index + (index >= place) for index in range(len(names))]
+    style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state)))
+    state.active_style = place
+    mark_both(state, None)
+
+
+def duplicate(state, place):
+    """Add a copy of a style after it, without keys and with a seed of its own. Raises `HairError`."""
+    item = state.styles[place]
+    add(state, replace(settings_of(item), seed=new_seed(state)), item.name, place + 1)
+
+
+def move(state, place, to):
+    """Move a style from one index of the list to another."""
+    names = names_of(state)
+    order = list(range(len(names)))
+    order.insert(to, order.pop(place))
+    state.styles.move(place, to)
+    _follow(state, names, order)
+    state.active_style = to
+
+
+def remove(state, place):
+    """Remove a style with its keys."""
+    names = names_of(state)
+    state.styles.remove(place)
+    _follow(state, names, [index for index in range(len(names)) if index != place])
+    state.active_style = min(state.active_style, max(len(state.styles) - 1, 0))
+
+
+def assign(state, styles, names=None):
+    """Replace all styles; names: of each, empty or None for those that styles of its kind have now, or new ones.
+
+    A style that stays, by name and kind, keeps its keys. Nothing is marked where nothing changes. Raises `HairError`.
+    """
+    require_room(len(styles))
+    styles = [setting_properties.as_stored(settings) for settings in styles]
+    before = [(item.name, item.kind) for item in state.styles]
+    wanted = _named(state, styles, names)
+    if wanted != before:
+        order = [before.index(pair) if pair in before else None for pair in wanted]
+        state.styles.clear()
+        for (name, _kind), settings in zip(wanted, styles, strict=True):
+            _append(state, settings, name)
+        _follow(state, [name for name, _kind in before], order)
+        state.active_style = min(state.active_style, max(len(styles) - 1, 0))
+    for item, settings in zip(state.styles, styles, strict=True):
+        if settings_of(item) != settings:
+            setting_properties.assign(group_of(item), settings)
+
+
+def _append(state, settings, name):
+    item = state.styles.add()
+    item.kind = kind_of(settings)
+    item.name = name or LABELS[item.kind]
+    setting_properties.assign(group_of(item), settings)
+
+
+def _named(state, styles, names):
+    """[(name, kind)] of styles, each name once; those without a name are, if they can be, styles that are there now."""
+    present = dict(zip(names_of(state), styles_of(state), strict=True))
+    taken = list(names or [""] * len(styles))
+    for is_same in (lambda a, b: a == b, lambda a, b: type(a) is type(b)):
+        for place, style in enumerate(styles):
+            if not taken[place]:
+                free = (name for name in present if name not in taken and is_same(present[name], style))
+                taken[place] = next(free, "")
+    named = []
+    for style, name in zip(styles, taken, strict=True):
+        kind = kind_of(style)
+        others = [other for other, _kind in named] + ([] if name else taken)
+        named.append((unique_name(name or LABELS[kind], others), kind))
+    return named
+
+
+def _follow(state, names, order):
+    """Bring keys up to date, and mark the hair; order: index before of each style in the list, None for a new one."""
+    places = [order.index(index) if index in order else None for index in range(len(names))]
+    style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state)))
+    mark_both(state, None)
+
+
+def values_of(item):
+    """{name: value} of an item's settings, for comparison."""
+    return setting_properties.values_of(group_of(item), [name for name, *_ in declared(KINDS[item.kind])])

@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Keys and drivers that follow their style when styles are moved, removed or renamed.
+
+Blender keys a style's setting by its place in the list, as vellus.styles[0].curl.radius, and leaves the key there.
+"""
+
+import re
+
+import bpy
+
+_PATH = re.compile(r'vellus\.styles\[(?:(\d+)|"((?:[^"\\]|\\.)*)")\](.*)', re.DOTALL)
+
+
+class Rearrangement:
+    """Where the styles of a hair went: `names` before, their `places` after (None: removed), and `new_names` there."""
+
+    def __init__(self, names, places, new_names):
+        self._names, self._places, self._new_names = list(names), list(places), list(new_names)
+
+    @property
+    def is_empty(self):
+        """Whether all styles kept place and name."""
+        kept = [place is not None and place == before for before, place in enumerate(self._places)]
+        return all(kept) and self._names == self._new_names[: len(self._names)]
+
+    def path(self, path):
+        """A data path as it is now: unchanged if it is of no style, None if its style was removed."""
+        match = _PATH.fullmatch(path)
+        place = None if match is None else self._place_of(match)
+        if place is None:
+            return path
+        to = self._places[place]
+        if to is None:
+            return None
+        key = to if match[1] else f'"{bpy.utils.escape_identifier(self._new_names[to])}"'
+        return f"vellus.styles[{key}]{match[3]}"
+
+    def path_of_target(self, path):
+        """The same for what a driver reads: the path of a removed style leads nowhere, as Blender's own do."""
+        now = self.path(path)
+        if now is not None:
+            return now
+        match = _PATH.fullmatch(path)
+        return f'vellus.styles["{bpy.utils.escape_identifier(self._names[self._place_of(match)])}"]{match[3]}'
+
+    def _place_of(self, match):
+        """Index before of the style that a path names, None if there was none."""
+        if match[1]:
+            return int(match[1]) if int(match[1]) < len(self._names) else None
+        name = bpy.utils.unescape_identifier(match[2])
+        return self._names.index(name) if name in self._names else None
+
+
+def follow(curves, rearrangement):
+    """Bring the keys and drivers of Curves, and drivers that read their settings, up to date."""
+    if rearrangement.is_empty:
+        return
+    animation = curves.animation_data
+    if animation is not None:
+        _follow_actions(curves, animation, rearrangement)
+        _follow_curves(animation.drivers, rearrangement)
+    for other in _all_animation():
+        for curve in other.drivers:
+            for target in (target for variable in curve.driver.variables for target in variable.targets):
+                if target.id == curves and target.data_path.startswith("vellus.styles["):
+                    target.data_path = rearrangement.path_of_target(target.data_path)
+
+
+def _follow_curves(fcurves, rearrangement):
+    for curve in list(fcurves):
+        now = rearrangement.path(curve.data_path)
+        if now is None:
+            fcurves.remove(curve)
+        elif now != curve.data_path:
+            curve.data_path = now
+
+
+def _follow_actions(curves, animation, rearrangement):
+    """Of the action, of NLA strips, and of actions that wait to be assigned again."""
+    done, identifiers = {}, {animation.last_slot_identifier}
+    for user in (animation, *_strips(animation)):
+        action, slot = user.action, user.action_slot
+        if action is None or slot is None:
+            continue
+        identifiers.add(slot.identifier)
+        key = action.session_uid, slot.handle
+        if key not in done:
+            done[key] = _follow_action(curves, action, slot, rearrangement)
+        if done[key] != action:
+            user.action = done[key]
+            user.action_slot = next(s for s in user.action.slots if s.handle == slot.handle)
+    for action in bpy.data.actions:
+        for slot in action.slots:
+            if slot.identifier in identifiers - {""} and not slot.users() and action.is_editable:
+                _follow_action(curves, action, slot, rearrangement)
+
+
+def _follow_action(curves, action, slot, rearrangement):
+    """Returns the action with paths that are up to date: a copy where others use it, or a library has it."""
+    handle = slot.handle
+    paths = [curve.data_path for bag in _channelbags(action, handle) for curve in bag.fcurves]
+    if all(rearrangement.path(path) == path for path in paths):
+        return action
+    if not action.is_editable or any(user != curves for user in slot.users()):
+        action = action.copy()
+    for bag in _channelbags(action, handle):
+        _follow_curves(bag.fcurves, rearrangement)
+    return action
+
+
+def _channelbags(action, handle):
+    strips = (strip for layer in action.layers for strip in layer.strips)
+    return [bag for strip in strips for bag in strip.channelbags if bag.slot_handle == handle]
+
+
+def _strips(animation):
+    """All NLA strips, those in meta strips too."""
+    waiting = [strip for track in animation.nla_tracks for strip in track.strips]
+    while waiting:
+        strip = waiting.pop()
+        waiting += strip.strips
+        yield strip
+
+
+def _all_animation():
+    """Animation data of all datablocks, node trees in others too."""
+    for block in bpy.data.all_ids:
+        for owner in (block, getattr(block, "node_tree", None)):
+            animation = getattr(owner, "animation_data", None)
+            if animation is not None:
+                yield animation

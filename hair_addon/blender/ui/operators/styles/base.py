@@ -1,0 +1,24 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What operators of styles share."""
+
+from ....groom.selection import hair_of
+from ....settings import properties, style_items
+
+
+def has_styles(operator, context):
+    """Whether the active hair has an active style; a `poll`, with its message."""
+    operator.poll_message_set("Select hair with styles.")
+    hair = hair_of(context.object)
+    return hair is not None and style_items.active_of(hair.vellus) is not None
+
+
+def fit_switch():
+    """The property of operators whose lengths may follow the surface."""
+    description = "Multiply lengths, which are for a human head, by the size of the surface"
+    return properties.switch("Fit to Surface", description, True)
+
+
+def keep_switch():
+    """The property of operators that may add styles in place of replacing them."""
+    description = "Add the styles of the preset after the present ones, in place of replacing them"
+    return properties.switch("Keep Styles", description, False)

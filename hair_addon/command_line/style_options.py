@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Options of styles: --style curl:radius=0.004,pitch=0.01, again for more, and --style-preset CURLY."""
+
+import argparse
+from dataclasses import replace
+
+from ..core.errors import HairError
+from ..core.files import style_presets
+from ..core.params import declared
+from ..core.styling.kinds import KINDS, MOST_STYLES, OFFERS
+
+_FLAGS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+
+
+def add_styles(parser, has_surface):
+    """Add the options; has_surface: whether the command knows what to fit a preset to."""
+    offers, presets = ", ".join(map(str.lower, OFFERS)), ", ".join(style_presets.PRESETS)
+    parser.add_argument(
+        "--style",
+        dest="styles",
+        metavar="STYLE",
+        type=style,
+        action="append",
+        default=[],
+        help=f"a style with settings, as in curl:radius=0.004,pitch=0.01; again for more, in order: {offers}",
+    )
+    fitted = ", fitted to the surface" if has_surface else ", with lengths for a head"
+    parser.add_argument(
+        "--style-preset", choices=style_presets.PRESETS, metavar="NAME", help=f"a style preset{fitted}: {presets}"
+    )
+    if has_surface:
+        parser.add_argument("--no-style-fit", action="store_true", help="keep the preset's lengths, for a head")
+
+
+def style(text):
+    """Parse KIND:name=value,name=value as (label, `StyleSettings`, whether it has a seed)."""
+    kind, _, rest = text.partition(":")
+    identifier = kind.strip().upper().replace("-", "_")
+    if identifier not in OFFERS:
+        known = ", ".join(map(str.lower, OFFERS))
+        raise argparse.ArgumentTypeError(f"{kind!r} is not a style: choose from {known}")
+    offer = OFFERS[identifier]
+    declarations = {name: (default, details) for name, default, details in declared(KINDS[offer.kind])}
+    changes = {}
+    for pair in rest.split(",") if rest else ():
+        name, is_given, value = pair.partition("=")
+        name = name.strip().replace("-", "_")
+        if name not in declarations:
+            known = ", ".join(declarations)
+            raise argparse.ArgumentTypeError(f"{name!r} is not a setting of {kind}: choose from {known}")
+        if name in changes or not is_given:
+            wrong = "is given twice" if name in changes else "needs a value"
+            raise argparse.ArgumentTypeError(f"{name} of {kind} {wrong}, as in {name}=0.01")
+        changes[name] = _value(name, value.strip(), *declarations[name])
+    try:
+        return offer.label, replace(offer.settings, **changes), "seed" in changes
+    except HairError as error:
+        raise argparse.ArgumentTypeError(str(error)) from error
+
+
+def _value(name, text, default, details):
+    """Text as the type of a setting's default; choices in any case."""
+    if isinstance(default, bool):
+        if text.lower() not in _FLAGS:
+            raise argparse.ArgumentTypeError(f"{name} must be yes or no, not {text!r}")
+        return _FLAGS[text.lower()]
+    try:
+        return text.upper() if details.choices else type(default)(text)
+    except (ValueError, OverflowError) as error:
+        kind = "whole number" if isinstance(default, int) else "number"
+        raise argparse.ArgumentTypeError(f"{name} must be a {kind}, not {text!r}") from error
+
+
+def styled(options, settings, fit=None):
+    """`GroomSettings` with the preset, and then with the styles, that options give. Raises `HairError`.
+
+    fit: function of no arguments that returns (factor of lengths, mean distance of strands [m]), None for a head's.
+    """
+    if options.style_preset:
+        preset = style_presets.read(options.style_preset)
+        if fit is not None:
+            preset = style_presets.fit(preset, *fit())
+        settings = preset.changed(settings)
+    if len(settings.styles) + len(options.styles) > MOST_STYLES:
+        raise HairError(f"Hair has at most {MOST_STYLES} styles: give fewer --style options.")
+    styles, names = list(settings.styles), list(settings.style_names or [""] * len(settings.styles))
+    for label, found, has_seed in options.styles:
+        taken = {other.seed for other in styles}
+        seed = found.seed if has_seed else next(n for n in range(len(taken) + 1) if n not in taken)
+        styles.append(replace(found, seed=seed))
+        names.append(label)
+    return replace(settings, styles=tuple(styles), style_names=tuple(names))

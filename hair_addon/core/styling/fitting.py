@@ -1,0 +1,34 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings that are made for a human scalp, fitted to another surface: all lengths are multiplied by one factor."""
+
+from dataclasses import fields, replace
+from typing import Any
+
+from ..params import Param
+from . import base, clump
+from .base import StyleSettings
+
+_FEWEST_SPACINGS = 4.0  # smaller locks have too few strands
+
+
+def fitted[S: StyleSettings](settings: S, factor: float, strand_spacing: float = 0.0) -> S:
+    """A style with its lengths multiplied by a factor; locks have a size of 4 strand spacings [m] at least."""
+    if factor != 1.0:
+        scaled = base.scaled(settings, factor)
+        lengths = [field.name for field in fields(scaled) if field.metadata["param"].unit == "LENGTH"]
+        settings = replace(scaled, **{name: _rounded(getattr(scaled, name)) for name in lengths})
+    if isinstance(settings, clump.Settings) and settings.size < _FEWEST_SPACINGS * strand_spacing:
+        settings = replace(settings, size=_rounded(_FEWEST_SPACINGS * strand_spacing))
+    return settings
+
+
+def fitted_value(value: Any, details: Param, factor: float) -> Any:
+    """The value of any setting: a length multiplied by a factor, within its range, and others as they are."""
+    if details.unit != "LENGTH" or factor == 1.0:
+        return value
+    return _rounded(min(max(value * factor, details.low), details.high))
+
+
+def _rounded(value):
+    """To three digits, as an artist would type it."""
+    return float(f"{value:.3g}")

@@ -1,0 +1,19 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What styles name, as it was read: masks, planes of cutters, directions of objects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from .masks import Mask
+from .program import Cutter
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Masks by `program.mask_key`, planes of cutters and directions by objects."""
+
+    masks: Mapping[tuple[str, str, bool], Mask] = field(default_factory=dict)
+    cutters: Mapping[str, Cutter] = field(default_factory=dict)
+    targets: Mapping[str, np.ndarray] = field(default_factory=dict)

@@ -1,0 +1,317 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Styles by operators: added, moved, removed, duplicated, keyed, undone, saved, appended; presets; the panel."""
+
+import math
+from types import SimpleNamespace
+
+import bpy
+import pytest
+
+from hair_addon.blender.groom import groom_settings, hair_styles, style_notes
+from hair_addon.blender.settings import saved_styles, setting_properties, style_items
+from hair_addon.blender.ui import look_previews, panels
+from hair_addon.core.files import style_presets
+from hair_addon.core.grooming import groom_defaults
+from hair_addon.core.params import declared
+from hair_addon.core.styling import clump, curl, frizz, lean, trim, wet
+from hair_addon.core.styling.base import ProfiledSettings, scaled
+from hair_addon.core.styling.kinds import KINDS, OFFERS, kind_of
+from tests.support.always import operate
+from tests.support.layout import draw, draw_all
+
+SPHERE_FACTOR = groom_defaults.FUR_LENGTH * math.sqrt(4.0 * math.pi) / 0.12  # of the sphere's default hair length
+
+
+def state():
+    """The settings of the hair, wherever undo has moved them."""
+    return bpy.data.hair_curves["Hair"].vellus
+
+
+def styles():
+    return style_items.styles_of(state())
+
+
+def names():
+    return style_items.names_of(state())
+
+
+def undo():
+    bpy.ops.ed.undo()
+
+
+@pytest.fixture
+def styled(hair):
+    """Hair with three styles, the second active."""
+    for style in ("CLUMP", "CURL", "FRIZZ"):
+        operate(bpy.ops.vellus.add_style, style=style)
+    state().active_style = 1
+    bpy.ops.ed.undo_push(message="styled")
+    return hair
+
+
+@pytest.mark.parametrize("offer", OFFERS)
+@pytest.mark.parametrize("is_fitted", [True, False])
+def test_the_menu_adds_its_styles(hair, offer, is_fitted):
+    state().is_live = is_fitted  # locks for a head would be tens of thousands
+    for _ in range(2):
+        operate(bpy.ops.vellus.add_style, style=offer, is_fitted=is_fitted)
+    assert names() == (OFFERS[offer].label, f"{OFFERS[offer].label}.001")
+    assert [style.seed for style in styles()] == [0, 1] and state().active_style == 1
+    wanted = scaled(OFFERS[offer].settings, SPHERE_FACTOR) if is_fitted else OFFERS[offer].settings
+    for name, _default, details in declared(type(wanted)):
+        if details.unit == "LENGTH":
+            expected = getattr(wanted, name)
+            if is_fitted and kind_of(wanted) == "CLUMP":  # locks of 500 strands on a sphere are larger
+                expected = max(expected, 4.0 * math.sqrt(4.0 * math.pi / 500))
+            assert getattr(styles()[0], name) == pytest.approx(expected, rel=0.02), name
+    assert state().is_stale != is_fitted  # it waits, or the update has been
+
+
+@pytest.mark.parametrize("active", ["Sphere", "Guides", "Hair"])
+def test_styles_are_of_the_active_hair(hair, active):
+    bpy.context.view_layer.objects.active = bpy.data.objects[active]
+    operate(bpy.ops.vellus.add_style, style="WAVE")
+    assert names() == ("Wave",)
+
+
+def test_one_undo_takes_a_style_back(styled):
+    before = styles(), names()
+    for operator, arguments in (
+        (bpy.ops.vellus.add_style, {"style": "TRIM"}),
+        (bpy.ops.vellus.move_style, {"direction": "UP"}),
+        (bpy.ops.vellus.move_style, {"direction": "DOWN"}),
+        (bpy.ops.vellus.remove_style, {}),
+        (bpy.ops.vellus.duplicate_style, {}),
+        (bpy.ops.vellus.apply_style_preset, {"preset": "CURLY"}),
+    ):
+        operate(operator, **arguments)
+        assert (styles(), names()) != before
+        after = styles(), names()
+        undo()
+        assert (styles(), names()) == before
+        bpy.ops.ed.redo()
+        assert (styles(), names()) == after
+        undo()
+
+
+def test_styles_are_moved_removed_and_duplicated(styled):
+    operate(bpy.ops.vellus.move_style, direction="UP")
+    assert names() == ("Curl", "Clump", "Frizz") and state().active_style == 0
+    operate(bpy.ops.vellus.move_style, direction="UP")  # it is at the top
+    assert names() == ("Curl", "Clump", "Frizz")
+    operate(bpy.ops.vellus.move_style, direction="DOWN")
+    operate(bpy.ops.vellus.move_style, direction="DOWN")
+    operate(bpy.ops.vellus.move_style, direction="DOWN")  # it is at the bottom
+    assert names() == ("Clump", "Frizz", "Curl") and state().active_style == 2
+    state().styles["Curl"].curl.radius = 0.5
+    operate(bpy.ops.vellus.duplicate_style)
+    assert names() == ("Clump", "Frizz", "Curl", "Curl.001") and state().active_style == 3
+    assert styles()[3].radius == 0.5 and len({style.seed for style in styles()}) == 4
+    for left in (3, 2, 1, 0):
+        operate(bpy.ops.vellus.remove_style)
+        assert len(names()) == left and state().active_style == max(left - 1, 0)
+    for operator in (bpy.ops.vellus.remove_style, bpy.ops.vellus.move_style, bpy.ops.vellus.duplicate_style):
+        assert not operator.poll()
+
+
+def test_keyed_styles_are_moved_and_undone(styled):
+    state().styles[1].curl.radius = 0.1
+    styled.data.keyframe_insert("vellus.styles[1].curl.radius", frame=1)
+    state().styles[1].curl.radius = 0.3
+    styled.data.keyframe_insert("vellus.styles[1].curl.radius", frame=11)
+    bpy.ops.ed.undo_push(message="keyed")
+
+    def radius():
+        bpy.context.scene.frame_set(1)
+        bpy.context.scene.frame_set(11)
+        return [style.radius for style in styles() if isinstance(style, curl.Settings)]
+
+    assert radius() == [0.3]
+    operate(bpy.ops.vellus.move_style, direction="DOWN")
+    assert radius() == [0.3] and names()[2] == "Curl"
+    operate(bpy.ops.vellus.duplicate_style)
+    state().styles[3].curl.radius = 0.7  # the copy has no keys
+    assert radius() == [0.3, 0.7]
+    undo()
+    undo()
+    assert radius() == [0.3] and names()[1] == "Curl"
+    operate(bpy.ops.vellus.remove_style)
+    assert radius() == [] and names() == ("Clump", "Frizz")
+    undo()
+    assert radius() == [0.3]
+
+
+def test_styles_are_saved_appended_and_copied_with_their_hair(styled, tmp_path):
+    state().styles[1].curl.radius = 0.123
+    styled.data.keyframe_insert("vellus.styles[1].curl.radius", frame=1)
+    copy = styled.copy()
+    copy.data = styled.data.copy()
+    copy.data.vellus.styles[0].clump.size = 0.5
+    assert state().styles[0].clump.size != 0.5
+    wanted = styles(), names()
+    path = str(tmp_path / "styled.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    bpy.ops.wm.open_mainfile(filepath=path)
+    assert (styles(), names()) == wanted
+    bpy.ops.wm.read_homefile(use_empty=True)
+    with bpy.data.libraries.load(path) as (_source, target):
+        target.objects = ["Hair"]
+    assert (styles(), names()) == wanted
+    assert bpy.data.hair_curves["Hair"].animation_data.action is not None
+
+
+# Presets.
+
+
+@pytest.mark.parametrize("preset", style_presets.PRESETS)
+def test_presets_replace_styles_and_leave_the_rest(styled, preset):
+    before = groom_settings.settings_of(styled.data)
+    state().is_live = False  # locks for a head would be tens of thousands
+    operate(bpy.ops.vellus.apply_style_preset, preset=preset, is_fitted=False)
+    after = groom_settings.settings_of(bpy.data.hair_curves["Hair"])
+    wanted = style_presets.read(preset).changed(before)
+    assert after.styles == tuple(map(setting_properties.as_stored, wanted.styles))
+    assert (after.guides, after.appearance, after.tables) == (before.guides, before.appearance, before.tables)
+    assert after.hair == setting_properties.as_stored(wanted.hair)
+
+
+def test_presets_fit_the_surface(hair):
+    operate(bpy.ops.vellus.apply_style_preset, preset="CURLY")
+    plain = style_presets.read("CURLY").styles
+    assert styles()[1].radius == pytest.approx(plain[1].radius * SPHERE_FACTOR, rel=0.02)
+    assert styles()[1].coherence == plain[1].coherence
+    factor, spacing = hair_styles.surface_fit(bpy.data.hair_curves["Hair"])
+    assert factor == pytest.approx(SPHERE_FACTOR, rel=0.02)
+    assert spacing == pytest.approx(math.sqrt(4.0 * math.pi / 500), rel=0.02)
+    assert styles()[0].size == pytest.approx(4.0 * spacing, rel=0.01)
+
+
+def test_a_preset_may_come_after_the_present_styles(styled):
+    before = styles()
+    operate(bpy.ops.vellus.apply_style_preset, preset="WET", keeps_styles=True)
+    assert styles()[:3] == before and isinstance(styles()[3], wet.Settings)
+    assert len({style.seed for style in styles()}) == 4
+
+
+def test_saved_presets_come_back(styled, tmp_path, monkeypatch):
+    monkeypatch.setattr(saved_styles.FILES, "folder", lambda create: tmp_path)
+    before = styles(), names()
+    state().hair.tip_taper = 0.75
+    assert bpy.ops.vellus.save_style_preset(name="My style") == {"FINISHED"}
+    assert saved_styles.names() == ["My_style"]
+    operate(bpy.ops.vellus.apply_style_preset, preset="BUZZ")
+    operate(bpy.ops.vellus.apply_saved_style, name="My_style")
+    assert (styles(), names()) == before and state().hair.tip_taper == 0.75
+    drawn = draw(bpy.types.VELLUS_PT_style_presets).drawn
+    assert drawn["vellus.apply_saved_style"] == drawn["vellus.remove_style_preset"] == 1
+    bpy.ops.vellus.remove_style_preset(name="My_style")
+    assert saved_styles.names() == []
+    with pytest.raises(RuntimeError, match="does not exist"):
+        bpy.ops.vellus.apply_saved_style(name="My_style")
+    for name in ("", "  ", ".."):
+        with pytest.raises(RuntimeError, match="The name is empty"):
+            bpy.ops.vellus.save_style_preset(name=name)
+
+
+def test_an_invalid_saved_preset_changes_nothing(styled, tmp_path, monkeypatch):
+    monkeypatch.setattr(saved_styles.FILES, "folder", lambda create: tmp_path)
+    before = groom_settings.settings_of(styled.data)
+    (tmp_path / "bad.json").write_text(
+        '{"format": "Vellus groom settings", "version": 3, "styles": [{"kind": "PERM"}]}'
+    )
+    with pytest.raises(RuntimeError, match=r"styles\[0\].kind"):
+        bpy.ops.vellus.apply_saved_style(name="bad")
+    assert groom_settings.settings_of(styled.data) == before
+
+
+def test_curls_get_the_points_they_want(hair):
+    with pytest.raises(RuntimeError, match="No style needs more points"):
+        bpy.ops.vellus.use_points()
+    style_items.assign(state(), [curl.Settings(radius=0.005, pitch=0.05)])
+    assert "vellus.use_points" in draw(bpy.types.VELLUS_PT_styles).drawn
+    operate(bpy.ops.vellus.use_points)
+    assert state().hair.point_count == curl.points_wanted(styles()[0], 0.5)
+    assert "vellus.use_points" not in draw(bpy.types.VELLUS_PT_styles).drawn
+    state().styles[0].curl.pitch = state().styles[0].curl.radius = 1e-3
+    operate(bpy.ops.vellus.use_points)
+    assert state().hair.point_count == 257
+    state().styles[0].curl.pitch = 1.0
+    operate(bpy.ops.vellus.use_points)
+    assert state().hair.point_count == 257  # it takes none away
+
+
+# The panel.
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_setting_of_a_style_has_a_row(hair, kind):
+    style_items.assign(state(), [KINDS[kind]()])
+    drawn = draw_all([panel for panel in panels.CLASSES if panel.bl_idname.startswith("VELLUS_PT_styles")])
+    names = [name for name, *_ in declared(KINDS[kind])]
+    assert {name: drawn[name] for name in names} == dict.fromkeys(names, 1)
+    is_profiled = issubclass(KINDS[kind], ProfiledSettings)
+    assert (draw(bpy.types.VELLUS_PT_styles_profile) is not None) == is_profiled
+
+
+def test_names_of_data_are_picked(hair):
+    sphere = bpy.data.objects["Sphere"]
+    for settings, picked in ((trim.Settings(), "cutter"), (lean.Settings(), "target")):
+        style_items.assign(state(), [settings])
+        assert draw(bpy.types.VELLUS_PT_styles).picked == {picked: bpy.data.objects}
+        found = draw(bpy.types.VELLUS_PT_styles_mask).picked
+        assert found == {"mask": sphere.vertex_groups, "mask_image": bpy.data.images}
+
+
+NOTES = {
+    "disabled": (curl.Settings(is_on=False), "disabled"),
+    "amount": (curl.Settings(amount=0.0), "amount is zero"),
+    "profile": (curl.Settings(root=0.0, tip=0.0), "at root and tip"),
+    "trim": (trim.Settings(), "No effect"),
+    "radius": (curl.Settings(radius=0.0), "No effect"),
+    "amplitude": (frizz.Settings(amplitude=0.0), "No effect"),
+    "cutter": (trim.Settings(cutter="Lost"), 'No object "Lost"'),
+    "target": (lean.Settings(direction="OBJECT", target="Lost"), 'No object "Lost"'),
+    "no target": (lean.Settings(direction="OBJECT"), "Pick an object"),
+    "mask": (curl.Settings(mask="lost"), 'attribute "lost"'),
+    "image": (curl.Settings(mask_image="lost"), 'image "lost"'),
+}
+EFFECTIVE = [
+    curl.Settings(mask="top"),
+    trim.Settings(factor=0.5),
+    trim.Settings(cutter="Sphere"),
+    lean.Settings(target="Lost"),
+    lean.Settings(direction="OBJECT", target="Sphere"),
+    clump.Settings(amount=0.1),
+    wet.Settings(),
+]
+
+
+@pytest.mark.parametrize("case", NOTES)
+def test_why_a_style_does_nothing_is_said(hair, case):
+    settings, words = NOTES[case]
+    style_items.assign(state(), [settings])
+    assert words in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
+
+
+@pytest.mark.parametrize("settings", EFFECTIVE, ids=lambda settings: kind_of(settings))
+def test_of_others_nothing_is_said(hair, settings):
+    style_items.assign(state(), [settings])
+    assert style_notes.notes_of(hair.data, state().styles[0]) == []
+
+
+def test_the_order_of_styles_is_explained(hair):
+    style_items.assign(state(), [wet.Settings(), curl.Settings(), lean.Settings()])
+    first, second, third = (style_notes.notes_of(hair.data, item) for item in state().styles)
+    assert "Wet belongs last" in first[0] and second == [] and "Lean acts on guides" in third[0]
+    state().styles[1].curl.is_on = state().styles[2].lean.is_on = False
+    assert style_notes.notes_of(hair.data, state().styles[0]) == []
+
+
+def test_presets_are_offered_with_pictures_where_there_are_some(hair, tmp_path, monkeypatch):
+    drawn = draw(bpy.types.VELLUS_PT_style_presets).drawn
+    assert drawn["vellus.apply_style_preset"] == len(style_presets.PRESETS)
+    (tmp_path / "curly.png").write_bytes((look_previews.FOLDER / "BLOND.png").read_bytes())
+    monkeypatch.setattr(look_previews, "style_presets", SimpleNamespace(FOLDER=tmp_path))
+    look_previews.unregister()
+    assert draw(bpy.types.VELLUS_PT_style_presets).drawn["template_icon"] == 1
+    look_previews.unregister()

@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Styles as words of a command line: what is wrong with one is one sentence, before anything is read."""
+
+import argparse
+import json
+import re
+
+import bpy
+import pytest
+
+from hair_addon import api
+from hair_addon.command_line import style_options
+from hair_addon.core.files import settings_file, style_presets
+from hair_addon.core.files.settings_file import GroomSettings
+from hair_addon.core.params import declared
+from hair_addon.core.styling import clump, curl, frizz, lean, trim, wet
+from hair_addon.core.styling.kinds import OFFERS
+from tests.command_line.test_command_line import SMALL, grown, mesh  # noqa: F401 (a fixture)
+from tests.support.commands import run, run_here
+
+
+def words(identifier, settings, names):
+    """A style as an option says it."""
+    return f"{identifier.lower()}:" + ",".join(f"{name}={getattr(settings, name)}" for name in names)
+
+
+@pytest.mark.parametrize("identifier", OFFERS)
+def test_any_style_can_be_said(identifier):
+    offer = OFFERS[identifier]
+    assert style_options.style(identifier.lower()) == (offer.label, offer.settings, False)
+    names = [name for name, *_ in declared(type(offer.settings))]
+    assert style_options.style(words(identifier, offer.settings, names)) == (offer.label, offer.settings, True)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("", "'' is not a style: choose from trim, clump"),
+        ("perm", "'perm' is not a style"),
+        ("curl:radios=1", "'radios' is not a setting of curl: choose from is_on"),
+        ("curl:radius", "radius of curl needs a value"),
+        ("curl:radius=1,radius=2", "radius of curl is given twice"),
+        ("curl:radius=", "radius must be a number, not ''"),
+        ("curl:radius=-1", "Radius must be between 0 and 1000, not -1."),
+        ("curl:radius=nan", "Radius must be between"),
+        ("curl:radius=0.1,", "'' is not a setting of curl"),
+        ("clump:levels=1.5", "levels must be a whole number, not '1.5'"),
+        ("curl:is_on=maybe", "is_on must be yes or no, not 'maybe'"),
+        ("trim:method=burn", "Method must be one of CUT, SCALE, not 'BURN'."),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(text, said):
+    with pytest.raises(argparse.ArgumentTypeError, match=re.escape(said)):
+        style_options.style(text)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--style", "perm"), "argument --style: 'perm' is not a style"),
+        (("--style-preset", "PERM"), "argument --style-preset: invalid choice: 'PERM'"),
+    ],
+)
+def test_a_command_ends_with_the_sentence(options, said, tmp_path):
+    ended = run("groom", "missing.obj", "--out", tmp_path / "a.npz", *options)
+    assert ended.status == 2 and said in ended.errors and len(ended.errors.splitlines()) == 1
+
+
+def test_a_preset_that_is_not_given_cannot_be_fitted(tmp_path):
+    ended = run("settings", "--style-preset", "CURLY", "--out", tmp_path / "a.json")
+    assert ended.status == 0
+    too_many = [word for _ in range(65) for word in ("--style", "curl")]
+    ended = run("settings", *too_many)
+    assert ended.status == 1 and "at most 64 styles" in ended.errors
+
+
+def test_styles_are_applied_in_the_order_of_the_words(scene, mesh, tmp_path):  # noqa: F811
+    out = tmp_path / "out.blend"
+    groom = ("groom", mesh, *SMALL, "--out", out)
+    styles = ("--style", "clump:size=0.5,levels=3", "--style", "Wave:radius=0.04,seed=7", "--style=trim:method=scale")
+    assert run_here(*groom, *styles, "--style", "lean:is_on=no").status == 0
+    settings = grown(out)[0]
+    wave = curl.Settings(radius=0.04, seed=7, **curl.WAVE)
+    first = clump.Settings(size=0.5, levels=3)
+    assert settings.styles[:2] == (first, wave)
+    assert settings.styles[2:] == (trim.Settings(method="SCALE", seed=1), lean.Settings(is_on=False, seed=2))
+    assert settings.style_names == ("Clump", "Wave", "Trim", "Lean")
+    settings_file.write(tmp_path / "groom.json", GroomSettings(styles=[frizz.Settings()]))
+    assert run_here(*groom, "--settings", tmp_path / "groom.json", "--style", "curl").status == 0
+    assert grown(out)[0].styles == (frizz.Settings(), curl.Settings(seed=1))
+
+
+def test_style_presets_fit_the_surface(scene, mesh, tmp_path):  # noqa: F811
+    out = tmp_path / "out.blend"
+    groom = ("groom", mesh, *SMALL, "--out", out, "--style-preset", "CURLY")
+    assert run_here(*groom, "--no-style-fit").status == 0
+    plain = grown(out)[0]
+    assert plain.styles == style_presets.read("CURLY").styles
+    assert run_here(*groom, "--style", "wet:lock=0.01", "--tip-taper", 0.9).status == 0
+    settings = grown(out)[0]
+    factor = settings.guides.length / 0.12  # the length of new hair on a head
+    assert settings.styles[1].radius / plain.styles[1].radius == pytest.approx(factor, rel=0.01)
+    assert settings.styles[3] == wet.Settings(lock=0.01, seed=3) and settings.hair.tip_taper == 0.9
+
+
+def test_settings_have_the_styles_of_the_words():
+    styled = json.loads(run_here("settings", "--style", "curl:radius=0.01", "--style-preset", "WET").out)
+    assert [(style["kind"], style["seed"]) for style in styled["styles"]] == [("WET", 0), ("CURL", 1)]
+
+
+def test_info_lists_styles(hair, tmp_path):
+    blend, styles = tmp_path / "a.blend", (clump.Settings(size=0.5), curl.Settings(radius=0.04))
+    api.set_styles(hair, styles)
+    bpy.ops.wm.save_as_mainfile(filepath=str(blend))
+    told = run_here("info", blend, "--json").results[0]["hair"][0]["styles"]
+    head = {"format": settings_file.FORMAT, "version": settings_file.VERSION}
+    named = GroomSettings(styles=styles, style_names=("Clump", "Curl"))
+    assert settings_file.from_object(head | {"styles": told}, blend) == named
+    settings_file.write(tmp_path / "a.json", GroomSettings(styles=styles))
+    told = run_here("info", tmp_path / "a.json", "--json").results[0]["settings"]["styles"]
+    assert [style["kind"] for style in told] == ["CLUMP", "CURL"]
