@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands with styles, as arrays: on a head, and straight ones on a plane."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -16,10 +17,21 @@ class Groom:
     """Hair without styles, to which styles are applied: `styled(*styles)` are points (S, P, 3)."""
 
     def __init__(self, mesh, guide_settings, hair_settings, device=DEVICE, axes=None, **ground):
-        self.mesh, self.settings, self.device, self.axes = mesh, hair_settings, device, axes
+        self.mesh, self.settings, self.device, self.axes, self.ground = mesh, hair_settings, device, axes, ground
         self.guides = groom.distribute_guides(mesh, guide_settings, device=device)
         self.binding = groom.bind_hair(mesh, self.guides, hair_settings, device=device, **ground)
         self.trees = hair_styles.clump_trees(mesh, self.guides.roots, hair_settings, device=device, **ground)
+
+    def rooted(self, roots):
+        """The same groom with strands at other roots."""
+        other = copy(self)
+        other.binding = groom.bind_hair(
+            self.mesh, self.guides, self.settings, roots=roots, device=self.device, **self.ground
+        )
+        other.trees = hair_styles.clump_trees(
+            self.mesh, self.guides.roots, self.settings, device=self.device, **self.ground
+        )
+        return other
 
     @property
     def plain(self):
@@ -38,16 +50,9 @@ class Groom:
         if styling is None:
             return following.follow_guides(self.binding, guides).numpy()
         followed = styling.guides(guides)
-
-        def strands_of(binding, rows=None):
-            weights = following.weights_now(binding, followed, rows)
-            places = None if rows is None else wp.array(rows, dtype=int, device=self.device)
-            return following.strands_now(binding, followed, weights, places)
-
-        points = strands_of(self.binding, chosen)
+        weights = following.weights_now(self.binding, followed, chosen)
         rows = None if chosen is None else wp.array(chosen, dtype=int, device=self.device)
-        styling.apply(points, strands_of, rows)
-        return points.numpy()
+        return following.strands_now(self.binding, followed, weights, styling, rows).numpy()
 
 
 def head(strand_count=1500, guide_count=120, device=DEVICE, **hair):

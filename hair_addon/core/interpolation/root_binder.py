@@ -51,15 +51,19 @@ class RootBinder:
         return weighed(roots, at_roots, at_guides, candidates, self.settings, self.is_mirrored)
 
     def nearest(self, strands: HairBinding, centres: HairBinding) -> np.ndarray:
-        """(S, 2) int32: the two centres nearest to each strand on its side of part lines, -1 where there is one alone.
+        """(S, 2) int32: the two centres nearest to each strand, in its region and on its side of part lines.
 
-        Those in the strand's region, where there are any.
+        -1 where there are not as many.
         """
         regions = self._with_guide_regions(strands, centres)
         found = interpolation.guide_weights.find_candidates(
             strands.positions, strands.normals, centres.positions, centres.normals, 1, regions=regions, lines=self.lines
         )
-        return found.indices.numpy().copy()
+        nearest = found.indices.numpy().copy()
+        if regions is not None:
+            of_strands, of_centres = regions
+            nearest[(nearest >= 0) & (of_centres[nearest] != of_strands[:, None])] = -1
+        return nearest
 
     def with_settings(self, settings: Any) -> "RootBinder":
         """The same with other `HairSettings`."""

@@ -3,7 +3,7 @@
 
 Sites are evenly placed on the surface and are not roots of the hair: a strand's clump depends on its own root alone,
 whichever other strands there are. A strand belongs to the nearest site of the finest level, and a site to the nearest
-one of the next coarser level, so locks are made of whole smaller locks.
+one of the next coarser level, so locks are made of whole smaller locks. One in a region without sites belongs to none.
 """
 
 from collections.abc import Callable
@@ -64,7 +64,7 @@ class ClumpTrees:
         )
 
     def members(self, owner: object, strands: HairBinding, tree: TreeSettings) -> list[np.ndarray]:
-        """(S,) int32 per level, the coarsest first: the place of each strand's centre in its level.
+        """(S,) int32 per level, the coarsest first: the place of each strand's centre in its level, -1 for none.
 
         owner: what the strands are known by.
         """
@@ -79,7 +79,7 @@ class ClumpTrees:
         return self._members[key]
 
     def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
-        """(K,) int32 per coarser level: the centres that those of one level belong to."""
+        """(K,) int32 per coarser level: the centres that those of one level belong to, -1 for none."""
         own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
         return self._upward(tree, own, level)[:-1]
 
@@ -91,7 +91,7 @@ class ClumpTrees:
             key = tree, finer
             if key not in self._parents:
                 self._parents[key] = self._nearest(levels[finer], levels[finer - 1])[:, 0]
-            found.insert(0, self._parents[key][found[0]])
+            found.insert(0, np.where(found[0] >= 0, self._parents[key][found[0]], -1))
         return found
 
     def forget(self, owner: object) -> None:
@@ -100,5 +100,5 @@ class ClumpTrees:
 
     def _nearest(self, strands, centres):
         nearest = self.binder.nearest(strands, centres)
-        require_indices("clump centres", nearest[:, 0], len(centres.roots))
+        require_indices("clump centres", nearest[:, 0] + 1, len(centres.roots) + 1)
         return nearest

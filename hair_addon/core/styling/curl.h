@@ -7,7 +7,9 @@ const float stretch = number[12], left_handed = number[13], switchback = number[
 const float two_pi = 6.28318530718f;
 const float turn = sqrtf(two_pi * radius * two_pi * radius + pitch * pitch);
 const float per_square = 0.5f * two_pi * two_pi * (1.0f + roundness * roundness);
-const lanes hand = random_number(lock, seed, ints(CLUMP_HAND)) < left_handed ? lanes(-1.0f) : lanes(1.0f);
+// -1 for locks that wind to the left, 1 for others. Few are in between, and flat: so the part may be a slider.
+const lanes side = random_number(lock, seed, ints(CLUMP_HAND)) - left_handed * 1.05f + 0.025f;
+const lanes hand = clamped(side * 40.0f, lanes(-1.0f), lanes(1.0f));
 lanes turns = random_number(lock, seed, ints(CLUMP_PHASE)) + (1.0f - coherence) * (random(PHASE) - 0.5f);
 const lanes shift = random_number(lock, seed, ints(CLUMP_SHIFT));
 lanes before = 0.0f, radius_before = 0.0f;

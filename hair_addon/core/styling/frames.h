@@ -3,7 +3,8 @@
 // Frames of a strand's segments, by least rotations [Bishop75]: from the centre's reference to the strand's normal, to
 // its first segment, and from each segment to the next. u and t × u are across segment i.
 
-const auto put_frames = [&]() {
+// The reference across the normal of the clump's centre.
+const auto reference = [&]() {
   // r(n), in the surface's own axes, is continuous everywhere but straight below.
   const auto to_axes = [&](const vector& v) {
     return vector{
@@ -21,8 +22,10 @@ const auto put_frames = [&]() {
   };
   const vector n = to_axes(centre_normal);
   const lanes above = higher_of(1.0f + n.z, lanes(1.0e-6f));
-  const vector reference = from_axes({1.0f - n.x * n.x / above, -n.x * n.y / above, -n.x});
-  vector across = turned(turned(reference, centre_normal, normal), normal, t[1]);
+  return from_axes({1.0f - n.x * n.x / above, -n.x * n.y / above, -n.x});
+};
+const auto put_frames = [&]() {
+  vector across = turned(turned(reference(), centre_normal, normal), normal, t[1]);
   u[1] = across;
   for (int i = 2; i < point_count; ++i) {
     across = turned(across, t[i - 1], t[i]);

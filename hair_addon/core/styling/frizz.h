@@ -7,7 +7,8 @@ const float per_spread = number[13], stray = number[14], stray_gain = number[15]
 const int octave_count = static_cast<int>(number[10]);
 const lanes per_spacing = (point_count - 1) * per_total;
 // Strands with the lowest numbers fly away, by degrees: so the part may be a slider.
-const lanes is_stray = stray > 0.0f ? clamped((stray - random(STRAY)) * 10.0f, lanes(0.0f), lanes(1.0f)) : lanes(0.0f);
+const lanes is_stray =
+    stray > 0.0f ? clamped((1.1f * stray - random(STRAY)) * 10.0f, lanes(0.0f), lanes(1.0f)) : lanes(0.0f);
 const lanes size = base * amplitude * (1.0f + (stray_gain - 1.0f) * is_stray);
 lanes phase[WAVES * MOST_OCTAVES], weight[WAVES * MOST_OCTAVES];
 float frequency[WAVES * MOST_OCTAVES];

@@ -27,7 +27,7 @@ class Settings(ProfiledSettings):
 
     amplitude: float = param(
         0.003,
-        "Root mean square distance of strands from their path",
+        "Size of the noise: root mean square of the distance in each direction across the strand",
         low=0.0,
         high=1e3,
         soft_high=0.02,

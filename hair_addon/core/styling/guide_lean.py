@@ -16,6 +16,9 @@ from ..kernels.checks import require_count
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
+_LEAST_AMOUNT = wp.constant(0.05)  # from which on guides are kept off the surface fully
+_CORRECTIONS = wp.constant(4)  # of a segment: a point that is lifted comes nearer to the surface at another place
+
 
 @wp.kernel
 def _lean(
@@ -33,15 +36,14 @@ def _lean(
     position = points[guide, 0]
     out_points[guide, 0] = position
     arc = float(0.0)
-    has_leaned = bool(False)
+    largest_amount = float(0.0)
     for i in range(1, points.shape[1]):
         segment = points[guide, i] - points[guide, i - 1]
         size = wp.length(segment)
         arc += size
         amount = amounts[guide, i]
-        if amount > 0.0:
-            has_leaned = True
-        if not has_leaned or size < 1.0e-12:
+        largest_amount = wp.max(largest_amount, amount)
+        if largest_amount == 0.0 or size < 1.0e-12:
             position += segment
             out_points[guide, i] = position
             continue
@@ -49,25 +51,31 @@ def _lean(
         leaned = (1.0 - amount) * forward + amount * directions[guide]
         if wp.length(leaned) >= 1.0e-3:
             forward = wp.normalize(leaned)
-        ahead = position + size * forward
-        # A guide leaves the surface by degrees.
+        # A guide leaves the surface by degrees, and one that hardly leans stays where it was combed.
         wanted = wp.min(clearance, 0.5 * arc)
-        query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * clearance + size)
-        if query.result:
-            face = query.face
-            u = query.u
-            v = query.v
-            w = 1.0 - u - v
-            normal = wp.normalize(
-                u * vertex_normals[indices[3 * face]]
-                + v * vertex_normals[indices[3 * face + 1]]
-                + w * vertex_normals[indices[3 * face + 2]]
-            )
-            away = ahead - wp.mesh_eval_position(surface, face, u, v)
-            height = wp.dot(away, normal)
-            # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
-            if height < wanted and wp.length(away - height * normal) < 0.5 * wanted + 1.0e-6 * size:
-                forward = wp.normalize(ahead + (wanted - height) * normal - position)
+        hold = wp.min(largest_amount / _LEAST_AMOUNT, 1.0)
+        for _correction in range(_CORRECTIONS):
+            ahead = position + size * forward
+            query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * (clearance + size))
+            if query.result:
+                face = query.face
+                u = query.u
+                v = query.v
+                w = 1.0 - u - v
+                normal = wp.normalize(
+                    u * vertex_normals[indices[3 * face]]
+                    + v * vertex_normals[indices[3 * face + 1]]
+                    + w * vertex_normals[indices[3 * face + 2]]
+                )
+                away = ahead - wp.mesh_eval_position(surface, face, u, v)
+                height = wp.dot(away, normal)
+                # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
+                sideways = wp.length(away - height * normal)
+                part = sideways / (0.5 * wp.length(away) + 0.1 * wanted + 1.0e-6 * size)
+                lift = hold * wp.clamp(1.5 - part, 0.0, 1.0) * wp.max(wanted - height, 0.0)
+                kept_off = ahead + lift * normal - position
+                if lift > 0.0 and wp.length(kept_off) > 1.0e-3 * size:
+                    forward = wp.normalize(kept_off)
         position += size * forward
         out_points[guide, i] = position
 

@@ -150,9 +150,8 @@ def _steps_of(settings, cutters):
         return [step(program_rows.SMOOTH, (settings.length,))]
     if isinstance(settings, braid.Settings):
         tress_count = 3 if settings.pattern == "BRAID" else 2
-        woven = settings.radius, settings.pitch, 1.0 - settings.flatness, float(tress_count)
-        gathered = step(program_rows.CLUMP, (settings.thickness, 0.0, 0.0), level=0)
-        return [gathered, step(program_rows.WEAVE, woven, level=0)]
+        size = settings.radius, settings.pitch, 1.0 - settings.flatness
+        return [step(program_rows.WEAVE, (*size, float(tress_count), settings.thickness), level=0)]
     if isinstance(settings, wet.Settings):
         return _of_wet(settings, step)
     return []  # a style of guides
@@ -174,7 +173,7 @@ def _of_curl(settings):
 
 def _of_frizz(settings):
     gains = settings.gain ** np.arange(settings.octaves)
-    # ρ has the amplitude as its root mean square: of two coordinates with half of each wave's square.
+    # Each coordinate of ρ has the amplitude as its root mean square: the square of a wave is one half.
     per_size = (0.5 * frizz.WAVES_AN_OCTAVE * np.sum(gains**2)) ** -0.5
     wave = np.arange(frizz.WAVES_AN_OCTAVE)
     frequencies = 2.0 ** ((wave + 0.5) / frizz.WAVES_AN_OCTAVE - 0.5)

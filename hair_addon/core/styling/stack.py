@@ -23,7 +23,7 @@ from .base import StyleSettings
 from .clump_trees import ClumpTrees
 from .guide_styles import FollowedGuides, leans
 from .program import TreeSettings, mask_key
-from .program_rows import CLUMP, Program
+from .program_rows import CLUMP, WEAVE, Program
 from .steps import StrandData
 from .style_inputs import Inputs
 
@@ -103,23 +103,24 @@ class Styling:
             is_changed[reach.of(combed)] = True
             members = level.data.members.numpy()
             for row, of_row in enumerate(changed):
-                is_changed |= of_row[members[row]]
+                is_changed |= (members[row] >= 0) & of_row[members[row]]
             changed.append(is_changed)
         members = self.data.members.numpy()
         for row, of_row in enumerate(changed):
-            is_moved |= of_row[members[row]]
+            is_moved |= (members[row] >= 0) & of_row[members[row]]
         return np.flatnonzero(is_moved)
 
     def clumps(self) -> tuple[np.ndarray, np.ndarray] | None:
         """(S,) int32 and (S,) float32 in [0, 1): the finest clump of each strand and a random number of that clump.
 
-        Of the first style that gathers strands; None without one.
+        Of the first style that gathers strands; None without one. -1 and 0 for strands in none.
         """
         if not self.tree_levels:
             return None
         row = len(self.tree_levels[0][0].sizes) - 1
         members = self.data.members.numpy()[row]
-        return members, self.levels[row].binding.identities[1][members]
+        numbers = self.levels[row].binding.identities[1][members]
+        return members, np.where(members >= 0, numbers, np.float32(0.0))
 
 
 @wp.kernel
@@ -174,8 +175,7 @@ def bind(
             tree, level = levels[row]
             is_own = owner != HAIR and owner[0] == tree
             rows[row] = (trees.parents(tree, owner[1]) if is_own else trees.members(owner, bound, tree))[level]
-        # Without guides near, as in a region of its own, a strand counts to the first.
-        rows[-1] = np.maximum(bound.guide_weights.indices.numpy()[:, 0], 0)
+        rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
         weights = np.array([inputs.masks[key].of_strands(bound) for key in keys], np.float32)
         return StrandData(
             bound.normals,
@@ -206,8 +206,8 @@ def bind(
 
 
 def _steps_before(program, made, level):
-    """The steps above the one that draws strands to the centres of a level."""
-    row = next(row for row, step in enumerate(made) if step.kind == CLUMP and step.level == level)
+    """The steps above the one that gathers strands around the centres of a level."""
+    row = next(row for row, step in enumerate(made) if step.kind in {CLUMP, WEAVE} and step.level == level)
     return program.before(row)
 
 

@@ -11,7 +11,7 @@
 //   array_t<vec3> normals               (S,) unit normals of the surface at the roots
 //   array_t<int> identities             (S,) what strands are known by
 //   array_t<float> masks                (masks, S) weights
-//   array_t<int> members                (levels, S) the clump centre that each strand belongs to, per level
+//   array_t<int> members                (levels, S) the clump centre that each strand belongs to, per level; -1: none
 //   array_t<vec4> centre_points         (K, P) points of centre strands [m], and the arc length from the root
 //   array_t<vec3> centre_normals        (K,)
 //   array_t<int> centre_identities      (K,)
@@ -38,6 +38,9 @@ const int left = points.shape[0] - first;
 const int lane_count = left < LANES ? left : LANES;
 lanes length[MOST], along[MOST];
 vector t[MOST], u[MOST], next[MOST];
+constexpr int MOST_KEPT = LANES == 1 ? 1 : MOST;
+lanes kept_length[MOST_KEPT];
+vector kept_t[MOST_KEPT];
 
 // Number `lane` of an entry of such an array.
 const auto lane_of = [](const lanes& values, int lane) { return reinterpret_cast<const float*>(&values)[lane]; };
@@ -106,28 +109,19 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
       set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
     }
   }
-  if (!any_of(base > 0.0f)) continue;
-  is_touched = is_touched | (base > 0.0f);
-  const float at_root = number[2], at_tip = number[3], exponent = number[4], from = number[6];
-  const bool is_even = at_root == at_tip, is_linear = exponent == 1.0f, is_flipped = number[5] != 0.0f;
-  const auto profile = [&](lanes x) {
-    if (is_even) return lanes(at_root);
-    lanes y = clamped((x - from) / (1.0f - from), lanes(0.0f), lanes(1.0f));
-    if (!is_linear) y = is_flipped ? 1.0f - power(1.0f - y, lanes(exponent)) : power(y, lanes(exponent));
-    return lanes(at_root + (at_tip - at_root) * y);
-  };
-  lanes total = 0.0f;
-  for (int i = 1; i < point_count; ++i) total += length[i];
-  const lanes per_total = 1.0f / higher_of(total, lanes(1.0e-20f));
-
   // The clump centre of each lane: its identity, and the reference of frames by its normal, which every strand of a
-  // clump shares.
+  // clump shares. A strand without a centre stands for itself.
   int centre[LANES];
   vector centre_normal = normal;
   ints lock = identity;
   if (level >= 0) {
     for (int lane = 0; lane < LANES; ++lane) {
-      centre[lane] = first_centre + members.data[size_t(level) * members.shape[1] + strand[lane]];
+      const int member = members.data[size_t(level) * members.shape[1] + strand[lane]];
+      centre[lane] = first_centre + (member < 0 ? 0 : member);
+      if (member < 0) {
+        if (kind == CLUMP || kind == WEAVE) set_lane(base, lane, 0.0f);
+        continue;
+      }
       set_lane(lock, lane, centre_identities.data[centre[lane]]);
       set_lane(centre_normal.x, lane, centre_normals.data[centre[lane]][0]);
       set_lane(centre_normal.y, lane, centre_normals.data[centre[lane]][1]);
@@ -135,8 +129,32 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
     }
   }
 
+  if (!any_of(base > 0.0f)) continue;
+  is_touched = is_touched | (base > 0.0f);
+  // Strands that a mask leaves out, beside others: they keep their bits.
+  const bool is_partial = LANES > 1 && any_of(base <= 0.0f);
+  if (is_partial) {
+    for (int i = 1; i < point_count; ++i) {
+      kept_t[i] = t[i];
+      kept_length[i] = length[i];
+    }
+  }
+  const float at_root = number[2], at_tip = number[3], exponent = number[4], from = number[6];
+  const bool is_even = at_root == at_tip, is_linear = exponent == 1.0f, is_flipped = number[5] != 0.0f;
+  const auto profile = [&](lanes x) {
+    if (is_even) return lanes(at_root);
+    // x of the tip is 1 but for rounding, which steep profiles are sensitive to.
+    lanes y = clamped((1.000001f * x - from) / (1.0f - from), lanes(0.0f), lanes(1.0f));
+    if (!is_linear) y = is_flipped ? 1.0f - power(1.0f - y, lanes(exponent)) : power(y, lanes(exponent));
+    return lanes(at_root + (at_tip - at_root) * y);
+  };
+  lanes total = 0.0f;
+  for (int i = 1; i < point_count; ++i) total += length[i];
+  const lanes per_total = 1.0f / higher_of(total, lanes(1.0e-20f));
+
 #include "frames.h"
 #include "across.h"
+#include "gather.h"
 
   switch (kind) {
     case TRIM: {
@@ -160,6 +178,13 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
     case WEAVE: {
 #include "weave.h"
     } break;
+  }
+  if (is_partial) {
+    const auto is_styled = base > 0.0f;
+    for (int i = 1; i < point_count; ++i) {
+      t[i] = chosen(is_styled, t[i], kept_t[i]);
+      length[i] = is_styled ? length[i] : kept_length[i];
+    }
   }
 }
 

@@ -23,6 +23,7 @@ wp.set_module_options({"enable_backward": False})
 LEAST_BLOCKS = 64  # fewer are not worth a thread
 WIDTH = 16  # strands that a thread of the processor styles at once: 8 take a fifth longer
 MOST_POINTS = 257  # of a strand
+SHORT_POINTS = 64  # of a strand that takes less memory of a GPU
 
 
 @dataclass(frozen=True)
@@ -35,80 +36,99 @@ class StrandData:
     normals: "wp.array[wp.vec3]"  # (S,) unit
     identities: "wp.array[int]"  # (S,)
     masks: "wp.array2d[float]"  # (masks, S)
-    members: "wp.array2d[int]"  # (levels, S) place of the strand's centre among those of its level
+    members: "wp.array2d[int]"  # (levels, S) place of the strand's centre among those of its level, -1: none
     centre_points: "wp.array2d[wp.vec4]"  # (K, P) x, y, z [m] and the arc length [m]
     centre_normals: "wp.array[wp.vec3]"  # (K,)
     centre_identities: "wp.array[int]"  # (K,)
 
 
-@wp.func_native(
-    native_code.body(
-        __file__,
-        "steps.cpp",
-        WIDTH=WIDTH,
-        MOST=MOST_POINTS,
-        CHOICES=CHOICES,
-        NUMBERS=NUMBERS,
-        TRIM=TRIM,
-        CLUMP=CLUMP,
-        CURL=CURL,
-        FRIZZ=FRIZZ,
-        BEND=BEND,
-        SMOOTH=SMOOTH,
-        WEAVE=WEAVE,
-        WAVES=frizz.WAVES_AN_OCTAVE,
-        MOST_OCTAVES=frizz.MOST_OCTAVES,
-        **PURPOSES,
-    )
-)
-def _apply_steps(
-    block: int,
-    points: wp.array2d[wp.vec3],
-    chosen_rows: wp.array[int],
-    normals: wp.array[wp.vec3],
-    identities: wp.array[int],
-    masks: wp.array2d[float],
-    members: wp.array2d[int],
-    centre_points: wp.array2d[wp.vec4],
-    centre_normals: wp.array[wp.vec3],
-    centre_identities: wp.array[int],
-    choices: wp.array2d[int],
-    numbers: wp.array2d[float],
-    axes: wp.mat33,
-): ...
+@dataclass(frozen=True)
+class Variant:
+    """The kernel compiled for a number of strands that a thread of the processor styles at once, and most points."""
+
+    kernel: wp.Kernel
+    width: int
+    most_points: int
 
 
-@wp.kernel
-def _style_blocks(
-    points: wp.array2d[wp.vec3],
-    chosen_rows: wp.array[int],
-    normals: wp.array[wp.vec3],
-    identities: wp.array[int],
-    masks: wp.array2d[float],
-    members: wp.array2d[int],
-    centre_points: wp.array2d[wp.vec4],
-    centre_normals: wp.array[wp.vec3],
-    centre_identities: wp.array[int],
-    choices: wp.array2d[int],
-    numbers: wp.array2d[float],
-    axes: wp.mat33,
-    first: int,
-):
-    _apply_steps(
-        first + wp.tid(),
-        points,
-        chosen_rows,
-        normals,
-        identities,
-        masks,
-        members,
-        centre_points,
-        centre_normals,
-        centre_identities,
-        choices,
-        numbers,
-        axes,
-    )
+def variant(width: int, most_points: int, module: wp.Module | None = None) -> Variant:
+    """A `Variant` in a Warp module, this file's unless another is given."""
+
+    @wp.func_native(native_code.body(__file__, "steps.cpp", WIDTH=width, MOST=most_points, **_CONSTANTS))
+    def _apply_steps(
+        block: int,
+        points: wp.array2d[wp.vec3],
+        chosen_rows: wp.array[int],
+        normals: wp.array[wp.vec3],
+        identities: wp.array[int],
+        masks: wp.array2d[float],
+        members: wp.array2d[int],
+        centre_points: wp.array2d[wp.vec4],
+        centre_normals: wp.array[wp.vec3],
+        centre_identities: wp.array[int],
+        choices: wp.array2d[int],
+        numbers: wp.array2d[float],
+        axes: wp.mat33,
+    ): ...
+
+    @wp.kernel(module=module)
+    def _style_blocks(
+        points: wp.array2d[wp.vec3],
+        chosen_rows: wp.array[int],
+        normals: wp.array[wp.vec3],
+        identities: wp.array[int],
+        masks: wp.array2d[float],
+        members: wp.array2d[int],
+        centre_points: wp.array2d[wp.vec4],
+        centre_normals: wp.array[wp.vec3],
+        centre_identities: wp.array[int],
+        choices: wp.array2d[int],
+        numbers: wp.array2d[float],
+        axes: wp.mat33,
+        first: int,
+    ):
+        _apply_steps(
+            first + wp.tid(),
+            points,
+            chosen_rows,
+            normals,
+            identities,
+            masks,
+            members,
+            centre_points,
+            centre_normals,
+            centre_identities,
+            choices,
+            numbers,
+            axes,
+        )
+
+    return Variant(_style_blocks, width, most_points)
+
+
+_CONSTANTS = {
+    "CHOICES": CHOICES,
+    "NUMBERS": NUMBERS,
+    "TRIM": TRIM,
+    "CLUMP": CLUMP,
+    "CURL": CURL,
+    "FRIZZ": FRIZZ,
+    "BEND": BEND,
+    "SMOOTH": SMOOTH,
+    "WEAVE": WEAVE,
+    "WAVES": frizz.WAVES_AN_OCTAVE,
+    "MOST_OCTAVES": frizz.MOST_OCTAVES,
+    **PURPOSES,
+}
+_ANY = variant(WIDTH, MOST_POINTS)
+# A thread of a GPU reserves memory for the most points that there may be.
+_SHORT = variant(WIDTH, SHORT_POINTS, wp.get_module(f"{__name__}_short"))
+
+
+def variant_for(point_count: int, device: wp.DeviceLike) -> Variant:
+    """The `Variant` for strands of some points on a device."""
+    is_short = point_count <= SHORT_POINTS and not wp.get_device(device).is_cpu
+    return _SHORT if is_short else _ANY
 
 
 def apply_steps(
@@ -117,25 +137,27 @@ def apply_steps(
     data: StrandData,
     axes: np.ndarray,
     chosen: wp.array[int] | None = None,
+    version: Variant | None = None,
 ) -> None:
     """Style strands in place: points (M, P) [m]. One launch for the whole program; none for an empty one.
 
     data: `StrandData` of S strands, of which chosen (M,) int32 are styled, all where it is None; axes: (3, 3), a
-    rotation from the coordinates of points to the surface's own axes. Raises `HairError` where counts or indices do
-    not match.
+    rotation from the coordinates of points to the surface's own axes; version: of the kernel, None for the fastest.
+    Raises `HairError` where counts or indices do not match.
     """
     if not len(program) or not len(points):
         return
-    _check(points, program, data, chosen)
     device = points.device
+    version = variant_for(points.shape[1], device) if version is None else version
+    _check(points, program, data, chosen, version.most_points)
     rows = wp.empty(0, dtype=int, device=device) if chosen is None else chosen
-    lanes = WIDTH if device.is_cpu else 1
+    lanes = version.width if device.is_cpu else 1
     block_count = -(-len(points) // lanes)
     there = [wp.array(array, dtype=kind, device=device) for array, kind in _program_arrays(program)]
     inputs = [points, rows, data.normals, data.identities, data.masks, data.members]
     inputs += [data.centre_points, data.centre_normals, data.centre_identities, *there, wp.mat33(axes)]
     share_count = parallel.share_count(block_count, device, LEAST_BLOCKS)
-    parallel.launch_shares(_style_blocks, block_count, inputs, [[] for _ in range(share_count)], device)
+    parallel.launch_shares(version.kernel, block_count, inputs, [[] for _ in range(share_count)], device)
 
 
 def _program_arrays(program):
@@ -144,11 +166,11 @@ def _program_arrays(program):
     return choices, numbers
 
 
-def _check(points, program, data, chosen):
+def _check(points, program, data, chosen, most_points):
     """Raise `HairError` unless all that the kernel reads is there."""
     point_count, strand_count, centre_count = points.shape[1], len(data.normals), len(data.centre_normals)
-    if not 2 <= point_count <= MOST_POINTS:
-        raise HairError(f"Strands need 2 to {MOST_POINTS} points to be styled, not {point_count}.")
+    if not 2 <= point_count <= most_points:
+        raise HairError(f"Strands need 2 to {most_points} points to be styled, not {point_count}.")
     require_count("strands", len(points), strand_count if chosen is None else len(chosen))
     require_count("identities", len(data.identities), strand_count)
     require_count("clump identities", len(data.centre_identities), centre_count)

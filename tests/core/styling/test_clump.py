@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Laws of Clump: strands gather on their centre's line, in locks of whole smaller locks."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hair_addon.core.styling import clump, program
+from hair_addon.core.styling.stack import HAIR
+from tests.support.stepped import curved_strands, largest_move, stepped, straight_strands
+from tests.support.styled import head
+
+FULL = clump.Settings(thickness=0.0, stray=0.0, root=1.0, tip=1.0, levels=1)
+
+
+@pytest.fixture(scope="module")
+def hair():
+    return head(600, 60)
+
+
+def bundle(rng, count=64, radius=0.006):
+    """(S, P, 3): strands beside a curved one, each a little further away from it along its length."""
+    centre = curved_strands(rng, 1)
+    away = rng.uniform(-radius, radius, (count, 1, 3)) * (1.0, 1.0, 0.0)
+    return (centre + away * np.linspace(1.0, 1.5, 41)[:, None]).astype(np.float32), centre
+
+
+def distances_to(line, points):
+    """(…,) [m] from points to a polyline (P, 3), the last segment of which goes on."""
+    line, points = line.astype(np.float64), points.astype(np.float64)
+    start, way = line[:-1], np.diff(line, axis=0)
+    part = np.einsum("...nc,nc->...n", points[..., None, :] - start, way) / (way**2).sum(axis=1)
+    part[..., :-1] = np.clip(part[..., :-1], 0.0, 1.0)
+    part[..., -1] = np.maximum(part[..., -1], 0.0)
+    return np.linalg.norm(points[..., None, :] - start - part[..., None] * way, axis=-1).min(axis=-1)
+
+
+def test_full_strength_gathers_strands_on_the_line_of_their_centre(rng):
+    strands, centre = bundle(rng)
+    made = stepped(strands, FULL, centres=centre)
+    assert distances_to(centre[0], strands[:, 10:]).max() > 5e-3
+    assert distances_to(centre[0], made[:, 10:]).max() < 1e-5 * 0.2
+
+
+def test_twice_is_once_on_the_line(rng):
+    strands, centre = bundle(rng)
+    twice = stepped(strands, FULL, FULL, centres=centre)
+    assert distances_to(centre[0], twice[:, 10:]).max() < 1e-5 * 0.2
+
+
+def test_tips_come_onto_the_line_as_well_by_a_profile(rng):
+    strands, centre = bundle(rng)
+    made = stepped(strands, replace(FULL, root=0.0), centres=centre)
+    # In the last of forty steps the profile is at 39 of 40 parts.
+    assert distances_to(centre[0], made[:, -1]).max() < 1e-4 * 0.2
+    middle = distances_to(centre[0], made[:, 20]) / distances_to(centre[0], strands[:, 20])
+    assert 0.2 < np.median(middle) < 0.9
+
+
+@pytest.mark.parametrize("thickness", [0.12, 0.5, 0.9])
+def test_thickness_multiplies_distances(thickness):
+    strands = straight_strands(9, 0.2, 41, 0.001)
+    made = stepped(strands, replace(FULL, thickness=thickness))
+    np.testing.assert_allclose(made[:, 15:, 0] - 0.004, thickness * (strands[:, 15:, 0] - 0.004), atol=2e-6)
+
+
+def test_a_lock_of_thickness_one_is_as_before(rng):
+    strands, centre = bundle(rng)
+    assert largest_move(stepped(strands, replace(FULL, thickness=1.0), centres=centre), strands) < 2e-6
+
+
+def test_the_strand_of_the_centre_stays(rng):
+    _strands, centre = bundle(rng)
+    np.testing.assert_allclose(stepped(centre, FULL, centres=centre), centre, atol=1e-6)
+
+
+def test_strands_leave_their_roots_by_degrees():
+    """No first segment lies flat on the surface, also where the profile is full at the root."""
+    strands = straight_strands(9, 0.2, 41, 0.003)
+    for settings in (FULL, replace(FULL, root=0.0, shape=0.32)):
+        segments = np.diff(stepped(strands, settings), axis=1)
+        assert (segments[:, :, 2] / np.linalg.norm(segments, axis=2)).min() > 0.65
+
+
+def test_a_shorter_strand_ends_higher_up():
+    """At its own length along the centre, not at the centre's tip."""
+    strands = straight_strands(5, 0.2, 41, 0.001)
+    strands[0, :, 2] *= 0.5
+    made = stepped(strands, FULL, centres=strands[2:3])
+    assert 0.099 < made[0, -1, 2] < 0.1 and 0.199 < made[1, -1, 2] < 0.2
+
+
+def test_a_longer_strand_goes_straight_on():
+    strands = straight_strands(5, 0.2, 41, 0.001)
+    made = stepped(strands, FULL, centres=0.5 * strands[2:3])
+    np.testing.assert_allclose(made[:, -1], np.tile([0.001, 0.0, 0.2], (5, 1)), atol=1e-3)
+
+
+def test_a_twist_turns_locks_about_their_centre():
+    strands = straight_strands(9, 0.2, 41, 0.001)
+    settings = replace(FULL, thickness=0.9, twist=0.5, root=0.0, shape=0.5)
+    away = (stepped(strands, settings) - [0.004, 0.0, 0.0])[[0, 8]]
+    angle = np.unwrap(np.arctan2(away[:, :, 1], away[:, :, 0]), axis=1)
+    turns = (angle - angle[:, :1]) / (2.0 * np.pi)
+    np.testing.assert_allclose(turns, np.tile(0.5 * np.linspace(0.0, 1.0, 41), (2, 1)), atol=0.01)
+
+
+def test_strays_join_no_lock():
+    strands = straight_strands(600, 0.2, 41, 0.00001)
+    made = stepped(strands, replace(FULL, stray=1.0))
+    is_joined = np.abs(made - strands).max(axis=(1, 2)) > 1e-5
+    assert not is_joined.any()
+    some = stepped(strands, replace(FULL, stray=0.3))
+    assert (np.abs(some - strands)[:, :, 0].max(axis=1) < 1e-6).mean() == pytest.approx(0.25, abs=0.06)
+
+
+def test_locks_are_made_of_whole_smaller_locks(hair):
+    settings = clump.Settings(levels=3, size=0.03, ratio=0.5)
+    bound = hair.bound(settings)
+    members = bound.data.members.numpy()[:3]
+    for coarse, fine in pairwise(members):
+        assert len(np.unique(np.stack([coarse, fine]), axis=1).T) == len(np.unique(fine))
+    assert len(np.unique(members[0])) < len(np.unique(members[1])) < len(np.unique(members[2]))
+
+
+def test_a_strand_belongs_to_the_nearest_centre(hair):
+    settings = clump.Settings(levels=2, size=0.03, crossover=0.0)
+    bound = hair.bound(settings)
+    centres = bound.levels[1].binding.positions.numpy()
+    apart = np.linalg.norm(hair.binding.positions.numpy()[:, None] - centres, axis=-1)
+    np.testing.assert_allclose(
+        np.take_along_axis(apart, bound.data.members.numpy()[1][:, None], 1)[:, 0], apart.min(axis=1), atol=1e-6
+    )
+
+
+def test_a_part_of_the_strands_crosses_over(hair):
+    plain = hair.bound(clump.Settings(crossover=0.0)).data.members.numpy()[1]
+    crossed = hair.bound(clump.Settings(crossover=0.3)).data.members.numpy()[1]
+    assert (plain != crossed).mean() == pytest.approx(0.3, abs=0.06)
+
+
+def test_locks_are_known_by_their_finest_level(hair):
+    settings = clump.Settings(levels=2)
+    bound = hair.bound(settings)
+    locks, numbers = bound.clumps()
+    np.testing.assert_array_equal(locks, bound.data.members.numpy()[1])
+    assert locks.dtype == np.int32 and np.all((numbers >= 0.0) & (numbers < 1.0))
+    for lock in np.unique(locks):
+        assert len(np.unique(numbers[locks == lock])) == 1
+    assert hair.bound(clump.Settings(is_on=False), replace(settings, seed=3)).clumps() is not None
+
+
+def test_sites_are_as_many_as_the_size_says(hair):
+    for size in (0.01, 0.02):
+        tree = program.tree_settings(clump.Settings(size=size, levels=1))
+        sites = hair.trees.levels(tree)[0].positions.numpy()
+        assert len(sites) == pytest.approx(hair.trees.area / (0.866 * size**2), abs=1.0)
+        apart = np.linalg.norm(sites[:, None] - sites, axis=-1) + np.eye(len(sites))
+        assert np.median(apart.min(axis=1)) == pytest.approx(size, rel=0.25)
+
+
+def test_forgotten_members_are_found_again(hair):
+    settings = clump.Settings(levels=2)
+    before = hair.bound(settings).data.members.numpy()
+    hair.trees.forget(HAIR)
+    np.testing.assert_array_equal(hair.bound(settings).data.members.numpy(), before)
+
+
+def test_more_strength_gathers_more(hair):
+    """Strands of a lock come closer together along their lengths, the more the stronger."""
+    spreads = []
+    for amount in (0.01, 0.3, 0.6, 1.0):
+        settings = clump.Settings(amount=amount, levels=1, size=0.03, stray=0.0)
+        points = hair.styled(settings)
+        locks = hair.bound(settings).clumps()[0]
+        spreads.append(np.mean([points[locks == lock, 20].std(axis=0).sum() for lock in np.unique(locks)]))
+    assert np.all(np.diff(spreads) < 0.0)
