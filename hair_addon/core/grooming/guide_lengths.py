@@ -1,0 +1,128 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lengths of guides: scaled, set, or kept within limits. Shorter guides are cut along their own curve, or scaled."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.strands import lengths as lengths_of
+from ..params import param
+from .guide_segments import ToolSettings
+
+_ROUNDS = 24  # of the search for where to cut: each of them at least halves the interval every other time
+_CLOSE = 1e-7  # of a guide's length
+
+
+@dataclass(frozen=True)
+class LengthSettings(ToolSettings):
+    """New lengths of guides."""
+
+    method: str = param(
+        "SCALE",
+        "How the new length of each guide is found",
+        choices=(
+            ("SCALE", "Scale", "Multiply the lengths"),
+            ("SET", "Set", "Make all guides equally long"),
+            ("MINIMUM", "Minimum", "Make shorter guides this long"),
+            ("MAXIMUM", "Maximum", "Make longer guides this long"),
+        ),
+    )
+    factor: float = param(
+        1.0, "Factor of the lengths; below 1 guides become shorter", above=0.0, high=1e3, soft_high=4.0
+    )
+    length: float = param(
+        0.1, "Length from root to tip", above=0.0, high=1e6, soft_high=1.0, unit="LENGTH", subtype="DISTANCE"
+    )
+    shorten: str = param(
+        "CUT",
+        "How guides become shorter; longer ones are always scaled",
+        choices=(
+            ("CUT", "Cut", "Cut off the tips; what is left keeps its shape"),
+            ("SCALE", "Scale", "Scale the whole guide"),
+        ),
+    )
+
+
+def resized(points: np.ndarray, settings: LengthSettings, weights: np.ndarray) -> np.ndarray:
+    """(S, P, 3) float32 [m]: guides of the lengths that `LengthSettings` ask for, their roots where they were.
+
+    points (S, P, 3) [m]; weights (S,) in [0, 1]: how much of the change each guide gets. Guides without a length, and
+    those that are as long already, stay the same to the last bit.
+    """
+    present = lengths_of(np.asarray(points, np.float64))
+    wanted = {
+        "SCALE": settings.factor * present,
+        "SET": np.full(len(points), settings.length),
+        "MINIMUM": np.maximum(present, settings.length),
+        "MAXIMUM": np.minimum(present, settings.length),
+    }[settings.method]
+    wanted = present + weights * (wanted - present)
+    out = np.array(points, np.float32)
+    is_cut = (wanted < present) & (settings.shorten == "CUT")
+    out[is_cut] = cut_to_length(points[is_cut], wanted[is_cut])
+    is_scaled = (wanted != present) & ~is_cut & (present > 0.0)
+    out[is_scaled] = _scaled(points[is_scaled], (wanted / np.where(present > 0.0, present, 1.0))[is_scaled])
+    return out
+
+
+def _scaled(points, factors):
+    """(S, P, 3) float32: strands scaled from their roots by factors (S,)."""
+    roots = points[:, :1].astype(np.float64)
+    scaled = (roots + factors[:, None, None] * (points - roots)).astype(np.float32)
+    scaled[:, 0] = points[:, 0]
+    return scaled
+
+
+def cut(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """(S, P, 3) float32 [m]: the first part of each guide, with as many points, all of them on the guide.
+
+    points (S, P, 3) [m]; ends (S,) [m]: how far along each guide it is cut, at most its length. Points keep their
+    shares of the length, so that a guide that is cut at its tip stays the same.
+    """
+    points = np.asarray(points, np.float64)
+    steps = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    along = np.concatenate([np.zeros((len(points), 1)), np.cumsum(steps, axis=1)], axis=1)
+    lengths = along[:, -1:]
+    wanted = along * np.minimum(ends[:, None] / np.where(lengths > 0.0, lengths, 1.0), 1.0)
+    last = points.shape[1] - 2
+    # Running lengths are compared strand by strand: P comparisons for each point are few.
+    segment = np.clip((along[:, None, :] <= wanted[:, :, None]).sum(axis=2) - 1, 0, last)
+    start, span = (np.take_along_axis(array, segment, axis=1) for array in (along, steps))
+    share = np.clip((wanted - start) / np.where(span > 0.0, span, 1.0), 0.0, 1.0)[..., None]
+    before, after = (np.take_along_axis(points, place[..., None], axis=1) for place in (segment, segment + 1))
+    shortened = ((1.0 - share) * before + share * after).astype(np.float32)
+    shortened[:, 0] = points[:, 0]
+    return shortened
+
+
+def cut_to_length(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """(S, P, 3) float32 [m]: guides cut where what is left, with as many points, has the wanted lengths (S,) [m].
+
+    A polyline through points of another one is shorter than that, so the cut lies a little beyond `wanted`: it is found
+    by false position, by the Illinois rule, between there and the tip.
+    """
+    if not len(points):
+        return np.asarray(points, np.float32)
+    full = lengths_of(np.asarray(points, np.float64))
+    low, high = wanted.astype(np.float64), full.copy()
+    low_error = _cut_length(points, low) - wanted
+    high_error = full - wanted
+    ends, side = low.copy(), np.zeros(len(points))
+    for _ in range(_ROUNDS):
+        slope = high_error - low_error
+        ends = np.where(slope > 0.0, high - high_error * (high - low) / np.where(slope > 0.0, slope, 1.0), low)
+        error = _cut_length(points, ends) - wanted
+        if np.all(np.abs(error) <= _CLOSE * full):
+            break
+        is_low = error < 0.0
+        # The end that stays twice in a row counts half.
+        high_error = np.where(is_low & (side < 0), 0.5 * high_error, high_error)
+        low_error = np.where(~is_low & (side > 0), 0.5 * low_error, low_error)
+        low, low_error = np.where(is_low, ends, low), np.where(is_low, error, low_error)
+        high, high_error = np.where(is_low, high, ends), np.where(is_low, high_error, error)
+        side = np.where(is_low, -1.0, 1.0)
+    return cut(points, ends)
+
+
+def _cut_length(points, ends):
+    return lengths_of(cut(points, ends).astype(np.float64))

@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lifting of guides: segments turn toward the normal at the root, most at the root, and keep their lengths."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..params import param
+from .guide_segments import ToolSettings, arc_shares, joined, only, split, turned
+
+
+@dataclass(frozen=True)
+class LiftSettings(ToolSettings):
+    """Lifting of guides."""
+
+    amount: float = param(
+        0.5,
+        "Part of the angle to the surface normal that guides turn by at their roots; at 1 they start along the normal",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    reach: float = param(
+        1.0,
+        "Part of the length along which the lift fades; lower values bend only the part near the root",
+        above=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+
+
+def lifted(points: np.ndarray, normals: np.ndarray, settings: LiftSettings, weights: np.ndarray) -> np.ndarray:
+    """(S, P, 3) float32 [m]: guides whose segments stand up from the surface; each keeps its length.
+
+    points (S, P, 3) [m]; normals (S, 3): unit, at the roots; weights (S,) in [0, 1].
+    """
+    directions, lengths = split(points)
+    fade = np.clip(1.0 - arc_shares(lengths) / settings.reach, 0.0, 1.0)
+    # Smooth at both ends, so that guides bend without a kink.
+    shares = settings.amount * np.asarray(weights, np.float64)[:, None] * fade * fade * (3.0 - 2.0 * fade)
+    upward = np.broadcast_to(np.asarray(normals, np.float64)[:, None], directions.shape)
+    return only(points, joined(points, turned(directions, upward, shares), lengths), weights)
