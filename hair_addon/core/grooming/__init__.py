@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         guide_mirror,
         guide_segments,
         guide_smoothing,
+        guide_tool_settings,
         guide_trim,
         hair_styles,
         rooted_curves,

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Attraction of guides to the surface: they lie down along it, at a clearance above it, and keep their lengths."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import warp as wp
 
@@ -11,8 +9,8 @@ from ..geometry.mesh import TriMesh
 from ..kernels import parallel
 from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
-from ..params import param
-from .guide_segments import ToolSettings, joined, only, split, turned
+from .guide_segments import joined, only, split, turned
+from .guide_tool_settings import AttractSettings
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -20,28 +18,6 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 STEPS = 6  # of the search for a segment's rise, each of which looks at the surface below its end
 RAMP = 0.5  # rise per length at the root, until a guide reaches the clearance
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
-
-
-@dataclass(frozen=True)
-class AttractSettings(ToolSettings):
-    """Attraction to the surface."""
-
-    amount: float = param(
-        0.5,
-        "How far guides turn toward the surface; at 1 they lie on it",
-        low=0.0,
-        high=1.0,
-        subtype="FACTOR",
-    )
-    clearance: float = param(
-        0.002,
-        "Height above the surface that guides keep, from a short way above their roots",
-        low=0.0,
-        high=1e3,
-        soft_high=0.1,
-        unit="LENGTH",
-        subtype="DISTANCE",
-    )
 
 
 def attracted(

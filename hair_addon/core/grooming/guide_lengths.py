@@ -1,46 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lengths of guides: scaled, set, or kept within limits. Shorter guides are cut along their own curve, or scaled."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from ..geometry.strands import lengths as lengths_of
-from ..params import param
-from .guide_segments import ToolSettings
+from .guide_tool_settings import LengthSettings
 
 _ROUNDS = 24  # of the search for where to cut: each of them at least halves the interval every other time
 _CLOSE = 1e-7  # of a guide's length
-
-
-@dataclass(frozen=True)
-class LengthSettings(ToolSettings):
-    """New lengths of guides."""
-
-    method: str = param(
-        "SCALE",
-        "How the new length of each guide is found",
-        choices=(
-            ("SCALE", "Scale", "Multiply the lengths"),
-            ("SET", "Set", "Make all guides equally long"),
-            ("MINIMUM", "Minimum", "Make shorter guides this long"),
-            ("MAXIMUM", "Maximum", "Make longer guides this long"),
-        ),
-    )
-    factor: float = param(
-        1.0, "Factor of the lengths; below 1 guides become shorter", above=0.0, high=1e3, soft_high=4.0
-    )
-    length: float = param(
-        0.1, "Length from root to tip", above=0.0, high=1e6, soft_high=1.0, unit="LENGTH", subtype="DISTANCE"
-    )
-    shorten: str = param(
-        "CUT",
-        "How guides become shorter; longer ones are always scaled",
-        choices=(
-            ("CUT", "Cut", "Cut off the tips; what is left keeps its shape"),
-            ("SCALE", "Scale", "Scale the whole guide"),
-        ),
-    )
 
 
 def resized(points: np.ndarray, settings: LengthSettings, weights: np.ndarray) -> np.ndarray:

@@ -1,32 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Lifting of guides: segments turn toward the normal at the root, most at the root, and keep their lengths."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..params import param
-from .guide_segments import ToolSettings, arc_shares, joined, only, split, turned
-
-
-@dataclass(frozen=True)
-class LiftSettings(ToolSettings):
-    """Lifting of guides."""
-
-    amount: float = param(
-        0.5,
-        "Part of the angle to the surface normal that guides turn by at their roots; at 1 they start along the normal",
-        low=0.0,
-        high=1.0,
-        subtype="FACTOR",
-    )
-    reach: float = param(
-        1.0,
-        "Part of the length along which the lift fades; lower values bend only the part near the root",
-        above=0.0,
-        high=1.0,
-        subtype="FACTOR",
-    )
+from .guide_segments import arc_shares, joined, only, split, turned
+from .guide_tool_settings import LiftSettings
 
 
 def lifted(points: np.ndarray, normals: np.ndarray, settings: LiftSettings, weights: np.ndarray) -> np.ndarray:

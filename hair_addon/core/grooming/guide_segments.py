@@ -4,24 +4,7 @@
 All arrays are float64 here, so that segments keep their lengths to the rounding of single precision.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
-
-from ..params import Settings, param
-
-
-@dataclass(frozen=True)
-class ToolSettings(Settings):
-    """Which guides a tool changes, and how much."""
-
-    selected_only: bool = param(
-        True, "Change only the guides selected in Sculpt Mode or Edit Mode; all guides if none is selected"
-    )
-    mask: str = param(
-        "",
-        "Vertex group of the surface that scales the effect; guides rooted where its weight is zero stay as they are",
-    )
 
 
 def split(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

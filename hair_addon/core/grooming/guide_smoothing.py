@@ -1,24 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Smoothing of guides along their length: directions of segments diffuse, so roots and lengths are kept."""
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ..params import param
-from .guide_segments import ToolSettings, joined, only, split, unit
-
-
-@dataclass(frozen=True)
-class SmoothSettings(ToolSettings):
-    """Smoothing of guides."""
-
-    strength: float = param(
-        0.5, "Strength of each step; higher values smooth more", low=0.0, high=1.0, subtype="FACTOR"
-    )
-    iterations: int = param(
-        10, "Number of smoothing steps; more of them smooth longer waves", low=1, high=1000, soft_high=100
-    )
+from .guide_segments import joined, only, split, unit
+from .guide_tool_settings import SmoothSettings
 
 
 def smoothed(points: np.ndarray, settings: SmoothSettings, weights: np.ndarray) -> np.ndarray:

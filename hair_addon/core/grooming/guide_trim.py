@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Trimming of guides: each is cut where it first crosses a plane or a mesh."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import warp as wp
 
@@ -10,24 +8,13 @@ from ..geometry.mesh import TriMesh, check_mesh
 from ..geometry.strands import lengths as lengths_of
 from ..kernels import parallel
 from ..kernels.parallel import Rows
-from ..params import param
 from .guide_lengths import cut
-from .guide_segments import ToolSettings, only
+from .guide_segments import only
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 SHORTEST = 1e-3  # of a guide's length: what is left of it at least, so that it keeps a direction
-
-
-@dataclass(frozen=True)
-class TrimSettings(ToolSettings):
-    """Trimming of guides."""
-
-    cutter: str = param(
-        "",
-        "Object that cuts: a mesh cuts with its faces; any other object, such as an empty, cuts off what is on its +Z side",
-    )
 
 
 def plane_crossings(points: np.ndarray, origin: np.ndarray, normal: np.ndarray) -> np.ndarray:

@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.grooming.guide_lengths import LengthSettings, cut, resized
+from hair_addon.core.grooming.guide_lengths import cut, resized
+from hair_addon.core.grooming.guide_tool_settings import LengthSettings
 from tests.support.combed import distance_to_polylines, lengths, wavy
 
 SHORTEN = ("CUT", "SCALE")

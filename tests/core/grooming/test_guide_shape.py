@@ -7,9 +7,10 @@ import pytest
 from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.mesh import positions
 from hair_addon.core.grooming import guide_segments
-from hair_addon.core.grooming.guide_attraction import AttractSettings, attracted
-from hair_addon.core.grooming.guide_lift import LiftSettings, lifted
-from hair_addon.core.grooming.guide_smoothing import SmoothSettings, smoothed
+from hair_addon.core.grooming.guide_attraction import attracted
+from hair_addon.core.grooming.guide_lift import lifted
+from hair_addon.core.grooming.guide_smoothing import smoothed
+from hair_addon.core.grooming.guide_tool_settings import AttractSettings, LiftSettings, SmoothSettings
 from tests.support.combed import lengths, segment_lengths, standing, wavy
 from tests.support.meshes import flat_grid, subdivided_sphere
 
