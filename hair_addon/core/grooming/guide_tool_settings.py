@@ -114,3 +114,68 @@ class AttractSettings(ToolSettings):
         unit="LENGTH",
         subtype="DISTANCE",
     )
+
+
+@dataclass(frozen=True)
+class CountSettings(ToolSettings):
+    """Another number of guides."""
+
+    method: str = param(
+        "FACTOR",
+        "How the new number of guides is found",
+        choices=(
+            (
+                "FACTOR",
+                "Factor",
+                "Multiply the number of guides, of the selected ones or inside the mask if there are any",
+            ),
+            ("COUNT", "Count", "Set the number of all guides"),
+        ),
+    )
+    factor: float = param(
+        2.0, "Factor of the number of guides; below 1 guides are removed", above=0.0, high=100.0, soft_high=4.0
+    )
+    guide_count: int = param(
+        400, "Number of guides to have", label="Guide count", low=1, high=1_000_000, soft_high=4000
+    )
+
+
+@dataclass(frozen=True)
+class MirrorSettings(ToolSettings):
+    """Mirroring of guides across the object's X axis."""
+
+    direction: str = param(
+        "FROM_POSITIVE",
+        "Side whose guides are kept; those of the other side are replaced with their images",
+        choices=(
+            ("FROM_POSITIVE", "+X to -X", "Replace the guides on the -X side"),
+            ("FROM_NEGATIVE", "-X to +X", "Replace the guides on the +X side"),
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class CopySettings(Settings):
+    """Copying of guide shapes between regions."""
+
+    source: str = param(
+        "",
+        "Vertex group of the guides to copy from. Leave empty to copy from the selected guides",
+        label="From",
+    )
+    target: str = param(
+        "",
+        "Vertex group of the guides to change; its weights scale the effect. Leave empty to change all other guides",
+        label="To",
+    )
+    mapping: str = param(
+        "FITTED",
+        "Which guide each one takes its shape from",
+        choices=(
+            ("FITTED", "Fitted", "The one in the same place when the regions are laid over each other"),
+            ("NEAREST", "Nearest", "The nearest one"),
+            ("MIRRORED", "Mirrored", "The one nearest to its place mirrored across the object's X axis"),
+        ),
+    )
+    copy_length: bool = param(True, "Copy the length too; when off, guides keep their lengths")
+    amount: float = param(1.0, "How much of the shape is copied", low=0.0, high=1.0, subtype="FACTOR")
