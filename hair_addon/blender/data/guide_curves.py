@@ -33,11 +33,11 @@ def remove(curves, indices):
     if len(indices) >= len(curves.curves):
         raise ValueError("all curves would be removed")
     if len(indices):
-        curves.remove_curves(indices=[int(index) for index in indices])
+        curves.remove_curves(indices=sorted(int(index) for index in indices))
 
 
 def append(curves, points, sources, starts):
-    """Append curves of points (M, P, 3) float32 in local coordinates, with the attributes of others.
+    """Append curves of points (M, P, 3) float32 in local coordinates, with the attributes of others, smooth like them.
 
     sources: (M,) indices of these; their points' attributes are taken at the same share of the number of points.
     starts (S+1,): where the present curves' points begin.
@@ -50,12 +50,27 @@ def append(curves, points, sources, starts):
     of_points = (starts[:-1][sources][:, None] + places).ravel()
     before = {}
     for attribute in curves.attributes:
-        if attribute.domain in (_POINTS, _CURVES) and attribute.data_type in attributes.LAYOUTS:
+        is_known = attribute.domain in (_POINTS, _CURVES) and attribute.data_type in attributes.LAYOUTS
+        if is_known and attribute.name != "curve_type":
             key = attribute.name, attribute.data_type, attribute.domain
             before[key] = attributes.read(curves, *key)
+    types = attributes.curve_types(curves)[sources]
     curves.add_curves([int(point_count)] * int(count))
+    # Blender counts the curves of each type, so that the attribute alone cannot be written.
+    for is_smooth, name in ((True, "CATMULL_ROM"), (False, "POLY")):
+        chosen = np.flatnonzero((types == attributes.CATMULL_ROM) == is_smooth) + len(starts) - 1
+        if len(chosen):
+            curves.set_types(type=name, indices=[int(index) for index in chosen])
     for (name, data_type, domain), values in before.items():
         added = values[of_points if domain == _POINTS else sources]
         if name == "position":
             added = points.reshape(-1, 3)
         attributes.write(curves, name, data_type, domain, np.concatenate([values, added.astype(values.dtype)]))
+
+
+def write_tail(curves, name, data_type, values):
+    """Write an attribute of the last curves, if there is one of this name and type; values: one each."""
+    present = attributes.read(curves, name, data_type, _CURVES)
+    if present is not None and len(values):
+        present[-len(values) :] = values
+        attributes.write(curves, name, data_type, _CURVES, present)

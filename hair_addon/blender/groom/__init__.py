@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         foreign_curves,
         groom_settings,
         hair_styles,
+        guide_additions,
         guide_tools,
         hair_systems,
         hand_made_guides,

@@ -6,7 +6,7 @@ apply to them, and hair follows at Blender's next update.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 
@@ -19,6 +19,7 @@ from ...core.geometry import mesh as mesh_math
 from ...core.geometry.mesh import SurfacePoints
 from ...core.grooming.guide_tool_settings import (
     AttractSettings,
+    CopySettings,
     LengthSettings,
     LiftSettings,
     SmoothSettings,
@@ -65,7 +66,9 @@ class CombedGuides:
         return self.starts[chosen][:, None] + np.arange(count)
 
     def even(self, point_count: int) -> np.ndarray:
-        """(G, point_count, 3) float32 [m], equally spaced along each guide."""
+        """(G, point_count, 3) float32 [m]: the guides as they are if all have as many points, else evenly resampled."""
+        if (self.counts == point_count).all():
+            return self.points.reshape(-1, point_count, 3)
         return geometry.resampling.resample(
             self.points, self.starts, point_count, attributes.are_smooth(self.datablock)
         )
@@ -79,8 +82,8 @@ class CombedGuides:
         return self.surface.from_local(posed_strands.carried(self.local, pose.motion, places, self.counts))
 
 
-def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> CombedGuides:
-    """The `CombedGuides` of guide Curves. Raises `HairError` where they cannot be changed."""
+def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
+    """The `CombedGuides` of guide Curves, all of weight one. Raises `HairError` where they cannot be changed."""
     curves.require_editable(datablock)
     if datablock.surface is None:
         raise HairError("The surface is missing: pick a mesh.")
@@ -95,16 +98,27 @@ def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> Com
         raise HairError(sentence, name=datablock.name)
     points = surface.from_local(local)
     roots = curves.read_roots(datablock, surface, points[starts[:-1]])
-    weights = np.ones(len(starts) - 1)
-    selected = guide_curves.selection(datablock, starts) if settings.selected_only else None
+    return CombedGuides(datablock, surface, local, points, starts, np.ones(len(starts) - 1), roots)
+
+
+def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> CombedGuides:
+    """The `CombedGuides` of guide Curves, weighted by selection and mask. Raises `HairError`."""
+    guides = open_guides(datablock, depsgraph)
+    weights = guides.weights.copy()
+    selected = guide_curves.selection(datablock, guides.starts) if settings.selected_only else None
     if selected is not None:
         weights *= selected
-    mask = scene.read_vertex_group(datablock.surface, depsgraph, settings.mask)
-    if mask is not None:
-        weights *= np.clip(mesh_math.interpolate(mask, surface.mesh, roots), 0.0, 1.0)
+    if settings.mask:
+        weights *= weights_in_group(guides, settings.mask, depsgraph)
     if not weights.any():
         raise HairError("No guide is both selected and inside the mask: change the selection or the mask.")
-    return CombedGuides(datablock, surface, local, points, starts, weights, roots)
+    return replace(guides, weights=weights)
+
+
+def weights_in_group(guides: CombedGuides, name: str, depsgraph: Depsgraph) -> np.ndarray:
+    """(G,) in [0, 1]: weights of a vertex group of the surface at the roots. Raises `HairError`."""
+    weights = scene.read_vertex_group(guides.datablock.surface, depsgraph, name)
+    return np.clip(mesh_math.interpolate(weights, guides.surface.mesh, guides.roots), 0.0, 1.0)
 
 
 Shaping = Callable[[np.ndarray, np.ndarray], np.ndarray]
@@ -179,6 +193,54 @@ def attract(datablock: Curves, settings: AttractSettings, depsgraph: Depsgraph) 
     return reshape(
         guides, lambda points, chosen: attracted(mesh, points, guides.normals[chosen], settings, guides.weights[chosen])
     )
+
+
+def copy_shape(datablock: Curves, settings: CopySettings, depsgraph: Depsgraph) -> int:
+    """Give guides of one region the shape of those of another; returns and raises as above."""
+    guides = open_guides(datablock, depsgraph)
+    is_source, weights = _regions(guides, settings, depsgraph)
+    guides = replace(guides, weights=weights)
+    sources, targets = np.flatnonzero(is_source), np.flatnonzero(weights > 0.0)
+    copies = grooming.guide_copies
+    its, own = (copies.Places(guides.first_points[rows], guides.normals[rows]) for rows in (sources, targets))
+    matches = copies.matched(its, own, settings.mapping, guides.surface.mirror_normal)
+
+    def shaped(points, chosen):
+        rows = np.searchsorted(targets, chosen)
+        shapes = guides.even(points.shape[1])[sources[matches.sources[rows]]]
+        return copies.copied(points, shapes, matches.matrices[rows], settings, weights[chosen])
+
+    return reshape(guides, shaped)
+
+
+def _regions(guides, settings, depsgraph):
+    """(G,) bool, the guides to copy from, and (G,) float64, how much of a copy each of the others gets."""
+    selected = guide_curves.selection(guides.datablock, guides.starts)
+    if settings.source:
+        is_source = weights_in_group(guides, settings.source, depsgraph) >= 0.5
+        if not is_source.any():
+            raise HairError(
+                'No guide is rooted in the vertex group "{name}": pick another group.', name=settings.source
+            )
+    elif selected is not None:
+        is_source = selected > 0.0
+    else:
+        raise HairError("Select the guides to copy from, or pick the vertex group that they are rooted in.")
+    if settings.target:
+        weights = weights_in_group(guides, settings.target, depsgraph).astype(np.float64)
+    elif settings.source and selected is not None:
+        weights = selected.astype(np.float64)
+    else:
+        weights = np.ones(len(is_source))
+    weights[is_source] = 0.0
+    if not weights.any():
+        raise HairError("There are no guides to copy to: pick another vertex group, or select fewer guides.")
+    return is_source, weights
+
+
+def is_any_selected(datablock: Curves) -> bool:
+    """Whether guides are selected in Sculpt Mode or Edit Mode, and others are not."""
+    return guide_curves.selection(datablock, curves.curve_offsets(datablock)) is not None
 
 
 def median_length(datablock: Curves) -> float:

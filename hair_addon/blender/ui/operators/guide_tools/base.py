@@ -24,7 +24,7 @@ class GuideTool(HairOperator):
         return context.mode in _MODES and guides_of(context.object) is not None
 
     def apply(self, guides, settings, depsgraph):
-        """Change guide Curves; returns how many guides have changed."""
+        """Change guide Curves; returns the number of guides for the message."""
         raise NotImplementedError
 
     def prefill(self, guides):
@@ -38,7 +38,10 @@ class GuideTool(HairOperator):
     def change(self, context):
         """Change the guides, and say how many."""
         settings = setting_properties.to_settings(self, self.Settings)
-        count = self.apply(guides_of(context.object), settings, context.evaluated_depsgraph_get())
+        return self.message(self.apply(guides_of(context.object), settings, context.evaluated_depsgraph_get()))
+
+    def message(self, count):
+        """(sentence, values) of the report."""
         return "{count} guides changed", {"count": count}
 
     def draw(self, context):
