@@ -116,8 +116,10 @@ def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> Com
 
 
 def weights_in_group(guides: CombedGuides, name: str, depsgraph: Depsgraph) -> np.ndarray:
-    """(G,) in [0, 1]: weights of a vertex group of the surface at the roots. Raises `HairError`."""
+    """(G,) in [0, 1]: weights of a vertex group at the roots; the guides' own for no name. Raises `HairError`."""
     weights = scene.read_vertex_group(guides.datablock.surface, depsgraph, name)
+    if weights is None:
+        return guides.weights
     return np.clip(mesh_math.interpolate(weights, guides.surface.mesh, guides.roots), 0.0, 1.0)
 
 

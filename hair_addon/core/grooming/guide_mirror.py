@@ -12,6 +12,7 @@ from ..geometry.closest_point import SurfaceQuery
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..placement.domain import Mirror
 
+_EVERYWHERE = 1e15  # [m]: a distance to search that leaves nothing out
 _MIDDLE = 0.1  # of the distance between guides: nearer to the plane than this, they are on it
 _OFF = 0.05  # of the surface's size: farther from it, a mirrored place has no surface
 
@@ -27,8 +28,8 @@ class Mirroring:
 
 def nearest(places: np.ndarray, others: np.ndarray, count: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """(M, count) indices of places (G, 3) [m] nearest to others (M, 3) [m], and their distances [m]; G > 0."""
-    there = [wp.array(np.ascontiguousarray(a, np.float32), dtype=wp.vec3, device="cpu") for a in (places, others)]
-    indices, distances = hash_grid.neighbours(*there, 1e15, count)
+    own, other = (wp.array(np.ascontiguousarray(a, np.float32), dtype=wp.vec3, device="cpu") for a in (places, others))
+    indices, distances = hash_grid.neighbours(own, other, _EVERYWHERE, count)
     return indices.numpy(), distances.numpy()
 
 

@@ -127,7 +127,7 @@ class CountSettings(ToolSettings):
             (
                 "FACTOR",
                 "Factor",
-                "Multiply the number of guides, of the selected ones or inside the mask if there are any",
+                "Multiply the number of guides, where they are selected and inside the mask",
             ),
             ("COUNT", "Count", "Set the number of all guides"),
         ),

@@ -20,7 +20,7 @@ class GuideTool(HairOperator):
     @classmethod
     def poll(cls, context):
         """Whether there are guides to change."""
-        cls.poll_message_set("Select a mesh with guides, guides, or hair that follows guides.")
+        cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
         return context.mode in _MODES and guides_of(context.object) is not None
 
     def apply(self, guides, settings, depsgraph):
