@@ -111,15 +111,12 @@ def _between(guides, count, mask, depsgraph):
 def _density(guides, mask, depsgraph):
     """Where new guides may stand: (V,) weights or None, and `Texture` or None.
 
-    Inside the mask that guides were placed by, or where they are; and inside the tool's own mask.
+    Inside the mask that guides were placed by, and inside the tool's own mask.
     """
     datablock, surface = guides.datablock, guides.surface
     density = texture = None
     if not curves.is_hand_made(datablock):
         density, texture = masks.of_guides(datablock.vellus.guides).read(datablock.surface, surface, depsgraph)
-    if density is None and texture is None:
-        places = mesh_math.positions(surface.mesh, guides.roots)
-        density = placement.coverage.coverage(surface.mesh, places)
     if mask:
         weights, _texture = masks.Mask(mask).read(datablock.surface, surface, depsgraph)
         density = weights if density is None else density * weights

@@ -7,7 +7,6 @@ from ..groom.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of
 from ..settings.translations import CONTEXT
 
-
 # In groups: length and shape, then number and place.
 _GUIDE_TOOLS = (
     (

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .. import placement
-from ..geometry.mesh import SurfacePoints, TriMesh
+from .. import grooming, placement
+from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..geometry.strands import Strands
 from ..geometry.texture import Texture
 from ..interpolation.regions import Regions
@@ -17,6 +17,7 @@ from .guide_tool_settings import CountSettings
 
 _POWER = 8  # of the weight between two guides  [Yuksel15]
 _NEIGHBOURS = 6  # of a guide, for the area that it stands for
+_AROUND = 0.75  # of the distance to the fourth nearest guide: new ones stand no farther from guides of a part
 _SAME_SIDE = -1.0 / 3.0  # cosine between normals: guides on two sides of an ear do not crowd each other
 
 
@@ -37,9 +38,19 @@ def new_roots(
     texture: Texture | None = None,
     device: str = "cpu",
 ) -> SurfacePoints:
-    """`count` roots evenly between others; around: (G,) bool, next to which of these. `placement.insertion.insert`."""
+    """`count` roots, as far as there is room, evenly between others; around: (G,) bool, next to which of these.
+
+    density (V,) and texture: where guides may be; with neither, they are among the others if these are on a part of the
+    surface only.
+    """
+    within = None
+    if density is None and texture is None:
+        places = positions(mesh, roots)
+        density = placement.coverage.coverage(mesh, places)
+        if density is not None:
+            within = _AROUND * grooming.guide_mirror.nearest(places, places, 5)[1][:, 4]
     return placement.insertion.insert(
-        mesh, roots, count, density=density, texture=texture, around=around, device=device
+        mesh, roots, count, density=density, texture=texture, around=around, within=within, device=device
     )
 
 

@@ -27,12 +27,14 @@ def insert(
     density: np.ndarray | None = None,
     texture: Texture | None = None,
     around: np.ndarray | None = None,
+    within: np.ndarray | None = None,
     device: str = "cpu",
 ) -> SurfacePoints:
     """`count` more sites, as `SurfacePoints`, evenly between `fixed` ones, of which there is at least one.
 
     mesh: a checked `TriMesh`; density (V,) and texture as in `cvt.place`; around: (F,) bool, which of the fixed sites
-    new ones may be nearest to, None for all. They are fewer where there is no room. The same arguments give the same
+    new ones may be nearest to, None for all; within: (F,) [m], how far from each fixed site they may be before they are
+    relaxed, None for any distance. They are fewer where there is no room. The same arguments give the same
     sites. Raises `HairError` where the density is zero everywhere.
     """
     total = len(fixed) + count
@@ -42,6 +44,8 @@ def insert(
     nearest = cells.nearest(sites_on(domain, fixed, device))
     squares = np.sum((cells.places - positions(domain.mesh, fixed)[nearest]) ** 2, axis=1)
     may_hold = np.ones(len(points), bool) if around is None else np.asarray(around)[nearest]
+    if within is not None:
+        may_hold &= np.sqrt(squares) * domain.size <= np.asarray(within)[nearest]
     candidates = points[may_hold]
     if not len(candidates) or not count:
         return points[:0]
