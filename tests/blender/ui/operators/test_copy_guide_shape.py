@@ -5,8 +5,8 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.blender.ui.operators.test_guide_tools import grown_from_nothing, lengths, select
 from tests.support.following import update
+from tests.support.guide_tools import grown_from_nothing, lengths_of, select_guides
 from tests.support.reading import points, vertex_positions, write_points
 
 
@@ -47,7 +47,7 @@ def test_the_left_hangs_down_like_the_right(groom, mapping):
     assert before[left, -1, 2].mean() - before[left, 0, 2].mean() > -0.2
     np.testing.assert_allclose(drop[left], drop[right].mean(), atol=0.25)
     assert drop[left].mean() == pytest.approx(drop[right].mean(), abs=0.1)
-    np.testing.assert_allclose(lengths(after)[left].mean(), lengths(before)[right].mean(), rtol=0.1)
+    np.testing.assert_allclose(lengths_of(after)[left].mean(), lengths_of(before)[right].mean(), rtol=0.1)
     assert np.array_equal(points(groom), grown_from_nothing(groom))
 
 
@@ -55,7 +55,7 @@ def test_a_selection_is_a_region(groom):
     guides = bpy.data.objects["Guides"]
     before = points(guides)
     right, _left = sides(before)
-    select(guides, right)
+    select_guides(guides, right)
     bpy.ops.vellus.copy_guide_shape(target="left")
     by_selection = points(guides)
     assert np.array_equal(by_selection[right], before[right])
@@ -70,7 +70,7 @@ def test_from_a_group_to_a_selection(groom):
     guides = bpy.data.objects["Guides"]
     before = points(guides)
     _right, left = sides(before)
-    select(guides, left)
+    select_guides(guides, left)
     bpy.ops.vellus.copy_guide_shape(source="right")
     assert np.array_equal((points(guides) != before).any(axis=(1, 2)), left)
 
@@ -79,19 +79,19 @@ def test_lengths_may_stay(groom):
     guides = bpy.data.objects["Guides"]
     before = points(guides)
     bpy.ops.vellus.copy_guide_shape(source="right", target="left", copy_length=False)
-    np.testing.assert_allclose(lengths(points(guides)), lengths(before), rtol=1e-4)
+    np.testing.assert_allclose(lengths_of(points(guides)), lengths_of(before), rtol=1e-4)
 
 
 def test_half_an_amount_is_between(groom):
     guides = bpy.data.objects["Guides"]
     before = points(guides)
     bpy.ops.vellus.copy_guide_shape(source="right", target="left", amount=0.5)
-    half = lengths(points(guides))
+    half = lengths_of(points(guides))
     write_points(guides, before)
     bpy.ops.vellus.copy_guide_shape(source="right", target="left")
-    whole = lengths(points(guides))
+    whole = lengths_of(points(guides))
     _right, left = sides(before)
-    np.testing.assert_allclose(half[left], 0.5 * (lengths(before) + whole)[left], rtol=1e-3)
+    np.testing.assert_allclose(half[left], 0.5 * (lengths_of(before) + whole)[left], rtol=1e-3)
 
 
 def test_regions_without_guides_are_refused(groom):

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves
-from tests.blender.ui.operators.test_guide_tools import comb, grown_from_nothing, select
 from tests.support.following import surface_points, update
+from tests.support.guide_tools import grown_from_nothing, select_guides, wave
 from tests.support.reading import attribute, points
 
 
@@ -15,7 +15,7 @@ from tests.support.reading import attribute, points
 def groom(hair):
     """Hair between combed guides that carry an attribute of the artist's own."""
     guides = bpy.data.objects["Guides"]
-    comb(guides)
+    wave(guides)
     named = guides.data.attributes.new("clump", "INT", "CURVE")
     named.data.foreach_set("value", np.arange(60, dtype=np.int32))
     widths = guides.data.attributes.new("width", "FLOAT", "POINT")
@@ -82,7 +82,7 @@ def test_new_guides_are_shaped_like_those_around(combed):
 
 def test_more_where_guides_are_selected(combed):
     chosen = points(combed)[:, 0, 2] > 0.3
-    select(combed, chosen)
+    select_guides(combed, chosen)
     bpy.ops.vellus.change_guide_count(factor=2.0)
     assert len(combed.data.curves) == 60 + chosen.sum()
     roots = points(combed)[:, 0]
@@ -127,7 +127,7 @@ def test_fewer_guides_are_some_of_those_that_were_there(combed, groom):
 
 def test_fewer_only_where_guides_are_selected(combed):
     chosen = points(combed)[:, 0, 2] > 0.0
-    select(combed, chosen)
+    select_guides(combed, chosen)
     bpy.ops.vellus.change_guide_count(factor=0.4)
     assert set(np.flatnonzero(~chosen)) <= set(rows(combed))
     assert len(combed.data.curves) == 60 - round(0.6 * chosen.sum())
@@ -219,7 +219,7 @@ def test_mirroring_twice_changes_nothing_more(combed):
 
 def test_only_images_of_selected_guides(combed):
     before = points(combed)
-    select(combed, before[:, 0, 2] > 0.0)
+    select_guides(combed, before[:, 0, 2] > 0.0)
     bpy.ops.vellus.mirror_guides()
     after, kept = points(combed), rows(combed)
     low = before[:, 0, 2] < -0.3
