@@ -29,6 +29,8 @@ from ...core.grooming.guide_tool_settings import (
 from ..data import attributes, curves, cutters, guide_curves, posed_strands, scene
 from ..data.scene import Surface
 
+_FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still floats
+
 
 @dataclass(frozen=True)
 class CombedGuides:
@@ -137,8 +139,8 @@ def reshape(guides: CombedGuides, shaped: Shaping) -> int:
         chosen = np.flatnonzero((guides.counts == count) & (guides.weights > 0.0))
         places = guides.of_count(int(count), chosen)
         after[places] = shaped(guides.points[places], chosen)
-    if not np.isfinite(after).all():
-        raise HairError("The guides would leave the range of numbers: use smaller values.")
+    if not np.abs(after).max() < _FARTHEST:  # also refuses NaN
+        raise HairError("The guides would extend too far from their surface: use smaller values.")
     is_moved = (after != guides.points).any(axis=1)
     local = guides.local.copy()
     local[is_moved] = guides.surface.to_local(after[is_moved][:, None])[:, 0]
