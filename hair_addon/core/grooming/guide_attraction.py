@@ -16,6 +16,7 @@ from .guide_tool_settings import AttractSettings
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 STEPS = 6  # of the search for a segment's rise, each of which looks at the surface below its end
+CLOSE = 1e-4  # of a segment's length: its end is as high as it should be
 RAMP = 0.5  # rise per length at the root, until a guide reaches the clearance
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
 
@@ -109,6 +110,9 @@ def _follow(
     lean = wp.normalize(lean)
     turn = wp.quat_identity()
     along = float(0.0)
+    # Guides may be rooted off the surface; from there on they stay as near to it, or it is of no concern.
+    first = wp.mesh_query_point_no_sign(surface, position, 1.0e15)
+    gap = wp.length(position - wp.mesh_eval_position(surface, first.face, first.u, first.v))
     for i in range(last):
         step = points[guide, i + 1] - points[guide, i]
         length = wp.length(step)
@@ -116,30 +120,36 @@ def _follow(
         along += length
         wanted = wp.min(clearance, wp.static(RAMP) * along)
         direction = ahead
+        searching = length > 0.0
         for _search in range(wp.static(STEPS)):
-            place = position + length * direction
-            query = wp.mesh_query_point_no_sign(surface, place, 1.0e15)
-            face = query.face
-            u = query.u
-            v = query.v
-            w = 1.0 - u - v
-            normal = wp.normalize(
-                u * vertex_normals[indices[3 * face]]
-                + v * vertex_normals[indices[3 * face + 1]]
-                + w * vertex_normals[indices[3 * face + 2]]
-            )
-            away = place - wp.mesh_eval_position(surface, face, u, v)
-            height = wp.dot(away, normal)
-            # Past the border of an open surface the nearest point lies sideways: there guides are left alone.
-            is_over = wp.length(away - height * normal) <= 0.5 * wp.max(wp.abs(height), wanted) + 1.0e-3 * length
-            if is_over and length > 0.0 and (height < wanted or lays_down):
-                rise = wp.clamp(wp.dot(direction, normal) + (wanted - height) / length, -1.0, 1.0)
-                side = _side(ahead, normal)
-                if wp.length(side) < 0.05:
-                    side = _side(lean, normal)
-                if wp.length(side) > 0.0:
-                    side = wp.normalize(side)
-                direction = wp.normalize(rise * normal + wp.sqrt(1.0 - rise * rise) * side)
+            if searching:
+                searching = False
+                place = position + length * direction
+                query = wp.mesh_query_point_no_sign(surface, place, gap + wanted + 2.0 * length)
+                if query.result:
+                    face = query.face
+                    u = query.u
+                    v = query.v
+                    normal = wp.normalize(
+                        u * vertex_normals[indices[3 * face]]
+                        + v * vertex_normals[indices[3 * face + 1]]
+                        + (1.0 - u - v) * vertex_normals[indices[3 * face + 2]]
+                    )
+                    away = place - wp.mesh_eval_position(surface, face, u, v)
+                    height = wp.dot(away, normal)
+                    # Past the border of an open surface the nearest point lies sideways: there guides are left alone.
+                    sideways = wp.length(away - height * normal)
+                    is_over = sideways <= 0.5 * wp.max(wp.abs(height), wanted) + 1.0e-3 * length
+                    is_off = wp.abs(wanted - height) > wp.static(CLOSE) * length
+                    if is_over and is_off and (height < wanted or lays_down):
+                        searching = True
+                        rise = wp.clamp(wp.dot(direction, normal) + (wanted - height) / length, -1.0, 1.0)
+                        side = _side(ahead, normal)
+                        if wp.length(side) < 0.05:
+                            side = _side(lean, normal)
+                        if wp.length(side) > 0.0:
+                            side = wp.normalize(side)
+                        direction = wp.normalize(rise * normal + wp.sqrt(1.0 - rise * rise) * side)
         if lays_down:
             # The rest of the guide turns with this segment.
             turn = wp.normalize(_least_turn(ahead, direction) * turn)

@@ -71,23 +71,26 @@ def cut_to_length(points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     if not len(points):
         return np.asarray(points, np.float32)
     full = lengths_of(np.asarray(points, np.float64))
-    low, high = wanted.astype(np.float64), full.copy()
-    low_error = _cut_length(points, low) - wanted
-    high_error = full - wanted
-    ends, side = low.copy(), np.zeros(len(points))
+    ends = wanted.astype(np.float64)
+    low, high = ends.copy(), full.copy()
+    low_error, high_error = _cut_length(points, low) - wanted, full - wanted
+    side = np.zeros(len(points))
+    left = np.flatnonzero(np.abs(low_error) > _CLOSE * full)
     for _ in range(_ROUNDS):
-        slope = high_error - low_error
-        ends = np.where(slope > 0.0, high - high_error * (high - low) / np.where(slope > 0.0, slope, 1.0), low)
-        error = _cut_length(points, ends) - wanted
-        if np.all(np.abs(error) <= _CLOSE * full):
+        if not len(left):
             break
+        slope = high_error[left] - low_error[left]
+        step = high_error[left] * (high[left] - low[left]) / np.where(slope > 0.0, slope, 1.0)
+        ends[left] = np.where(slope > 0.0, high[left] - step, low[left])
+        error = _cut_length(points[left], ends[left]) - wanted[left]
         is_low = error < 0.0
         # The end that stays twice in a row counts half.
-        high_error = np.where(is_low & (side < 0), 0.5 * high_error, high_error)
-        low_error = np.where(~is_low & (side > 0), 0.5 * low_error, low_error)
-        low, low_error = np.where(is_low, ends, low), np.where(is_low, error, low_error)
-        high, high_error = np.where(is_low, high, ends), np.where(is_low, high_error, error)
-        side = np.where(is_low, -1.0, 1.0)
+        high_error[left] *= np.where(is_low & (side[left] < 0), 0.5, 1.0)
+        low_error[left] *= np.where(~is_low & (side[left] > 0), 0.5, 1.0)
+        low[left], low_error[left] = np.where(is_low, (ends[left], error), (low[left], low_error[left]))
+        high[left], high_error[left] = np.where(is_low, (high[left], high_error[left]), (ends[left], error))
+        side[left] = np.where(is_low, -1.0, 1.0)
+        left = left[np.abs(error) > _CLOSE * full[left]]
     return cut(points, ends)
 
 
