@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves
+from tests.support.counting import counts_of
 from tests.support.following import update
 from tests.support.guide_tools import CHOSEN, SHAPING, TOOLS, grown_from_nothing, lengths_of, select_guides, use_tool
-from tests.support.layout import draw_all
+from tests.support.layout import draw_all, redo_panel
 from tests.support.reading import points, snapshot
 
 
@@ -154,3 +155,39 @@ def test_the_panel_and_the_menu_offer_each_tool_once(waved, active):
     bpy.context.view_layer.objects.active = bpy.data.objects[active]
     for drawn in (draw_all([bpy.types.VELLUS_PT_guides_tools]), draw_all([bpy.types.VELLUS_MT_guide_tools])):
         assert {name: drawn[f"vellus.{name}"] for name in TOOLS} == dict.fromkeys(TOOLS, 1)
+
+
+@pytest.mark.parametrize("name", sorted(SHAPING.keys() - {"copy_guide_shape"}))  # which looks for the nearest guides
+def test_hair_follows_as_it_follows_a_brush(waved, monkeypatch, name):
+    """No search among guides: what is bound stays bound."""
+    calls = counts_of(monkeypatch)
+    use_tool(name)
+    assert (calls["searches"], calls["writes"]) == (0, 1)
+
+
+# Names of choices → the settings that a tool shows with them.
+SHOWN = {
+    "guide_length": ({"method": "SET"}, {"method", "length", "shorten"}, {"method", "factor", "shorten"}),
+    "change_guide_count": ({"method": "COUNT"}, {"method", "guide_count"}, {"method", "factor"}),
+    "trim_guides": ({}, {"cutter"}, {"cutter"}),
+    "mirror_guides": ({}, {"direction"}, {"direction"}),
+    "smooth_guides": ({}, {"strength", "iterations"}, {"strength", "iterations"}),
+    "lift_guides": ({}, {"amount", "reach"}, {"amount", "reach"}),
+    "attract_guides": ({}, {"amount", "clearance"}, {"amount", "clearance"}),
+}
+
+
+@pytest.mark.parametrize("name", SHOWN)
+def test_the_redo_panel_shows_what_has_an_effect(waved, name):
+    values, chosen, default = SHOWN[name]
+    for given, wanted in ((values, chosen), ({}, default)):
+        drawn = redo_panel(name, **given)
+        shown = {row for row in drawn.drawn if row != "label"}
+        assert shown == wanted | {"selected_only", "mask"}
+        assert drawn.picked["mask"] == bpy.data.objects["Sphere"].vertex_groups
+
+
+def test_the_redo_panel_of_copies_picks_groups(waved):
+    drawn = redo_panel("copy_guide_shape")
+    assert {row for row in drawn.drawn if row != "label"} == {"source", "target", "mapping", "copy_length", "amount"}
+    assert drawn.picked["source"] == drawn.picked["target"] == bpy.data.objects["Sphere"].vertex_groups

@@ -53,10 +53,10 @@ class GuideTool(HairOperator):
         """The rows of the tool's own settings."""
         for name, _default, _details in declared(self.Settings):
             if name not in _COMMON:
-                setting_rows.row(layout, self, name)
+                setting_rows.row(layout, self.properties, name)
 
     def draw_choice(self, layout, surface):
         """The rows that say which guides are changed."""
-        setting_rows.row(layout, self, "selected_only")
+        setting_rows.row(layout, self.properties, "selected_only")
         if surface is not None:
-            setting_rows.search_row(layout, self, "mask", surface, "vertex_groups")
+            setting_rows.search_row(layout, self.properties, "mask", surface, "vertex_groups")

@@ -30,4 +30,4 @@ class VELLUS_OT_change_guide_count(GuideTool, bpy.types.Operator):
 
     def draw_settings(self, layout):
         for name in ("method", "factor" if self.method == "FACTOR" else "guide_count"):
-            setting_rows.row(layout, self, name)
+            setting_rows.row(layout, self.properties, name)

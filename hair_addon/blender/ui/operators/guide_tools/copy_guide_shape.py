@@ -32,6 +32,6 @@ class VELLUS_OT_copy_guide_shape(GuideTool, bpy.types.Operator):
         surface = surface_of(context.object)
         if surface is not None:
             for name in ("source", "target"):
-                setting_rows.search_row(self.layout, self, name, surface, "vertex_groups")
+                setting_rows.search_row(self.layout, self.properties, name, surface, "vertex_groups")
         for name in ("mapping", "copy_length", "amount"):
-            setting_rows.row(self.layout, self, name)
+            setting_rows.row(self.layout, self.properties, name)

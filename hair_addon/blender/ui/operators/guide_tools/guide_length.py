@@ -27,4 +27,4 @@ class VELLUS_OT_guide_length(GuideTool, bpy.types.Operator):
 
     def draw_settings(self, layout):
         for name in ("method", "factor" if self.method == "SCALE" else "length", "shorten"):
-            setting_rows.row(layout, self, name)
+            setting_rows.row(layout, self.properties, name)

@@ -33,4 +33,4 @@ class VELLUS_OT_trim_guides(GuideTool, bpy.types.Operator):
         return guide_tools.trim(guides, settings, depsgraph)
 
     def draw_settings(self, layout):
-        setting_rows.search_row(layout, self, "cutter", bpy.data, "objects")
+        setting_rows.search_row(layout, self.properties, "cutter", bpy.data, "objects")
