@@ -14,6 +14,8 @@ if TYPE_CHECKING:
         edits,
         foreign_curves,
         groom_settings,
+        guide_additions,
+        guide_tools,
         hair_styles,
         hair_systems,
         hand_made_guides,
