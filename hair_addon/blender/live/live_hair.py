@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, masks
-from ..groom import bindings, edited_surfaces, pipeline, staleness, writing
+from ..groom import bindings, edited_surfaces, painted_masks, pipeline, staleness, writing
 from ..render import hair_cache
 from ..settings import style_items
 from . import invalidation, reported
@@ -225,17 +225,33 @@ def _parts_by(state, changed):
 
 
 def follow_masks(surfaces, depsgraph):
-    """Style hair again while masks of its styles are painted; surfaces: mesh objects in a paint mode that changed."""
+    """Style hair again while masks of its styles are painted, or settings of its styles change meanwhile.
+
+    surfaces: mesh objects in a paint mode that changed. Roots wait until the mode is left.
+    """
     for hair in bpy.data.hair_curves:
         state = hair.vellus
-        if state.kind != "HAIR" or not state.is_live or hair.surface not in surfaces or not _has_masks(state):
+        if state.kind != "HAIR" or not state.is_live or hair.surface is None:
+            continue
+        if not _is_painted(hair, surfaces) and not _is_set_while_painting(hair):
             continue
         try:
-            if bindings.of(hair) is not None and pipeline.restyle(hair, depsgraph):
+            if bindings.of(hair) is None:
+                if not staleness.has_other_mask(hair, depsgraph):
+                    make_again(hair, depsgraph)
+            elif pipeline.restyle(hair, depsgraph):
                 _restyled(hair)
                 state.status = ""
         except HairError as error:
             state.status = str(error)
+
+
+def _is_painted(hair, surfaces):
+    return hair.surface in surfaces and _has_masks(hair.vellus)
+
+
+def _is_set_while_painting(hair):
+    return hair.vellus.is_stale and hair.surface.mode in painted_masks.PAINT_MODES and not is_ahead(hair)
 
 
 def _has_masks(state):
