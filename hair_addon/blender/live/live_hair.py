@@ -193,7 +193,7 @@ def follow_mask(guides, depsgraph):
     """Mark hair as stale whose guides' mask has changed; the guides may be unchanged."""
     for hair in curves.followers(guides):
         state = hair.vellus
-        if not state.is_live or state.hair.density_group or hair.surface is None:
+        if not state.is_live or masks.own(state.hair) or hair.surface is None:
             continue
         try:
             if staleness.has_other_mask(hair, depsgraph):
@@ -252,6 +252,28 @@ def _is_painted(hair, surfaces):
 
 def _is_set_while_painting(hair):
     return hair.vellus.is_stale and hair.surface.mode in painted_masks.PAINT_MODES and not is_ahead(hair)
+
+
+def images_of(target):
+    """The names of the images that guides or hair are masked by; hair's guides have their own."""
+    state = target.vellus
+    if state.kind == "GUIDES":
+        return {state.guides.density_image} - {""}
+    groups = (style_items.group_of(item) for item in state.styles)
+    return {state.hair.density_image, *(group.mask_image for group in groups)} - {""}
+
+
+def follow_images(target, depsgraph):
+    """Mark guides or hair as stale whose images may have been painted. Roots wait until Texture Paint is left."""
+    state = target.vellus
+    state.is_stale = True
+    if state.kind != "HAIR" or not state.hair.density_image or target.surface.mode == "TEXTURE_PAINT":
+        return
+    try:
+        if staleness.has_other_mask(target, depsgraph):
+            _mark(target)
+    except HairError as error:
+        state.status = str(error)
 
 
 def _has_masks(state):
