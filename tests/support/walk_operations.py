@@ -129,7 +129,7 @@ class Artist(StyleSteps, RuleBasedStateMachine):
         if names:
             activate(chosen(names, number))
             own = {"trim_guides": {"cutter": chosen(list(bpy.data.objects), other).name}}
-            own |= dict.fromkeys(("guide_length", "change_guide_count"), {"factor": factor})
+            own |= {name: {"factor": factor} for name in ("guide_length", "change_guide_count")}
             operate(getattr(bpy.ops.vellus, tool), **own.get(tool, {}))
 
     @step(number=pick, operator=st.sampled_from(["make_uv_map", "use_uv_map", "check_uvs", "apply_scale"]))
