@@ -29,12 +29,13 @@ STRAND_COUNT = 12_000  # software drivers take their time for each
 
 # Pixels from the upper left corner of a sidebar of the default width that shows the panel Styles alone.
 _ADD_FIRST = (120, 46)  # the button of a hair without styles
-_ADD = (258, 44)  # beside the list
+_ADD = (241, 46)  # beside the list
 
 # The hairline of the sample's head from the side, (y, z) [m], from the forehead to the nape; the face looks to -Y.
 _HAIRLINE = np.array([(-0.17, 0.82), (-0.105, 0.787), (-0.068, 0.74), (-0.03, 0.744), (0.0, 0.69), (0.04, 0.68)])
 
 facts = {"steps": []}
+hidden = []  # panels that the sidebar does not show
 
 
 def picture(name):
@@ -110,8 +111,15 @@ def show_styles_alone():
     classes = sys.modules[f"{MODULE}.hair_addon.blender"].panels.CLASSES
     for panel in reversed(classes):
         is_shown = panel.bl_idname.startswith(("VELLUS_PT_style", "VELLUS_UL"))
-        if not is_shown and panel.is_registered and issubclass(panel, bpy.types.Panel) and panel.bl_category == "Hair":
+        if not is_shown and panel.is_registered and getattr(panel, "bl_category", "") == "Hair":
             bpy.utils.unregister_class(panel)
+            hidden.append(panel)
+
+
+def show_all_panels():
+    """What `show_styles_alone` took away comes back: the add-on unregisters all of its panels at the end."""
+    while hidden:
+        bpy.utils.register_class(hidden.pop())
 
 
 def add_style(offer):
@@ -154,12 +162,12 @@ def bare_head():
     above = positions[:, 2] > np.interp(positions[:, 1], *_HAIRLINE.T)
     scalp.add(np.flatnonzero(above).tolist(), 1.0, "REPLACE")
     fringe = head.vertex_groups.new(name="fringe")
-    is_front = above & (positions[:, 1] < -0.10) & (np.abs(positions[:, 0]) < 0.05)
+    is_front = above & (positions[:, 1] < -0.085) & (np.abs(positions[:, 0]) < 0.075)
     fringe.add(np.flatnonzero(is_front).tolist(), 1.0, "REPLACE")
     area, _region = viewport()
     area.spaces.active.show_region_ui = True
     view = area.spaces.active.region_3d
-    view.view_location, view.view_distance = (0.0, -0.03, 0.70), 0.75
+    view.view_location, view.view_distance = (0.02, -0.03, 0.70), 0.6
     view.view_rotation = Vector((0.55, -1.0, 0.18)).to_track_quat("Z", "Y")
     yield from wait(0.5)
     sidebar().active_panel_category = "Hair"
@@ -189,8 +197,8 @@ def comb():
     before = strands()
     bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 130
     middle = places(points(guides_object())[20::41]).mean(axis=0)
-    for below in (-10, 60, 120):
-        yield from drag(middle + np.array([-150, 30 - below]), middle + np.array([120, 40 - below]))
+    for start, end in (((-60, 60), (160, 40)), ((-60, 0), (170, -20)), ((-90, 60), (-220, 20))):
+        yield from drag(middle + np.array(start), middle + np.array(end))
     yield from wait(1.5)
     facts["combed"] = moved(before)
     with in_viewport():
@@ -365,6 +373,7 @@ def advance(steps):
         facts["is_done"] = True
     except Exception:
         traceback.print_exc()
+    show_all_panels()
     (OUT / "curly_hair.json").write_text(json.dumps(facts, indent=1))
     bpy.ops.wm.quit_blender()
     return None

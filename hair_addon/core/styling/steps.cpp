@@ -44,6 +44,7 @@ vector kept_t[MOST_KEPT];
 
 // Number `lane` of an entry of such an array.
 const auto lane_of = [](const lanes& values, int lane) { return reinterpret_cast<const float*>(&values)[lane]; };
+const auto put_lane = [](lanes& values, int lane, float value) { reinterpret_cast<float*>(&values)[lane] = value; };
 const auto gathered = [&](const vector* from, const marks& index, int ahead) {
   vector found;
   for (int lane = 0; lane < LANES; ++lane) {
@@ -63,9 +64,9 @@ for (int lane = 0; lane < LANES; ++lane) {
   strand[lane] = chosen_rows.shape[0] > 0 ? chosen_rows.data[row] : row;
   const float* from = reinterpret_cast<const float*>(points.data) + size_t(row) * point_count * 3;
   for (int i = 0; i < point_count; ++i) {
-    set_lane(next[i].x, lane, from[3 * i]);
-    set_lane(next[i].y, lane, from[3 * i + 1]);
-    set_lane(next[i].z, lane, from[3 * i + 2]);
+    put_lane(next[i].x, lane, from[3 * i]);
+    put_lane(next[i].y, lane, from[3 * i + 1]);
+    put_lane(next[i].z, lane, from[3 * i + 2]);
   }
   set_lane(normal.x, lane, normals.data[strand[lane]][0]);
   set_lane(normal.y, lane, normals.data[strand[lane]][1]);
