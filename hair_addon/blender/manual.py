@@ -43,6 +43,7 @@ _OPERATORS = {
     "strands": ("interpolate_hair",),
     "styles": (
         *("add_style", "remove_style", "move_style", "duplicate_style", "use_points"),
+        *("paint_style_mask", "mask_from_selection"),
         *("apply_style_preset", "apply_saved_style", "save_style_preset", "remove_style_preset"),
     ),
     "shading": ("apply_preset", "apply_saved_look", "save_look", "remove_look", "toggle_drawing"),

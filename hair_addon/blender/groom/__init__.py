@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         hair_styles,
         hair_systems,
         hand_made_guides,
+        painted_masks,
         pipeline,
         selection,
         staleness,

@@ -118,6 +118,11 @@ class HairSettings(Settings):
         "Vertex group that controls strand density. Leave empty to use the guide mask",
         label="Strand mask",
     )
+    density_image: str = param(
+        "",
+        "Image that controls strand density through the UV map; brighter pixels grow more strands, black grows none. "
+        "Leave empty to use the guide mask",
+    )
     automatic_influence: bool = param(True, "Set the influence distance from the guide spacing around each root")
     influence_distance: float | None = param_from_surface(
         0.03,
