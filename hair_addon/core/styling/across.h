@@ -35,11 +35,17 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
     before_v = to_v;
     const lanes square = w_u * w_u + w_v * w_v, most = 0.9604f * d * d;
     const auto is_far = square > most;
-    const lanes held = is_far ? sqrt_of(most / (is_far ? square : lanes(1.0f))) : lanes(1.0f);
-    w_u *= held;
-    w_v *= held;
-    const lanes advance = sqrt_of(higher_of(d * d - (w_u * w_u + w_v * w_v), lanes(0.0f)));
-    const lanes forward = keep_length == 1.0f ? advance : (1.0f - keep_length) * d + keep_length * advance;
+    if (any_of(is_far)) {
+      const lanes held = is_far ? sqrt_of(most / (is_far ? square : lanes(1.0f))) : lanes(1.0f);
+      w_u *= held;
+      w_v *= held;
+    }
+    lanes forward = sqrt_of(higher_of(d * d - (w_u * w_u + w_v * w_v), lanes(0.0f)));
+    lanes size = d;
+    if (keep_length != 1.0f) {
+      forward = (1.0f - keep_length) * d + keep_length * forward;
+      size = sqrt_of(forward * forward + w_u * w_u + w_v * w_v);
+    }
     const lanes middle = progress + 0.5f * forward;
     progress += forward;
     // The frame at `middle`, between those of the segments around it.
@@ -74,11 +80,11 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
         chosen(is_flat, flat, u_below - forwards * dot(u_below, forwards)), lanes(1.0e-6f), u_below
     );
     const vector made = forwards * forward + sideways * w_u + cross(forwards, sideways) * w_v;
-    const lanes size = sqrt_of(dot(made, made));
     const auto has_length = d > 1.0e-12f;
-    const auto is_made = has_length && size > 1.0e-14f;
-    next[i] = chosen(is_made, made * (1.0f / (is_made ? size : lanes(1.0f))), t[i]);
-    if (keep_length != 1.0f) length[i] = is_made ? size : d;
+    const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));
+    // Unit but for rounding, which a step of Newton's method takes away.
+    next[i] = chosen(has_length, nearly * (1.5f - 0.5f * dot(nearly, nearly)), t[i]);
+    length[i] = has_length ? size : d;
   }
   for (int i = 1; i < point_count; ++i) t[i] = next[i];
 };

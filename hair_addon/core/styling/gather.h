@@ -13,10 +13,10 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
   // The points of the centre around the strand's progress, which are kept while it stays between them.
   ints at = 0;
   lanes row[4];
-  put_rows(rows, at * 4, row);
+  read_rows(rows, at * 4, row);
   vector low = {row[0], row[1], row[2]};
   lanes below = row[3];
-  put_rows(rows, at * 4 + 4, row);
+  read_rows(rows, at * 4 + 4, row);
   vector high = {row[0], row[1], row[2]};
   lanes above = row[3];
   // Roots stay: what the profile asks for at the root is reached over twice the distance to the centre.
@@ -39,7 +39,7 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
       low = chosen(is_past, high, low);
       below = is_past ? above : below;
       at = is_past ? at + 1 : at;
-      put_rows(rows, at * 4 + 4, row);
+      read_rows(rows, at * 4 + 4, row);
       high = {row[0], row[1], row[2]};
       above = row[3];
     }
