@@ -8,6 +8,7 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         cost,
+        flow_lines,
         following,
         groom,
         groom_defaults,
