@@ -128,8 +128,6 @@ def add_style(offer):
     panel = sidebar()
     x, y = _ADD if len(state.styles) else _ADD_FIRST
     yield from click(panel.x + x, panel.y + panel.height - y)
-    if offer == "CLUMP":
-        picture("menu")
     count = len(state.styles)
     for _entry in range(1 + list(offers()).index(offer)):
         yield from key("DOWN_ARROW")
