@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .api_guide_tools import change_guides
 from .api_styles import (
     Bend,
     Braid,
@@ -89,6 +90,7 @@ __all__ = [
     "apply_settings",
     "apply_style_preset",
     "bake_tables",
+    "change_guides",
     "distribute_guides",
     "draw",
     "interpolate_hair",

@@ -12,7 +12,7 @@ import bpy
 from .groom import hair_systems
 from .settings import preferences, properties, style_items
 from .ui import operators
-from .ui.operators import styles
+from .ui.operators import guide_tools, styles
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
 _CLASSES = {
@@ -36,9 +36,14 @@ _OPERATORS = {
         *("check_uvs", "use_uv_map", "make_uv_map", "attach_to_surface", "apply_scale", "restore_guides"),
     ),
     "guides": ("distribute_guides",),
+    "guide_tools": (
+        *("guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"),
+        *("smooth_guides", "lift_guides", "attract_guides"),
+    ),
     "strands": ("interpolate_hair",),
     "styles": (
         *("add_style", "remove_style", "move_style", "duplicate_style", "use_points"),
+        *("paint_style_mask", "mask_from_selection"),
         *("apply_style_preset", "apply_saved_style", "save_style_preset", "remove_style_preset"),
     ),
     "shading": ("apply_preset", "apply_saved_look", "save_look", "remove_look", "toggle_drawing"),
@@ -81,7 +86,8 @@ def _properties():
 
 def _operators():
     """Of an operator's properties too, which Blender looks up by their operator."""
-    labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in (*operators.CLASSES, *styles.CLASSES)}
+    every = (*operators.CLASSES, *guide_tools.CLASSES, *styles.CLASSES)
+    labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in every}
     for page, names in _OPERATORS.items():
         for name in names:
             yield f"bpy.ops.vellus.{name}", page, labels[name]

@@ -13,7 +13,7 @@ from fractions import Fraction
 import bpy
 import numpy as np
 
-from hair_addon import api
+from hair_addon import api, api_guide_tools
 from hair_addon.blender.live import live_hair
 from hair_addon.core.files import settings_file
 from hair_addon.core.imaging.pixel_sampling import DRAWING_FIELDS, FRAME_FIELDS, PictureSettings
@@ -67,6 +67,7 @@ COSTLY = {
     "height": 24,
     "samples_per_side": 2,
     "sample_count": 2,
+    "factor": 1.5,
 }
 
 
@@ -129,6 +130,12 @@ def add_style(dice):
     return api.add_style(target(dice, "HAIR"), anything(dice, kind), **details, **changed)
 
 
+def change_guides(dice):
+    tool = dice.choice([*api_guide_tools.TOOLS])
+    changed = changes(dice, api_guide_tools.TOOLS[tool], ())
+    return api.change_guides(target(dice, "GUIDES"), anything(dice, tool), **changed)
+
+
 def anything(dice, *often):
     return dice.choice(OTHERS + NUMBERS) if dice.random() < 0.15 else dice.choice(often)
 
@@ -140,6 +147,7 @@ CALLS = {
     "arrays": lambda d: api.distribute_guides(
         (anything(d, np.eye(3)), anything(d, [[0, 1, 2]])), **changes(d, api.GuideSettings, COSTLY)
     ),
+    "change_guides": change_guides,
     "points": lambda d: api.points(target(d, d.choice(["GUIDES", "HAIR"]))),
     "shade": lambda d: api.shade(
         target(d, "HAIR"),

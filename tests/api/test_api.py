@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import warp
 
-from hair_addon import api, api_styles, api_tables
+from hair_addon import api, api_guide_tools, api_styles, api_tables
 from tests.support.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
@@ -23,7 +23,7 @@ WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'):
 
 def examples():
     """The doctests of the functions, in the order of the files; the module's own is the first."""
-    return [*examples_of(api), *examples_of(api_styles), *examples_of(api_tables)]
+    return [test for module in (api, api_guide_tools, api_styles, api_tables) for test in examples_of(module)]
 
 
 def examples_of(module):
@@ -100,6 +100,11 @@ def test_examples_of_the_readme_run(tmp_path):
         (lambda: api.shade(bpy.data.objects["Hair"], melanin=3), "Melanin must be between"),
         (lambda: api.shade(bpy.data.objects["Guides"]), "is not Vellus hair"),
         (lambda: api.points(bpy.data.objects["Sphere"]), "is not Vellus guides or hair"),
+        (lambda: api.change_guides(bpy.data.objects["Guides"], "SHAVE"), "Unknown guide tool"),
+        (lambda: api.change_guides(bpy.data.objects["Guides"], "LENGTH", factor=0), "Factor must be positive"),
+        (lambda: api.change_guides(bpy.data.objects["Guides"], "LIFT", api.Clump()), "settings must be"),
+        (lambda: api.change_guides(bpy.data.objects["Hair"], "LIFT"), "is not Vellus guides"),
+        (lambda: api.change_guides(bpy.data.objects["Guides"], "TRIM"), "Pick the object that cuts"),
         (lambda: api.draw(width=0), "Width must be"),
         (lambda: api.draw(), "no camera"),
         (lambda: api.draw(height=16385), "exceed 16384 a side"),

@@ -118,3 +118,16 @@ def draw_all(panels):
     """Counter of all that some panels draw together."""
     layouts = [draw(panel) for panel in panels]
     return sum((layout.drawn for layout in layouts if layout is not None), Counter())
+
+
+def redo_panel(name, **values):
+    """The `Layout` of an operator's redo panel while its properties have some values, the others their defaults."""
+    operator = getattr(bpy.types, f"VELLUS_OT_{name}")
+    rna = getattr(bpy.ops.vellus, name).get_rna_type()
+    values = {key: entry.default for key, entry in rna.properties.items() if hasattr(entry, "default")} | values
+    # An operator's own RNA has none of its settings: `properties` has them.
+    own = {"bl_rna": operator.bl_rna, "properties": SimpleNamespace(bl_rna=rna, **values), "layout": Layout()}
+    bases = tuple(base for base in operator.__bases__ if base is not bpy.types.Operator)
+    shown = type("Shown", bases, {**vars(operator), **own, **values})()
+    shown.draw(Context())
+    return shown.layout

@@ -11,6 +11,7 @@ import pytest
 import hair_addon
 import tests.support.examples  # noqa: F401 (for what it sets)
 from hair_addon.blender.data import curves
+from tests.support.guide_tools import wave
 from tests.support.imported import curves_object, lines_on
 from tests.support.reading import vertex_positions
 
@@ -144,3 +145,14 @@ def imported(head, rng):
     made.data.materials.append(bpy.data.materials.new("Artist's"))
     bpy.context.view_layer.update()
     return made
+
+
+@pytest.fixture
+def waved(hair):
+    """Hair whose guides were combed to waves, and a mesh that cuts every guide."""
+    wave(bpy.data.objects["Guides"])
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=1.2)
+    bpy.context.object.name = "Cutter"
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    bpy.ops.ed.undo_push(message="combed")
+    return bpy.data.objects["Hair"]

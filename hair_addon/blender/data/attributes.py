@@ -4,7 +4,7 @@
 import numpy as np
 
 # Data types that can be read as arrays: (name of the value property, components, dtype).
-_LAYOUTS = {
+LAYOUTS = {
     "FLOAT": ("value", 1, np.float32),
     "INT": ("value", 1, np.int32),
     "INT8": ("value", 1, np.int8),
@@ -28,7 +28,7 @@ def write(curves, name, data_type, domain, values):
     if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, domain):
         curves.attributes.remove(attribute)
         attribute = None
-    value_name, _width, scalar = _LAYOUTS[data_type]
+    value_name, _width, scalar = LAYOUTS[data_type]
     values = np.ascontiguousarray(values, scalar).ravel()
     if attribute is None:
         attribute = curves.attributes.new(name, data_type, domain)
@@ -59,7 +59,7 @@ def read(curves, name, data_type, domain):
     attribute = curves.attributes.get(name)
     if attribute is None or (attribute.data_type, attribute.domain) != (data_type, domain):
         return None
-    value_name, width, scalar = _LAYOUTS[data_type]
+    value_name, width, scalar = LAYOUTS[data_type]
     values = np.empty((len(attribute.data), width), scalar)
     attribute.data.foreach_get(value_name, values.ravel())
     return values[:, 0] if width == 1 else values
@@ -79,7 +79,7 @@ def are_smooth(curves):
 def reorder_points(curves, order):
     """Reorder all point attributes: point i gets the value of point order[i]; order: (N,) indices."""
     for attribute in curves.attributes:
-        layout = _LAYOUTS.get(attribute.data_type)
+        layout = LAYOUTS.get(attribute.data_type)
         if attribute.domain != "POINT" or layout is None:
             continue
         name, width, kind = layout

@@ -8,6 +8,8 @@ as a finer subdivision for renders, by the nearest point of the surface at rest.
 
 import bpy
 
+from ..host.notices import name_of
+
 _NAME = "Vellus Follow Surface"
 _VERSION = 2  # of the nodes below: groups of other versions, from older files, are not changed
 # Of the group: identifiers, which stay when an artist renames inputs, and types.
@@ -39,6 +41,12 @@ def set_surface(curves_object, surface_object, vertex_count, is_combed):
                 socket = getattr(modifier.properties.inputs, _INPUTS[name][0])
                 if socket.value != inputs[name]:
                     socket.value = inputs[name]
+
+
+def modifiers_of_artist(curves_object):
+    """Names of an object's modifiers that renders show, but for the one that deforms strands with their surface."""
+    shown = [modifier for modifier in curves_object.modifiers if modifier.show_render]
+    return [name_of(m) for m in shown if m.type != "NODES" or (m.node_group is not None and not _is_ours(m.node_group))]
 
 
 def _is_ours(group):

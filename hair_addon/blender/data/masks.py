@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Masks of guides and strands: a vertex group and an image. Strands use the mask of their guides, or a group of their
+"""Masks of guides and strands: a vertex group and an image. Strands use the mask of their guides, or one of their
 own.
 """
 
@@ -16,21 +16,23 @@ class Mask:
     group: str = ""
     image: str = ""
 
+    def __bool__(self):
+        return bool(self.group or self.image)
+
     def read(self, surface_object, surface, depsgraph):
         """Weights (V,) and `Texture` on the `Surface` of a mesh object, each None without a name."""
         weights = scene.read_vertex_group(surface_object, depsgraph, self.group)
         return weights, scene.read_texture(surface, self.image)
 
 
-def of_guides(settings):
-    """The `Mask` of guides; settings: `GuideSettings`, or properties of the same names."""
+def own(settings):
+    """The `Mask` that settings name: `GuideSettings`, `HairSettings`, or properties of the same names."""
     return Mask(_name(settings, "density_group"), _name(settings, "density_image"))
 
 
 def of_strands(settings, guide_settings):
     """The `Mask` of strands between guides; settings: `HairSettings`, or properties, and those of the guides."""
-    group = _name(settings, "density_group")
-    return Mask(group) if group else of_guides(guide_settings)
+    return own(settings) or own(guide_settings)
 
 
 def _name(settings, attribute):
@@ -44,7 +46,7 @@ def of_curves(target):
     """The `Mask` of a guide or hair Curves datablock."""
     state = target.vellus
     if state.kind == "GUIDES":
-        return of_guides(state.guides)
+        return own(state.guides)
     if state.guide_curves is None:
-        return Mask(_name(state.hair, "density_group"))
+        return own(state.hair)
     return of_strands(state.hair, state.guide_curves.vellus.guides)

@@ -5,6 +5,7 @@ import hashlib
 from dataclasses import dataclass
 from functools import cached_property
 
+import bmesh
 import bpy
 import numpy as np
 
@@ -252,20 +253,27 @@ def read_vertex_group(surface_object, depsgraph, name):
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        weights = np.zeros(len(mesh.vertices), np.float32)
-        # Blender offers no array access to vertex groups.
-        for vertex, entry in enumerate(mesh.vertices):
-            for element in entry.groups:
-                if element.group == group.index:
-                    weights[vertex] = element.weight
+        return _weights_in_group(mesh, group.index)
     finally:
         evaluated.to_mesh_clear()
-    return weights
 
 
-def read_texture(surface, name):
+def _weights_in_group(mesh, index):
+    """(V,) float32. Blender offers no array access to vertex groups; by BMesh it takes a quarter of the time."""
+    edited = bmesh.new()
+    try:
+        edited.from_mesh(mesh, face_normals=False, vertex_normals=False)
+        layer = edited.verts.layers.deform.active
+        if layer is None:  # no vertex has a weight
+            return np.zeros(len(edited.verts), np.float32)
+        return np.fromiter((vertex[layer].get(index, 0.0) for vertex in edited.verts), np.float32, len(edited.verts))
+    finally:
+        edited.free()
+
+
+def read_texture(surface, name, may_be_black=False):
     """The `Texture` of an image on a `Surface`, the mean of its colours, or None for the empty name."""
-    values = read_image(name)
+    values = read_image(name, may_be_black)
     if values is None:
         return None
     if surface.corner_uvs is None:
@@ -274,7 +282,7 @@ def read_texture(surface, name):
     return Texture(values, surface.corner_uvs)
 
 
-def read_image(name):
+def read_image(name, may_be_black=False):
     """(height, width) float32, at least zero, the mean of an image's colours; None for the empty name."""
     if not name:
         return None
@@ -287,7 +295,9 @@ def read_image(name):
     pixels = np.empty(width * height * image.channels, np.float32)
     image.pixels.foreach_get(pixels)
     values = pixels.reshape(height, width, image.channels)[:, :, :3].mean(axis=2)
-    if not (np.isfinite(values).all() and np.any(values > 0.0)):
+    if not np.isfinite(values).all():
+        raise HairError('The image "{name}" has non-finite pixels: paint over them, or pick another image.', name=name)
+    if not (may_be_black or np.any(values > 0.0)):
         raise HairError('The image "{name}" is black: paint white where hair should grow.', name=name)
     return np.maximum(values, 0.0)
 

@@ -53,11 +53,12 @@ def _z_axis(matrix, name):
 
 def _mask(surface_object, surface, guide_curves, key, depsgraph):
     name, image, is_inverted = key
-    texture = scene.read_texture(surface, image) if image else None
+    texture = scene.read_texture(surface, image, may_be_black=True)
     if not name:
         return Mask(None, texture, None, is_inverted)
     if surface_object.vertex_groups.get(name) is not None:
         weights = scene.read_vertex_group(surface_object, depsgraph, name)
+        _require_same(len(weights) == len(surface.rest), surface_object)
         return Mask(weights[surface.mesh.triangles], texture, None, is_inverted)
     corners = _read_surface_attribute(surface_object, surface, name, depsgraph)
     guides = None if corners is not None or guide_curves is None else _read_guide_attribute(guide_curves, name)
@@ -75,6 +76,7 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
         attribute = mesh.attributes.get(name)
         if attribute is None:
             return None
+        _require_same(len(mesh.vertices) == len(surface.rest), surface_object)
         values = _numbers(attribute, surface_object.name)
         if attribute.domain == "POINT":
             return values[surface.mesh.triangles]
@@ -82,11 +84,19 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
         kind, shape = ("loops", 3) if attribute.domain == "CORNER" else ("polygon_index", 1)
         places = np.empty((len(mesh.loop_triangles), shape), np.int32)
         mesh.loop_triangles.foreach_get(kind, places.ravel())
+        _require_same(len(places) == len(surface.mesh.triangles), surface_object)
     finally:
         evaluated.to_mesh_clear()
     if surface.is_mirrored and shape == 3:
         places = places[:, [0, 2, 1]]
     return np.broadcast_to(values[places], (len(places), 3)).copy()
+
+
+def _require_same(is_same, surface_object):
+    """Raise `HairError` unless a mesh has as many vertices and faces as its `Surface`, which was read before."""
+    if not is_same:
+        sentence = 'The mesh of "{name}" has changed: the hair updates when you leave its paint mode.'
+        raise HairError(sentence, name=surface_object.name)
 
 
 def _numbers(attribute, owner):

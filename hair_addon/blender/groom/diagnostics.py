@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Curves, Object
 
+from ..data import follow_nodes
 from ..data.curves import followers
 from ..settings.translations import interface_text
 
@@ -38,6 +39,19 @@ def parting_warnings(hair: Curves) -> list[Warning]:
         text = 'No vertex group "{name}": pick another for regions.'
         found.append(Warning(interface_text(text, name=group.region_group)))
     return found
+
+
+def modifier_notes(hair_object: Object | None) -> list[str]:
+    """Translated sentences about modifiers of a hair object, or None, that Vellus does not draw in viewports."""
+    if hair_object is None or not hair_object.data.vellus.is_drawn:
+        return []
+    found = follow_nodes.modifiers_of_artist(hair_object)
+    if not found:
+        return []
+    if len(found) == 1:
+        return [interface_text("1 modifier shows in renders only: {name}", name=found[0])]
+    sentence = "{count} modifiers show in renders only: {names}"
+    return [interface_text(sentence, count=len(found), names=", ".join(found))]
 
 
 def _of_library(surface, parts):

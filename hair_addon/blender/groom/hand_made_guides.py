@@ -20,7 +20,7 @@ from ...core.geometry.mesh import TriMesh, positions
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.rooted_curves import RootedCurves, reversal
 from ...core.long_work import Work, part_of, run_now
-from ..data import attributes, curves, curves_objects, follow_nodes, posed_strands, scene
+from ..data import attributes, curves, curves_objects, follow_nodes, masks, posed_strands, scene
 from ..host.datablocks import Remembered
 from ..settings import preferences
 from . import foreign_curves, pipeline, staleness
@@ -115,7 +115,7 @@ def using_as_guides(
     """`use_as_guides` as work in steps.
 
     every: keep every n-th curve; applies_modifiers: take curves as modifiers leave them, not as they are stored;
-    hair_settings: of hair that is grown between them, None for no hair; where they name no density group and the curves
+    hair_settings: of hair that is grown between them, None for no hair; where they name no mask and the curves
     are not all over the surface, it becomes a new one that is painted where curves are. Raises `HairError` before
     anything changes.
     """
@@ -126,7 +126,7 @@ def using_as_guides(
     if len(seen.starts) < 2:
         raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=curves_object.name)
     to_surface = np.linalg.inv(np.array(surface_object.matrix_world)) @ np.array(curves_object.matrix_world)
-    is_unmasked = hair_settings is not None and not hair_settings.density_group
+    is_unmasked = hair_settings is not None and not masks.own(hair_settings)
     grow = None if hair_settings is None else pipeline.hair_between(surface_object, surface, hair_settings, depsgraph)
     place, its_surface, device = Remembered(curves_object), Remembered(surface_object), preferences.device()
 

@@ -48,7 +48,7 @@ def distributing_guides(
 ) -> Work[Curves]:
     """`distribute_guides` as work in steps (core/long_work.py)."""
     surface = _read_surface(surface_object, depsgraph)
-    density, texture = masks.of_guides(settings).read(surface_object, surface, depsgraph)
+    density, texture = masks.own(settings).read(surface_object, surface, depsgraph)
     settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture)
     key = staleness.root_key(settings, density, None if texture is None else texture.values)
     roots = _kept_roots(target, surface, key, settings.guide_count) if keeps_roots else None
@@ -149,7 +149,7 @@ def complete(
 
 def _completed(surface_object, surface, guide_settings, hair_settings, depsgraph):
     """((`GuideSettings`, `HairSettings`), their masks): weights (V,) and `Texture` of guides, and of strands."""
-    guide_mask, hair_mask = masks.of_guides(guide_settings), masks.of_strands(hair_settings, guide_settings)
+    guide_mask, hair_mask = masks.own(guide_settings), masks.of_strands(hair_settings, guide_settings)
     of_guides = guide_mask.read(surface_object, surface, depsgraph)
     of_hair = of_guides if hair_mask == guide_mask else hair_mask.read(surface_object, surface, depsgraph)
     mesh, count = surface.posed_mesh, guide_settings.guide_count
@@ -205,15 +205,15 @@ def hair_between(
 
     density: (V,) where strands grow, None for the vertex group that settings name.
     """
-    painted = scene.read_vertex_group(surface_object, depsgraph, settings.density_group)
+    painted, texture = masks.own(settings).read(surface_object, surface, depsgraph)
     parting = partings.read(surface_object, surface, None, settings, depsgraph)
     device = preferences.device()
 
     def compute(guides, progress, density=None):
         density = painted if density is None else density
-        completed = groom_defaults.complete(settings, surface.posed_mesh, density, guide_count=len(guides))
-        key = staleness.root_key(completed, density)
-        ground = _ground(surface, (density, None), parting, device)
+        completed = groom_defaults.complete(settings, surface.posed_mesh, density, texture, len(guides))
+        key = staleness.root_key(completed, density, None if texture is None else texture.values)
+        ground = _ground(surface, (density, texture), parting, device)
         binding = _bind(surface, guides, completed, ground, None, progress)
         styles = _unstyled(binding, guides, completed, surface, ground)
         return _growing(BoundHair(binding, completed, key, parting.key, guides, None, surface, styles), progress)

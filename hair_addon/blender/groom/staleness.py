@@ -19,7 +19,10 @@ def root_key(settings: Settings, density: np.ndarray | None, image: np.ndarray |
         *("seed", "guide_count", "relax_iterations", "density_image", "curvature", "symmetric"),
         "strand_count",
     )
-    placing = repr([getattr(settings, name, None) for name in names])
+    values = {name: getattr(settings, name, None) for name in names}
+    if isinstance(settings, groom.HairSettings):  # as in files from before strands had an image
+        values["density_image"] = settings.density_image or None
+    placing = repr(list(values.values()))
     painted = b"".join(values.tobytes() for values in (density, image) if values is not None)
     return hashlib.blake2b(placing.encode() + painted, digest_size=16).hexdigest()
 

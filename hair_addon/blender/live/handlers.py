@@ -48,7 +48,8 @@ def after_depsgraph_update(_scene, depsgraph):
                 datablock.vellus.is_stale = True
     if any(isinstance(update.id, bpy.types.Image | bpy.types.World) for update in depsgraph.updates):
         invalidation.image_changed()
-    _mark_painted({update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Image)})
+    painted = {update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Image)}
+    _mark_painted(painted, depsgraph)
     combed = []
     for datablock in changed:
         if isinstance(datablock, bpy.types.Curves):
@@ -89,19 +90,19 @@ def _deformed(depsgraph):
     return {o for o in updated if isinstance(o, bpy.types.Object) and o.type == "MESH"}
 
 
-def _mark_painted(images):
-    """Mark guides as stale whose image was painted: if it did not change, they keep their roots."""
+def _mark_painted(images, depsgraph):
+    """Mark guides and hair as stale whose images were painted: if these did not change, roots stay."""
     names = {name_of(image) for image in images}
     painting = set()
-    for guides in _of_kind("GUIDES"):
-        state, surface = guides.vellus, guides.surface
-        if surface is None or not (state.is_live and state.guides.density_image):
+    for datablock in bpy.data.hair_curves:
+        surface, used = datablock.surface, live_hair.images_of(datablock)
+        if surface is None or not (datablock.vellus.is_live and used):
             continue
         uid = surface.session_uid
         if surface.mode == "TEXTURE_PAINT":
             painting.add(uid)
-        if state.guides.density_image in names or (reported.painting_cache.get(uid) and uid not in painting):
-            state.is_stale = True
+        if used & names or (reported.painting_cache.get(uid) and uid not in painting):
+            live_hair.follow_images(datablock, depsgraph)
     reported.painting_cache.clear()
     for uid in painting:
         reported.painting_cache.keep(uid, True)

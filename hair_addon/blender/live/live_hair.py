@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, masks
-from ..groom import bindings, edited_surfaces, pipeline, staleness, writing
+from ..groom import bindings, edited_surfaces, painted_masks, pipeline, staleness, writing
 from ..render import hair_cache
 from ..settings import style_items
 from . import invalidation, reported
@@ -193,7 +193,7 @@ def follow_mask(guides, depsgraph):
     """Mark hair as stale whose guides' mask has changed; the guides may be unchanged."""
     for hair in curves.followers(guides):
         state = hair.vellus
-        if not state.is_live or state.hair.density_group or hair.surface is None:
+        if not state.is_live or masks.own(state.hair) or hair.surface is None:
             continue
         try:
             if staleness.has_other_mask(hair, depsgraph):
@@ -225,17 +225,55 @@ def _parts_by(state, changed):
 
 
 def follow_masks(surfaces, depsgraph):
-    """Style hair again while masks of its styles are painted; surfaces: mesh objects in a paint mode that changed."""
+    """Style hair again while masks of its styles are painted, or settings of its styles change meanwhile.
+
+    surfaces: mesh objects in a paint mode that changed. Roots wait until the mode is left.
+    """
     for hair in bpy.data.hair_curves:
         state = hair.vellus
-        if state.kind != "HAIR" or not state.is_live or hair.surface not in surfaces or not _has_masks(state):
+        if state.kind != "HAIR" or not state.is_live or hair.surface is None:
+            continue
+        if not _is_painted(hair, surfaces) and not _is_set_while_painting(hair):
             continue
         try:
-            if bindings.of(hair) is not None and pipeline.restyle(hair, depsgraph):
+            if bindings.of(hair) is None:
+                if not staleness.has_other_mask(hair, depsgraph):
+                    make_again(hair, depsgraph)
+            elif pipeline.restyle(hair, depsgraph):
                 _restyled(hair)
                 state.status = ""
         except HairError as error:
             state.status = str(error)
+
+
+def _is_painted(hair, surfaces):
+    return hair.surface in surfaces and _has_masks(hair.vellus)
+
+
+def _is_set_while_painting(hair):
+    return hair.vellus.is_stale and hair.surface.mode in painted_masks.PAINT_MODES and not is_ahead(hair)
+
+
+def images_of(target):
+    """The names of the images that guides or hair are masked by; hair's guides have their own."""
+    state = target.vellus
+    if state.kind == "GUIDES":
+        return {state.guides.density_image} - {""}
+    groups = (style_items.group_of(item) for item in state.styles)
+    return {state.hair.density_image, *(group.mask_image for group in groups)} - {""}
+
+
+def follow_images(target, depsgraph):
+    """Mark guides or hair as stale whose images may have been painted. Roots wait until Texture Paint is left."""
+    state = target.vellus
+    state.is_stale = True
+    if state.kind != "HAIR" or not state.hair.density_image or target.surface.mode == "TEXTURE_PAINT":
+        return
+    try:
+        if staleness.has_other_mask(target, depsgraph):
+            _mark(target)
+    except HairError as error:
+        state.status = str(error)
 
 
 def _has_masks(state):

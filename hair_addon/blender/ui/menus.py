@@ -7,6 +7,43 @@ from ..groom.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of
 from ..settings.translations import CONTEXT
 
+# In groups: length and shape, then number and place.
+_GUIDE_TOOLS = (
+    (
+        ("guide_length", "DRIVER_DISTANCE"),
+        ("trim_guides", "MOD_BOOLEAN"),
+        ("smooth_guides", "MOD_SMOOTH"),
+        ("lift_guides", "SORT_DESC"),
+        ("attract_guides", "SNAP_ON"),
+    ),
+    (
+        ("change_guide_count", "PARTICLES"),
+        ("mirror_guides", "MOD_MIRROR"),
+        ("copy_guide_shape", "COPYDOWN"),
+    ),
+)
+
+
+def draw_guide_tools(layout):
+    """A button or menu entry for each tool that changes combed guides."""
+    layout.operator_context = "INVOKE_DEFAULT"
+    for place, tools in enumerate(_GUIDE_TOOLS):
+        if place:
+            layout.separator()
+        for name, icon in tools:
+            layout.operator(f"vellus.{name}", icon=icon)
+
+
+class VELLUS_MT_guide_tools(bpy.types.Menu):
+    """Tools that change guides and keep their combing"""
+
+    bl_label = "Guide Tools"
+    bl_idname = "VELLUS_MT_guide_tools"
+    bl_translation_context = CONTEXT
+
+    def draw(self, context):
+        draw_guide_tools(self.layout)
+
 
 class VELLUS_MT_hair(bpy.types.Menu):
     """Operations on hair"""
@@ -26,6 +63,7 @@ class VELLUS_MT_hair(bpy.types.Menu):
             layout.separator()
             layout.operator("vellus.comb_guides")
             layout.operator("vellus.select_guides")
+            layout.menu("VELLUS_MT_guide_tools")
         if hair_of(context.object) is not None:
             layout.operator("vellus.select_hair")
             layout.operator("vellus.toggle_drawing")
@@ -54,9 +92,20 @@ def _in_object_menu(menu, context):
         menu.layout.menu("VELLUS_MT_hair", icon="OUTLINER_OB_CURVES")
 
 
-_ENTRIES = (("VIEW3D_MT_curve_add", _in_add_menu), ("VIEW3D_MT_object", _in_object_menu))
+def _in_curves_menu(menu, context):
+    if guides_of(context.object) is not None:
+        menu.layout.separator()
+        menu.layout.menu("VELLUS_MT_guide_tools", icon="OUTLINER_OB_CURVES")
 
-CLASSES = (VELLUS_MT_hair,)
+
+_ENTRIES = (
+    ("VIEW3D_MT_curve_add", _in_add_menu),
+    ("VIEW3D_MT_object", _in_object_menu),
+    ("VIEW3D_MT_sculpt_curves", _in_curves_menu),
+    ("VIEW3D_MT_edit_curves", _in_curves_menu),
+)
+
+CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair)
 
 
 def register():

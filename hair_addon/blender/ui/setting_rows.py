@@ -18,7 +18,7 @@ WIDE = ("neighbour_limit", "mode")
 
 _GROWTH = ("length_variation", "tilt", "gravity")
 _PLACEMENT = ("seed", "relax_iterations", "curvature", "symmetric")
-_GUIDE_MASKS = ("density_group", "density_image")
+_MASKS = ("density_group", "density_image")
 _PARTING_LIMITS = ("angle_limit", "length_limit")
 _PARTING_REGIONS = ("region_group", "region_attribute", "part_lines")
 _INFLUENCE = ("automatic_influence", "influence_distance")
@@ -76,9 +76,8 @@ def others(settings_class, *shown):
 
 def guide_rows(layout, owner, surface):
     """Number, length and masks of guides; owner: has properties of `GuideSettings`; surface: object or None."""
-    rows(layout, owner, GuideSettings, others(GuideSettings, _GROWTH, _PLACEMENT, _GUIDE_MASKS))
-    _mask_row(layout, owner, "density_group", surface)
-    search_row(layout, owner, "density_image", bpy.data, "images")
+    rows(layout, owner, GuideSettings, others(GuideSettings, _GROWTH, _PLACEMENT, _MASKS))
+    _density_rows(layout, owner, surface)
 
 
 def growth_rows(layout, owner):
@@ -93,10 +92,10 @@ def placement_rows(layout, owner):
 
 def strand_rows(layout, owner, surface, skip=()):
     """Number, thickness and mask of strands; owner: has the properties of `HairSettings` but for those of `skip`."""
-    apart = (_PARTING_LIMITS, _PARTING_REGIONS, _BLENDING, ("density_group",), _INFLUENCE, skip)
+    apart = (_PARTING_LIMITS, _PARTING_REGIONS, _BLENDING, _MASKS, _INFLUENCE, skip)
     rows(layout, owner, HairSettings, others(HairSettings, *apart))
     if "density_group" not in skip:
-        _mask_row(layout, owner, "density_group", surface)
+        _density_rows(layout, owner, surface)
 
 
 def parting_rows(layout, owner, surface):
@@ -124,6 +123,11 @@ def blending_rows(layout, owner, skip=()):
 def _mask_row(layout, owner, name, surface):
     if surface is not None:
         search_row(layout, owner, name, surface, "vertex_groups")
+
+
+def _density_rows(layout, owner, surface):
+    _mask_row(layout, owner, "density_group", surface)
+    search_row(layout, owner, "density_image", bpy.data, "images")
 
 
 def style_rows(layout, item):

@@ -6,6 +6,25 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import cost, following, groom, groom_defaults, guide_growth, hair_styles, rooted_curves
+    from . import (
+        cost,
+        flow_lines,
+        following,
+        groom,
+        groom_defaults,
+        guide_attraction,
+        guide_copies,
+        guide_count,
+        guide_growth,
+        guide_lengths,
+        guide_lift,
+        guide_mirror,
+        guide_segments,
+        guide_smoothing,
+        guide_tool_settings,
+        guide_trim,
+        hair_styles,
+        rooted_curves,
+    )
 else:
     __getattr__ = submodules(__name__)

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .. import geometry, grooming, interpolation, placement, styling
-from ..errors import HairError
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, check_points, positions
 from ..geometry.strands import Strands
 from ..geometry.texture import Texture
@@ -98,6 +97,17 @@ class GuideSettings(Settings):
     gravity: float | None = param_from_surface(
         0.75, "Bend the guides toward the ground; higher values bend them more", low=0.0, high=1.0, subtype="FACTOR"
     )
+    flow_lines: str = param(
+        "", "Curve object on the surface; guides near its curves begin in their direction, from start to end"
+    )
+    lift: float = param(
+        math.radians(30.0),
+        "Angle between the surface and guides near flow lines; at 0 they lie flat",
+        low=0.0,
+        high=math.radians(90.0),
+        unit="ROTATION",
+        subtype="ANGLE",
+    )
 
 
 @dataclass(frozen=True)
@@ -117,6 +127,11 @@ class HairSettings(Settings):
         "",
         "Vertex group that controls strand density. Leave empty to use the guide mask",
         label="Strand mask",
+    )
+    density_image: str = param(
+        "",
+        "Image that controls strand density through the UV map; brighter pixels grow more strands, black grows none. "
+        "Leave empty to use the guide mask",
     )
     automatic_influence: bool = param(True, "Set the influence distance from the guide spacing around each root")
     influence_distance: float | None = param_from_surface(
@@ -211,6 +226,8 @@ def distribute_guides(
     mirror_normal: ArrayLike = (1.0, 0.0, 0.0),
     shape: TriMesh | None = None,
     roots: SurfacePoints | None = None,
+    flow: np.ndarray | None = None,
+    drawn_on: np.ndarray | None = None,
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> Strands:
@@ -221,7 +238,8 @@ def distribute_guides(
     mirror_normal: of the plane through the origin that symmetric guides mirror; shape: `TriMesh` that was turned and
     scaled evenly to be `mesh`, its mirror across the X axis: guides are placed on it, and so in the same places however
     it was turned and scaled; None where there is none; roots: `SurfacePoints` that guides have already, None to place
-    them; progress(step, part): told how far the work is, and may raise to stop it.
+    them; flow: (L, 2, 3) segments [m] of flow lines and drawn_on (V, 3), as lines and drawn_on of `bind_hair`;
+    progress(step, part): told how far the work is, and may raise to stop it.
     """
     check_mesh(mesh)
     load_kernels(device, part_of(progress, 0.0, 0.1))
@@ -249,29 +267,19 @@ def distribute_guides(
     controls = grooming.guide_growth.grow(
         mesh,
         roots,
-        length=_known(settings.length),
+        length=groom_defaults.known(settings.length),
         length_variation=settings.length_variation,
         tilt=settings.tilt,
-        gravity=_known(settings.gravity),
+        gravity=groom_defaults.known(settings.gravity),
+        flow=None if flow is None else grooming.flow_lines.lay(mesh, flow, device, drawn_on),
+        lift=settings.lift,
         seed=settings.seed,
         control_point_count=CONTROL_POINT_COUNT,
         device=device,
     )
     if mirror is not None:
-        controls = _symmetric(controls, positions(mesh, roots), mirror)
+        controls = grooming.guide_growth.mirrored(controls, positions(mesh, roots), mirror)
     return Strands(geometry.bspline.evaluate(controls, POINT_COUNT, device), roots)
-
-
-def _symmetric(controls, places, mirror):
-    """Controls (G, n, 3) of which the second half are grown as images of the first, where their roots (G, 3) are."""
-    count = len(places) // 2
-    images = mirror.image(places[:count])
-    reach = 5e-3 * np.ptp(places, axis=0).max()
-    is_image = np.linalg.norm(images - places[len(places) - count :], axis=1) <= reach
-    arms = controls[:count] - controls[:count, :1]
-    mirrored = mirror.image(arms.reshape(-1, 3)).reshape(arms.shape) + places[len(places) - count :, None]
-    controls[len(places) - count :][is_image] = mirrored[is_image]
-    return controls
 
 
 def bind_hair(
@@ -383,12 +391,5 @@ def _load_kernels(device, modules, progress, most_threads=kernel_setup.MOST_THRE
 
 def strand_radii(settings: HairSettings) -> np.ndarray:
     """(point_count,) float32 [m]: radius along every strand, from `radius` at the root to its `tip_taper` part."""
-    radius = _known(settings.radius)
+    radius = groom_defaults.known(settings.radius)
     return np.linspace(radius, radius * settings.tip_taper, settings.point_count, dtype=np.float32)
-
-
-def _known(value: float | None) -> float:
-    """A setting that `groom_defaults.complete` has found by the surface. Raises `HairError` where it has yet to."""
-    if value is None:
-        raise HairError("Length, gravity or radius is not set: call groom_defaults.complete first.")
-    return value

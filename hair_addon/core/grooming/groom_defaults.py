@@ -90,6 +90,13 @@ def complete[S: Settings](
     return replace(settings, **{name: getattr(size, name) for name in missing})
 
 
+def known(value: float | None) -> float:
+    """A setting that `complete` has found by the surface. Raises `HairError` where it has yet to."""
+    if value is None:
+        raise HairError("Length, gravity or radius is not set: call groom_defaults.complete first.")
+    return value
+
+
 def _mean_weights(mesh, density, texture):
     """(F,) in [0, 1]: the mean of the mask over each triangle."""
 

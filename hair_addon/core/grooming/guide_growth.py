@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Growth of guides from roots: control points of a smooth arc that starts along the normal and bends with gravity."""
+"""Growth of guides from roots: control points of a smooth arc that starts along the normal, or along flow lines, and
+bends with gravity.
+"""
 
 import numpy as np
 import warp as wp
@@ -8,6 +10,8 @@ from ..geometry.bspline import basis, greville_abscissae
 from ..geometry.closest_point import SurfaceQuery
 from ..geometry.mesh import SurfacePoints, TriMesh, normals, positions
 from ..kernels import kernel_cache
+from ..placement.domain import Mirror
+from . import flow_lines
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -15,6 +19,8 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 STEP_COUNT = 48  # straight steps that a guide's arc is made of
 TURNING = 10.0  # how far full gravity bends a guide: the angle to the ground, as tan(angle / 2), shrinks by exp(-10)
 CLEARANCE = 0.03  # how far above the surface a guide slides, by its length
+RISE = 0.5  # how fast a guide may leave the surface at its root, by its length
+LEAST_RISE = 0.05  # of guides that begin flat on it
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
 
 
@@ -28,18 +34,25 @@ def grow(
     gravity: float,
     seed: int,
     control_point_count: int,
+    flow: flow_lines.FlowLines | None = None,
+    lift: float = 0.5 * np.pi,
     device: wp.DeviceLike = "cpu",
 ) -> np.ndarray:
     """Control points (G, control_point_count, 3) float32 [m] of guides on a checked mesh.
 
     length [m]; length_variation: each guide's length is multiplied by a random number within 1 ± this; tilt [rad]:
-    largest random angle to the smooth normal; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z).
+    largest random angle to the smooth normal; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z);
+    flow: lines along which guides begin instead, at the angle lift [rad] to the surface, or None.
     A guide keeps its length while it bends, and slides over the surface where it would sink into it.
     """
     random = np.random.Generator(np.random.PCG64(seed)).random((len(roots), 3))
     root_normals = normals(mesh, roots)
     lengths = length * (1.0 + length_variation * (2.0 * random[:, 0] - 1.0))
-    directions = _tilted(root_normals, tilt, random[:, 1], random[:, 2])
+    axes, rises = root_normals, np.full(len(roots), RISE)
+    if flow is not None:
+        axes = flow_lines.axes(flow, positions(mesh, roots), root_normals, lift)
+        rises = np.clip(np.einsum("gi,gi->g", axes, root_normals), LEAST_RISE, RISE)
+    directions = _tilted(axes, tilt, random[:, 1], random[:, 2])
     surface = SurfaceQuery(mesh, device=device).mesh
     path = wp.empty((len(roots), STEP_COUNT + 1), dtype=wp.vec3, device=device)
     kernel_cache.launch(
@@ -51,6 +64,7 @@ def grow(
             wp.array(positions(mesh, roots), dtype=wp.vec3, device=device),
             wp.array(directions, dtype=wp.vec3, device=device),
             wp.array(lengths, dtype=float, device=device),
+            wp.array(rises, dtype=float, device=device),
             gravity,
         ],
         outputs=[path],
@@ -59,6 +73,18 @@ def grow(
     # Controls whose curve runs through the arc itself, so that it is neither shorter nor nearer to the surface.
     abscissae = greville_abscissae(control_point_count)
     return np.linalg.inv(basis(abscissae, control_point_count)).astype(np.float32) @ _along(path.numpy(), abscissae)
+
+
+def mirrored(controls: np.ndarray, places: np.ndarray, mirror: Mirror) -> np.ndarray:
+    """Controls (G, n, 3) of which the second half are grown as images of the first, where their roots (G, 3) are."""
+    count = len(places) // 2
+    images = mirror.image(places[:count])
+    reach = 5e-3 * np.ptp(places, axis=0).max()
+    is_image = np.linalg.norm(images - places[len(places) - count :], axis=1) <= reach
+    arms = controls[:count] - controls[:count, :1]
+    images = mirror.image(arms.reshape(-1, 3)).reshape(arms.shape) + places[len(places) - count :, None]
+    controls[len(places) - count :][is_image] = images[is_image]
+    return controls
 
 
 def _tilted(directions, largest, random_angle, random_turn):
@@ -88,6 +114,7 @@ def _march(
     roots: wp.array[wp.vec3],
     directions: wp.array[wp.vec3],
     lengths: wp.array[float],
+    rises: wp.array[float],
     gravity: float,
     # outputs
     out_path: wp.array2d[wp.vec3],
@@ -106,7 +133,7 @@ def _march(
         direction = wp.normalize(direction + bend * (DOWN - wp.dot(direction, DOWN) * direction))
         ahead = position + step * direction
         # A guide may first leave the surface, and later keeps a distance that grows with it.
-        wanted = wp.min(clearance, float(i + 1) * step * 0.5)
+        wanted = wp.min(clearance, float(i + 1) * step * rises[guide])
         query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * clearance + step)
         if query.result:
             face = query.face

@@ -59,7 +59,7 @@ def lay(
     surface = mesh if drawn_on is None else TriMesh(drawn_on, mesh.triangles)
     step = np.ptp(mesh.vertices.astype(np.float64), axis=0).max() / PIECES
     query = closest_point.SurfaceQuery(surface, device=device)
-    lines = [positions(mesh, query.nearest(_divided(line, step))).astype(np.float64) for line in _chained(segments)]
+    lines = [positions(mesh, query.nearest(divided(line, step))).astype(np.float64) for line in chained(segments)]
     borders = _border_segments(mesh)
     laid, kinds = [], []
     for number, line in enumerate(lines):
@@ -116,13 +116,13 @@ def in_order(edges: ArrayLike) -> np.ndarray:
     return np.array(walked, np.int64).reshape(-1, 2)
 
 
-def _chained(segments):
-    """[(N, 3)]: segments that begin where the last ended become one polyline."""
+def chained(segments: np.ndarray) -> list[np.ndarray]:
+    """[(N, 3)]: segments (L, 2, 3) that begin where the last ended become one polyline."""
     breaks = np.flatnonzero((segments[1:, 0] != segments[:-1, 1]).any(axis=1)) + 1
     return [np.concatenate([part[:1, 0], part[:, 1]]) for part in np.split(segments, breaks)]
 
 
-def _divided(line, step):
+def divided(line: np.ndarray, step: float) -> np.ndarray:
     """(N, 3) → (M, 3): points of a polyline a step apart where they were farther, a quarter of one where nearer."""
     along = np.cumsum(np.concatenate([[0.0], np.linalg.norm(np.diff(line, axis=0), axis=1)]))
     is_kept = np.diff(np.floor(along / (0.25 * step)), prepend=-1.0) > 0.0

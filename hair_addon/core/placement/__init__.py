@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         domain,
         exact_cells,
         farthest,
+        insertion,
         lbfgs,
         preconditioner,
         sampled_cells,

@@ -1,11 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands grow where their guides do, unless they have a vertex group of their own; changes are followed live."""
 
+import hashlib
+
 import bpy
 import numpy as np
 import pytest
 
 from hair_addon import api
+from hair_addon.blender.groom import staleness
+from hair_addon.core.grooming import groom
 from tests.support.reading import points, vertex_positions, write_points
 
 LOWEST = -0.2  # of roots in the group `top`: a ring of faces below its border, where its weight runs out
@@ -162,3 +166,82 @@ def test_a_missing_mask_is_reported_and_hair_is_kept(masked):
     bpy.context.view_layer.update()
     assert "no vertex group" in hair.data.vellus.status
     np.testing.assert_array_equal(points(hair), before)
+
+
+def root_u(hair):
+    """(S,) where roots are along the width of the UV map."""
+    uvs = np.empty((len(hair.data.curves), 2), np.float32)
+    hair.data.attributes["surface_uv_coordinate"].data.foreach_get("vector", uvs.ravel())
+    return uvs[:, 0]
+
+
+PIXEL = 1.0 / 32.0  # the image is linear between pixels
+
+
+def is_in_image(hair):
+    return (root_u(hair) > 0.125 - PIXEL) & (root_u(hair) < 0.5 + PIXEL)
+
+
+def test_an_image_of_the_strands_alone_wins(masked, image):
+    guides, hair = masked
+    before = points(guides)
+    set_setting(hair.data.vellus.hair, "density_image", "Mask")
+    assert is_in_image(hair).all() and lowest(hair) < -0.5  # the guides' group does not hold
+    np.testing.assert_array_equal(points(guides), before)
+    set_setting(hair.data.vellus.hair, "density_group", "top")
+    assert is_in_image(hair).all() and lowest(hair) > LOWEST
+    set_setting(hair.data.vellus.hair, "density_group", "")
+    set_setting(hair.data.vellus.hair, "density_image", "")
+    assert not is_in_image(hair).all() and lowest(hair) > LOWEST
+
+
+@pytest.mark.parametrize("is_cached", [True, False])
+def test_painting_the_image_of_the_strands_moves_them_when_it_is_left(masked, image, is_cached):
+    guides, hair = masked
+    sphere = bpy.data.objects["Sphere"]
+    set_setting(hair.data.vellus.hair, "density_image", "Mask")
+    before, guides_before = points(hair), points(guides)
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.object.mode_set(mode="TEXTURE_PAINT")
+    bpy.context.view_layer.update()
+    pixels = np.zeros((32, 32, 4), np.float32)
+    pixels[:, 20:28] = 1.0
+    image.pixels.foreach_set(pixels.ravel())
+    if is_cached:  # Blender need not report an image before the mode is left
+        image.update_tag()
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(points(hair), before)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.context.view_layer.update()
+    assert (root_u(hair) > 20 * PIXEL - PIXEL).all() and (root_u(hair) < 28 * PIXEL + PIXEL).all()
+    np.testing.assert_array_equal(points(guides), guides_before)
+
+
+def test_an_image_that_is_updated_unchanged_moves_no_strand(masked, image):
+    _guides, hair = masked
+    set_setting(hair.data.vellus.hair, "density_image", "Mask")
+    before = points(hair)
+    image.update_tag()
+    bpy.context.view_layer.update()
+    np.testing.assert_array_equal(points(hair), before)
+
+
+def test_hand_made_guides_take_the_image_of_their_strands(imported, image):
+    sphere = bpy.data.objects["Sphere"]
+    bpy.context.view_layer.objects.active = imported
+    sphere.select_set(False)
+    assert bpy.ops.vellus.use_as_guides(surface="Sphere", strand_count=200, density_image="Mask") == {"FINISHED"}
+    hair = next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR")
+    assert len(hair.data.curves) == 200 and is_in_image(hair).all()
+    assert not sphere.vertex_groups[1:]  # the image is a mask: no group is painted
+    before = points(hair)
+    bpy.context.view_layer.update()
+    set_setting(hair.data.vellus.hair, "keep_length", 0.5)
+    np.testing.assert_array_equal(points(hair)[:, 0], before[:, 0])
+
+
+def test_keys_of_roots_in_files_stay_valid_without_an_image():
+    """Strands had no image at first: hair in files keeps its roots."""
+    settings = groom.HairSettings(strand_count=7)
+    placing = repr([1, None, None, None, None, None, 7])
+    assert staleness.root_key(settings, None) == hashlib.blake2b(placing.encode(), digest_size=16).hexdigest()

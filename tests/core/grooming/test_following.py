@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from hair_addon.core.geometry import strands
-from hair_addon.core.grooming import following, groom
+from hair_addon.core.grooming import following, groom, hair_styles
 from hair_addon.core.interpolation import hair_binding
+from hair_addon.core.styling import clump, curl
 from tests.support.devices import DEVICE
 
 
@@ -19,36 +20,27 @@ def bound(head, scalp):
 
 
 @pytest.fixture
-def curled(monkeypatch):
-    """A style for want of a real one: each strand's segments are turned about its normal by its own angle."""
-    summed = following.strands_now
-
-    def strands_now(binding, guides, weights, chosen=None, out=None):
-        points = summed(binding, guides, weights, chosen, out)
-        rows = slice(None) if chosen is None else chosen.numpy()
-        angles, normals = 3.0 * binding.identities[1][rows, None, None], binding.normals.numpy()[rows, None]
-        offsets = np.diff(points.numpy(), axis=1)
-        along = (offsets * normals).sum(axis=2, keepdims=True) * normals
-        turned = along + np.cos(angles) * (offsets - along) + np.sin(angles) * np.cross(normals, offsets)
-        styled = np.concatenate([points.numpy()[:, :1], turned], axis=1).cumsum(axis=1)
-        points.assign(styled.astype(np.float32))
-        return points
-
-    monkeypatch.setattr(following, "strands_now", strands_now)
-    return summed
+def styling(head, scalp, bound):
+    """Locks that curl, on the same strands."""
+    guides, binding = bound
+    settings = groom.HairSettings(strand_count=2000)
+    trees = hair_styles.clump_trees(head, guides.roots, settings, density=scalp, device=DEVICE)
+    return hair_styles.bind_styles(binding, guides, settings, [clump.Settings(), curl.Settings(seed=1)], trees)
 
 
-def test_a_style_is_in_strands_of_every_update(bound, curled):
+def test_a_style_is_in_strands_of_every_update(bound, styling):
     guides, binding = bound
     weights = following.weights_now(binding, guides)
-    whole = following.follow_guides(binding, guides).numpy()
-    plain = curled(binding, guides, weights).numpy()
+    plain = following.follow_guides(binding, guides).numpy()
+    whole = following.follow_guides(binding, guides, styling).numpy()
     assert np.abs(whole - plain).max() > 0.01
     np.testing.assert_array_equal(whole[:, 0], plain[:, 0])
     np.testing.assert_allclose(strands.lengths(whole), strands.lengths(plain), rtol=1e-4)
-    np.testing.assert_array_equal(following.growing_points(binding, guides, weights).result(), whole)
+    grown = following.growing_points(binding, guides, weights, styling=styling).result()
+    np.testing.assert_array_equal(grown, whole)
     chosen = np.arange(3, 2000, 7)
-    some = following.follow_some(binding, guides, chosen, following.weights_now(binding, guides, chosen))
+    of_chosen = following.weights_now(binding, guides, chosen)
+    some = following.follow_some(binding, guides, chosen, of_chosen, styling=styling)
     np.testing.assert_allclose(some, whole[chosen], atol=1e-6)
 
 

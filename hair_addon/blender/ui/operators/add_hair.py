@@ -61,5 +61,5 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
 
     def _settings(self):
         """The seed is asked for once; strands take the mask of their guides."""
-        hair_settings = setting_properties.given_settings(self, HairSettings, skip=("density_group",))
+        hair_settings = setting_properties.given_settings(self, HairSettings, skip=("density_group", "density_image"))
         return setting_properties.given_settings(self, GuideSettings), hair_settings

@@ -40,11 +40,11 @@ class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):
             surface = self._surface(context)
         except HairError:
             surface = None
-        setting_rows.search_row(self.layout, self, "surface", bpy.data, "objects")
+        setting_rows.search_row(self.layout, self.properties, "surface", bpy.data, "objects")
         for name in ("every", "applies_modifiers", "grows_hair"):
-            setting_rows.row(self.layout, self, name)
+            setting_rows.row(self.layout, self.properties, name)
         if self.grows_hair:
-            setting_rows.all_strand_rows(setting_rows.titled(self.layout, "Strands"), self, surface)
+            setting_rows.all_strand_rows(setting_rows.titled(self.layout, "Strands"), self.properties, surface)
 
     def seconds(self, context):
         if not self.grows_hair:

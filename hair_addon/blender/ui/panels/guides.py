@@ -10,7 +10,7 @@ from ...data.scene import triangle_count
 from ...groom.foreign_curves import is_foreign
 from ...groom.selection import guides_again, guides_of, surface_of
 from ...settings.translations import interface_text
-from .. import setting_rows
+from .. import menus, setting_rows
 from .tab import HairTab, draw_work, split, write
 
 
@@ -98,4 +98,20 @@ class VELLUS_PT_guides_placement(_OfGuides, bpy.types.Panel):
         setting_rows.placement_rows(split(self.layout), guides_of(context.object).vellus.guides)
 
 
-CLASSES = (VELLUS_PT_guides, VELLUS_PT_guides_growth, VELLUS_PT_guides_placement)
+class VELLUS_PT_guides_tools(HairTab, bpy.types.Panel):
+    """Tools that change guides and keep their combing"""
+
+    bl_label = "Guide Tools"
+    bl_idname = "VELLUS_PT_guides_tools"
+    bl_parent_id = "VELLUS_PT_guides"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return guides_of(context.object) is not None
+
+    def draw(self, context):
+        menus.draw_guide_tools(self.layout.column(align=True))
+
+
+CLASSES = (VELLUS_PT_guides, VELLUS_PT_guides_growth, VELLUS_PT_guides_placement, VELLUS_PT_guides_tools)

@@ -6,7 +6,8 @@ import bpy
 from ....core.shading import appearance
 from ....core.shading.appearance import Appearance
 from ....core.shading.presets import PRESETS
-from ...groom.selection import hair_of
+from ...groom.diagnostics import modifier_notes
+from ...groom.selection import active_of_kind, hair_of, object_of
 from ...settings import saved_looks
 from ...settings.translations import CONTEXT
 from .. import look_previews
@@ -72,10 +73,20 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
         state = hair_of(context.object).vellus
         if state.shading_status:
             write(layout, context, state.shading_status, "ERROR")
-        for name in ("is_drawn", "viewport_percentage", "model"):
+        row(layout, state, "is_drawn")
+        for note in modifier_notes(_hair_object(context)):
+            write(layout, context, note, "INFO")
+        for name in ("viewport_percentage", "model"):
             row(layout, state, name)
         if state.model != "KAJIYA_KAY":
             row(layout, state.appearance, "mode")
+
+
+def _hair_object(context):
+    """The active object if it is hair, else the object of the hair that is shown; None if there is none."""
+    if active_of_kind(context.object, "HAIR") is not None:
+        return context.object
+    return object_of(hair_of(context.object), context.view_layer)
 
 
 class _OfShading(_OfHair):

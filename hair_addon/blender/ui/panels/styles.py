@@ -6,6 +6,7 @@ import bpy
 from ....core.files import style_presets
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
+from ...groom import painted_masks
 from ...groom.hair_styles import points_wanted
 from ...groom.selection import hair_of
 from ...groom.style_notes import notes_of
@@ -154,6 +155,11 @@ class VELLUS_PT_styles_mask(_OfStyle, bpy.types.Panel):
 
     def draw(self, context):
         setting_rows.style_mask_rows(split(self.layout), _active_of(context), hair_of(context.object).surface)
+        column = self.layout.column(align=True)
+        painting = painted_masks.is_painting(context.object)
+        text, icon = ("Stop Painting", "CHECKMARK") if painting else ("Paint Mask", "BRUSH_DATA")
+        column.operator("vellus.paint_style_mask", text=text, icon=icon)
+        column.operator("vellus.mask_from_selection", icon="RESTRICT_SELECT_OFF")
 
 
 LISTS = (VELLUS_UL_styles,)

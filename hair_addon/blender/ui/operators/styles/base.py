@@ -5,11 +5,16 @@ from ....groom.selection import hair_of
 from ....settings import properties, style_items
 
 
+def active_style_of(context):
+    """The properties of the active hair's active style, None where there is none."""
+    hair = hair_of(context.object)
+    return None if hair is None else style_items.active_of(hair.vellus)
+
+
 def has_styles(operator, context):
     """Whether the active hair has an active style; a `poll`, with its message."""
     operator.poll_message_set("Select hair with styles.")
-    hair = hair_of(context.object)
-    return hair is not None and style_items.active_of(hair.vellus) is not None
+    return active_style_of(context) is not None
 
 
 def fit_switch():

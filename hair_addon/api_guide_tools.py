@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python interface's function of guide tools; api.py offers it."""
+
+from typing import Any
+
+from .api_arguments import changed, choice
+from .core import lazy
+from .core.grooming import guide_tool_settings
+from .core.grooming.guide_tool_settings import CopySettings, ToolSettings
+from .core.params import require_class
+
+blender = lazy.Package(".blender", __package__)
+
+Curves = Any
+
+__all__ = ["change_guides"]
+
+# The settings of each tool.
+TOOLS = {
+    "LENGTH": guide_tool_settings.LengthSettings,
+    "TRIM": guide_tool_settings.TrimSettings,
+    "COUNT": guide_tool_settings.CountSettings,
+    "MIRROR": guide_tool_settings.MirrorSettings,
+    "COPY": guide_tool_settings.CopySettings,
+    "SMOOTH": guide_tool_settings.SmoothSettings,
+    "LIFT": guide_tool_settings.LiftSettings,
+    "ATTRACT": guide_tool_settings.AttractSettings,
+}
+
+
+def change_guides(
+    guides: Curves, tool: str, settings: ToolSettings | CopySettings | None = None, **changes: Any
+) -> int:
+    """Change guide Curves and keep their combing; returns how many have changed, were mirrored, or are there now.
+
+    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT" or "ATTRACT"; settings: of the tool, from
+    core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of the
+    view layer.
+
+    >>> guides = bpy.data.objects["Guides"]
+    >>> api.change_guides(guides, "LENGTH", method="MAXIMUM", length=0.2)
+    50
+    >>> api.change_guides(guides, "COUNT", factor=1.5)
+    75
+    """
+    settings_class = TOOLS[choice(tool, "guide tool", TOOLS)]
+    if settings is not None:
+        require_class(settings, settings_class, "settings")
+    wanted = changed(settings_class, settings, changes)
+    target, depsgraph = blender.data.arguments.guides_of(guides), blender.data.scene.present_depsgraph()
+    tools, additions = blender.groom.guide_tools, blender.groom.guide_additions
+    functions = {
+        "LENGTH": tools.change_lengths,
+        "TRIM": tools.trim,
+        "COUNT": additions.change_count,
+        "MIRROR": additions.mirror,
+        "COPY": tools.copy_shape,
+        "SMOOTH": tools.smooth,
+        "LIFT": tools.lift,
+        "ATTRACT": tools.attract,
+    }
+    return functions[tool](target, wanted, depsgraph)

@@ -1,0 +1,27 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Attraction of combed guides to their surface."""
+
+import bpy
+
+from .....core.grooming.guide_tool_settings import AttractSettings
+from ....groom import guide_tools
+from ....settings import setting_properties
+from .base import GuideTool
+
+_PART = 0.02  # of the guides' length: a clearance that fits a surface of any size
+
+
+class VELLUS_OT_attract_guides(GuideTool, bpy.types.Operator):
+    """Turn guides toward the surface and keep them above it; lengths are kept"""
+
+    bl_idname = "vellus.attract_guides"
+    bl_label = "Attract Guides"
+    Settings = AttractSettings
+    __annotations__ = setting_properties.annotations(AttractSettings)
+
+    def prefill(self, guides):
+        if not self.properties.is_property_set("clearance"):
+            self.clearance = _PART * guide_tools.median_length(guides)
+
+    def apply(self, guides, settings, depsgraph):
+        return guide_tools.attract(guides, settings, depsgraph)

@@ -1,0 +1,158 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Attraction of guides to the surface: they lie down along it, at a clearance above it, and keep their lengths."""
+
+import numpy as np
+import warp as wp
+
+from ..geometry.closest_point import SurfaceQuery
+from ..geometry.mesh import TriMesh
+from ..kernels import parallel
+from ..kernels.checks import require_count
+from ..kernels.parallel import Rows
+from .guide_segments import joined, only, split, turned
+from .guide_tool_settings import AttractSettings
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+STEPS = 6  # of the search for a segment's rise, each of which looks at the surface below its end
+CLOSE = 1e-4  # of a segment's length: its end is as high as it should be
+RAMP = 0.5  # rise per length at the root, until a guide reaches the clearance
+DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
+
+
+def attracted(
+    mesh: TriMesh, points: np.ndarray, normals: np.ndarray, settings: AttractSettings, weights: np.ndarray
+) -> np.ndarray:
+    """(S, P, 3) float32 [m]: guides that lie closer to a checked `TriMesh`, and not under it; segments keep lengths.
+
+    points (S, P, 3) [m]; normals (S, 3): unit, at the roots; weights (S,) in [0, 1]. First each guide is laid down, as
+    a path on the surface that turns to the sides as the guide does; then its segments turn toward those by their
+    shares; then what came too low is raised.
+    """
+    shares = settings.amount * np.asarray(weights, np.float64)
+    directions, lengths = split(points)
+    if not directions.shape[1] or not len(directions):
+        return np.array(points, np.float32)
+    query = SurfaceQuery(mesh)
+    laid, _lengths = split(_march(query.mesh, mesh, points, normals, settings.clearance, lays_down=True))
+    turned_down = joined(points, turned(directions, laid, shares[:, None]), lengths)
+    kept = _march(query.mesh, mesh, turned_down, normals, settings.clearance, lays_down=False)
+    # The marches are of single precision: the lengths are the guides' own.
+    return only(points, joined(points, split(kept)[0], lengths), shares)
+
+
+def _march(surface, mesh, points, normals, clearance, lays_down):
+    """(S, P, 3) float32: strands laid down at the clearance, or those of their points raised that are below it."""
+    require_count("normals", len(normals), len(points))
+
+    def there(array):
+        return wp.array(np.ascontiguousarray(array, np.float32), dtype=wp.vec3, device="cpu", copy=False)
+
+    path = parallel.empty_vectors(points.shape[:2], "cpu")
+    parallel.launch(
+        _follow,
+        len(points),
+        inputs=[
+            surface.id,
+            there(mesh.vertex_normals),
+            Rows(there(points)),
+            Rows(there(normals)),
+            clearance,
+            lays_down,
+        ],
+        outputs=[path],
+        device="cpu",
+        least_rows=64,
+    )
+    return path.numpy()
+
+
+@wp.func
+def _side(vector: wp.vec3, normal: wp.vec3):
+    """The part of a vector at right angles to a unit normal."""
+    return vector - wp.dot(vector, normal) * normal
+
+
+@wp.func
+def _least_turn(start: wp.vec3, end: wp.vec3):
+    """The least rotation between unit vectors; none between opposite ones."""
+    axis = wp.cross(start, end)
+    cosine = wp.dot(start, end)
+    if cosine < -0.9999:
+        return wp.quat_identity()
+    return wp.normalize(wp.quat(axis[0], axis[1], axis[2], 1.0 + cosine))
+
+
+@wp.kernel
+def _follow(
+    surface: wp.uint64,
+    vertex_normals: wp.array[wp.vec3],
+    points: wp.array2d[wp.vec3],
+    normals: wp.array[wp.vec3],
+    clearance: float,
+    lays_down: bool,
+    # outputs
+    out_path: wp.array2d[wp.vec3],
+):
+    guide = wp.tid()
+    last = points.shape[1] - 1
+    indices = wp.mesh_get(surface).indices
+    root_normal = normals[guide]
+    position = points[guide, 0]
+    out_path[guide, 0] = position
+    # Where a guide that stands upright falls to: as it leans on the whole, or down.
+    lean = _side(points[guide, last] - points[guide, 0], root_normal)
+    if wp.length(lean) < 0.05 * wp.length(points[guide, last] - points[guide, 0]):
+        lean = _side(DOWN, root_normal)
+        if wp.length(lean) < 1.0e-3:
+            lean = _side(wp.vec3(1.0, 0.0, 0.0), root_normal)
+    lean = wp.normalize(lean)
+    turn = wp.quat_identity()
+    along = float(0.0)
+    # Guides may be rooted off the surface; from there on they stay as near to it, or it is of no concern.
+    first = wp.mesh_query_point_no_sign(surface, position, 1.0e15)
+    gap = wp.length(position - wp.mesh_eval_position(surface, first.face, first.u, first.v))
+    for i in range(last):
+        step = points[guide, i + 1] - points[guide, i]
+        length = wp.length(step)
+        ahead = wp.quat_rotate(turn, step / wp.max(length, 1.0e-30))
+        along += length
+        wanted = wp.min(clearance, wp.static(RAMP) * along)
+        direction = ahead
+        searching = length > 0.0
+        for _search in range(wp.static(STEPS)):
+            if searching:
+                searching = False
+                place = position + length * direction
+                query = wp.mesh_query_point_no_sign(surface, place, gap + wanted + 2.0 * length)
+                if query.result:
+                    face = query.face
+                    u = query.u
+                    v = query.v
+                    normal = wp.normalize(
+                        u * vertex_normals[indices[3 * face]]
+                        + v * vertex_normals[indices[3 * face + 1]]
+                        + (1.0 - u - v) * vertex_normals[indices[3 * face + 2]]
+                    )
+                    away = place - wp.mesh_eval_position(surface, face, u, v)
+                    height = wp.dot(away, normal)
+                    # Past the border of an open surface the nearest point lies sideways: there guides are left alone.
+                    sideways = wp.length(away - height * normal)
+                    is_over = sideways <= 0.5 * wp.max(wp.abs(height), wanted) + 1.0e-3 * length
+                    is_off = wp.abs(wanted - height) > wp.static(CLOSE) * length
+                    if is_over and is_off and (height < wanted or lays_down):
+                        searching = True
+                        rise = wp.clamp(wp.dot(direction, normal) + (wanted - height) / length, -1.0, 1.0)
+                        side = _side(ahead, normal)
+                        if wp.length(side) < 0.05:
+                            side = _side(lean, normal)
+                        if wp.length(side) > 0.0:
+                            side = wp.normalize(side)
+                        direction = wp.normalize(rise * normal + wp.sqrt(1.0 - rise * rise) * side)
+        if lays_down:
+            # The rest of the guide turns with this segment.
+            turn = wp.normalize(_least_turn(ahead, direction) * turn)
+            lean = direction
+        position += length * direction
+        out_path[guide, i + 1] = position

@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The redo panel of Use as Guides."""
+
+import bpy
+import pytest
+
+from tests.support.layout import redo_panel
+
+
+@pytest.mark.parametrize("grows_hair", [True, False])
+def test_the_redo_panel_draws_what_has_an_effect(imported, grows_hair):
+    bpy.context.view_layer.objects.active = imported
+    drawn = redo_panel("use_as_guides", grows_hair=grows_hair).drawn
+    assert {drawn[name] for name in ("surface", "every", "applies_modifiers", "grows_hair")} == {1}
+    assert drawn["strand_count"] == drawn["neighbour_limit"] == grows_hair

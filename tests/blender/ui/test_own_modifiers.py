@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""An artist's own modifiers on hair: Vellus does not draw them in viewports, and the panel says so."""
+
+import bpy
+import pytest
+
+from tests.support.layout import draw
+
+NODE_ASSETS = bpy.utils.system_resource("DATAFILES", path="assets/nodes") + "/procedural_hair_node_assets.blend"
+
+
+def notes(active="Hair"):
+    """What the Shading panel says about modifiers."""
+    bpy.context.view_layer.objects.active = bpy.data.objects[active]
+    said = " ".join(draw(bpy.types.VELLUS_PT_shading).texts)
+    return said if "renders only" in said else ""
+
+
+def add_asset(hair, name):
+    """A modifier with one of Blender's own hair node groups."""
+    with bpy.data.libraries.load(NODE_ASSETS, link=False, assets_only=True) as (_, wanted):
+        wanted.node_groups = [name]
+    modifier = hair.modifiers.new(name, "NODES")
+    modifier.node_group = wanted.node_groups[0]
+    return modifier
+
+
+def test_the_modifier_that_follows_the_surface_is_not_mentioned(hair):
+    assert len(hair.modifiers) == 1 and not notes()
+
+
+@pytest.mark.parametrize("active", ["Hair", "Guides", "Sphere"])
+def test_modifiers_are_counted_and_named(hair, active):
+    clump = add_asset(hair, "Clump Hair Curves")
+    assert "1 modifier shows" in notes(active) and clump.name in notes(active)
+    curl = add_asset(hair, "Curl Hair Curves")
+    assert "2 modifiers show" in notes(active) and clump.name in notes(active) and curl.name in notes(active)
+
+
+def test_modifiers_without_effect_on_renders_are_not_counted(hair):
+    clump = add_asset(hair, "Clump Hair Curves")
+    hair.modifiers.new("Empty", "NODES")
+    clump.show_render = False
+    assert not notes()
+    clump.show_render, clump.show_viewport = True, False
+    assert "1 modifier shows" in notes()
+
+
+def test_hair_that_blender_draws_shows_its_modifiers(hair):
+    add_asset(hair, "Clump Hair Curves")
+    assert notes()
+    assert bpy.ops.vellus.toggle_drawing() == {"FINISHED"}
+    assert not notes()
+
+
+def test_hair_without_an_object_has_no_note(hair):
+    add_asset(hair, "Clump Hair Curves")
+    hair.data.use_fake_user = True
+    bpy.data.objects.remove(hair)
+    assert not notes("Sphere")
