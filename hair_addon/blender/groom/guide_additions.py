@@ -116,7 +116,7 @@ def _density(guides, mask, depsgraph):
     datablock, surface = guides.datablock, guides.surface
     density = texture = None
     if not curves.is_hand_made(datablock):
-        density, texture = masks.of_guides(datablock.vellus.guides).read(datablock.surface, surface, depsgraph)
+        density, texture = masks.own(datablock.vellus.guides).read(datablock.surface, surface, depsgraph)
     if mask:
         weights, _texture = masks.Mask(mask).read(datablock.surface, surface, depsgraph)
         density = weights if density is None else density * weights
@@ -131,7 +131,7 @@ def _crowded(guides, count, depsgraph):
         raise HairError("No more guides can be removed here: change the selection or the mask.")
     spread = None
     if not curves.is_hand_made(guides.datablock):
-        density, _texture = masks.of_guides(guides.datablock.vellus.guides).read(
+        density, _texture = masks.own(guides.datablock.vellus.guides).read(
             guides.datablock.surface, guides.surface, depsgraph
         )
         if density is not None:
