@@ -6,6 +6,7 @@ import json
 import re
 
 import bpy
+import numpy as np
 import pytest
 
 from hair_addon import api
@@ -16,7 +17,7 @@ from hair_addon.core.params import declared
 from hair_addon.core.styling import clump, curl, frizz, lean, trim, wet
 from hair_addon.core.styling.kinds import OFFERS
 from tests.command_line.test_command_line import SMALL, grown, mesh  # noqa: F401 (a fixture)
-from tests.support.commands import run, run_here
+from tests.support.commands import HEAD, load, run, run_here
 
 
 def words(identifier, settings, names):
@@ -119,3 +120,12 @@ def test_info_lists_styles(hair, tmp_path):
     settings_file.write(tmp_path / "a.json", GroomSettings(styles=styles))
     told = run_here("info", tmp_path / "a.json", "--json").results[0]["settings"]["styles"]
     assert [style["kind"] for style in told] == ["CLUMP", "CURL"]
+
+
+def test_what_is_written_is_styled(tmp_path):
+    groom = ("groom", HEAD, "--guides", 30, "--strands", 100)
+    assert run_here(*groom, "--out", tmp_path / "plain.npz").status == 0
+    assert run_here(*groom, "--style", "curl:radius=0.02", "--out", tmp_path / "curly.npz").status == 0
+    plain, curly = (load(tmp_path / f"{name}.npz")["strand_points"] for name in ("plain", "curly"))
+    np.testing.assert_array_equal(plain[:, 0], curly[:, 0])
+    assert np.abs(plain - curly).max() > 0.005

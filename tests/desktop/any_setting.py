@@ -156,6 +156,8 @@ class Artist:
         group = self.random.choice([state, state.guides if state.kind == "GUIDES" else state.hair])
         if state.kind == "HAIR" and self.random.random() < 0.3:
             group = self.random.choice([state.appearance, state.marschner])
+        if state.kind == "HAIR" and len(state.styles) and self.random.random() < 0.4:
+            group = self.blender.settings.style_items.group_of(self.random.choice(list(state.styles)))
         hidden = {"rna_type", "name", "kind"}
         declared = [p for p in group.bl_rna.properties if p.identifier not in hidden and not p.is_readonly]
         names = [p.identifier for p in declared if not p.is_hidden and p.type != "POINTER"]
@@ -176,6 +178,9 @@ class Artist:
             "region_attribute": ["", "sharp_face", "missing"],
             "part_lines": ["", "Sun", "missing"],
             "density_image": ["", "missing"],
+            "mask": ["", "half", "missing"],
+            "mask_image": ["", "missing"],
+            **{key: ["", "Sun", "missing"] for key in ("cutter", "target")},
         }
         if declared.type == "STRING":
             return self.random.choice(names.get(name, [""]))
@@ -185,11 +190,34 @@ class Artist:
             return self.random.choice([item.identifier for item in declared.enum_items])
         if declared.is_array:
             return [self.random.random() for _ in range(declared.array_length)]
-        most = {"guide_count": 300, "strand_count": 5000, "relax_iterations": 20, "size": 64}
-        low, high = declared.hard_min, min(declared.hard_max, most.get(name, declared.soft_max))
+        most = {"guide_count": 300, "strand_count": 5000, "relax_iterations": 20, "size": 64, "levels": 2}
+        # Smaller locks are tens of thousands.
+        least = {"size": 0.1, "lock": 0.1} if declared.type == "FLOAT" else {}
+        low, high = least.get(name, declared.hard_min), min(declared.hard_max, most.get(name, declared.soft_max))
         if declared.type == "INT":
             return self.random.choice([int(low), int(high), self.random.randint(int(low), max(int(low), int(high)))])
         return self.random.choice([low, high, low + (high - low) * self.random.random() ** 3])
+
+    def do_style(self):
+        """A style is added, moved, removed or keyed."""
+        hair = self._curves("HAIR")
+        if hair is None or not self._activate(hair):
+            return
+        state = hair.data.vellus
+        operators = {
+            "add_style": {"style": self.random.choice(list(self.core.styling.kinds.OFFERS))},
+            "move_style": {"direction": self.random.choice(["UP", "DOWN"])},
+            "remove_style": {},
+            "duplicate_style": {},
+        }
+        name = self.random.choice(["add_style", *operators])
+        operator = getattr(bpy.ops.vellus, name)
+        self.say(f"{name} {operators[name]} of {hair.name}")
+        if operator.poll():
+            operator("EXEC_DEFAULT", **operators[name])
+        if hair.library is None and len(state.styles) and self.random.random() < 0.3:
+            item = self.random.choice(list(state.styles))
+            self.blender.settings.style_items.group_of(item).keyframe_insert("amount", frame=self.random.randint(1, 5))
 
     def do_many_strands(self):
         hair = self._curves("HAIR")

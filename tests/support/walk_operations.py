@@ -32,6 +32,8 @@ from tests.support.walk_steps import needs_room, odd_numbers, pick, step
 from tests.support.walk_styles import StyleSteps
 
 GUIDE_COUNT, STRAND_COUNT = 12, 40
+GUIDE_TOOLS = ["guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"]
+GUIDE_TOOLS += ["smooth_guides", "lift_guides", "attract_guides"]
 
 
 class Artist(StyleSteps, RuleBasedStateMachine):
@@ -120,6 +122,15 @@ class Artist(StyleSteps, RuleBasedStateMachine):
         if names:
             activate(chosen(names, number))
             operate(getattr(bpy.ops.vellus, operator))
+
+    @step(number=pick, other=pick, tool=st.sampled_from(GUIDE_TOOLS), factor=st.sampled_from([0.5, 0.9, 1.5]))
+    def use_guide_tool(self, number, other, tool, factor):
+        names = objects("MESH") + objects("CURVES")
+        if names:
+            activate(chosen(names, number))
+            own = {"trim_guides": {"cutter": chosen(list(bpy.data.objects), other).name}}
+            own |= {name: {"factor": factor} for name in ("guide_length", "change_guide_count")}
+            operate(getattr(bpy.ops.vellus, tool), **own.get(tool, {}))
 
     @step(number=pick, operator=st.sampled_from(["make_uv_map", "use_uv_map", "check_uvs", "apply_scale"]))
     def mend_surface(self, number, operator):

@@ -64,10 +64,12 @@ def write(guides: CombedGuides, additions: list[Additions], removed: np.ndarray)
             starts = curves.curve_offsets(datablock).astype(np.int64)
             guide_curves.append(datablock, surface.to_local(points), sources, starts)
             roots = roots.joined(new_roots)
-            for name, data_type, values in zip(
-                ("id", "strand_random"), ("INT", "FLOAT"), surface.identities(new_roots), strict=True
-            ):
-                guide_curves.write_tail(datablock, name, data_type, values)
+            identities, randoms = surface.identities(new_roots)
+            # Those made of curves may be rooted off the surface, and so their images.
+            apart = np.linalg.norm(points[:, 0] - mesh_math.positions(surface.mesh, new_roots), axis=1)
+            guide_curves.write_tail(datablock, "id", "INT", identities)
+            guide_curves.write_tail(datablock, "strand_random", "FLOAT", randoms)
+            guide_curves.write_tail(datablock, "root_distance", "FLOAT", apart / surface.scale)
     guide_curves.remove(datablock, removed)
     curves.write_roots(datablock, surface, roots[np.setdiff1d(np.arange(len(roots)), removed)])
     datablock.update_tag()

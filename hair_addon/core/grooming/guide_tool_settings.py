@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Settings of the tools that change combed guides: each in a file of its own, of the same name.
+"""Settings of the tools that change combed guides, whose mathematics is in the files beside this one.
 
-They stand here because those files import Warp, which takes longer than an add-on may take to register.
+Some of those import Warp, which takes longer than an add-on may take to register: so settings are apart.
 """
 
 from dataclasses import dataclass

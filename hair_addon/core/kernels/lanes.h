@@ -17,7 +17,7 @@
   const auto sqrt_of = [](lanes value) { return sqrtf(value); };
   const auto abs_of = [](lanes value) { return fabsf(value); };
   const auto to_ints = [](lanes value) { return static_cast<int>(value); };
-  const auto to_lanes = [](uints value) { return static_cast<float>(value); };
+  const auto to_lanes = [](auto value) { return static_cast<float>(value); };
   const auto lanes_of_bits = [](ints bits) { return __int_as_float(bits); };
   const auto bits_of_lanes = [](lanes value) { return __float_as_int(value); };
   const auto any_of = [](auto condition) { return static_cast<bool>(condition); };
@@ -32,7 +32,7 @@
   const auto sqrt_of = [](lanes value) { return __builtin_elementwise_sqrt(value); };
   const auto abs_of = [](lanes value) { return __builtin_elementwise_abs(value); };
   const auto to_ints = [](lanes value) { return __builtin_convertvector(value, ints); };
-  const auto to_lanes = [](uints value) { return __builtin_convertvector(value, lanes); };
+  const auto to_lanes = [](auto value) { return __builtin_convertvector(value, lanes); };
   const auto lanes_of_bits = [](ints bits) { return __builtin_bit_cast(lanes, bits); };
   const auto bits_of_lanes = [](lanes value) { return __builtin_bit_cast(ints, value); };
   const auto any_of = [](ints condition) { return __builtin_reduce_or(condition) != 0; };

@@ -18,9 +18,11 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
     along[i] = arc + 0.5f * length[i];
     arc += length[i];
   }
-  marks at;
-  for (int lane = 0; lane < LANES; ++lane) at[lane] = 1;
-  const int ahead = point_count > 2 ? 1 : 0;
+  // The segments around each lane's progress, which are kept while it stays between their middles.
+  const int ahead = point_count > 2 ? 2 : 1;
+  ints at = 1;
+  lanes below = along[1], above = along[ahead];
+  vector t_below = t[1], u_below = u[1], t_above = t[ahead], u_above = u[ahead];
   lanes progress = 0.0f;
   arc = 0.0f;
   for (int i = 1; i < point_count; ++i) {
@@ -33,29 +35,42 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
     before_v = to_v;
     const lanes square = w_u * w_u + w_v * w_v, most = 0.9604f * d * d;
     const auto is_far = square > most;
-    const lanes held = is_far ? sqrt_of(most / (is_far ? square : lanes(1.0f))) : lanes(1.0f);
-    w_u *= held;
-    w_v *= held;
-    const lanes advance = sqrt_of(higher_of(d * d - (w_u * w_u + w_v * w_v), lanes(0.0f)));
-    const lanes forward = keep_length == 1.0f ? advance : (1.0f - keep_length) * d + keep_length * advance;
+    if (any_of(is_far)) {
+      const lanes held = is_far ? sqrt_of(most / (is_far ? square : lanes(1.0f))) : lanes(1.0f);
+      w_u *= held;
+      w_v *= held;
+    }
+    lanes forward = sqrt_of(higher_of(d * d - (w_u * w_u + w_v * w_v), lanes(0.0f)));
+    lanes size = d;
+    if (keep_length != 1.0f) {
+      forward = (1.0f - keep_length) * d + keep_length * forward;
+      size = sqrt_of(forward * forward + w_u * w_u + w_v * w_v);
+    }
     const lanes middle = progress + 0.5f * forward;
     progress += forward;
     // The frame at `middle`, between those of the segments around it.
-    lanes below, above;
-    for (int lane = 0; lane < LANES; ++lane) {
-      const float place = get_lane(middle, lane);
-      while (at[lane] < point_count - 2 && lane_of(along[at[lane] + 1], lane) <= place) ++at[lane];
-      set_lane(below, lane, lane_of(along[at[lane]], lane));
-      set_lane(above, lane, lane_of(along[at[lane] + ahead], lane));
+    for (;;) {
+      const auto is_past = above <= middle && at < point_count - 2;
+      if (!any_of(is_past)) break;
+      below = is_past ? above : below;
+      t_below = chosen(is_past, t_above, t_below);
+      u_below = chosen(is_past, u_above, u_below);
+      at = is_past ? at + 1 : at;
+      const int last = most_of(is_past ? at : ints(0));
+      for (int i_at = least_of(is_past ? at : ints(MOST)); i_at <= last; ++i_at) {
+        const auto is_here = is_past && at == i_at;
+        above = is_here ? along[i_at + 1] : above;
+        t_above = chosen(is_here, t[i_at + 1], t_above);
+        u_above = chosen(is_here, u[i_at + 1], u_above);
+      }
     }
     const lanes range = above - below;
     const auto is_between = range > 1.0e-12f;
     const lanes part = clamped(
         is_between ? (middle - below) / (is_between ? range : lanes(1.0f)) : lanes(0.0f), lanes(0.0f), lanes(1.0f)
     );
-    const vector t_below = gathered(t, at, 0), u_below = gathered(u, at, 0);
-    const vector t_between = t_below + (gathered(t, at, ahead) - t_below) * part;
-    const vector u_between = u_below + (gathered(u, at, ahead) - u_below) * part;
+    const vector t_between = t_below + (t_above - t_below) * part;
+    const vector u_between = u_below + (u_above - u_below) * part;
     // Segments that turn back cancel each other: there the frame of the first holds.
     const auto is_facing = dot(t_between, t_between) > 0.01f;
     const vector forwards = unit_or(chosen(is_facing, t_between, t_below), lanes(1.0e-6f), t_below);
@@ -65,11 +80,11 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
         chosen(is_flat, flat, u_below - forwards * dot(u_below, forwards)), lanes(1.0e-6f), u_below
     );
     const vector made = forwards * forward + sideways * w_u + cross(forwards, sideways) * w_v;
-    const lanes size = sqrt_of(dot(made, made));
     const auto has_length = d > 1.0e-12f;
-    const auto is_made = has_length && size > 1.0e-14f;
-    next[i] = chosen(is_made, made * (1.0f / (is_made ? size : lanes(1.0f))), t[i]);
-    if (keep_length != 1.0f) length[i] = is_made ? size : d;
+    const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));
+    // Unit but for rounding, which a step of Newton's method takes away.
+    next[i] = chosen(has_length, nearly * (1.5f - 0.5f * dot(nearly, nearly)), t[i]);
+    length[i] = has_length ? size : d;
   }
   for (int i = 1; i < point_count; ++i) t[i] = next[i];
 };

@@ -81,7 +81,7 @@ class ClumpTrees:
     def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
         """(K,) int32 per coarser level: the centres that those of one level belong to, -1 for none."""
         own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
-        return self._upward(tree, own, level)[:-1]
+        return self._upward(tree, own, level)
 
     def _upward(self, tree, places, level):
         """Places in a level and in all coarser ones, the coarsest first."""

@@ -10,14 +10,13 @@ const lanes per_spacing = (point_count - 1) * per_total;
 const lanes is_stray =
     stray > 0.0f ? clamped((1.1f * stray - random(STRAY)) * 10.0f, lanes(0.0f), lanes(1.0f)) : lanes(0.0f);
 const lanes size = base * amplitude * (1.0f + (stray_gain - 1.0f) * is_stray);
-lanes phase[WAVES * MOST_OCTAVES], weight[WAVES * MOST_OCTAVES];
-float frequency[WAVES * MOST_OCTAVES];
+// A wave is the real part of (even + i odd) e^(i 2π f s).
+lanes even[WAVES * MOST_OCTAVES], odd[WAVES * MOST_OCTAVES];
 float octave_gain = 1.0f;
 for (int wave = 0; wave < WAVES * octave_count; ++wave) {
-  frequency[wave] = number[16 + wave % WAVES] * static_cast<float>(1 << (wave / WAVES)) / wavelength;
-  const lanes points_a_wave = per_spacing / frequency[wave];
-  weight[wave] = octave_gain * smoothstep((points_a_wave - 2.0f) * 0.5f);
-  phase[wave] = (1.0f - coherence) * random(WAVE_PHASES + wave);
+  const float frequency = number[16 + wave % WAVES] * static_cast<float>(1 << (wave / WAVES)) / wavelength;
+  const lanes weight = octave_gain * smoothstep((per_spacing / frequency - 2.0f) * 0.5f);
+  lanes phase = (1.0f - coherence) * random(WAVE_PHASES + wave);
   if (coherence > 0.0f) {
     // k_m has a random direction and a random size about 1 / spread turns.
     const auto pick = [&](int part) { return random_number(ints(wave), seed, ints(WAVE_VECTORS + part)); };
@@ -30,18 +29,29 @@ for (int wave = 0; wave < WAVES * octave_count; ++wave) {
         axes.data[1][0] * root.x + axes.data[1][1] * root.y + axes.data[1][2] * root.z,
         axes.data[2][0] * root.x + axes.data[2][1] * root.y + axes.data[2][2] * root.z,
     };
-    phase[wave] += coherence * per_spread * (0.7f + 0.6f * pick(2)) * dot(direction, rest) + coherence * pick(3);
+    phase += coherence * per_spread * (0.7f + 0.6f * pick(2)) * dot(direction, rest) + coherence * pick(3);
   }
+  lanes sine, cosine;
+  sine_and_cosine(phase, sine, cosine);
+  even[wave] = weight * cosine;
+  odd[wave] = weight * sine;
   if (wave % WAVES == WAVES - 1) octave_gain *= gain;
 }
 const auto noise = [&](lanes s, lanes x, lanes& to_u, lanes& to_v) {
   to_u = 0.0f;
   to_v = 0.0f;
-  for (int wave = 0; wave < WAVES * octave_count; ++wave) {
+  for (int first = 0; first < WAVES; ++first) {
     lanes sine, cosine;
-    sine_and_cosine(phase[wave] + frequency[wave] * s, sine, cosine);
-    to_u += weight[wave] * cosine;
-    to_v += wave % 2 ? -weight[wave] * sine : weight[wave] * sine;
+    sine_and_cosine((number[16 + first] / wavelength) * s, sine, cosine);
+    const float sense = first % 2 ? -1.0f : 1.0f;
+    for (int wave = first; wave < WAVES * octave_count; wave += WAVES) {
+      to_u += even[wave] * cosine - odd[wave] * sine;
+      to_v += sense * (even[wave] * sine + odd[wave] * cosine);
+      // The next octave has twice the angle.
+      const lanes twice = 2.0f * sine * cosine;
+      cosine = 1.0f - 2.0f * sine * sine;
+      sine = twice;
+    }
   }
   const lanes amount = size * profile(x);
   to_u *= amount;

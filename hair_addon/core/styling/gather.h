@@ -6,25 +6,19 @@
 // offset(arc length of the centre, how far it is drawn, out u, out v) moves q in the centre's frames, if `is_woven`.
 
 const auto gather = [&](float thickness, float twist, lanes joined, bool is_woven, auto offset) {
-  const auto* centre_of = reinterpret_cast<const float*>(centre_points.data);
-  marks at;
-  vector low, high;
-  lanes below, above;
-  const auto take_place = [&](int lane) {
-    const float* entry = centre_of + (size_t(centre[lane]) * point_count + at[lane]) * 4;
-    set_lane(low.x, lane, entry[0]);
-    set_lane(low.y, lane, entry[1]);
-    set_lane(low.z, lane, entry[2]);
-    set_lane(below, lane, entry[3]);
-    set_lane(high.x, lane, entry[4]);
-    set_lane(high.y, lane, entry[5]);
-    set_lane(high.z, lane, entry[6]);
-    set_lane(above, lane, entry[7]);
-  };
+  const float* rows[LANES];
   for (int lane = 0; lane < LANES; ++lane) {
-    at[lane] = 0;
-    take_place(lane);
+    rows[lane] = reinterpret_cast<const float*>(centre_points.data) + size_t(centre[lane]) * point_count * 4;
   }
+  // The points of the centre around the strand's progress, which are kept while it stays between them.
+  ints at = 0;
+  lanes row[4];
+  read_rows(rows, at * 4, row);
+  vector low = {row[0], row[1], row[2]};
+  lanes below = row[3];
+  read_rows(rows, at * 4 + 4, row);
+  vector high = {row[0], row[1], row[2]};
+  lanes above = row[3];
   // Roots stay: what the profile asks for at the root is reached over twice the distance to the centre.
   const vector root_away = root - low;
   const lanes root_distance = 2.0f * sqrt_of(dot(root_away, root_away));
@@ -37,13 +31,17 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
     const lanes d = length[i];
     arc += d;
     point = point + t[i] * d;
-    const lanes advance = d + (clamped(rate * (d - lead), 0.25f * d, 2.0f * d) - d) * weight;
+    const lanes advance = d + (clamped(rate * (d - 0.5f * lead), 0.25f * d, 1.25f * d) - d) * weight;
     ahead += advance;
-    for (int lane = 0; lane < LANES; ++lane) {
-      const float* arcs = centre_of + size_t(centre[lane]) * point_count * 4 + 3;
-      const float wanted = get_lane(ahead, lane);
-      while (at[lane] < point_count - 2 && arcs[4 * (at[lane] + 1)] <= wanted) ++at[lane];
-      take_place(lane);
+    for (;;) {
+      const auto is_past = above <= ahead && at < point_count - 2;
+      if (!any_of(is_past)) break;
+      low = chosen(is_past, high, low);
+      below = is_past ? above : below;
+      at = is_past ? at + 1 : at;
+      read_rows(rows, at * 4 + 4, row);
+      high = {row[0], row[1], row[2]};
+      above = row[3];
     }
     const lanes range = above - below;
     const auto has_range = range > 1.0e-12f;
@@ -87,12 +85,13 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
     const lanes square = dot(beside, beside), most = 0.25f * d * d;
     const auto is_off = square > most;
     const lanes held = is_off ? sqrt_of(most / (is_off ? square : lanes(1.0f))) : lanes(1.0f);
-    t[i] = chosen(is_far, unit_or(way_on + beside * (held * weight), lanes(1.0e-30f), t[i]), t[i]);
+    t[i] = chosen(is_far, unit_or(way_on + beside * (0.7f * held * weight), lanes(1.0e-30f), t[i]), t[i]);
     place = place + t[i] * d;
     drawn_before = drawn;
     // The strand's progress along the centre: as far as its length goes along the curve.
     const auto has_moved = distance > 0.5f * advance;
-    rate = has_moved ? advance / (has_moved ? distance : lanes(1.0f)) : lanes(2.0f);
+    const lanes rate_here = has_moved ? advance / (has_moved ? distance : lanes(1.0f)) : lanes(2.0f);
+    rate = 0.5f * (rate + lower_of(rate_here, lanes(1.25f)));
     lead = dot(drawn - place, forwards);
   }
 };

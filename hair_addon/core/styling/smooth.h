@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Smooth (smooth.py): directions of chords around each segment, twice. Two marks run along the strand, so the cost does
+// Smooth (smooth.py): directions of chords around each segment, twice. Two places run along the strand, so the cost does
 // not depend on the length of the chords.
 
 const float half = 0.5f * number[8];
@@ -8,27 +8,36 @@ vector old[MOST];
 for (int i = 1; i < point_count; ++i) old[i] = t[i];
 for (int pass = 0; pass < 2; ++pass) {
   put_points();
-  marks low, high;
-  for (int lane = 0; lane < LANES; ++lane) low[lane] = high[lane] = 0;
-  // The point at an arc length, past which the mark of a lane has not moved yet.
-  const auto point_at = [&](lanes place, marks& mark) {
+  // Two places that run along the strand, between two points of it each.
+  struct runner {
+    ints at;
     lanes below, above;
-    for (int lane = 0; lane < LANES; ++lane) {
-      const float wanted = get_lane(place, lane);
-      while (mark[lane] < point_count - 2 && lane_of(along[mark[lane] + 1], lane) <= wanted) ++mark[lane];
-      set_lane(below, lane, lane_of(along[mark[lane]], lane));
-      set_lane(above, lane, lane_of(along[mark[lane] + 1], lane));
+    vector start, end;
+  };
+  runner behind = {ints(0), along[0], along[1], next[0], next[1]}, before = behind;
+  const auto point_at = [&](lanes place, runner& run) {
+    for (;;) {
+      const auto is_past = run.above <= place && run.at < point_count - 2;
+      if (!any_of(is_past)) break;
+      run.below = is_past ? run.above : run.below;
+      run.start = chosen(is_past, run.end, run.start);
+      run.at = is_past ? run.at + 1 : run.at;
+      const int last = most_of(is_past ? run.at : ints(0));
+      for (int k = least_of(is_past ? run.at : ints(MOST)); k <= last; ++k) {
+        const auto is_here = is_past && run.at == k;
+        run.above = is_here ? along[k + 1] : run.above;
+        run.end = chosen(is_here, next[k + 1], run.end);
+      }
     }
-    const lanes range = above - below;
+    const lanes range = run.above - run.below;
     const auto has_range = range > 1.0e-12f;
-    const lanes part = has_range ? (place - below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f);
-    const vector start = gathered(next, mark, 0);
-    return start + (gathered(next, mark, 1) - start) * part;
+    const lanes part = has_range ? (place - run.below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f);
+    return run.start + (run.end - run.start) * part;
   };
   for (int i = 1; i < point_count; ++i) {
     const lanes middle = 0.5f * (along[i - 1] + along[i]);
     const lanes back = higher_of(middle - half, lanes(0.0f)), forth = lower_of(middle + half, total);
-    u[i] = unit_or(point_at(forth, high) - point_at(back, low), lanes(1.0e-3f) * (forth - back), t[i]);
+    u[i] = unit_or(point_at(forth, before) - point_at(back, behind), lanes(1.0e-3f) * (forth - back), t[i]);
   }
   for (int i = 1; i < point_count; ++i) t[i] = u[i];
 }

@@ -173,7 +173,7 @@ def bind(
         rows = np.zeros((len(levels) + 1, len(bound.roots)), np.int32)
         for row in range(known):
             tree, level = levels[row]
-            is_own = owner != HAIR and owner[0] == tree
+            is_own = owner != HAIR and owner[0] == tree and level <= owner[1]
             rows[row] = (trees.parents(tree, owner[1]) if is_own else trees.members(owner, bound, tree))[level]
         rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
         weights = np.array([inputs.masks[key].of_strands(bound) for key in keys], np.float32)

@@ -29,6 +29,7 @@
   #pragma clang fp contract(fast)
 #endif
 #include "lanes.h"
+#include "lane_rows.h"
 #include "vectors.h"
 
 using marks = int[LANES];  // a place along the strand of each lane
@@ -44,6 +45,7 @@ vector kept_t[MOST_KEPT];
 
 // Number `lane` of an entry of such an array.
 const auto lane_of = [](const lanes& values, int lane) { return reinterpret_cast<const float*>(&values)[lane]; };
+const auto put_lane = [](lanes& values, int lane, float value) { reinterpret_cast<float*>(&values)[lane] = value; };
 const auto gathered = [&](const vector* from, const marks& index, int ahead) {
   vector found;
   for (int lane = 0; lane < LANES; ++lane) {
@@ -56,21 +58,24 @@ const auto gathered = [&](const vector* from, const marks& index, int ahead) {
 };
 
 int strand[LANES];
+float* rows[LANES];
 vector root, normal;
 ints identity;
 for (int lane = 0; lane < LANES; ++lane) {
   const int row = first + (lane < lane_count ? lane : lane_count - 1);
   strand[lane] = chosen_rows.shape[0] > 0 ? chosen_rows.data[row] : row;
-  const float* from = reinterpret_cast<const float*>(points.data) + size_t(row) * point_count * 3;
-  for (int i = 0; i < point_count; ++i) {
-    set_lane(next[i].x, lane, from[3 * i]);
-    set_lane(next[i].y, lane, from[3 * i + 1]);
-    set_lane(next[i].z, lane, from[3 * i + 2]);
-  }
+  rows[lane] = reinterpret_cast<float*>(points.data) + size_t(row) * point_count * 3;
   set_lane(normal.x, lane, normals.data[strand[lane]][0]);
   set_lane(normal.y, lane, normals.data[strand[lane]][1]);
   set_lane(normal.z, lane, normals.data[strand[lane]][2]);
   set_lane(identity, lane, identities.data[strand[lane]]);
+}
+// `next` as numbers: x, y and z of the first point, of the second …
+lanes* const coordinates = reinterpret_cast<lanes*>(next);
+const int number_count = 3 * point_count, in_fours = number_count & ~3;
+for (int i = 0; i < in_fours; i += 4) read_rows(rows, ints(i), coordinates + i);
+for (int i = in_fours; i < number_count; ++i) {
+  for (int lane = 0; lane < LANES; ++lane) put_lane(coordinates[i], lane, rows[lane][i]);
 }
 root = next[0];
 
@@ -189,13 +194,13 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
 }
 
 put_points();
+// Strands that no style has touched keep their bits.
+const bool is_all = lane_count == LANES && !any_of(is_touched == 0);
+if (is_all) {
+  for (int i = 0; i < in_fours; i += 4) write_rows(coordinates + i, rows, i);
+}
 for (int lane = 0; lane < lane_count; ++lane) {
-  if (!get_lane(is_touched, lane)) continue;  // the same bits as before
-  float* to = reinterpret_cast<float*>(points.data) + size_t(first + lane) * point_count * 3;
-  for (int i = 1; i < point_count; ++i) {
-    to[3 * i] = lane_of(next[i].x, lane);
-    to[3 * i + 1] = lane_of(next[i].y, lane);
-    to[3 * i + 2] = lane_of(next[i].z, lane);
-  }
+  if (!get_lane(is_touched, lane)) continue;
+  for (int i = is_all ? in_fours : 3; i < number_count; ++i) rows[lane][i] = lane_of(coordinates[i], lane);
 }
 }

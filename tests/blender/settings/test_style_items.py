@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Styles as properties: what is assigned comes back, names differ, and keys follow their style."""
 
+import math
+
 import bpy
 import pytest
 from hypothesis import given, settings
@@ -59,6 +61,19 @@ def test_all_offers_come_back_as_they_went(state):
     assert len(set(names)) == len(names)
     style_items.assign(state, ())
     assert style_items.styles_of(state) == ()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_ends_of_all_ranges_come_back(state, kind):
+    """Rounded to single precision they are within the range still."""
+    for name, default, details in declared(KINDS[kind]):
+        ends = [choice[0] for choice in details.choices]
+        if not isinstance(default, str | bool):
+            ends = [end for end in (details.low, details.high, details.soft_high) if math.isfinite(end)]
+        for end in ends:
+            wanted = KINDS[kind](**{name: end})
+            style_items.assign(state, [wanted])
+            assert style_items.styles_of(state) == (setting_properties.as_stored(wanted),), (name, end)
 
 
 def test_a_style_marks_its_hair_and_the_same_styles_do_not(state):

@@ -181,3 +181,14 @@ def test_blending_ends_at_both_shapes(rng):
     np.testing.assert_allclose(guide_segments.blended(one, other, np.ones(30)), other, atol=1e-6)
     half = guide_segments.blended(one, other, np.full(30, 0.5))
     np.testing.assert_allclose(segment_lengths(half), 0.5 * (segment_lengths(one) + segment_lengths(other)), rtol=1e-4)
+
+
+@pytest.mark.parametrize("tool", [smooth, lift])
+def test_turned_moved_and_scaled_guides_are_changed_alike(ball, rng, tool):
+    """Attraction is left out: upright guides fall down, which a turn changes."""
+    points, _roots, normals = standing(ball, 40, rng)
+    turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    there = (3.0 * points @ turn.T + np.array([1.0, -2.0, 0.5])).astype(np.float32)
+    before = 3.0 * tool(None, points, normals, np.ones(40)) @ turn.T + np.array([1.0, -2.0, 0.5])
+    np.testing.assert_allclose(tool(None, there, normals @ turn.T, np.ones(40)), before, atol=2e-5)

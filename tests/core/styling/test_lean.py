@@ -36,7 +36,7 @@ def directions(points):
     return segments / np.linalg.norm(segments, axis=2, keepdims=True)
 
 
-@pytest.mark.parametrize("settings", [lean.Settings(), lean.Settings(**lean.LIFT), wet.Settings()], ids=type)
+@pytest.mark.parametrize("settings", [lean.Settings(), lean.Settings(**lean.LIFT), wet.Settings(lock=0.2)], ids=type)
 @pytest.mark.parametrize("name", ["fur", "hair"])
 def test_roots_and_lengths_stay(request, name, settings):
     hair = request.getfixturevalue(name)

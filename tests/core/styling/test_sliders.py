@@ -29,8 +29,9 @@ RANGES = {
     (bend.Settings, "angle"): (-6.0, 6.0),
     (smooth.Settings, "length"): (0.002, 0.1),
     (wet.Settings, "amount"): (0.1, 1.0),  # small locks join by its square root
-    (braid.Settings, "pitch"): (0.15, 0.4),
-    (braid.Settings, "radius"): (0.0, 0.03),
+    (braid.Settings, "pitch"): (0.1, 0.3),
+    (braid.Settings, "radius"): (0.0, 0.02),
+    (braid.Settings, "root"): (0.0, 0.5),
 }
 WITH = {
     (trim.Settings, "undercoat_length"): {"undercoat": 0.5},
@@ -47,7 +48,12 @@ MORE_STEPS = {
     (curl.Settings, "amount"): 1600,
     (curl.Settings, "tip"): 1600,
     (frizz.Settings, "coherence"): 6400,
-    (braid.Settings, "root"): 1600,
+    (braid.Settings, "amount"): 3200,
+    (braid.Settings, "vary"): 3200,
+    (braid.Settings, "root"): 3200,
+    (braid.Settings, "tip"): 3200,
+    (braid.Settings, "shape"): 3200,
+    (braid.Settings, "thickness"): 3200,
     (braid.Settings, "start"): 1600,
     (frizz.Settings, "wavelength"): 3200,
     (frizz.Settings, "spread"): 25600,
@@ -66,7 +72,7 @@ DEFAULTS = {
     bend.Settings: {"random_turn": 0.2},
     clump.Settings: {"size": 0.03},
     wet.Settings: {"lock": 0.2},
-    braid.Settings: {"size": 0.3, "radius": 0.03, "pitch": 0.2},
+    braid.Settings: {"size": 0.3, "radius": 0.015, "pitch": 0.15},
     lean.Settings: {"clearance": 0.02},
 }
 # Of all styles: a profile that begins vertically moves by a power of the step where its beginning passes a point.
@@ -95,7 +101,7 @@ def hair():
 
 @pytest.fixture(scope="module")
 def fur():
-    """For leaning, as the nearest point of a head jumps, and for braids, which need long curves."""
+    """For what keeps off the surface, whose nearest point jumps on a head, and for braids, which need gentle curves."""
     return ball(160)
 
 

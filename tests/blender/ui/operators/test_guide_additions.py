@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import curves
+from hair_addon.blender.data import curves, scene
+from hair_addon.core.geometry import mesh
 from tests.support.following import surface_points, update
 from tests.support.guide_tools import grown_from_nothing, select_guides, wave
 from tests.support.reading import attribute, points
@@ -235,3 +236,22 @@ def test_there_must_be_guides_on_the_side(combed):
     count = len(combed.data.curves)
     bpy.ops.vellus.mirror_guides()
     assert len(combed.data.curves) == 2 * count
+
+
+@pytest.mark.parametrize("tool", ["change_guide_count", "mirror_guides"])
+def test_guides_rooted_off_the_surface_keep_their_roots(imported, tool):
+    """New guides begin on the surface, images as far from it as their originals; none is rooted anew later."""
+    bpy.context.view_layer.objects.active = imported
+    bpy.ops.vellus.use_as_guides(surface="Sphere", grows_hair=False)
+    off = curves.read_points(imported.data) + np.float32([0.0, 0.0, 0.01])
+    imported.data.attributes["position"].data.foreach_set("vector", off.ravel())
+    apart = imported.data.attributes["root_distance"]
+    surface = scene.read_surface(bpy.data.objects["Sphere"], bpy.context.evaluated_depsgraph_get())
+    stored = curves.stored_roots(imported.data, surface)
+    places = surface.from_local(curves.first_points(imported.data))
+    gaps = np.linalg.norm(places - mesh.positions(surface.mesh, stored), axis=1) / surface.scale
+    apart.data.foreach_set("value", gaps.astype(np.float32))
+    getattr(bpy.ops.vellus, tool)()
+    stored = curves.stored_roots(imported.data, surface)
+    found = curves.read_roots(imported.data, surface, surface.from_local(curves.first_points(imported.data)))
+    assert found.is_same(stored) and len(stored) != len(places)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves
+from hair_addon.blender.live import invalidation, live_hair
 from tests.support.counting import counts_of
 from tests.support.following import update
 from tests.support.guide_tools import CHOSEN, SHAPING, TOOLS, grown_from_nothing, lengths_of, select_guides, use_tool
@@ -163,6 +164,25 @@ def test_hair_follows_as_it_follows_a_brush(waved, monkeypatch, name):
     calls = counts_of(monkeypatch)
     use_tool(name)
     assert (calls["searches"], calls["writes"]) == (0, 1)
+
+
+@pytest.mark.parametrize("name", TOOLS)
+def test_undo_in_a_window_keeps_hair_and_guides_together(waved, monkeypatch, name):
+    """There the hair's Curves are written when an interaction is over, after the undo step was made."""
+    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    before = points(bpy.data.objects["Guides"]), points(waved)
+    use_tool(name)
+    live_hair.write_all()
+    after = points(bpy.data.objects["Guides"]), points(bpy.data.objects["Hair"])
+    assert np.array_equal(after[1], grown_from_nothing(bpy.data.objects["Hair"]))
+    for operator, wanted in ((bpy.ops.ed.undo, before), (bpy.ops.ed.redo, after)):
+        operator()
+        update()
+        live_hair.write_all()
+        for found, strands in zip(("Guides", "Hair"), wanted, strict=True):
+            assert np.array_equal(points(bpy.data.objects[found]), strands)
+    live_hair.cancel_writing()
+    invalidation.data_replaced()
 
 
 # Names of choices → the settings that a tool shows with them.
