@@ -236,11 +236,11 @@ def locks():
 
 
 def curls():
-    """7. Add Style, Curl: Radius 0.007 m, Pitch 0.025 m, Coherence 0.97."""
+    """7. Add Style, Curl: Radius 0.006 m, Pitch 0.02 m, Coherence 0.97."""
     before = strands()
     yield from add_style("CURL")
     curl = hair_object().data.vellus.styles["Curl"].curl
-    curl.radius, curl.pitch, curl.coherence = 0.007, 0.025, 0.97
+    curl.radius, curl.pitch, curl.coherence = 0.006, 0.02, 0.97
     yield from wait(1.5)
     facts["curled"] = moved(before)
     picture("curls")
