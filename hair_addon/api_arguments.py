@@ -17,7 +17,7 @@ from .core.params import Settings, declared, described, require_class
 blender = lazy.Package(".blender", __package__)
 
 # Settings that refer to data in a .blend file.
-_OF_BLENDER = ("density_group", "density_image", "region_group", "region_attribute", "part_lines")
+_OF_BLENDER = ("density_group", "density_image", "region_group", "region_attribute", "part_lines", "flow_lines")
 
 
 def changed[S: Settings](

@@ -27,7 +27,8 @@ def warnings_of(surface: Object | None, parts: Iterable[Curves]) -> list[Warning
     """[Warning] about a mesh object, or None where it is missing, and the guide and hair Curves that grow on it."""
     partings = [warning for part in parts if part.vellus.kind == "HAIR" for warning in parting_warnings(part)]
     first = [*_of_library(surface, parts), *_of_surface(surface, parts), *_of_uv_map(surface, parts)]
-    return [*first, *_of_guides(parts), *dict.fromkeys(partings)]
+    flows = [warning for part in parts if part.vellus.kind == "GUIDES" for warning in flow_warnings(part)]
+    return [*first, *_of_guides(parts), *dict.fromkeys([*partings, *flows])]
 
 
 def parting_warnings(hair: Curves) -> list[Warning]:
@@ -39,6 +40,14 @@ def parting_warnings(hair: Curves) -> list[Warning]:
         text = 'No vertex group "{name}": pick another for regions.'
         found.append(Warning(interface_text(text, name=group.region_group)))
     return found
+
+
+def flow_warnings(guides: Curves) -> list[Warning]:
+    """Return [Warning] about missing flow lines of a guide Curves datablock."""
+    name = guides.vellus.guides.flow_lines
+    if not name or name in bpy.data.objects:
+        return []
+    return [Warning(interface_text('No object "{name}": pick other flow lines.', name=name))]
 
 
 def modifier_notes(hair_object: Object | None) -> list[str]:

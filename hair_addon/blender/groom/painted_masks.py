@@ -6,7 +6,7 @@ import numpy as np
 from bpy.types import Context, Curves, Object, PropertyGroup
 
 from ...core.errors import HairError, cause_of
-from ..data import curves
+from ..data import curves, guide_curves
 from ..data.attributes import read, write
 from ..settings import style_items
 from . import bindings, selection, writing
@@ -14,7 +14,6 @@ from . import bindings, selection, writing
 # Blender's paint modes by `Object.mode`.
 PAINT_MODES = ("WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT")
 
-_SELECTION = ".selection"
 _COLORS = ("FLOAT_COLOR", "BYTE_COLOR")
 
 
@@ -76,7 +75,9 @@ def from_selection(hair: Curves, item: PropertyGroup) -> int:
     guides = hair.vellus.guide_curves
     for datablock in (hair, guides):
         curves.require_editable(datablock)
-    weights = _selection_of(guides)
+    weights = guide_curves.selection(guides, curves.curve_offsets(guides))
+    if weights is None:
+        raise HairError("Select guides in Sculpt Mode first: Blender stores no selection where all are selected.")
     group = style_items.group_of(item)
     name = group.mask if _is_guide_mask(hair, group.mask) else _new_name(hair, item)
     write(guides, name, "FLOAT", "CURVE", weights)
@@ -137,19 +138,6 @@ def _is_guide_mask(hair, mask):
     if not mask or (surface is not None and (mask in surface.vertex_groups or mask in surface.data.attributes)):
         return False
     return read(hair.vellus.guide_curves, mask, "FLOAT", "CURVE") is not None
-
-
-def _selection_of(guides):
-    """(G,) float32: how far each guide is selected, as its most selected point. Raises `HairError`."""
-    attribute = guides.attributes.get(_SELECTION)
-    if attribute is None or not len(guides.curves):  # Blender stores no selection of everything
-        raise HairError("All guides are selected: select some of them in Sculpt Mode first.")
-    values = read(guides, _SELECTION, attribute.data_type, attribute.domain).astype(np.float32)
-    if attribute.domain == "POINT":
-        values = np.maximum.reduceat(values, curves.curve_offsets(guides)[:-1])
-    if not values.any():
-        raise HairError("No guides are selected: select some of them in Sculpt Mode first.")
-    return np.clip(values, 0.0, 1.0)
 
 
 def _masks_of(hair):

@@ -15,7 +15,7 @@ from ...core.grooming import following, groom, groom_defaults, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
-from ..data import curves, curves_objects, masks, partings, scene
+from ..data import curves, curves_objects, drawn_lines, masks, partings, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..settings import preferences, setting_properties
@@ -52,6 +52,7 @@ def distributing_guides(
     settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture)
     key = staleness.root_key(settings, density, None if texture is None else texture.values)
     roots = _kept_roots(target, surface, key, settings.guide_count) if keeps_roots else None
+    flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
     device, place, target = preferences.device(), Remembered(surface_object), Remembered(target)
     guides = yield lambda progress: groom.distribute_guides(
         surface.mesh,
@@ -61,10 +62,12 @@ def distributing_guides(
         mirror_normal=surface.mirror_normal,
         shape=surface.shape,
         roots=roots,
+        flow=flow,
+        drawn_on=_drawn_on(surface),
         device=device,
         progress=progress,
     )
-    return writing.write_guides(target.find(), place.find(), surface, guides, settings, key)
+    return writing.write_guides(target.find(), place.find(), surface, guides, settings, key, drawn_lines.key(flow))
 
 
 def interpolate_hair(
@@ -169,6 +172,7 @@ def adding_hair(
     completed, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
     (guide_settings, hair_settings), ((density, texture), of_hair) = completed, read
     parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
+    flow = drawn_lines.read(surface_object, surface, guide_settings.flow_lines, depsgraph)
     device, place = preferences.device(), Remembered(surface_object)
     hair_key = staleness.root_key(hair_settings, of_hair[0], of_hair[1] and of_hair[1].values)
 
@@ -181,6 +185,8 @@ def adding_hair(
             texture=texture,
             mirror_normal=surface.mirror_normal,
             shape=surface.shape,
+            flow=flow,
+            drawn_on=_drawn_on(surface),
             device=device,
             progress=part_of(progress, 0.0, 0.5),
         )
@@ -194,7 +200,8 @@ def adding_hair(
 
     grown, bound = yield compute
     key = staleness.root_key(guide_settings, density, None if texture is None else texture.values)
-    guide_curves = writing.write_guides(None, place.find(), surface, grown, guide_settings, key)
+    flow_key = drawn_lines.key(flow)
+    guide_curves = writing.write_guides(None, place.find(), surface, grown, guide_settings, key, flow_key)
     return guide_curves, write_between(guide_curves, bound)
 
 
@@ -241,11 +248,16 @@ def _ground(surface, mask, parting, device):
         "texture": texture,
         "regions": parting.regions,
         "lines": parting.lines,
-        "drawn_on": surface.from_local(surface.posed) if surface.is_deformed else None,
+        "drawn_on": _drawn_on(surface),
         "shape": surface.shape,
         "is_mirrored": surface.is_mirrored,
         "device": device,
     }
+
+
+def _drawn_on(surface):
+    """(V, 3) vertices that lines are drawn on, where these are not the surface's own."""
+    return surface.from_local(surface.posed) if surface.is_deformed else None
 
 
 def _bind(surface, guides, settings, ground, roots, progress):

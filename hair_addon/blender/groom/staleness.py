@@ -9,7 +9,7 @@ from bpy.types import Curves, Depsgraph
 from ...core import geometry
 from ...core.grooming import groom
 from ...core.params import Settings
-from ..data import curves, masks, partings, scene
+from ..data import curves, drawn_lines, masks, partings, scene
 from ..settings import setting_properties
 
 
@@ -43,6 +43,15 @@ def has_other_parting(target: Curves, depsgraph: Depsgraph) -> bool:
     surface = scene.read_surface(target.surface, depsgraph)
     parting = partings.read(target.surface, surface, target.vellus.guide_curves, group, depsgraph)
     return parting.key != target.vellus.parting_key
+
+
+def has_other_flow(guides: Curves, depsgraph: Depsgraph) -> bool:
+    """Whether the flow lines of guides have changed since they were grown. Raises `HairError`."""
+    name = guides.vellus.guides.flow_lines
+    if not name or guides.surface is None:
+        return False
+    surface = scene.read_surface(guides.surface, depsgraph)
+    return drawn_lines.key(drawn_lines.read(guides.surface, surface, name, depsgraph)) != guides.vellus.flow_key
 
 
 def has_other_mask(target: Curves, depsgraph: Depsgraph) -> bool:

@@ -20,15 +20,22 @@ _GUIDE_RADIUS = 1.0 / 300.0
 
 
 def write_guides(
-    target: Curves | None, surface_object: Object, surface: Surface, guides: Strands, settings: GuideSettings, key: str
+    target: Curves | None,
+    surface_object: Object,
+    surface: Surface,
+    guides: Strands,
+    settings: GuideSettings,
+    key: str,
+    flow_key: str,
 ) -> Curves:
     """Write guides into Curves, a new object's for None; returns them.
 
-    settings: completed for the surface, so with a length; key: `staleness.root_key`.
+    settings: completed for the surface, so with a length; key: `staleness.root_key`; flow_key: `drawn_lines.key` of
+    their flow lines.
     """
     target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
-    target.vellus.root_key = key
+    target.vellus.root_key, target.vellus.flow_key = key, flow_key
     radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
     points = Future()
     points.set_result(surface.to_local(guides.numpy()))

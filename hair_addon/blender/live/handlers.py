@@ -39,6 +39,7 @@ def after_depsgraph_update(_scene, depsgraph):
             live_hair.follow_surface(surface_object, depsgraph, surface_object.data in changed)
     moved = [u.id.original for u in depsgraph.updates if u.is_updated_geometry or u.is_updated_transform]
     live_hair.follow_partings(moved, depsgraph)
+    live_hair.follow_flow(moved, depsgraph)
     live_hair.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
     reported.remember_axes()
     if _is_undone:

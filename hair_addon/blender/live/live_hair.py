@@ -10,7 +10,7 @@ import sys
 import bpy
 
 from ...core.errors import HairError
-from ..data import curves, masks
+from ..data import curves, drawn_lines, masks
 from ..groom import bindings, edited_surfaces, painted_masks, pipeline, staleness, writing
 from ..render import hair_cache
 from ..settings import style_items
@@ -215,9 +215,21 @@ def follow_partings(changed, depsgraph):
             state.status = str(error)
 
 
+def follow_flow(changed, depsgraph):
+    """Mark guides as stale whose flow lines are among some datablocks and have changed."""
+    for guides in bpy.data.hair_curves:
+        state = guides.vellus
+        if state.kind != "GUIDES" or not state.is_live or not drawn_lines.is_among(state.guides.flow_lines, changed):
+            continue
+        try:
+            if staleness.has_other_flow(guides, depsgraph):
+                state.is_stale = True
+        except HairError as error:
+            state.status = str(error)
+
+
 def _parts_by(state, changed):
-    lines = bpy.data.objects.get(state.hair.part_lines) if state.hair.part_lines else None
-    if lines is not None and (lines in changed or lines.data in changed):
+    if drawn_lines.is_among(state.hair.part_lines, changed):
         return True
     # Read with each step of a stroke: so only if guides have regions of their own.
     guides = state.guide_curves

@@ -154,6 +154,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     topology: bpy.props.StringProperty(description="Triangulation that the stored roots refer to", options={"HIDDEN"})
     root_key: bpy.props.StringProperty(description="Settings and inputs that placed the roots", options={"HIDDEN"})
     parting_key: bpy.props.StringProperty(description="Settings and inputs that parted the hair", options={"HIDDEN"})
+    flow_key: bpy.props.StringProperty(description="Flow lines that the guides were grown along", options={"HIDDEN"})
     written: bpy.props.StringProperty(description="Fingerprint of the generated points", options={"HIDDEN"})
     followed: bpy.props.StringProperty(description="Fingerprint of the followed guides", options={"HIDDEN"})
     shading_status: bpy.props.StringProperty(description="Shading error", options={"HIDDEN"})

@@ -17,6 +17,7 @@ NAME_SHARE = 0.54
 WIDE = ("neighbour_limit", "mode")
 
 _GROWTH = ("length_variation", "tilt", "gravity")
+_FLOW = ("flow_lines", "lift")
 _PLACEMENT = ("seed", "relax_iterations", "curvature", "symmetric")
 _MASKS = ("density_group", "density_image")
 _PARTING_LIMITS = ("angle_limit", "length_limit")
@@ -76,13 +77,17 @@ def others(settings_class, *shown):
 
 def guide_rows(layout, owner, surface):
     """Number, length and masks of guides; owner: has properties of `GuideSettings`; surface: object or None."""
-    rows(layout, owner, GuideSettings, others(GuideSettings, _GROWTH, _PLACEMENT, _MASKS))
+    rows(layout, owner, GuideSettings, others(GuideSettings, _GROWTH, _FLOW, _PLACEMENT, _MASKS))
     _density_rows(layout, owner, surface)
 
 
 def growth_rows(layout, owner):
     """Length variation and direction of guides."""
     rows(layout, owner, GuideSettings, _GROWTH)
+    search_row(layout, owner, "flow_lines", bpy.data, "objects")
+    angle = layout.column()
+    angle.active = bool(owner.flow_lines)
+    row(angle, owner, "lift")
 
 
 def placement_rows(layout, owner):

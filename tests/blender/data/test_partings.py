@@ -334,7 +334,7 @@ REFUSED = {
     "no line": (
         lambda _: linked("Line", bpy.data.lights.new("Line", "SUN")),
         {"part_lines": "Line"},
-        "cannot be used as part lines",
+        "cannot be used as lines",
     ),
     "no points": (
         lambda _: linked("Line", bpy.data.curves.new("Line", "CURVE")),
@@ -350,7 +350,7 @@ REFUSED = {
     ),
     "a surface": (lambda _: None, {"part_lines": "Grid"}, "has no lines"),
     "non-finite": (lambda _: draw_line((0, 0, math.nan), (1, 0, 0)), {"part_lines": "Line"}, "non-finite"),
-    "hair": (lambda _: None, {"part_lines": "Guides"}, "cannot be used as part lines"),
+    "hair": (lambda _: None, {"part_lines": "Guides"}, "cannot be used as lines"),
     "no group": (lambda _: None, {"region_group": "Lost"}, 'no vertex group "Lost"'),
     "no attribute": (lambda _: None, {"region_attribute": "Lost"}, 'attribute "Lost"'),
     "wrong type": (face_set("a", "FLOAT", "FACE"), {"region_attribute": "a"}, "integers on faces or vertices"),

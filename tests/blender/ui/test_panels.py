@@ -242,6 +242,7 @@ def test_names_of_data_are_picked_in_the_redo_panel(hair, operator):
         "region_group": sphere.vertex_groups,
         "region_attribute": sphere.data.attributes,
         "part_lines": bpy.data.objects,
+        "flow_lines": bpy.data.objects,
     }
     assert redo(operator).picked == {name: data for name, data in pickers.items() if name in own}
 
