@@ -25,7 +25,7 @@ MODULE = "bl_ext.user_default.vellus"
 ZIP, HEAD, OUT = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 
-STRAND_COUNT = 12_000  # software drivers take their time for each
+STRAND_COUNT = 16_000  # software drivers take their time for each
 
 # Pixels from the upper left corner of a sidebar of the default width that shows the panel Styles alone.
 _ADD_FIRST = (120, 46)  # the button of a hair without styles
@@ -180,7 +180,7 @@ def hair_system():
     yield from wait_for(lambda: hair_object() is not None)
     guides, hair = guides_object().data.vellus.guides, hair_object().data.vellus.hair
     guides.density_group, guides.length, guides.gravity = "scalp", 0.24, 0.9
-    hair.strand_count, hair.thickness = STRAND_COUNT, 0.16
+    hair.strand_count, hair.thickness = STRAND_COUNT, 0.2
     yield from wait_for(lambda: len(hair_object().data.curves) == STRAND_COUNT)
     yield from wait(1.0)
     picture("hair_system")
@@ -236,11 +236,11 @@ def locks():
 
 
 def curls():
-    """7. Add Style, Curl: Radius 0.007 m, Pitch 0.036 m, Coherence 0.97."""
+    """7. Add Style, Curl: Radius 0.006 m, Pitch 0.02 m, Coherence 0.97."""
     before = strands()
     yield from add_style("CURL")
     curl = hair_object().data.vellus.styles["Curl"].curl
-    curl.radius, curl.pitch, curl.coherence = 0.007, 0.036, 0.97
+    curl.radius, curl.pitch, curl.coherence = 0.006, 0.02, 0.97
     yield from wait(1.5)
     facts["curled"] = moved(before)
     picture("curls")
@@ -270,6 +270,7 @@ def paint():
     yield from wait(1.0)
     unified = bpy.context.tool_settings.weight_paint.unified_paint_settings
     unified.weight, unified.size = 0.0, 70
+    bpy.context.tool_settings.weight_paint.brush.weight = 0.0
     before = strands()
     top = places(np.array([[0.02, -0.10, 0.84], [0.02, 0.0, 0.85]]))
     start, end = top[0], top[1]
@@ -340,9 +341,9 @@ def comb_styled():
         bpy.ops.vellus.comb_guides()
     yield from wait(0.5)
     before = strands()
-    middle = places(points(guides_object())[40::41]).mean(axis=0)
+    middle = places(points(guides_object())[20::41]).mean(axis=0)
     followed = []
-    stroke = drag(middle - np.array([80, 0]), middle + np.array([80, 30]), steps=16)
+    stroke = drag(middle + np.array([-60, 60]), middle + np.array([160, 40]), steps=16)
     for number, _pause in enumerate(stroke):
         yield
         if number == 12:

@@ -53,6 +53,8 @@ class Variant:
 
 def variant(width: int, most_points: int, module: wp.Module | None = None) -> Variant:
     """A `Variant` in a Warp module, this file's unless another is given."""
+    if module is not None:
+        module.options["enable_backward"] = False
 
     @wp.func_native(native_code.body(__file__, "steps.cpp", WIDTH=width, MOST=most_points, **_CONSTANTS))
     def _apply_steps(
