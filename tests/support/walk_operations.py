@@ -28,6 +28,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support import always
 from tests.support.always import activate, changed, chosen, nothing_is_left_listening, objects, operate, ours
+from tests.support.walk_painting import PaintingSteps
 from tests.support.walk_steps import needs_room, odd_numbers, pick, step
 from tests.support.walk_styles import StyleSteps
 
@@ -36,7 +37,7 @@ GUIDE_TOOLS = ["guide_length", "trim_guides", "change_guide_count", "mirror_guid
 GUIDE_TOOLS += ["smooth_guides", "lift_guides", "attract_guides"]
 
 
-class Artist(StyleSteps, RuleBasedStateMachine):
+class Artist(PaintingSteps, StyleSteps, RuleBasedStateMachine):
     """The state is Blender's own."""
 
     def __init__(self):

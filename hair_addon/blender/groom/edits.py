@@ -16,6 +16,8 @@ from .selection import curves_on
 
 _UV_MAP = "Hair"
 
+_LARGEST_UNWRAPPED = 1e9  # in local units: Blender never ends to unwrap meshes of 1e12
+
 # Roots on seams may be found on either side of them.
 _TOLERATED = 0.002
 
@@ -68,6 +70,8 @@ def make_uv_map(surface_object: Object, view_layer: ViewLayer) -> None:
         raise HairError("The surface has no faces to grow hair on.")
     if not surface_object.visible_get(view_layer=view_layer):
         raise HairError('"{name}" is hidden: show it first.', name=surface_object.name)
+    if np.ptp(scene.vertex_positions(surface_object.data), axis=0).max() > _LARGEST_UNWRAPPED:
+        raise HairError('"{name}" is too large to unwrap: scale its mesh down.', name=surface_object.name)
     if surface_object.data.uv_layers.new(name=_UV_MAP) is None:
         raise HairError('"{name}" has no room for another UV map: remove one.', name=surface_object.name)
     surface_object.data.uv_layers.active_index = len(surface_object.data.uv_layers) - 1

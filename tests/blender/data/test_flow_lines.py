@@ -7,6 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.core.errors import HairError
+from tests.support.layout import draw
 from tests.support.reading import points, write_points
 
 
@@ -193,3 +194,18 @@ def test_undo_brings_guides_back(plane):
     bpy.ops.ed.undo()
     bpy.context.view_layer.update()
     np.testing.assert_array_equal(points(bpy.data.objects["Guides"]), before)
+
+
+def test_missing_flow_lines_are_reported_with_the_surface(plane):
+    drawn = spline("POLY")
+    guides = grow(flow_lines="Flow")
+    bpy.context.view_layer.objects.active = plane
+
+    def said():
+        return " ".join(draw(bpy.types.VELLUS_PT_surface).texts)
+
+    assert "flow lines" not in said()
+    bpy.data.objects.remove(drawn)
+    assert 'No object "Flow"' in said() and "flow lines" in said()
+    guides.data.vellus.guides.flow_lines = ""
+    assert "flow lines" not in said()

@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from hair_addon.blender.groom import edits
 from hair_addon.blender.settings import preferences, saved_looks
@@ -146,6 +147,15 @@ def test_overlaps_are_found_when_asked_for(hair):
     assert hair.data.vellus.uv_status
     bpy.ops.vellus.make_uv_map()
     assert not hair.data.vellus.uv_status
+
+
+def test_a_mesh_that_blender_cannot_unwrap_is_refused(hair):
+    sphere = bpy.data.objects["Sphere"]
+    count = len(sphere.data.uv_layers)
+    sphere.data.transform(Matrix.Scale(1e12, 4))
+    with pytest.raises(RuntimeError, match="too large to unwrap"):
+        bpy.ops.vellus.make_uv_map()
+    assert len(sphere.data.uv_layers) == count
 
 
 def test_a_renamed_uv_map_is_found_again(hair):
