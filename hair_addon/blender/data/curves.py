@@ -19,6 +19,8 @@ from . import attributes, follow_nodes
 
 _GUIDE_MAP = ("guide_index", "guide_weight")
 
+_WETNESS = "wetness"  # a strand's, where a mask or a variation of the style Wet makes strands differ
+
 _RADIUS = 0.005  # of Curves without one, as Blender has it
 
 # A stored root further than this part of the surface's size from the curve's first point is out of date.
@@ -86,10 +88,21 @@ def write_guide_map(curves, guide_map):
 def write_clumps(curves, clumps):
     """Store (S,) int32 clumps of strands and (S,) float32 random numbers of these, for shaders; None: remove them."""
     for name, data_type, place in (("clump_index", "INT", 0), ("clump_random", "FLOAT", 1)):
-        if clumps is not None:
-            attributes.write(curves, name, data_type, "CURVE", clumps[place])
-        elif (attribute := curves.attributes.get(name)) is not None:
-            curves.attributes.remove(attribute)
+        _write_or_remove(curves, name, data_type, None if clumps is None else clumps[place])
+
+
+def write_wetness(curves, wetness):
+    """Store (S,) float32 wetness of strands, for shaders; None: remove it. Returns whether it came or went."""
+    had_wetness = has_wetness(curves)
+    _write_or_remove(curves, _WETNESS, "FLOAT", wetness)
+    return had_wetness != (wetness is not None)
+
+
+def _write_or_remove(curves, name, data_type, values):
+    if values is not None:
+        attributes.write(curves, name, data_type, "CURVE", values)
+    elif (attribute := curves.attributes.get(name)) is not None:
+        curves.attributes.remove(attribute)
 
 
 def write_roots(curves, surface, roots, normals=None):
@@ -247,6 +260,18 @@ def read_randoms(curves):
     if randoms is None:
         return strands.random_numbers(len(curves.curves))
     return np.where((randoms >= 0.0) & (randoms <= 1.0), randoms, np.float32(0.5))
+
+
+def has_wetness(curves):
+    """Whether strands store a wetness each."""
+    attribute = curves.attributes.get(_WETNESS)
+    return attribute is not None and (attribute.data_type, attribute.domain) == ("FLOAT", "CURVE")
+
+
+def read_wetness(curves):
+    """(S,) wetness, float32 in [0, 1], of strands; None for curves without it."""
+    wetness = attributes.read(curves, _WETNESS, "FLOAT", "CURVE")
+    return None if wetness is None else np.clip(np.where(np.isfinite(wetness), wetness, np.float32(0.0)), 0.0, 1.0)
 
 
 def write_randoms(curves):

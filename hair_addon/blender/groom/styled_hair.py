@@ -63,6 +63,11 @@ class StyledHair:
         return None if self.styling is None else self.styling.clumps()
 
     @cached_property
+    def wetness(self) -> np.ndarray | None:
+        """(S,) float32: as `Styling.wetness`."""
+        return None if self.styling is None else self.styling.wetness()
+
+    @cached_property
     def trees(self) -> ClumpTrees:
         """The clump trees of the hair; made when a style needs them."""
         return self.make_trees() if self.styling is None else self.styling.trees

@@ -79,6 +79,8 @@ def write_hair(target: Curves) -> None:
         )
         bound.written_radii = radii
         curves.write_clumps(target, bound.styles.clumps)
+        if curves.write_wetness(target, bound.styles.wetness):
+            looks.evaluate_shading(target)
     if not bound.is_map_written:
         curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
     curves.write_points(target, bound.growing)

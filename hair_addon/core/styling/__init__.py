@@ -26,6 +26,7 @@ if TYPE_CHECKING:
         smooth,
         stack,
         steps,
+        strand_wetness,
         style_inputs,
         trim,
         wet,

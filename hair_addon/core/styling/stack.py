@@ -18,7 +18,7 @@ from ..interpolation.hair_binding import HairBinding
 from ..kernels import kernel_cache
 from ..kernels.checks import require_count
 from . import program as programs
-from . import steps
+from . import steps, strand_wetness
 from .base import StyleSettings
 from .clump_trees import ClumpTrees
 from .guide_styles import FollowedGuides, leans
@@ -121,6 +121,16 @@ class Styling:
         members = self.data.members.numpy()[row]
         numbers = self.levels[row].binding.identities[1][members]
         return members, np.where(members >= 0, numbers, np.float32(0.0))
+
+    def wetness(self) -> np.ndarray | None:
+        """(S,) float32 in [0, 1]: the wetness that styles give the shading of each strand.
+
+        None where no mask and no variation makes strands differ in it.
+        """
+        if not strand_wetness.is_uneven(self.styles):
+            return None
+        masks = dict(zip(programs.mask_keys(self.styles), self.data.masks.numpy(), strict=True))
+        return strand_wetness.of_strands(self.styles, masks, self.data.identities.numpy())
 
 
 @wp.kernel

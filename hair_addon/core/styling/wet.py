@@ -3,7 +3,7 @@
 
 With w the amount: guides lean down by cling · w over the first 0.3; strands are smoothed over twice the lock
 size by relax · w, and clump in two levels with amounts 0.92 w^1.5 (large) and 0.92 w^½ (small). Shading takes the
-same w as its wetness.
+same w as its wetness, that of each strand where a mask or a variation makes them differ (strand_wetness.py).
 """
 
 from dataclasses import dataclass
