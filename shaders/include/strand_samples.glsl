@@ -3,6 +3,7 @@
 // segments and the image picture.
 
 #include "include/this_place.glsl"
+#include "include/whole_samples.glsl"
 
 // At the place that `find_place` found.
 vec4 sample_value();
@@ -17,7 +18,10 @@ void main()
   // Segments of other hair, and no segment at all, are beyond this hair's count either way.
   uint found = texelFetch(segments, place, 0).r - uint(first_segment);
   if (found < uint(segment_count)) {
-    find_place(int(found), vec2(place) + 0.5, vec2(size));
-    imageStore(picture, place, sample_value());
+    float share = look_share(int(found) / (view.drawn_points - 1));
+    if (share > 0.0) {
+      find_place(int(found), vec2(place) + 0.5, vec2(size));
+      imageStore(picture, place, mixed_light(place, sample_value(), share));
+    }
   }
 }

@@ -8,6 +8,7 @@ from functools import partial
 import gpu
 import numpy as np
 
+from ...core.shading.appearance import wet_share
 from ...core.shading.fibre import kajiya_kay, strand_variation
 from ...core.shading.tables import albedo, dual_scattering
 from . import shaders, uniforms
@@ -25,7 +26,7 @@ class Shading:
     """Inputs of a strand shader, apart from the scene."""
 
     program: gpu.types.GPUShader
-    parts_program: Callable[[], gpu.types.GPUShader]  # the same for a part of the light; compiled where it is asked for
+    variant: Callable[..., gpu.types.GPUShader]  # the same with options of `shaders.shading_program`; compiled if used
     blocks: dict = field(default_factory=dict)  # {instance: GPUUniformBuf}
     samplers: dict = field(default_factory=dict)
     forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # passed on to strands behind
@@ -34,7 +35,54 @@ class Shading:
     @property
     def opacity(self):
         """Opacity of a strand, the mean over the channels."""
-        return max(1.0 - float(np.mean(self.forward)), 0.05)
+        return _opacity(self.forward)
+
+    @property
+    def layers(self):
+        """[(`Shading`, `Mix`)] that are drawn one over the other; None in place of a `Mix` for all of the light."""
+        return [(self, None)]
+
+
+@dataclass(frozen=True)
+class Mix:
+    """Which share of a strand's light a `Shading` has: constants of shaders/include/mixed_samples.glsl."""
+
+    wetness_range: tuple  # of the driest look and of the wettest
+    is_wet: bool  # the share of the wettest, or of the driest
+
+
+@dataclass(frozen=True)
+class MixedShading:
+    """Shading of strands that differ in wetness: a mix of two, by the wetness of each."""
+
+    driest: Shading
+    wettest: Shading
+    wetness_range: tuple
+    mean_share: float  # of the wettest, in all strands
+
+    @property
+    def forward(self):
+        """As a `Shading` has it, the mean over the strands."""
+        return (1.0 - self.mean_share) * self.driest.forward + self.mean_share * self.wettest.forward
+
+    @property
+    def opacity(self):
+        """The same."""
+        return _opacity(self.forward)
+
+    @property
+    def layers(self):
+        """The same: the driest first."""
+        return [(self.driest, Mix(self.wetness_range, False)), (self.wettest, Mix(self.wetness_range, True))]
+
+
+def mixed(driest, wettest, wetness, wetness_range):
+    """The `MixedShading` of two `Shading`s for strands of a wetness (S,); wetness_range: of both, least and most."""
+    return MixedShading(driest, wettest, wetness_range, float(wet_share(wetness, *wetness_range).mean()))
+
+
+def _opacity(forward):
+    return max(1.0 - float(np.mean(forward)), 0.05)
 
 
 def kajiya_kay_shading(settings):
@@ -83,10 +131,10 @@ def _shading(file, blocks, arrays, forward, is_varied=False):
     classes = tuple((instance, type(settings)) for instance, settings in blocks.items())
     wanted = file, classes, tuple(kinds)
     program = shaders.shading_program(*wanted)
-    parts_program = partial(shaders.shading_program, *wanted, in_parts=True)
+    variant = partial(shaders.shading_program, *wanted)
     buffers = {instance: uniforms.uniform_buffer(uniforms.fill(settings)) for instance, settings in blocks.items()}
     textures = {name: _table_texture(array) for name, array in arrays.items()}
-    return Shading(program, parts_program, buffers, textures, forward, is_varied)
+    return Shading(program, variant, buffers, textures, forward, is_varied)
 
 
 def _table_texture(array):

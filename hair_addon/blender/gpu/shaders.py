@@ -18,15 +18,16 @@ FOLDER = Path(__file__).resolve().parents[3] / "shaders"
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 
 
-def expand(name, skipped=()):
-    """(text, lines): the file with every #include but those of `skipped` put in its place once.
+def expand(name, replaced=None):
+    """(text, lines): the file with every #include put in its place once.
 
-    lines: each line's (file, number).
+    replaced: {file: the one that is included in its place, or None}; lines: each line's (file, number).
     """
-    text, lines, seen = [], [], set(skipped)
+    text, lines, seen, replaced = [], [], set(), replaced or {}
 
     def add(file):
-        if file in seen:
+        file = replaced.get(file, file)
+        if file is None or file in seen:
             return
         seen.add(file)
         path = FOLDER / file
@@ -145,27 +146,37 @@ PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 
 
 @kept
-def shading_program(file, blocks=(), tables=(), in_parts=False):
+def shading_program(file, blocks=(), tables=(), in_parts=False, is_mixed=False):
     """The compute program that shades strands: a model's .comp, its blocks and its samplers of tables.
 
     blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: whether just a part of the light
-    is drawn, by the constants of include/drawn_light.glsl.
+    is drawn, by the constants of include/drawn_light.glsl; is_mixed: whether strands take just their share of it, by
+    the constants of include/mixed_samples.glsl.
     """
     structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
-    info = strand_samples_info("".join(block.source for block in structs), tables)
+    structs_source = "".join(block.source for block in structs)
+    info = strand_samples_info(
+        structs_source, (*tables, ("strand_wetness", "FLOAT_2D")) if is_mixed else tables, is_mixed=is_mixed
+    )
     for slot, ((instance, _class), block) in enumerate(zip(blocks, structs, strict=True), start=2):
         info.uniform_buf(slot, block.type_name, instance)
-    if not in_parts:
-        return compile_compute(info, file)
-    info.push_constant("VEC4", "drawn_lobes")
-    info.push_constant("FLOAT", "drawn_world")
-    return compile_compute(info, file, skipped=("include/drawn_light.glsl",))
+    replaced = {}
+    if in_parts:
+        replaced["include/drawn_light.glsl"] = None
+        info.push_constant("VEC4", "drawn_lobes")
+        info.push_constant("FLOAT", "drawn_world")
+    if is_mixed:
+        replaced["include/whole_samples.glsl"] = "include/mixed_samples.glsl"
+        info.push_constant("VEC2", "wetness_range")
+        info.push_constant("INT", "is_wet")
+    return compile_compute(info, file, replaced)
 
 
-def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT):
+def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, is_mixed=False):
     """Info of a program that includes strand_samples.glsl.
 
-    samplers: (name, type), ... beside the scene's; texture_format: of what it fills.
+    samplers: (name, type), ... beside the scene's; texture_format: of what it fills; is_mixed: whether it reads that
+    too.
     """
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
@@ -173,7 +184,7 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT):
     first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
     for slot, (name, kind) in enumerate((("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *samplers), start=first):
         info.sampler(slot, kind, name)
-    info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"} if is_mixed else {"WRITE"})
     for name in ("first_segment", "segment_count"):
         info.push_constant("INT", name)
     return info
@@ -308,9 +319,9 @@ def compile_drawing(info, vertex, fragment, targets=_COLOR):
     return _create(info, (vertex, fragment), vertex_lines, fragment_lines)
 
 
-def compile_compute(info, file, skipped=()):
-    """The compute program of a file, without the includes of `skipped`. Raises `HairError`."""
-    text, lines = expand(file, skipped)
+def compile_compute(info, file, replaced=None):
+    """The compute program of a file, some of its includes replaced as `expand` says. Raises `HairError`."""
+    text, lines = expand(file, replaced)
     info.compute_source(text)
     return _create(info, (file,), [], lines)
 

@@ -29,6 +29,8 @@ class StrandsOnGPU:
     point_count: int
     row_strands: int
     randoms: gpu.types.GPUTexture  # a number in [0, 1] a strand, `row_strands` a row
+    wetness: gpu.types.GPUTexture | None  # the same, None where strands do not differ
+    wetness_here: np.ndarray | None  # (S,)
     points: np.ndarray  # (S, P, 3) as uploaded, for computations on the CPU
     radii: np.ndarray  # (S, P)
     bounds: np.ndarray  # (2, 3): least and greatest coordinates
@@ -36,15 +38,17 @@ class StrandsOnGPU:
     mean_radius: float
 
 
-def upload_strands(points, radii, randoms=None):
+def upload_strands(points, radii, randoms=None, wetness=None):
     """(S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
 
-    randoms: (S,) numbers in [0, 1] by which strands may differ; without them all are average.
+    randoms: (S,) numbers in [0, 1] by which strands may differ; without them all are average; wetness: (S,) in [0, 1],
+    None where strands do not differ in it.
     """
     strand_count, point_count, _xyz = points.shape
     row_strands = TEXTURE_WIDTH // point_count
     texture = places_texture(points, radii, row_strands)
-    random_texture = _randoms_texture(strand_count, row_strands, randoms)
+    random_texture = _numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
+    wetness_texture = None if wetness is None else _numbers_texture(wetness, row_strands)
     strip = bare_vertices(vertex_count(strand_count, point_count))
     # Strand by strand first: NumPy is ten times faster along the long axis of a flat array.
     flat = points.reshape(strand_count, -1)
@@ -59,6 +63,8 @@ def upload_strands(points, radii, randoms=None):
         point_count,
         row_strands,
         random_texture,
+        wetness_texture,
+        wetness,
         points,
         radii,
         bounds,
@@ -67,11 +73,10 @@ def upload_strands(points, radii, randoms=None):
     )
 
 
-def _randoms_texture(strand_count, row_strands, randoms):
-    """A number a strand, `row_strands` a row."""
-    numbers = np.full((-(-strand_count // row_strands), row_strands), 0.5, np.float32)
-    if randoms is not None:
-        numbers.ravel()[:strand_count] = randoms
+def _numbers_texture(values, row_strands):
+    """A number a strand, `row_strands` a row; values: (S,)."""
+    numbers = np.zeros((-(-len(values) // row_strands), row_strands), np.float32)
+    numbers.ravel()[: len(values)] = values
     data = gpu.types.Buffer("FLOAT", numbers.size, numbers.ravel())
     texture = gpu.types.GPUTexture(numbers.shape[::-1], format="R32F", data=data)
     texture.filter_mode(False)

@@ -13,7 +13,7 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.shading.tables import dual_scattering
 from . import drawing, shaders, uniforms
-from .hair_shading import Shading
+from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
 _NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
@@ -24,7 +24,7 @@ class _Placed:
     """One hair object in a picture, and its range of segments."""
 
     strands: StrandsOnGPU
-    shading: Shading
+    shading: Shading | MixedShading
     record: np.ndarray  # uniforms.VIEW
     samplers: dict
     first: int
@@ -64,7 +64,7 @@ class VisibilityBuffer:
         """Find the hair in front of the surfaces and shade it: arguments as for `find_hair`."""
         self.find_hair(hair, lights, view, in_compute)
         for placed in self._hair:
-            self._shade(placed, placed.shading.program, self.color)
+            self._shade(placed, self.color)
 
     def find_hair(self, hair, lights, view, in_compute=None):
         """Fill `segments` and `depths` with the hair that is nearest, in front of the surfaces. Raises `HairError`.
@@ -126,11 +126,7 @@ class VisibilityBuffer:
             pass
         texture = self._parts[shaders.PICTURE_FORMAT][1]
         for placed in self._hair:
-            program = placed.shading.parts_program()
-            program.bind()
-            program.uniform_float("drawn_lobes", lobes)
-            program.uniform_float("drawn_world", world)
-            self._shade(placed, program, texture)
+            self._shade(placed, texture, {"drawn_lobes": lobes, "drawn_world": world})
         return texture
 
     def hair_at(self, x, y):
@@ -162,17 +158,33 @@ class VisibilityBuffer:
                 program.uniform_int("first_segment", placed.first)
                 drawing.draw_strip(placed.strands, program, placed.record, self._lights)
 
-    def _shade(self, placed, program, picture):
-        """Fill the samples in which a strand of a hair is nearest with its light."""
-        shading = placed.shading
-        textures = (
-            {**shading.samplers, "strand_randoms": placed.strands.randoms} if shading.is_varied else shading.samplers
-        )
-        self._fill(placed, program, picture, shading.blocks, textures)
+    def _shade(self, placed, picture, parts=None):
+        """Fill the samples in which a strand of a hair is nearest with its light, or with parts of it.
 
-    def _fill(self, placed, program, picture, blocks, textures):
-        """Run a program on the samples in which a strand of a hair is nearest."""
-        blocks = {"view": uniforms.uniform_buffer(placed.record), "lights": self._lights, **blocks}
+        parts: constants of include/drawn_light.glsl.
+        """
+        for shading, mix in placed.shading.layers:
+            has_options = parts is not None or mix is not None
+            program = shading.program
+            if has_options:
+                program = shading.variant(in_parts=parts is not None, is_mixed=mix is not None)
+            program.bind()
+            for name, value in (parts or {}).items():
+                program.uniform_float(name, value)
+            textures, record = dict(shading.samplers), placed.record.copy()
+            if shading.is_varied:
+                textures["strand_randoms"] = placed.strands.randoms
+            if mix is not None:
+                program.uniform_float("wetness_range", mix.wetness_range)
+                program.uniform_int("is_wet", int(mix.is_wet))
+                textures["strand_wetness"] = placed.strands.wetness
+                record["hair_forward"][:3] = shading.forward
+            self._fill(placed, program, picture, shading.blocks, textures, record)
+
+    def _fill(self, placed, program, picture, blocks, textures, record=None):
+        """Run a program on the samples in which a strand of a hair is nearest; record: in place of the hair's own."""
+        record = placed.record if record is None else record
+        blocks = {"view": uniforms.uniform_buffer(record), "lights": self._lights, **blocks}
         textures = {"segments": self.segments, "strands": placed.strands.texture, **placed.samplers, **textures}
         with drawing.bound(program, blocks, textures):
             program.image("picture", picture)

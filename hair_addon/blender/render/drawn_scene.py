@@ -153,15 +153,16 @@ def _read_rendered_hair(depsgraph, known, refused):
             continue
         try:
             arrays = hair_cache.read_strands(hair_object.data)
-            shading = hair_cache.shading_of(original.evaluated_get(depsgraph))  # its settings may be keyed
+            uid = hair_object.original.session_uid
+            if uid not in known or not all(map(np.array_equal, arrays, known[uid])):
+                known[uid] = (*arrays, strand_textures.upload_strands(*arrays))
+            strands = known[uid][-1]
+            shading = hair_cache.shading_of(original.evaluated_get(depsgraph), strands)  # its settings may be keyed
         except HairError as error:
             refused(original, error)
             continue
-        uid = hair_object.original.session_uid
-        if uid not in known or not all(map(np.array_equal, arrays, known[uid])):
-            known[uid] = (*arrays, strand_textures.upload_strands(*arrays))
         color = drawn_meshes.surface_color(original.surface)
-        yield (known[uid][-1], shading, to_world, color, 1.0), drawn_meshes.owner_of(instance)
+        yield (strands, shading, to_world, color, 1.0), drawn_meshes.owner_of(instance)
 
 
 def _read_hair(places, viewport, refused):

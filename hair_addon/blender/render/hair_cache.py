@@ -2,7 +2,7 @@
 """Cache of hair on the GPU, by session UID: invalidated by changes, filled on drawing.
 
 It holds no reference to Blender's data, so undo, deletion and new files cannot leave dangling ones. Points, radii,
-random numbers and roots are read and replaced together.
+random numbers, wetness and roots are read and replaced together.
 """
 
 import sys
@@ -37,6 +37,7 @@ class _KeptStrands:
     points: np.ndarray  # (S, P, 3) float32 in local coordinates
     radii: np.ndarray  # (S, P) float32
     randoms: np.ndarray  # (S,) float32
+    wetness: np.ndarray | None  # (S,) float32, None where strands do not differ
     places: tuple | None  # roots as `curves.read_root_places` returns them, None for none
     rooted_on: tuple  # (session_uid of the surface, its topology)
     growing: Future | None = None  # of these points, which other threads may be computing; None where they are read
@@ -47,6 +48,8 @@ class _KeptStrands:
     def __post_init__(self):
         require_count("radii", len(self.radii), len(self.points))
         require_count("random numbers", len(self.randoms), len(self.points))
+        if self.wetness is not None:
+            require_count("wetness", len(self.wetness), len(self.points))
 
 
 _REFUSED = object()  # in place of strands that cannot be drawn
@@ -59,7 +62,7 @@ shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 def hair_on_gpu(datablock):
     """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`."""
     strands_there = strands_on_gpu(datablock)
-    return strands_there, strands_there and shading_of(datablock)
+    return strands_there, strands_there and shading_of(datablock, strands_there)
 
 
 def strands_on_gpu(datablock):
@@ -76,7 +79,8 @@ def strands_on_gpu(datablock):
     moved, kept.moved = kept.moved, []
     if kept.on_gpu is None or kept.pose is not pose:
         points = _carried(kept, pose)
-        kept.on_gpu, kept.pose = strand_textures.upload_strands(points, kept.radii, kept.randoms), pose
+        kept.on_gpu = strand_textures.upload_strands(points, kept.radii, kept.randoms, kept.wetness)
+        kept.pose = pose
     elif moved:
         chosen = np.unique(np.concatenate(moved))
         require_indices("strands", chosen, len(kept.points))
@@ -164,6 +168,7 @@ def _is_same(datablock, kept, bound):
         is_known
         and np.array_equal(kept.radii.ravel(), curves.read_radii(datablock))
         and np.array_equal(kept.randoms, curves.read_randoms(datablock))
+        and _are_equal(kept.wetness, curves.read_wetness(datablock))
         and kept.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
         and (bound is not None or _are_places(kept.places, curves.read_root_places(datablock, np.inf)))
     )
@@ -181,6 +186,12 @@ def _are_places(places, others):
     return all(map(np.array_equal, places, others))
 
 
+def _are_equal(values, others):
+    if values is None or others is None:
+        return values is others
+    return np.array_equal(values, others)
+
+
 def _are_points(datablock, points):
     return np.array_equal(points.reshape(-1, 3), curves.read_points(datablock))
 
@@ -191,36 +202,49 @@ def _read(datablock, bound):
         places = None if datablock.surface is None else curves.read_root_places(datablock, np.inf)
         return _KeptStrands(*read_strands(datablock), places, _rooted_on(datablock, datablock.vellus.topology))
     if bound.is_written or bound.has_moved_only:
-        randoms = curves.read_randoms(datablock)
+        randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)
     else:
-        _identities, randoms = bound.binding.identities
+        (_identities, randoms), wetness = bound.binding.identities, bound.styles.wetness
     # Roots too are those of the binding: the datablock may store those of earlier strands.
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
     radii = np.tile(bound.radii, (len(bound.points), 1))
-    return _KeptStrands(bound.points, radii, randoms, places, rooted_on, bound.growing)
+    return _KeptStrands(bound.points, radii, randoms, wetness, places, rooted_on, bound.growing)
 
 
 def read_strands(datablock):
-    """(S, P, 3) points, (S, P) radii in local coordinates and (S,) random numbers of Curves, stored or evaluated.
+    """(S, P, 3) points, (S, P) radii in local coordinates, (S,) random numbers and (S,) wetness of Curves.
 
-    Curves of fewer points than the longest are resampled to as many. Raises `HairError`.
+    Stored or evaluated ones; the wetness is None where strands do not differ in it. Curves of fewer points than the
+    longest are resampled to as many. Raises `HairError`.
     """
     counts = curves.point_counts(datablock)
     if not len(counts):
         raise HairError(f'"{datablock.name}" has no strands to draw.')
     points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
+    wetness = curves.read_wetness(datablock)
     most = int(counts.max())
     if (counts == most).all():
-        return points.reshape(-1, most, 3), radii.reshape(-1, most), randoms
+        return points.reshape(-1, most, 3), radii.reshape(-1, most), randoms, wetness
     starts = curves.curve_offsets(datablock)
     mean_radii = np.add.reduceat(radii, starts[:-1]) / counts
-    return strands.resample(points, starts, most), np.repeat(mean_radii[:, None], most, axis=1), randoms
+    return strands.resample(points, starts, most), np.repeat(mean_radii[:, None], most, axis=1), randoms, wetness
 
 
-def shading_of(datablock):
-    """`Shading` of a hair Curves datablock: its model, ready to draw. Raises `HairError`."""
+def shading_of(datablock, strands=None):
+    """`Shading` of a hair Curves datablock: its model, ready to draw. Raises `HairError`.
+
+    strands: its `StrandsOnGPU`; where these differ in wetness, a `MixedShading`.
+    """
     state = datablock.vellus
-    look = properties.look_of(state)
+    wettest = _shading_of_look(state, properties.look_of(state))
+    least, most = properties.wetness_of(state)
+    if strands is None or strands.wetness is None or least == most:
+        return wettest
+    driest = _shading_of_look(state, properties.dry_look_of(state))
+    return hair_shading.mixed(driest, wettest, strands.wetness_here, (least, most))
+
+
+def _shading_of_look(state, look):
     variation = appearance.strand_settings(look)
     if state.model == "KAJIYA_KAY":
         if variation.is_even:
@@ -228,7 +252,7 @@ def shading_of(datablock):
         return _kept_shading(
             (appearance.kajiya_kay_strand_settings(look), variation), hair_shading.kajiya_kay_strand_shading
         )
-    settings = properties.table_settings_of(state)
+    settings = properties.table_settings_of(state, look)
     if variation.is_even and not settings.is_elliptic:
         return _kept_shading(
             (settings,), lambda wanted: hair_shading.marschner_shading(_tables(wanted, state.table_folder))

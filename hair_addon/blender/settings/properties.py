@@ -33,10 +33,20 @@ def own_look_of(state):
     return setting_properties.to_settings(state.appearance, Appearance)
 
 
+def wetness_of(state):
+    """(least, most) wetness of a hair: that of its look, which all strands have, and of its wettest style if more."""
+    least = own_look_of(state).wetness
+    return least, max(least, setting_properties.shortest(style_items.wetness_of(state)))
+
+
 def look_of(state):
     """The dry `Appearance` that a hair is shaded with, which is as wet as its look or its wettest style."""
-    look = own_look_of(state)
-    return appearance.wetted(look, max(look.wetness, setting_properties.shortest(style_items.wetness_of(state))))
+    return appearance.wetted(own_look_of(state), wetness_of(state)[1])
+
+
+def dry_look_of(state):
+    """The same of strands that no style wets, where these have places."""
+    return appearance.wetted(own_look_of(state), wetness_of(state)[0])
 
 
 def own_table_settings_of(state):
@@ -44,9 +54,12 @@ def own_table_settings_of(state):
     return setting_properties.to_settings(state.marschner, lookup_tables.Settings, skip=appearance.TABLE_FIELDS)
 
 
-def table_settings_of(state):
-    """The `lookup_tables.Settings` that the Marschner model shades a hair with. Raises `HairError`."""
-    settings = appearance.table_settings(look_of(state), own_table_settings_of(state))
+def table_settings_of(state, look=None):
+    """The `lookup_tables.Settings` that the Marschner model shades a hair with. Raises `HairError`.
+
+    look: a dry `Appearance`; None for `look_of` the hair.
+    """
+    settings = appearance.table_settings(look_of(state) if look is None else look, own_table_settings_of(state))
     # Rounded as in an operator's properties, so that tables baked with these settings match.
     return setting_properties.as_stored(settings)
 

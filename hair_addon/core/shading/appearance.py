@@ -104,6 +104,21 @@ def wetted(look: Appearance, wetness: float) -> Appearance:
     return replace(look, wetness=0.0, **mixed)
 
 
+# Less of a look beside another is not seen.
+_LEAST_SHARE = 1.0 / 1024.0
+
+
+def wet_share(wetness: np.ndarray, least: float, most: float) -> np.ndarray:
+    """(S,) float32 in [0, 1]: how far strands of a wetness (S,) are shaded as the wettest, not as the driest.
+
+    least, most: wetness of the looks of both, least < most.
+    """
+    share = np.clip((np.asarray(wetness, np.float32) - np.float32(least)) / np.float32(most - least), 0.0, 1.0)
+    share[share < _LEAST_SHARE] = 0.0
+    share[share > 1.0 - _LEAST_SHARE] = 1.0
+    return share
+
+
 def shaded(look: Appearance) -> Appearance:
     """The dry look of a look that may be wet; what every model is made from."""
     return wetted(look, look.wetness)

@@ -1,0 +1,157 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that is wet in places: each strand is drawn dry, wet or between them, by its own wetness."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import attributes, curves
+from hair_addon.blender.groom import bindings
+from hair_addon.blender.render import film, hair_cache, offscreen
+from hair_addon.blender.settings import style_items
+from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from hair_addon.core.shading import appearance
+from hair_addon.core.styling import wet
+from tests.support import glsl
+from tests.support.rendering import light_up, rendered
+
+AMOUNT = 0.8
+SIZE = 64
+
+# (model, mode, random color): of each program a variant draws shares.
+MODELS = [
+    ("KAJIYA_KAY", "energy", 0.0),
+    ("MARSCHNER", "classic", 0.0),
+    ("MARSCHNER", "energy", 0.0),
+    ("MARSCHNER", "energy", 0.5),
+]
+
+
+def picture():
+    """(SIZE, SIZE, 4) linear."""
+    settings = PictureSettings(width=SIZE, height=SIZE, samples_per_side=2, is_transparent=True)
+    return offscreen.draw_picture(settings).astype(np.float64)
+
+
+def wetten(hair, **changes):
+    style_items.assign(hair.data.vellus, [wet.Settings(**{"amount": AMOUNT, "lock": 0.3} | changes)])
+    bpy.context.view_layer.update()
+    return picture()
+
+
+def soak(hair, wetness):
+    """A wetness (S,) of strands that stay where they are; None for the same of all. Returns the picture."""
+    if wetness is None:
+        hair.data.attributes.remove(hair.data.attributes["wetness"])
+    else:
+        attributes.write(hair.data, "wetness", "FLOAT", "CURVE", wetness)
+    for _report in ("of what we wrote before", "of this"):
+        hair.data.update_tag()
+        bpy.context.view_layer.update()
+    return picture()
+
+
+def group(name, weights):
+    """A vertex group of the sphere, of weights by vertex."""
+    made = bpy.data.objects["Sphere"].vertex_groups.new(name=name)
+    for index, weight in enumerate(weights):
+        made.add([index], float(weight), "REPLACE")
+
+
+@pytest.fixture
+def small(lit):
+    state = lit.data.vellus
+    state.marschner.size, state.hair.radius = 32, 0.02
+    return lit
+
+
+def test_a_mask_of_one_is_wet_and_of_zero_is_dry(small):
+    """Also of a style that wets less. Interpolated weights are one but for rounding, which moves strands as little."""
+    count = len(bpy.data.objects["Sphere"].data.vertices)
+    group("all", np.ones(count))
+    group("none", np.zeros(count))
+    for amount in (1.0, 0.3):
+        whole = wetten(small, amount=amount)
+        np.testing.assert_allclose(wetten(small, amount=amount, mask="all"), whole, atol=1e-4)
+    # Swelling is of all strands.
+    dry = wetten(small, amount=0.0)
+    np.testing.assert_array_equal(wetten(small, mask="none", swelling=0.0), dry)
+    assert "wetness" in small.data.attributes
+    assert abs(wetten(small, swelling=0.0) - dry).mean() > 1e-3
+    assert "wetness" not in small.data.attributes
+
+
+@pytest.mark.parametrize("model, mode, random_color", MODELS)
+def test_half_of_the_hair_is_wet(small, model, mode, random_color):
+    """Away from the border each half is as in the picture of all dry and of all wet hair."""
+    state = small.data.vellus
+    state.model, state.appearance.mode, state.appearance.random_color = model, mode, random_color
+    group("any", np.ones(len(bpy.data.objects["Sphere"].data.vertices)))
+    wetten(small, mask="any")
+    roots = curves.first_points(small.data)
+    ones = np.ones(len(roots), np.float32)
+    dry, wettest = soak(small, 0.0 * ones), soak(small, AMOUNT * ones)
+    half = soak(small, AMOUNT * (roots[:, 0] > 0.0))
+    seen = abs(wettest - dry)
+    for columns, expected, other in ((slice(16, 26), dry, wettest), (slice(38, 48), wettest, dry)):
+        assert seen[:, columns].mean() > 1e-4
+        error = abs(half - expected)[:, columns]
+        assert error.mean() < 0.1 * abs(half - other)[:, columns].mean()
+    middle = soak(small, 0.5 * AMOUNT * ones)
+    np.testing.assert_allclose(middle[..., :3], 0.5 * (dry + wettest)[..., :3], atol=2e-3)
+    np.testing.assert_array_equal(middle[..., 3], dry[..., 3])
+    np.testing.assert_array_equal(soak(small, None), wettest)
+
+
+def test_a_wet_look_leaves_no_strand_dry(small):
+    """Strands are as wet as the look, or as their style, which is more."""
+    group("any", np.ones(len(bpy.data.objects["Sphere"].data.vertices)))
+    wetten(small, mask="any")
+    ones = np.ones(len(small.data.curves), np.float32)
+    small.data.vellus.appearance.wetness = 0.4
+    np.testing.assert_array_equal(soak(small, 0.4 * ones), soak(small, 0.0 * ones))
+    small.data.vellus.appearance.wetness = 0.9
+    np.testing.assert_array_equal(soak(small, AMOUNT * ones), soak(small, 0.0 * ones))
+
+
+def test_passes_of_the_light_add_up(small, tmp_path):
+    """Each pass of a render mixes both looks as the picture does."""
+    light_up()
+    wetten(small, vary=1.0)
+    bpy.data.objects["Sphere"].is_holdout = True
+    bpy.context.view_layer.vellus.has_lobes = True
+    passes = rendered(tmp_path, film_transparent=True)
+    light = passes["Combined"][..., :3]
+    np.testing.assert_allclose(sum(passes[name] for name in film.LOBES), light, atol=2e-3 * light.max())
+    assert light.mean() > 1e-3
+
+
+def test_hair_ahead_of_its_datablock_is_drawn_as_wet_as_it_will_be_written(small):
+    group("half", np.linspace(0.0, 1.0, len(bpy.data.objects["Sphere"].data.vertices)))
+    wetten(small, mask="half")
+    stored = curves.read_wetness(small.data)
+    bound = bindings.of(small.data)
+    np.testing.assert_array_equal(bound.styles.wetness, stored)
+    np.testing.assert_array_equal(hair_cache.strands_on_gpu(small.data).wetness_here, stored)
+    bound.is_written = False
+    hair_cache.strand_cache.clear()
+    np.testing.assert_array_equal(hair_cache.strands_on_gpu(small.data).wetness_here, stored)
+    bound.is_written = True
+
+
+def test_hostile_wetness_is_held_to_its_range(small):
+    wetten(small)
+    wetness = np.linspace(-3.0, 3.0, len(small.data.curves), dtype=np.float32)
+    wetness[:3] = np.nan, np.inf, -np.inf
+    assert np.isfinite(soak(small, wetness)).all()
+    found = curves.read_wetness(small.data)
+    assert found.min() == 0.0 and found.max() == 1.0
+
+
+def test_shares_in_the_shader_are_their_twins(rng):
+    wetness = np.concatenate([rng.random(500), np.linspace(0.0, 1.0, 11), [0.2501, 0.7499]]).astype(np.float32)
+    for least, most in ((0.0, 1.0), (0.25, 0.75), (0.0, 0.8)):
+        shader = glsl.evaluate(
+            glsl.source("include/wet_share.glsl"), "float", f"wet_share(wetness, {least}, {most})", wetness=wetness
+        )
+        np.testing.assert_allclose(shader, appearance.wet_share(wetness, least, most), atol=1e-6)
