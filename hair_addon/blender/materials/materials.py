@@ -7,7 +7,7 @@ from ...core.shading import appearance
 from ..data import curves as curves_door
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, style_items
-from . import strand_nodes
+from . import strand_nodes, wet_nodes
 
 HAIR_NODE = "ShaderNodeBsdfHairPrincipled"
 
@@ -33,12 +33,25 @@ def write_hair_material(curves):
         if is_hair_material(material) and (material.library or _shows_another_look(material, curves)):
             material = curves.materials[slot] = material.copy()
     if is_hair_material(material) and material.library is None:
-        node = next((n for n in material.node_tree.nodes if n.bl_idname == HAIR_NODE), None)
+        nodes = (n for n in material.node_tree.nodes if n.bl_idname == HAIR_NODE and not wet_nodes.is_ours(n))
+        node = next(nodes, None)
         if node is not None:  # otherwise the user has edited it
             look = properties.look_of(curves.vellus)
             if not appearance.strand_settings(look).is_even:
                 curves_door.write_randoms(curves)  # hair of before this attribute
-            _fill(node, material, look)
+            if _has_places(curves):
+                _fill(node, material, properties.dry_look_of(curves.vellus))
+                wettest = wet_nodes.write(material.node_tree, node, properties.wetness_of(curves.vellus))
+                _fill(wettest, material, look)
+            else:
+                wet_nodes.remove(material.node_tree, node)
+                _fill(node, material, look)
+
+
+def _has_places(curves):
+    """Whether strands differ in wetness."""
+    least, most = properties.wetness_of(curves.vellus)
+    return least < most and curves_door.has_wetness(curves)
 
 
 def _fill_first_slot(curves, material):
@@ -51,14 +64,17 @@ def _fill_first_slot(curves, material):
 
 def _shows_another_look(material, curves):
     """Whether a material is that of other hair too, as Blender has it after a duplication, and they look different."""
-    look = _values(curves.vellus)
+    look = _values(curves)
     others = (c for c in bpy.data.hair_curves if c != curves and c.vellus.kind == "HAIR")
-    return any(material in {*c.materials} and _values(c.vellus) != look for c in others)
+    return any(material in {*c.materials} and _values(c) != look for c in others)
 
 
-def _values(state):
+def _values(curves):
+    state = curves.vellus
     values = setting_properties.values_of(state.appearance, setting_properties.names_of(appearance.Appearance))
-    return values | {"wetness": max(values["wetness"], style_items.wetness_of(state))}
+    least = values["wetness"]
+    most = max(least, style_items.wetness_of(state))
+    return values | {"wetness": (least if curves_door.has_wetness(curves) else most, most)}
 
 
 def is_hair_material(material):
