@@ -51,14 +51,20 @@ def _holds(attribute, value_name, values):
     return np.array_equal(present, values)
 
 
+def has(curves, name, data_type, domain):
+    """Whether there is an attribute of this name, type and domain."""
+    attribute = curves.attributes.get(name)
+    return attribute is not None and (attribute.data_type, attribute.domain) == (data_type, domain)
+
+
 def read(curves, name, data_type, domain):
     """Read (N,) or (N, width) values; None if there is no attribute of this name, type and domain.
 
     Users or nodes may have stored any data under our names.
     """
-    attribute = curves.attributes.get(name)
-    if attribute is None or (attribute.data_type, attribute.domain) != (data_type, domain):
+    if not has(curves, name, data_type, domain):
         return None
+    attribute = curves.attributes[name]
     value_name, width, scalar = LAYOUTS[data_type]
     values = np.empty((len(attribute.data), width), scalar)
     attribute.data.foreach_get(value_name, values.ravel())

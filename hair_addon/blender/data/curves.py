@@ -101,8 +101,8 @@ def write_wetness(curves, wetness):
 def _write_or_remove(curves, name, data_type, values):
     if values is not None:
         attributes.write(curves, name, data_type, "CURVE", values)
-    elif (attribute := curves.attributes.get(name)) is not None:
-        curves.attributes.remove(attribute)
+    elif attributes.has(curves, name, data_type, "CURVE"):
+        curves.attributes.remove(curves.attributes[name])
 
 
 def write_roots(curves, surface, roots, normals=None):
@@ -264,8 +264,7 @@ def read_randoms(curves):
 
 def has_wetness(curves):
     """Whether strands store a wetness each."""
-    attribute = curves.attributes.get(_WETNESS)
-    return attribute is not None and (attribute.data_type, attribute.domain) == ("FLOAT", "CURVE")
+    return attributes.has(curves, _WETNESS, "FLOAT", "CURVE")
 
 
 def read_wetness(curves):

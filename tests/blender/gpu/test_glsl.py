@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.gpu import hair_shading, strand_textures, uniforms
+from hair_addon.core.shading import appearance
 from hair_addon.core.shading.fibre import angles, energy_conserving, kajiya_kay, longitudinal, marschner
 from hair_addon.core.shading.fibre.principled import variance_from_roughness
 from hair_addon.core.shading.tables import dual_scattering, lookup_tables
@@ -369,3 +370,14 @@ def test_transmitted_light_is_the_mean_over_a_random_number_of_strands():
     expected = np.exp(-means) * (1.0 + np.sum(later * forward[:, None] ** strands, axis=1))
     shader = opacity("transmitted(mean, vec3(forward)).g", mean=means, forward=forward)
     assert_twins(shader, expected, 1e-6)
+
+
+# Wetness
+
+
+@pytest.mark.parametrize("least, most", [(0.0, 1.0), (0.25, 0.75), (0.0, 0.8)])
+def test_share_of_the_wet_look(rng, least, most):
+    wetness = np.concatenate([rng.random(500), np.linspace(0.0, 1.0, 11), [0.2501, 0.7499]]).astype(np.float32)
+    text, expression = glsl.source("include/wet_share.glsl"), f"wet_share(wetness, {least}, {most})"
+    shader = glsl.evaluate(text, "float", expression, wetness=wetness)
+    assert_twins(shader, appearance.wet_share(wetness, least, most), 1e-6)

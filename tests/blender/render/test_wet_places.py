@@ -10,9 +10,7 @@ from hair_addon.blender.groom import bindings
 from hair_addon.blender.render import film, hair_cache, offscreen
 from hair_addon.blender.settings import style_items
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
-from hair_addon.core.shading import appearance
 from hair_addon.core.styling import wet
-from tests.support import glsl
 from tests.support.rendering import light_up, rendered
 
 AMOUNT = 0.8
@@ -146,12 +144,3 @@ def test_hostile_wetness_is_held_to_its_range(small):
     assert np.isfinite(soak(small, wetness)).all()
     found = curves.read_wetness(small.data)
     assert found.min() == 0.0 and found.max() == 1.0
-
-
-def test_shares_in_the_shader_are_their_twins(rng):
-    wetness = np.concatenate([rng.random(500), np.linspace(0.0, 1.0, 11), [0.2501, 0.7499]]).astype(np.float32)
-    for least, most in ((0.0, 1.0), (0.25, 0.75), (0.0, 0.8)):
-        shader = glsl.evaluate(
-            glsl.source("include/wet_share.glsl"), "float", f"wet_share(wetness, {least}, {most})", wetness=wetness
-        )
-        np.testing.assert_allclose(shader, appearance.wet_share(wetness, least, most), atol=1e-6)
