@@ -5,7 +5,10 @@ At the arc length s_i of a point p_i, with C the centre strand of level k after 
 
     q_i = c + (1 - B_ki (1 - thickness)) Rot(t_c, 2π twist · profile(x_i)) (p_i - c)
 
-and the strand's segments point from q_(i-1) to q_i, as long as they were. clump_trees.py has sites and levels.
+The strand follows the curve of these points as far as its own length goes, so that what is drawn onto the centre lies
+on it (gather.h). Roots stay: the pull that the profile has at the root grows over twice the distance to the centre. The
+part `stray` of strands joins no lock; a tenth more joins in part, so the part may be animated. clump_trees.py has sites
+and levels.
 """
 
 import math

@@ -8,8 +8,10 @@ With the arc of a turn ℓ = sqrt((2πR)² + h²) and κ = keep_length:
     φ_0 = 2π (h_clump + (1 - coherence) (h_s - ½)),    ρ_i = R_i (cos φ_i, ± (1 - flatness) sin φ_i)
 
 A straight strand of length L reaches L pitch / ℓ. It is the curve of curvature R / (R² + (h/2π)²) and torsion
-(h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fibre [Bertails06]. Coils whose handedness flips
-along the strand (switchbacks, or perversions) turn φ back where a one-dimensional noise of the lock changes sign.
+(h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fibre [Bertails06]. A twentieth of the locks winds
+neither left nor right but is flat, in between, so that the part of left-handed ones may be animated. Coils whose
+handedness flips along the strand (switchbacks, or perversions) turn φ back where a one-dimensional noise of the lock
+changes sign.
 """
 
 import math

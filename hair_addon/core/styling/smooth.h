@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Smooth (smooth.py): directions of chords around each segment, twice. Two places run along the strand, so the cost does
-// not depend on the length of the chords.
+// Smooth (smooth.py): directions of chords around each segment, twice. Two places run along the strand, so the cost
+// does not depend on the length of the chords.
 
 const float half = 0.5f * number[8];
 vector old[MOST];

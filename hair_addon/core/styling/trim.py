@@ -3,7 +3,8 @@
 
     L' = min(L · factor · (1 - random · h), to_length or ∞), times undercoat_length for the part `undercoat` of strands
 
-A strand takes L + amount (L' - L): a mask of lengths is the mask of the style.
+A strand takes L + amount (L' - L): a mask of lengths is the mask of the style. A twentieth of the strands is between
+the undercoat and the others, so that its part may be animated.
 """
 
 from dataclasses import dataclass

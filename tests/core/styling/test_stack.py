@@ -205,15 +205,12 @@ def test_a_region_without_a_site_joins_no_lock():
 
 def test_arrays_that_do_not_fit_are_refused(hair):
     bound = hair.bound(*STACK)
-    points = hair.binding.positions  # (S,), and more strands than data has
-    with pytest.raises((HairError, AttributeError, IndexError)):
-        steps.apply_steps(points, bound.program, bound.data, np.eye(3))
     strands = from_numpy(np.zeros((7, 41, 3), np.float32), hair.binding.roots[:7], hair.device)
     with pytest.raises(HairError):
         steps.apply_steps(strands.points, bound.program, bound.data, np.eye(3))
     wrong = replace(bound.program, choices=np.full_like(bound.program.choices, 99))
     all_strands = from_numpy(np.zeros((500, 41, 3), np.float32), hair.binding.roots, hair.device)
-    with pytest.raises((HairError, IndexError)):
+    with pytest.raises(HairError):
         steps.apply_steps(all_strands.points, wrong, bound.data, np.eye(3))
     for point_count in (1, 258):
         strands = from_numpy(np.zeros((500, point_count, 3), np.float32), hair.binding.roots, hair.device)
