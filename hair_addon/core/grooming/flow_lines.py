@@ -116,9 +116,14 @@ def _distances(places, starts, ends):
     """(G, N) distances from places (G, 3) to segments."""
     along = ends - starts
     squared = np.einsum("ni,ni->n", along, along)
-    part = (places @ along.T - np.einsum("ni,ni->n", starts, along)) / squared
-    part = np.clip(part, 0.0, 1.0)[:, :, None]
-    return np.linalg.norm(starts + part * along - places[:, None], axis=2)
+    center = starts.mean(axis=0)  # so that nothing is lost far from the origin
+    places, starts = places - center, starts - center
+    progress = places @ along.T - np.einsum("ni,ni->n", starts, along)
+    part = np.clip(progress / squared, 0.0, 1.0)
+    to_starts = np.einsum("gi,gi->g", places, places)[:, None] - 2.0 * places @ starts.T
+    to_starts += np.einsum("ni,ni->n", starts, starts)
+    # |x - s - part a|², without a table of vectors
+    return np.sqrt(np.maximum(to_starts + part * (part * squared - 2.0 * progress), 0.0))
 
 
 def _blocks(row_count, column_count):

@@ -188,3 +188,11 @@ def test_lines_are_drawn_on_the_surface_as_it_is_posed(plane, roots):
 def test_lines_that_are_none_are_refused(plane, segments, words):
     with pytest.raises(HairError, match=words):
         flow_lines.lay(plane, segments, DEVICE)
+
+
+def test_distances_equal_those_to_many_points_of_the_pieces(rng):
+    places, starts, ends = rng.normal(size=(3, 40, 3)) + 5.0
+    part = np.linspace(0.0, 1.0, 2001)[:, None, None]
+    there = starts + part * (ends - starts)
+    brute = np.stack([np.linalg.norm(there - place, axis=2).min(axis=0) for place in places])
+    np.testing.assert_allclose(flow_lines._distances(places, starts, ends), brute, atol=1e-5)
