@@ -5,7 +5,7 @@ Grows hair on the sample's head, opens it in a window of a desktop Blender with 
 of each panel in a sidebar of `SIDEBAR_WIDTH`. With the name `windows`, also build/manual/window_*.png of the whole
 window for each kind of active object, to look for labels that are cut. With the name `five_minutes`, README's pictures
 of its five minutes alone: docs/five_minutes/*.png, cut out of what `tests/desktop/test_first_minutes.py` saw in its
-window when it ran last.
+window when it ran last; with `curly_hair` those of the page Curly Hair, of `tests/desktop/test_curly_hair.py`.
 """
 
 import subprocess
@@ -21,6 +21,14 @@ MODULE = "bl_ext.user_default.vellus"
 # Step of tests/desktop/first_minutes.py → its picture in README.
 FIVE_MINUTES = {"cube_near": "new_hair_system", "head": "guide_mask", "combed": "comb_guides", "shaded": "look"}
 SEEN = ROOT / "out" / "desktop" / "first_opengl"
+
+# Steps of tests/desktop/curly_hair.py that the page Curly Hair shows.
+CURLY_HAIR = (
+    *("bare_head", "hair_system", "combed", "shoulder_length", "fringe"),
+    *("locks", "curls", "smooth_curls", "painted", "look"),
+)
+CURLY_SEEN = ROOT / "out" / "desktop" / "curly_opengl"
+CURLY_SIZE = (560, 373)
 
 # (left, top, right, bottom) pixels of its window: the 3D view with the top of its sidebar; and the size it is shown in.
 SEEN_PART = (190, 60, 1310, 807)
@@ -49,6 +57,8 @@ def start():
 
     if sys.argv[1:] == ["five_minutes"]:
         return cut_five_minutes()
+    if sys.argv[1:] == ["curly_hair"]:
+        return cut_curly_hair()
     folder = ROOT / "build" / "manual"
     folder.mkdir(parents=True, exist_ok=True)
     if len(sys.argv) == 1 or not (folder / "head.blend").exists():
@@ -73,6 +83,14 @@ def cut_five_minutes():
     bpy.data.images.load(str(SEEN / "first_picture.png")).save(
         filepath=str(ROOT / "docs" / "five_minutes" / "picture.png")
     )
+    return 0
+
+
+def cut_curly_hair():
+    """Write the pictures of the page Curly Hair; returns the exit status."""
+    left, top, right, bottom = SEEN_PART
+    for step in CURLY_HAIR:
+        write(MANUAL / f"curly_{step}.png", read(CURLY_SEEN / f"{step}.png")[top:bottom, left:right], CURLY_SIZE)
     return 0
 
 
