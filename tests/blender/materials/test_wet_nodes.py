@@ -93,6 +93,22 @@ def test_both_looks_vary_between_strands(hair):
         assert found["Absorption Coefficient"].is_linked and found["Random"].is_linked
 
 
+def test_keyed_water_is_mixed_in_each_frame(hair):
+    soak(hair, {"mask": "top"})
+    for frame, amount in ((1, 0.0), (11, 1.0)):
+        hair.data.vellus.styles[0].wet.amount = amount
+        hair.data.keyframe_insert("vellus.styles[0].wet.amount", frame=frame)
+    for frame in (1, 5, 11, 1):
+        bpy.context.scene.frame_set(frame)
+        amount = hair.data.vellus.styles[0].wet.amount
+        driest, wettest, _mix = nodes_of(hair)
+        np.testing.assert_allclose(sockets(driest), sockets_of(Appearance()), rtol=1e-6)
+        assert (wettest is not None) == (amount > 0.0) == curves.has_wetness(hair.data)
+        if wettest is not None:
+            np.testing.assert_allclose(sockets(wettest), sockets_of(Appearance(wetness=amount)), rtol=1e-5)
+            assert curves.read_wetness(hair.data).max() == pytest.approx(amount, rel=1e-6)
+
+
 def test_hair_that_shares_a_material_gets_its_own_where_it_is_wet(hair):
     copy = hair.copy()
     copy.data = hair.data.copy()
