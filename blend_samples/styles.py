@@ -80,7 +80,7 @@ def _drawn_style(hair, name):
     hair.vellus.hair.tip_taper = 0.2
     api.apply_style_preset(hair, name)
     bpy.context.view_layer.update()
-    return _drawn()
+    return drawn()
 
 
 def _drawn_wet(hair, wetness):
@@ -88,10 +88,10 @@ def _drawn_wet(hair, wetness):
     frizz = api.Frizz(amplitude=0.002, wavelength=0.03, seed=1)
     api.set_styles(hair, [frizz, api.Wet(amount=wetness, lock=0.022, cling=0.45, seed=2)])
     bpy.context.view_layer.update()
-    return _drawn()
+    return drawn()
 
 
-def _drawn():
+def drawn():
     """(height, width, 3) uint8 through the scene's view transform, the top row first."""
     render = bpy.context.scene.render
     render.resolution_x, render.resolution_y = SIZE
