@@ -50,7 +50,7 @@ def build():
     head.matrix_world.identity()
     head.data.shade_smooth()
     head.data.materials.clear()
-    head.data.materials.append(_skin())
+    head.data.materials.append(skin())
     _add_scalp(head)
     subdivision = head.modifiers.new("Subdivision", "SUBSURF")
     subdivision.levels = subdivision.render_levels = 2
@@ -68,7 +68,8 @@ def _add_scalp(head):
         group.add([int(vertex)], float(weights[vertex]), "REPLACE")
 
 
-def _skin():
+def skin():
+    """The head's material."""
     material = bpy.data.materials.new("Skin")
     color = (0.52, 0.31, 0.22, 1.0)
     material.diffuse_color = color

@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Presets on the sample head, as pictures: coily hair is narrower than curly, frizz wider than straight, wet darker."""
+
+import importlib.util
+import sys
+from pathlib import Path
+
+import bpy
+import pytest
+
+from hair_addon import api
+from hair_addon.blender.render import offscreen
+from hair_addon.core.imaging.pixel_sampling import PictureSettings
+
+SAMPLES = Path(__file__).resolve().parents[3] / "blend_samples"
+STYLES = ("STRAIGHT", "CURLY", "COILY", "FRIZZY", "WET")
+WIDTH, HEIGHT = 96, 112
+
+
+@pytest.fixture(scope="module")
+def pictures():
+    """{preset: (HEIGHT, WIDTH, 4) linear pixels} of the hair alone, with the light and camera of the gallery."""
+    sys.path.insert(0, str(SAMPLES))
+    try:
+        spec = importlib.util.spec_from_file_location("gallery_of_styles", SAMPLES / "styles.py")
+        gallery = importlib.util.module_from_spec(spec)
+        spec.loader.exec_module(gallery)
+    finally:
+        sys.path.remove(str(SAMPLES))
+    hair = gallery.build(strand_count=4000)
+    bpy.data.objects["Head"].hide_render = True
+    return {name: drawn(hair, name) for name in STYLES}
+
+
+def drawn(hair, preset):
+    api.set_styles(hair, [])
+    api.apply_style_preset(hair, preset)
+    bpy.context.view_layer.update()
+    return offscreen.draw_picture(PictureSettings(width=WIDTH, height=HEIGHT, samples_per_side=2, is_transparent=True))
+
+
+def width(picture):
+    """Pixels from the first to the last column that shows hair, without single strands that stray."""
+    shown = (picture[..., 3] > 0.1).sum(axis=0) > 2
+    return shown.nonzero()[0][-1] - shown.nonzero()[0][0]
+
+
+def luminance(picture):
+    """Mean over what hair covers."""
+    return picture[..., :3].sum() / picture[..., 3].sum()
+
+
+def test_coily_hair_is_narrower_than_curly(pictures):
+    assert width(pictures["COILY"]) < width(pictures["CURLY"])
+
+
+def test_frizzy_hair_is_wider_than_straight(pictures):
+    assert width(pictures["FRIZZY"]) > width(pictures["STRAIGHT"])
+
+
+def test_wet_hair_is_darker_than_dry(pictures):
+    assert luminance(pictures["WET"]) < 0.9 * luminance(pictures["STRAIGHT"])
