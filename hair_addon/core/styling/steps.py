@@ -24,6 +24,7 @@ LEAST_BLOCKS = 64  # fewer are not worth a thread
 WIDTH = 16  # strands that a thread of the processor styles at once: 8 take a fifth longer
 MOST_POINTS = 257  # of a strand
 SHORT_POINTS = 64  # of a strand that takes less memory of a GPU
+POINTS_AT_ONCE = 10  # of each strand, that threads of a GPU read and write together
 
 
 @dataclass(frozen=True)
@@ -120,6 +121,7 @@ _CONSTANTS = {
     "WEAVE": WEAVE,
     "WAVES": frizz.WAVES_AN_OCTAVE,
     "MOST_OCTAVES": frizz.MOST_OCTAVES,
+    "POINTS_AT_ONCE": POINTS_AT_ONCE,
     **PURPOSES,
 }
 _ANY = variant(WIDTH, MOST_POINTS)
