@@ -56,33 +56,40 @@
     }
   };
 #else
-  // Four points, 12 numbers of each lane, at a time.
+  // Four points, 12 numbers of each lane, at a time; the points that are left over number by number.
   const auto read_points = [&](float* const* rows, auto take) {
-    for (int start = 0; start < point_count; start += 4) {
-      vector four_points[4];
-      lanes* const numbers = reinterpret_cast<lanes*>(four_points);
-      const int left_over = 3 * (point_count - start), count = left_over < 12 ? left_over : 12, in_fours = count & ~3;
-      for (int k = 0; k < in_fours; k += 4) read_rows(rows, ints(3 * start + k), numbers + k);
-      for (int k = in_fours; k < count; ++k) {
-        for (int lane = 0; lane < LANES; ++lane) set_lane(numbers[k], lane, rows[lane][3 * start + k]);
-      }
-      for (int i = 0; 3 * i < count; ++i) take(start + i, four_points[i]);
+    vector four_points[4];
+    lanes* const numbers = reinterpret_cast<lanes*>(four_points);
+    int start = 0;
+    for (; start + 4 <= point_count; start += 4) {
+      for (int k = 0; k < 12; k += 4) read_rows(rows, ints(3 * start + k), numbers + k);
+      for (int i = 0; i < 4; ++i) take(start + i, four_points[i]);
     }
+    for (int k = 0; k < 3 * (point_count - start); ++k) {
+      for (int lane = 0; lane < LANES; ++lane) set_lane(numbers[k], lane, rows[lane][3 * start + k]);
+    }
+    for (int i = start; i < point_count; ++i) take(i, four_points[i - start]);
   };
   const auto write_points = [&](float* const* rows, ints is_written, auto point_at) {
-    const bool is_all = lane_count == LANES && !any_of(is_written == 0);
-    for (int start = 0; start < point_count; start += 4) {
-      vector four_points[4];
-      const lanes* const numbers = reinterpret_cast<const lanes*>(four_points);
-      const int left_over = 3 * (point_count - start), count = left_over < 12 ? left_over : 12, in_fours = count & ~3;
-      for (int i = 0; 3 * i < count; ++i) four_points[i] = point_at(start + i);
-      if (is_all) {
-        for (int k = 0; k < in_fours; k += 4) write_rows(numbers + k, rows, 3 * start + k);
-      }
+    vector four_points[4];
+    const lanes* const numbers = reinterpret_cast<const lanes*>(four_points);
+    const auto write_lanes = [&](int start, int count) {
       for (int lane = 0; lane < lane_count; ++lane) {
         if (!get_lane(is_written, lane)) continue;
-        for (int k = is_all ? in_fours : 0; k < count; ++k) rows[lane][3 * start + k] = get_lane(numbers[k], lane);
+        for (int k = 0; k < count; ++k) rows[lane][3 * start + k] = get_lane(numbers[k], lane);
+      }
+    };
+    const bool is_all = lane_count == LANES && !any_of(is_written == 0);
+    int start = 0;
+    for (; start + 4 <= point_count; start += 4) {
+      for (int i = 0; i < 4; ++i) four_points[i] = point_at(start + i);
+      if (is_all) {
+        for (int k = 0; k < 12; k += 4) write_rows(numbers + k, rows, 3 * start + k);
+      } else {
+        write_lanes(start, 12);
       }
     }
+    for (int i = start; i < point_count; ++i) four_points[i - start] = point_at(i);
+    write_lanes(start, 3 * (point_count - start));
   };
 #endif

@@ -4,11 +4,10 @@
 // does not depend on the length of the chords.
 
 const float half = 0.5f * number[8];
-vector old[MOST], place[MOST];
-lanes along[MOST];
+vector old[MOST];
 for (int i = 1; i < point_count; ++i) old[i] = t[i];
 for (int pass = 0; pass < 2; ++pass) {
-  put_points(place, along);
+  put_points();
   // Two places that run along the strand, between two points of it each.
   struct runner {
     ints at;

@@ -43,6 +43,9 @@ lanes lengths[2][MOST];
 vector directions[2][MOST];
 lanes *length = lengths[0], *next_length = lengths[1];
 vector *t = directions[0], *next = directions[1];
+// Points and their arc lengths, of styles that ask for them by `put_points`.
+vector place[MOST];
+lanes along[MOST];
 constexpr int MOST_KEPT = LANES == 1 ? 1 : MOST;
 lanes kept_length[MOST_KEPT];
 vector kept_t[MOST_KEPT];
@@ -95,8 +98,7 @@ read_points(rows, [&](int i, const vector& point) {
   }
   point_before = point;
 });
-// Points, and their arc lengths.
-const auto put_points = [&](vector* place, lanes* along) {
+const auto put_points = [&]() {
   place[0] = root;
   along[0] = 0.0f;
   for (int i = 1; i < point_count; ++i) {

@@ -9,9 +9,7 @@ const bool is_cut = number[13] != 0.0f, has_plane = number[14] != 0.0f;
 const lanes coat = clamped((undercoat * 1.05f - random(UNDERCOAT)) * 20.0f, lanes(0.0f), lanes(1.0f));
 lanes wanted = lower_of(total * factor * (1.0f - random_part * random(LENGTH)), lanes(to_length));
 wanted *= 1.0f + (undercoat_length - 1.0f) * coat;
-vector place[MOST];
-lanes along[MOST];
-put_points(place, along);
+put_points();
 const vector axis = {number[15], number[16], number[17]};
 const float plane = number[18];
 lanes is_at_plane = 0.0f;
@@ -32,7 +30,7 @@ if (has_plane) {
 wanted = total + base * (wanted - total);
 if (is_cut) {
   const auto is_kept = abs_of(wanted * per_total - 1.0f) < 1.0e-7f;
-  lanes length_made[MOST];
+  lanes* const length_made = next_length;
   lanes exact;
   // The curve through the points is not where the points' segments are: its tip is brought back to the plane.
   for (int pass = 0; pass < (has_plane ? 3 : 1); ++pass) {
