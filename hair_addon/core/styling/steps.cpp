@@ -89,7 +89,7 @@ read_points(rows, [&](int i, const vector& point) {
     root = point;
   } else {
     const vector segment = point - point_before;
-    const lanes size = sqrt_of(dot(segment, segment));
+    const lanes size = exact_sqrt_of(dot(segment, segment));
     const auto is_long = size > 1.0e-12f;
     before = chosen(is_long, segment * (1.0f / (is_long ? size : lanes(1.0f))), before);
     t[i] = before;
@@ -161,11 +161,12 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const auto profile = [&](lanes x) {
     if (is_even) return lanes(at_root);
     // x of the tip is 1 but for rounding, which steep profiles are sensitive to.
-    lanes y = clamped((1.000001f * x - from) / (1.0f - from), lanes(0.0f), lanes(1.0f));
+    const lanes part = exact_quotient_of(1.000001f * x - from, lanes(1.0f - from));
+    lanes y = clamped(part, lanes(0.0f), lanes(1.0f));
     if (!is_linear) y = is_flipped ? 1.0f - power(1.0f - y, lanes(exponent)) : power(y, lanes(exponent));
     return lanes(at_root + (at_tip - at_root) * y);
   };
-  const lanes per_total = 1.0f / higher_of(total, lanes(1.0e-20f));
+  const lanes per_total = exact_quotient_of(lanes(1.0f), higher_of(total, lanes(1.0e-20f)));
 
 #include "frames.h"
 #include "across.h"
