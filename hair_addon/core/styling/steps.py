@@ -17,8 +17,8 @@ from . import frizz
 from .program_rows import BEND, CHOICES, CLUMP, CURL, FRIZZ, NUMBERS, SMOOTH, TRIM, WEAVE, Program
 from .random_numbers import PURPOSES
 
-# Nothing differentiates these kernels. A GPU's approximate divisions and roots move hair by 2e-6 of its size at most; where
-# more would follow from them, steps.cpp asks for exact ones.
+# Nothing differentiates these kernels. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
+# where more would follow from them, steps.cpp asks for exact ones.
 _OPTIONS = {"enable_backward": False, "fast_math": True}
 wp.set_module_options(_OPTIONS)
 
