@@ -15,7 +15,7 @@
   const int threads_left = points.shape[0] - (block - thread);
   const int thread_count = threads_left < THREADS ? threads_left : THREADS;
   const unsigned all_threads = 0xffffffffu >> (THREADS - thread_count);
-  // move(number of the first thread's row, number of `staged`, which row), for points from `start` on.
+  // move(place in memory, from the thread's own row on; place in `staged`; which row), for points from `start` on.
   const auto move_together = [&](int start, auto move) {
     const int count = 3 * (point_count - start);
   #pragma unroll
