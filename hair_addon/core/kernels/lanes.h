@@ -16,6 +16,9 @@
   const auto floor_of = [](lanes value) { return floorf(value); };
   const auto sqrt_of = [](lanes value) { return sqrtf(value); };
   const auto abs_of = [](lanes value) { return fabsf(value); };
+  // Rounded to the nearest, also where a module's option `fast_math` approximates roots and divisions.
+  const auto exact_sqrt_of = [](lanes value) { return __fsqrt_rn(value); };
+  const auto exact_quotient_of = [](lanes a, lanes b) { return __fdiv_rn(a, b); };
   const auto to_ints = [](lanes value) { return static_cast<int>(value); };
   const auto to_lanes = [](auto value) { return static_cast<float>(value); };
   const auto lanes_of_bits = [](ints bits) { return __int_as_float(bits); };
@@ -31,6 +34,8 @@
   const auto floor_of = [](lanes value) { return __builtin_elementwise_floor(value); };
   const auto sqrt_of = [](lanes value) { return __builtin_elementwise_sqrt(value); };
   const auto abs_of = [](lanes value) { return __builtin_elementwise_abs(value); };
+  const auto exact_sqrt_of = [](lanes value) { return __builtin_elementwise_sqrt(value); };
+  const auto exact_quotient_of = [](lanes a, lanes b) { return a / b; };
   const auto to_ints = [](lanes value) { return __builtin_convertvector(value, ints); };
   const auto to_lanes = [](auto value) { return __builtin_convertvector(value, lanes); };
   const auto lanes_of_bits = [](ints bits) { return __builtin_bit_cast(lanes, bits); };

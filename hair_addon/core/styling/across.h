@@ -11,20 +11,19 @@
 
 const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
   const float keep_length = number[7];
-  put_frames();
-  // Where the middles of segments are along the strand: there their frames hold.
-  lanes arc = 0.0f;
-  for (int i = 1; i < point_count; ++i) {
-    along[i] = arc + 0.5f * length[i];
-    arc += length[i];
-  }
-  // The segments around each lane's progress, which are kept while it stays between their middles.
+  // The segments around each lane's progress, which are kept while it stays between their middles: there their frames
+  // hold. `end` is the arc length at the end of the second.
   const int ahead = point_count > 2 ? 2 : 1;
   ints at = 1;
-  lanes below = along[1], above = along[ahead];
-  vector t_below = t[1], u_below = u[1], t_above = t[ahead], u_above = u[ahead];
-  lanes progress = 0.0f;
-  arc = 0.0f;
+  lanes below = 0.5f * length[1], above = below, end = length[1];
+  vector t_below = t[1], u_below = first_frame(), t_above = t_below, u_above = u_below;
+  if (ahead > 1) {
+    above = end + 0.5f * length[ahead];
+    end += length[ahead];
+    t_above = t[ahead];
+    u_above = turned(u_below, t_below, t_above);
+  }
+  lanes progress = 0.0f, arc = 0.0f;
   for (int i = 1; i < point_count; ++i) {
     const lanes d = length[i];
     arc += d;
@@ -56,13 +55,16 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
       t_below = chosen(is_past, t_above, t_below);
       u_below = chosen(is_past, u_above, u_below);
       at = is_past ? at + 1 : at;
+      lanes size_above = 0.0f;
       const int last = most_of(is_past ? at : ints(0));
       for (int i_at = least_of(is_past ? at : ints(MOST)); i_at <= last; ++i_at) {
         const auto is_here = is_past && at == i_at;
-        above = is_here ? along[i_at + 1] : above;
+        size_above = is_here ? length[i_at + 1] : size_above;
         t_above = chosen(is_here, t[i_at + 1], t_above);
-        u_above = chosen(is_here, u[i_at + 1], u_above);
       }
+      above = is_past ? end + 0.5f * size_above : above;
+      end += size_above;
+      u_above = chosen(is_past, turned(u_below, t_below, t_above), u_above);
     }
     const lanes range = above - below;
     const auto is_between = range > 1.0e-12f;
@@ -84,7 +86,11 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));
     // Unit but for rounding, which a step of Newton's method takes away.
     next[i] = chosen(has_length, nearly * (1.5f - 0.5f * dot(nearly, nearly)), t[i]);
-    length[i] = has_length ? size : d;
+    if (keep_length != 1.0f) next_length[i] = has_length ? size : d;
   }
-  for (int i = 1; i < point_count; ++i) t[i] = next[i];
+  swap(t, next);
+  if (keep_length != 1.0f) {
+    swap(length, next_length);
+    put_total();
+  }
 };

@@ -3,7 +3,8 @@
 // Bend (bend.py): segments turn in one plane of the strand's frame.
 
 const float angle = number[8], direction = number[9], random_turn = number[10];
-put_frames();
+vector* const u = next;
+put_frames(u);
 // ψ: towards the root's normal, in the frames of all segments; a strand along its normal takes the reference's.
 lanes toward_u = 0.0f, toward_v = 0.0f;
 for (int i = 1; i < point_count; ++i) {

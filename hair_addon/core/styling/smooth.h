@@ -14,10 +14,10 @@ for (int pass = 0; pass < 2; ++pass) {
     lanes below, above;
     vector start, end;
   };
-  runner behind = {ints(0), along[0], along[1], next[0], next[1]}, before = behind;
-  const auto point_at = [&](lanes place, runner& run) {
+  runner behind = {ints(0), along[0], along[1], place[0], place[1]}, before = behind;
+  const auto point_at = [&](lanes arc, runner& run) {
     for (;;) {
-      const auto is_past = run.above <= place && run.at < point_count - 2;
+      const auto is_past = run.above <= arc && run.at < point_count - 2;
       if (!any_of(is_past)) break;
       run.below = is_past ? run.above : run.below;
       run.start = chosen(is_past, run.end, run.start);
@@ -26,20 +26,20 @@ for (int pass = 0; pass < 2; ++pass) {
       for (int k = least_of(is_past ? run.at : ints(MOST)); k <= last; ++k) {
         const auto is_here = is_past && run.at == k;
         run.above = is_here ? along[k + 1] : run.above;
-        run.end = chosen(is_here, next[k + 1], run.end);
+        run.end = chosen(is_here, place[k + 1], run.end);
       }
     }
     const lanes range = run.above - run.below;
     const auto has_range = range > 1.0e-12f;
-    const lanes part = has_range ? (place - run.below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f);
+    const lanes part = has_range ? (arc - run.below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f);
     return run.start + (run.end - run.start) * part;
   };
   for (int i = 1; i < point_count; ++i) {
     const lanes middle = 0.5f * (along[i - 1] + along[i]);
     const lanes back = higher_of(middle - half, lanes(0.0f)), forth = lower_of(middle + half, total);
-    u[i] = unit_or(point_at(forth, before) - point_at(back, behind), lanes(1.0e-3f) * (forth - back), t[i]);
+    next[i] = unit_or(point_at(forth, before) - point_at(back, behind), lanes(1.0e-3f) * (forth - back), t[i]);
   }
-  for (int i = 1; i < point_count; ++i) t[i] = u[i];
+  swap(t, next);
 }
 lanes arc = 0.0f;
 for (int i = 1; i < point_count; ++i) {

@@ -37,15 +37,26 @@ const int point_count = points.shape[1];
 const int first = block * LANES;
 const int left = points.shape[0] - first;
 const int lane_count = left < LANES ? left : LANES;
-lanes length[MOST], along[MOST];
-vector t[MOST], u[MOST], next[MOST];
+#include "point_rows.h"
+// A style writes directions or lengths that it reads again into the second array, and swaps.
+lanes lengths[2][MOST];
+vector directions[2][MOST];
+lanes *length = lengths[0], *next_length = lengths[1];
+vector *t = directions[0], *next = directions[1];
+// Points and their arc lengths, of styles that ask for them by `put_points`.
+vector place[MOST];
+lanes along[MOST];
 constexpr int MOST_KEPT = LANES == 1 ? 1 : MOST;
 lanes kept_length[MOST_KEPT];
 vector kept_t[MOST_KEPT];
 
+const auto swap = [](auto*& a, auto*& b) {
+  auto* const kept = a;
+  a = b;
+  b = kept;
+};
 // Number `lane` of an entry of such an array.
 const auto lane_of = [](const lanes& values, int lane) { return reinterpret_cast<const float*>(&values)[lane]; };
-const auto put_lane = [](lanes& values, int lane, float value) { reinterpret_cast<float*>(&values)[lane] = value; };
 const auto gathered = [&](const vector* from, const marks& index, int ahead) {
   vector found;
   for (int lane = 0; lane < LANES; ++lane) {
@@ -70,35 +81,36 @@ for (int lane = 0; lane < LANES; ++lane) {
   set_lane(normal.z, lane, normals.data[strand[lane]][2]);
   set_lane(identity, lane, identities.data[strand[lane]]);
 }
-// `next` as numbers: x, y and z of the first point, of the second …
-lanes* const coordinates = reinterpret_cast<lanes*>(next);
-const int number_count = 3 * point_count, in_fours = number_count & ~3;
-for (int i = 0; i < in_fours; i += 4) read_rows(rows, ints(i), coordinates + i);
-for (int i = in_fours; i < number_count; ++i) {
-  for (int lane = 0; lane < LANES; ++lane) put_lane(coordinates[i], lane, rows[lane][i]);
-}
-root = next[0];
-
-// Directions and lengths of the segments between points in `next`. A segment without length goes on as the one before.
-const auto take_segments = [&]() {
-  vector before = normal;
-  for (int i = 1; i < point_count; ++i) {
-    const vector segment = next[i] - next[i - 1];
-    length[i] = sqrt_of(dot(segment, segment));
-    before = unit_or(segment, lanes(1.0e-12f), before);
+lanes total = 0.0f;
+// Directions and lengths of the segments between points. A segment without length goes on as the one before.
+vector before = normal, point_before;
+read_points(rows, [&](int i, const vector& point) {
+  if (i == 0) {
+    root = point;
+  } else {
+    const vector segment = point - point_before;
+    const lanes size = exact_sqrt_of(dot(segment, segment));
+    const auto is_long = size > 1.0e-12f;
+    before = chosen(is_long, segment * (1.0f / (is_long ? size : lanes(1.0f))), before);
     t[i] = before;
+    length[i] = size;
+    total += size;
   }
-};
-// Points into `next`, and their arc lengths into `along`.
+  point_before = point;
+});
 const auto put_points = [&]() {
-  next[0] = root;
+  place[0] = root;
   along[0] = 0.0f;
   for (int i = 1; i < point_count; ++i) {
-    next[i] = next[i - 1] + t[i] * length[i];
+    place[i] = place[i - 1] + t[i] * length[i];
     along[i] = along[i - 1] + length[i];
   }
 };
-take_segments();
+// To be called where lengths have changed.
+const auto put_total = [&]() {
+  total = 0.0f;
+  for (int i = 1; i < point_count; ++i) total += length[i];
+};
 ints is_touched = 0;
 
 for (int step = 0; step < numbers.shape[0]; ++step) {
@@ -149,13 +161,12 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const auto profile = [&](lanes x) {
     if (is_even) return lanes(at_root);
     // x of the tip is 1 but for rounding, which steep profiles are sensitive to.
-    lanes y = clamped((1.000001f * x - from) / (1.0f - from), lanes(0.0f), lanes(1.0f));
+    const lanes part = exact_quotient_of(1.000001f * x - from, lanes(1.0f - from));
+    lanes y = clamped(part, lanes(0.0f), lanes(1.0f));
     if (!is_linear) y = is_flipped ? 1.0f - power(1.0f - y, lanes(exponent)) : power(y, lanes(exponent));
     return lanes(at_root + (at_tip - at_root) * y);
   };
-  lanes total = 0.0f;
-  for (int i = 1; i < point_count; ++i) total += length[i];
-  const lanes per_total = 1.0f / higher_of(total, lanes(1.0e-20f));
+  const lanes per_total = exact_quotient_of(lanes(1.0f), higher_of(total, lanes(1.0e-20f)));
 
 #include "frames.h"
 #include "across.h"
@@ -190,17 +201,14 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
       t[i] = chosen(is_styled, t[i], kept_t[i]);
       length[i] = is_styled ? length[i] : kept_length[i];
     }
+    put_total();
   }
 }
 
-put_points();
 // Strands that no style has touched keep their bits.
-const bool is_all = lane_count == LANES && !any_of(is_touched == 0);
-if (is_all) {
-  for (int i = 0; i < in_fours; i += 4) write_rows(coordinates + i, rows, i);
-}
-for (int lane = 0; lane < lane_count; ++lane) {
-  if (!get_lane(is_touched, lane)) continue;
-  for (int i = is_all ? in_fours : 3; i < number_count; ++i) rows[lane][i] = lane_of(coordinates[i], lane);
-}
+vector point = root;
+write_points(rows, is_touched, [&](int i) {
+  if (i > 0) point = point + t[i] * length[i];
+  return point;
+});
 }

@@ -17,13 +17,16 @@ from . import frizz
 from .program_rows import BEND, CHOICES, CLUMP, CURL, FRIZZ, NUMBERS, SMOOTH, TRIM, WEAVE, Program
 from .random_numbers import PURPOSES
 
-# Nothing differentiates these kernels.
-wp.set_module_options({"enable_backward": False})
+# Nothing differentiates these kernels. A GPU's approximate divisions and roots move hair by less than 2e-6 of its size;
+# where more would follow from them, steps.cpp asks for exact ones.
+_OPTIONS = {"enable_backward": False, "fast_math": True}
+wp.set_module_options(_OPTIONS)
 
 LEAST_BLOCKS = 64  # fewer are not worth a thread
 WIDTH = 16  # strands that a thread of the processor styles at once: 8 take a fifth longer
 MOST_POINTS = 257  # of a strand
 SHORT_POINTS = 64  # of a strand that takes less memory of a GPU
+POINTS_AT_ONCE = 5  # of a strand in the shared memory of a GPU: more take cache from directions and lengths
 
 
 @dataclass(frozen=True)
@@ -54,7 +57,7 @@ class Variant:
 def variant(width: int, most_points: int, module: wp.Module | None = None) -> Variant:
     """A `Variant` in a Warp module, this file's unless another is given."""
     if module is not None:
-        module.options["enable_backward"] = False
+        module.options.update(_OPTIONS)
 
     @wp.func_native(native_code.body(__file__, "steps.cpp", WIDTH=width, MOST=most_points, **_CONSTANTS))
     def _apply_steps(
@@ -73,7 +76,8 @@ def variant(width: int, most_points: int, module: wp.Module | None = None) -> Va
         axes: wp.mat33,
     ): ...
 
-    @wp.kernel(module=module)
+    # Blocks of 256 threads, three on a multiprocessor: registers are what keeps a GPU from running more at once.
+    @wp.kernel(module=module, launch_bounds=(256, 3))
     def _style_blocks(
         points: wp.array2d[wp.vec3],
         chosen_rows: wp.array[int],
@@ -120,6 +124,7 @@ _CONSTANTS = {
     "WEAVE": WEAVE,
     "WAVES": frizz.WAVES_AN_OCTAVE,
     "MOST_OCTAVES": frizz.MOST_OCTAVES,
+    "POINTS_AT_ONCE": POINTS_AT_ONCE,
     **PURPOSES,
 }
 _ANY = variant(WIDTH, MOST_POINTS)

@@ -18,7 +18,7 @@ if (has_plane) {
   lanes before = dot(root, axis) - plane;
   lanes crossing = before > 0.0f ? lanes(0.0f) : lanes(3.0e38f);
   for (int i = 1; i < point_count; ++i) {
-    const lanes beyond = dot(next[i], axis) - plane;
+    const lanes beyond = dot(place[i], axis) - plane;
     const auto is_crossing = beyond > 0.0f && before <= 0.0f && crossing > 1.0e38f;
     const lanes step_size = is_crossing ? beyond - before : lanes(1.0f);
     crossing = is_crossing ? along[i - 1] - length[i] * before / step_size : crossing;
@@ -30,7 +30,7 @@ if (has_plane) {
 wanted = total + base * (wanted - total);
 if (is_cut) {
   const auto is_kept = abs_of(wanted * per_total - 1.0f) < 1.0e-7f;
-  lanes length_made[MOST];
+  lanes* const length_made = next_length;
   lanes exact;
   // The curve through the points is not where the points' segments are: its tip is brought back to the plane.
   for (int pass = 0; pass < (has_plane ? 3 : 1); ++pass) {
@@ -40,10 +40,10 @@ if (is_cut) {
     lanes sum = 0.0f;
     vector before = root, direction = t[1];
     for (int i = 1; i < point_count; ++i) {
-      const lanes place = along[i] * scale;
+      const lanes reached = along[i] * scale;
       lanes below, above;
       for (int lane = 0; lane < LANES; ++lane) {
-        const float arc = get_lane(place, lane);
+        const float arc = get_lane(reached, lane);
         while (at[lane] < point_count - 2 && lane_of(along[at[lane] + 1], lane) < arc) ++at[lane];
         set_lane(below, lane, lane_of(along[at[lane]], lane));
         set_lane(above, lane, lane_of(along[at[lane] + 1], lane));
@@ -51,7 +51,7 @@ if (is_cut) {
       const lanes range = above - below;
       const auto has_range = range > 1.0e-12f;
       const lanes f = clamped(
-          has_range ? (place - below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f), lanes(0.0f), lanes(1.0f)
+          has_range ? (reached - below) / (has_range ? range : lanes(1.0f)) : lanes(0.0f), lanes(0.0f), lanes(1.0f)
       );
       // A cubic through the points around [Catmull74], and straight on past the tip.
       marks back, beyond;
@@ -62,17 +62,17 @@ if (is_cut) {
         set_lane(is_first, lane, at[lane] > 0 ? 0.0f : 1.0f);
         set_lane(is_last, lane, at[lane] < point_count - 2 ? 0.0f : 1.0f);
       }
-      const vector p1 = gathered(next, at, 0), p2 = gathered(next, at, 1);
-      const vector p0 = chosen(is_first > 0.0f, p1 * 2.0f - p2, gathered(next, back, 0));
-      const vector p3 = chosen(is_last > 0.0f, p2 * 2.0f - p1, gathered(next, beyond, 0));
+      const vector p1 = gathered(place, at, 0), p2 = gathered(place, at, 1);
+      const vector p0 = chosen(is_first > 0.0f, p1 * 2.0f - p2, gathered(place, back, 0));
+      const vector p3 = chosen(is_last > 0.0f, p2 * 2.0f - p1, gathered(place, beyond, 0));
       const vector bend = p0 * 2.0f - p1 * 5.0f + p2 * 4.0f - p3;
       const vector twist = (p1 - p2) * 3.0f + p3 - p0;
       vector point = p1 + ((p2 - p0) + (bend + twist * f) * f) * (0.5f * f);
-      point = point + t[point_count - 1] * higher_of(place - total, lanes(0.0f));
+      point = point + t[point_count - 1] * higher_of(reached - total, lanes(0.0f));
       const vector segment = point - before;
       const lanes size = sqrt_of(dot(segment, segment));
       direction = unit_or(segment, lanes(1.0e-12f), direction);
-      u[i] = direction;
+      next[i] = direction;
       before = point;
       length_made[i] = size;
       sum += size;
@@ -80,16 +80,17 @@ if (is_cut) {
     exact = wanted / higher_of(sum, lanes(1.0e-20f));
     if (has_plane) {
       vector tip = root;
-      for (int i = 1; i < point_count; ++i) tip = tip + u[i] * (length_made[i] * exact);
+      for (int i = 1; i < point_count; ++i) tip = tip + next[i] * (length_made[i] * exact);
       const lanes slope = higher_of(dot(direction, axis), lanes(0.1f));
       wanted -= is_at_plane * (dot(tip, axis) - plane) / slope;
       wanted = higher_of(wanted, lanes(0.0f));
     }
   }
   for (int i = 1; i < point_count; ++i) {
-    t[i] = chosen(is_kept, t[i], u[i]);
+    t[i] = chosen(is_kept, t[i], next[i]);
     length[i] = is_kept ? length[i] : length_made[i] * exact;
   }
 } else {
   for (int i = 1; i < point_count; ++i) length[i] *= wanted * per_total;
 }
+put_total();

@@ -38,15 +38,21 @@ const auto turned = [&](const vector& u, const vector& a, const vector& b) {
   return u - (a + b) * lean;
 };
 
-// Sine and cosine of whole turns: polynomials of least error over a turn, 1e-7, that vanish where these do.
+// Sine and cosine of whole turns: by a GPU's own instructions, 4e-7, or polynomials of least error over a turn, 1e-7,
+// that vanish where these do.
 const auto sine_and_cosine = [&](lanes turns, lanes& sine, lanes& cosine) {
   const lanes x = turns - floor_of(turns + 0.5f);
+#if defined(__CUDA_ARCH__)
+  sine = __sinf(6.28318530718f * x);
+  cosine = __cosf(6.28318530718f * x);
+#else
   const lanes z = x * x;
   sine = x * (0.25f - z)
       * (25.13273048f + z * (-64.83467865f + z * (67.04389954f + z * (-38.12319565f + z * 12.23330116f))));
   cosine = (0.0625f - z)
       * (16.0f
          + z * (-59.82727432f + z * (81.78964233f + z * (-58.57185364f + z * (25.56709099f - z * 6.54000998f)))));
+#endif
 };
 
 // x to the power e, for x and e from 0 to 1; 0 for x = 0.
