@@ -7,7 +7,6 @@ radius, until Blender has evaluated the strands: the best of some, taken in turn
 
 import os
 import sys
-import tempfile
 import time
 from pathlib import Path
 
@@ -18,7 +17,6 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import guide_tool_pictures  # beside this file
-import head
 import ratio_plot
 import styles
 
@@ -40,7 +38,7 @@ def main():
     gpu.init()
     hair = styles.build(STRAND_COUNT)
     hair_object = bpy.data.objects["Hair"]
-    clump = api.Clump(size=SIZE, levels=1, thickness=0.08, shape=SHAPE, crossover=0.0, stray=0.0)
+    clump = api.Clump(size=SIZE, levels=1, thickness=0.03, shape=SHAPE, crossover=0.0, stray=0.0)
     curl = api.Curl(radius=RADIUS, pitch=PITCH, coherence=1.0, seed=1)
     hair.vellus.hair.point_count = POINT_COUNT
     api.set_styles(hair, [clump, curl])
@@ -57,10 +55,11 @@ def main():
     coils = {"Subdivision": 0, "Radius": RADIUS, "Frequency": length / PITCH}
     curled = _add(hair_object, "Curl Hair Curves", coils)
     bpy.context.view_layer.update()
-    print("nodes make a mean length of", _mean_length(hair_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data))
+    evaluated = hair_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    print(f"mean length {length:.3f} m, of Blender's nodes {_mean_length(evaluated):.3f} m")
     theirs = styles.drawn()
     their_time = _best(lambda step: _curl_theirs(hair_object, curled, step))
-    print(f"Blender {1e3 * their_time:.0f} ms, Vellus {1e3 * our_time:.0f} ms, {their_time / our_time:.1f} times; {length} m")
+    print(f"Blender {1e3 * their_time:.0f} ms, Vellus {1e3 * our_time:.0f} ms: {their_time / our_time:.1f} times")
     pixels = np.concatenate([theirs, ours], axis=1)
     pixels = np.concatenate([np.full((CAPTION, pixels.shape[1], 3), 24, np.uint8), pixels & styles.KEPT_BITS])
     words = [

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """make demo: the report's pictures and its two results tables, made on this machine.
 
-Writes head.blend, kajiya_kay.png, marschner.png, dual_scattering.png and tables/{m,n,n_trt}.exr to a folder.
+Writes head.blend, kajiya_kay.png, marschner.png, dual_scattering.png, styled.png (the same hair, wavy) and
+tables/{m,n,n_trt}.exr to a folder.
 """
 
 import argparse
@@ -21,11 +22,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import head  # beside this file
 
 import hair_addon
+from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import drawing, visibility_buffer
 from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.core.geometry import bspline
 
+STYLE = "WAVY"  # of styled.png
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
 REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
 REPORT_FRAMES = {("Marschner", 10_000): 25, ("Kajiya-Kay", 10_000): 36}
@@ -55,10 +58,23 @@ def main():
     classic_roughness = look.roughness
     look.mode, look.absorption, look.roughness = "energy", head.AUBURN, 0.3
     bpy.ops.vellus.render_picture(filepath=str(out / "dual_scattering.png"))
+    draw_styled(hair.data, out / "styled.png")
     look.mode, look.roughness = "classic", classic_roughness
     print_spline_table()
     print_frame_table(guides, hair)
     print(f"\nmade in {time.perf_counter() - started:.1f} s: {out}")
+
+
+def draw_styled(hair, path):
+    """Draw the same hair with a style preset, and leave it as it was."""
+    settings = hair.vellus.hair
+    before = settings.point_count, settings.tip_taper
+    api.apply_style_preset(hair, STYLE)
+    bpy.context.view_layer.update()
+    bpy.ops.vellus.render_picture(filepath=str(path))
+    api.set_styles(hair, [])
+    settings.point_count, settings.tip_taper = before
+    bpy.context.view_layer.update()
 
 
 def print_spline_table():
