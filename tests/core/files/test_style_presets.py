@@ -30,6 +30,7 @@ def lengths(preset):
 
 def test_each_preset_has_its_file_and_each_file_its_preset():
     assert sorted(path.stem.upper() for path in style_presets.FOLDER.glob("*.json")) == sorted(style_presets.PRESETS)
+    assert sorted(path.stem.upper() for path in style_presets.FOLDER.glob("*.png")) == sorted(style_presets.PRESETS)
     assert len(style_presets.PRESETS) >= 12
 
 
