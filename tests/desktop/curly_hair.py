@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The manual's page Curly Hair in ten steps, in a window: from a bare head to curly hair with a fringe.
 
-Run by a desktop Blender with a clean profile: curly_hair.py -- ZIP HEAD OUT. Writes a picture of the screen for each
-step to OUT, and curly_hair.json with what the tests want to know. The page's pictures are made of them by
+Run by a desktop Blender: curly_hair.py -- PART ZIP HEAD OUT. Writes a picture of the screen for each step to OUT, and
+curly_hair.json with what the tests want to know. The page's pictures are made of them by
 `tools/manual_pictures.py curly_hair`. After the ten steps a style is keyed, moved and undone, and hair is combed with
-its styles on.
+its styles on. Each of the `PARTS` runs in a Blender of its own and goes on with the file of the one before: a hundred
+redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or without add-on.
 """
 
 import json
@@ -22,7 +23,7 @@ sys.path.insert(0, str(ROOT))
 from tests.desktop.window import drag, import_head, in_viewport, places, take_picture, viewport, wait, wait_for  # noqa: E402
 
 MODULE = "bl_ext.user_default.vellus"
-ZIP, HEAD, OUT = sys.argv[sys.argv.index("--") + 1 :]
+PART, ZIP, HEAD, OUT = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 
 STRAND_COUNT = 16_000  # software drivers take their time for each
@@ -34,7 +35,8 @@ _ADD = (241, 46)  # beside the list
 # The hairline of the sample's head from the side, (y, z) [m], from the forehead to the nape; the face looks to -Y.
 _HAIRLINE = np.array([(-0.17, 0.82), (-0.105, 0.787), (-0.068, 0.74), (-0.03, 0.744), (0.0, 0.69), (0.04, 0.68)])
 
-facts = {"steps": []}
+FACTS, SCENE = OUT / "curly_hair.json", OUT / "curly_hair.blend"
+facts = json.loads(FACTS.read_text()) if FACTS.exists() else {"steps": [], "done": []}
 hidden = []  # panels that the sidebar does not show
 
 
@@ -147,7 +149,6 @@ def bare_head():
     """1. A head with a vertex group where hair grows."""
     bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
     bpy.context.preferences.system.use_region_overlap = False
-    sys.modules[f"{MODULE}.hair_addon.blender"].render.hair_picture.SAMPLE_COUNT = 8
     for thing in list(bpy.data.objects):
         if thing.type == "MESH":
             bpy.data.objects.remove(thing)
@@ -340,6 +341,7 @@ def comb_styled():
     with in_viewport():
         bpy.ops.vellus.comb_guides()
     yield from wait(0.5)
+    bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 130
     before = strands()
     middle = places(points(guides_object())[20::41]).mean(axis=0)
     followed = []
@@ -354,13 +356,28 @@ def comb_styled():
     picture("combed_styled")
 
 
-STEPS = (bare_head, hair_system, comb, shoulder_length, fringe, locks, curls, smooth_curls, paint, look)
+PARTS = {
+    "cut": (bare_head, hair_system, comb, shoulder_length, fringe),
+    "curl": (locks, curls, smooth_curls, paint, look),
+    "beyond": (key_move_undo, comb_styled),
+}
+
+
+def go_on():
+    """Open the file of the part before."""
+    bpy.ops.wm.open_mainfile(filepath=str(SCENE))
+    yield from wait(1.0)
+    activate(hair_object())
+    show_styles_alone()
+    yield from wait(1.0)
 
 
 def walk():
-    """All steps; between them Blender handles its events and redraws."""
-    for part in (*STEPS, key_move_undo, comb_styled):
+    """All steps of a part; between them Blender handles its events and redraws."""
+    parts = PARTS[PART] if PART == next(iter(PARTS)) else (go_on, *PARTS[PART])
+    for part in parts:
         yield from part()
+    bpy.ops.wm.save_as_mainfile(filepath=str(SCENE))
 
 
 def advance(steps):
@@ -369,11 +386,11 @@ def advance(steps):
         next(steps)
         return 0.05
     except StopIteration:
-        facts["is_done"] = True
+        facts["done"].append(PART)
     except Exception:
         traceback.print_exc()
     show_all_panels()
-    (OUT / "curly_hair.json").write_text(json.dumps(facts, indent=1))
+    FACTS.write_text(json.dumps(facts, indent=1))
     bpy.ops.wm.quit_blender()
     return None
 
