@@ -93,15 +93,15 @@ def test_styles_are_applied_in_the_order_of_the_words(scene, mesh, tmp_path):  #
 
 def test_style_presets_fit_the_surface(scene, mesh, tmp_path):  # noqa: F811
     out = tmp_path / "out.blend"
-    groom = ("groom", mesh, *SMALL, "--out", out, "--style-preset", "CURLY")
+    groom = ("groom", mesh, *SMALL, "--out", out, "--style-preset", "FRIZZY")
     assert run_here(*groom, "--no-style-fit").status == 0
     plain = grown(out)[0]
-    assert plain.styles == style_presets.read("CURLY").styles
+    assert plain.styles == style_presets.read("FRIZZY").styles
     assert run_here(*groom, "--style", "wet:lock=0.01", "--tip-taper", 0.9).status == 0
     settings = grown(out)[0]
     factor = settings.guides.length / 0.12  # the length of new hair on a head
-    assert settings.styles[1].radius / plain.styles[1].radius == pytest.approx(factor, rel=0.01)
-    assert settings.styles[3] == wet.Settings(lock=0.01, seed=3) and settings.hair.tip_taper == 0.9
+    assert settings.styles[0].amplitude / plain.styles[0].amplitude == pytest.approx(factor, rel=0.01)
+    assert settings.styles[1] == wet.Settings(lock=0.01, seed=1) and settings.hair.tip_taper == 0.9
 
 
 def test_settings_have_the_styles_of_the_words():

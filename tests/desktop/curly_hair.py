@@ -41,7 +41,6 @@ hidden = []  # panels that the sidebar does not show
 
 
 def picture(name):
-    """A picture of the screen after a step."""
     take_picture(OUT / f"{name}.png")
     facts["steps"].append(name)
     print(f"curly_hair: {name}", flush=True)

@@ -23,7 +23,7 @@ WANTED = GroomSettings(
     HairSettings(strand_count=70, radius=0.003, influence_distance=0.4),
     Appearance(melanin=0.3, mode="classic"),
     lookup_tables.Settings(size=64, eccentricity=0.9),
-    (clump.Settings(size=0.02, levels=3), curl.Settings(radius=0.004), curl.Settings(is_on=False, seed=7)),
+    (clump.Settings(size=0.3, levels=3), curl.Settings(radius=0.004), curl.Settings(is_on=False, seed=7)),
     ("Locks", "Curl", "Curl.001"),
 )
 
