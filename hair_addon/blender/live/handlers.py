@@ -66,10 +66,11 @@ def after_depsgraph_update(_scene, depsgraph):
 
 def _painted(depsgraph):
     """The mesh objects in a paint mode whose colors or weights may have changed."""
-    images = any(isinstance(update.id, bpy.types.Image) for update in depsgraph.updates)
-    modes = {"WEIGHT_PAINT", "VERTEX_PAINT"}
-    found = {o for o in _deformed(depsgraph) if o.mode in modes}
-    return found | {o for o in depsgraph.view_layer.objects if images and o.mode == "TEXTURE_PAINT"}
+    found = {o for o in _deformed(depsgraph) if o.mode in {"WEIGHT_PAINT", "VERTEX_PAINT"}}
+    if not any(isinstance(update.id, bpy.types.Image) for update in depsgraph.updates):
+        return found
+    surfaces = {hair.surface for hair in _of_kind("HAIR")} - {None}
+    return found | {surface for surface in surfaces if surface.mode == "TEXTURE_PAINT"}
 
 
 def _is_hair_only(depsgraph):

@@ -90,11 +90,12 @@ def is_ahead(hair):
         return False
     try:
         guide_curves, settings = pipeline.inputs_of(hair)
+        styles = style_items.styles_of(hair.vellus)
     except HairError:
         return False  # `make_again` handles it
     if bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
-    return bound.styles.read.styles == style_items.styles_of(hair.vellus)
+    return bound.styles.read.styles == styles
 
 
 def is_left_by_undo(hair):

@@ -79,7 +79,7 @@ class ClumpTrees:
         return self._members[key]
 
     def parents(self, tree: TreeSettings, level: int) -> list[np.ndarray]:
-        """(K,) int32 per coarser level: the centres that those of one level belong to, -1 for none."""
+        """(K,) int32 per level, the coarsest first: the centres that those of one level belong to, themselves last."""
         own = np.arange(len(self.levels(tree)[level].roots), dtype=np.int32)
         return self._upward(tree, own, level)
 
@@ -93,10 +93,6 @@ class ClumpTrees:
                 self._parents[key] = self._nearest(levels[finer], levels[finer - 1])[:, 0]
             found.insert(0, np.where(found[0] >= 0, self._parents[key][found[0]], -1))
         return found
-
-    def forget(self, owner: object) -> None:
-        """Drop the members that some strands are of: they have other roots now."""
-        self._members = {key: found for key, found in self._members.items() if key[0] != owner}
 
     def _nearest(self, strands, centres):
         nearest = self.binder.nearest(strands, centres)

@@ -7,7 +7,8 @@ before. Then all strands take the whole program in one launch.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -27,6 +28,9 @@ from .program_rows import CLUMP, WEAVE, Program
 from .steps import StrandData
 from .style_inputs import Inputs
 
+if TYPE_CHECKING:
+    from ..interpolation.guide_weights import Reach
+
 # Nothing differentiates these kernels.
 wp.set_module_options({"enable_backward": False})
 
@@ -44,6 +48,11 @@ class _Level:
     first: int  # of its centres among all
     steps: Program  # that style them
     data: StrandData
+
+    @cached_property
+    def reach(self) -> "Reach":
+        """The centres that follow each guide."""
+        return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.binding.guide_positions))
 
 
 @dataclass
@@ -93,14 +102,12 @@ class Styling:
         """
         if not self.levels:
             return moved
-        guide_count = len(self.levels[0].binding.guide_positions)
         is_moved = np.zeros(len(self.data.normals), bool)
         is_moved[moved] = True
         changed: list[np.ndarray] = []
         for level in self.levels:
             is_changed = np.zeros(len(level.binding.roots), bool)
-            reach = interpolation.guide_weights.reach(level.binding.guide_weights, guide_count)
-            is_changed[reach.of(combed)] = True
+            is_changed[level.reach.of(combed)] = True
             members = level.data.members.numpy()
             for row, of_row in enumerate(changed):
                 is_changed |= (members[row] >= 0) & of_row[members[row]]

@@ -161,13 +161,6 @@ def test_sites_are_as_many_as_the_size_says(hair):
         assert np.median(apart.min(axis=1)) == pytest.approx(size, rel=0.25)
 
 
-def test_forgotten_members_are_found_again(hair):
-    settings = clump.Settings(levels=2)
-    before = hair.bound(settings).data.members.numpy()
-    hair.trees.forget(HAIR)
-    np.testing.assert_array_equal(hair.bound(settings).data.members.numpy(), before)
-
-
 def test_more_strength_gathers_more(hair):
     """Strands of a lock come closer together along their lengths, the more the stronger."""
     spreads = []
