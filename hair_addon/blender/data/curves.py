@@ -349,8 +349,8 @@ def read_guides(curves, surface, device, known=None):
 def read_shown_guides(curves, surface, device, known=None):
     """Guides as hair follows them in this frame: where dynamics has moved them, else as `read_guides` reads them."""
     guides = read_guides(curves, surface, device, known)
-    shown = simulated_guides.points_of(curves, len(guides))
-    return guides if shown is None else guides.moved(surface.from_local(shown))
+    shown = simulated_guides.point_cache.get(curves.session_uid)
+    return guides if shown is None or len(shown) != len(guides) else guides.moved(surface.from_local(shown))
 
 
 def even_points(points, offsets, are_smooth):

@@ -9,7 +9,8 @@ import numpy as np
 
 from ..host.caches import Cache
 
-# session_uid of guide Curves → (G, POINT_COUNT, 3) float32 in local coordinates
+# session_uid of guide Curves → (G, POINT_COUNT, 3) float32 in local coordinates. Those of another number of guides than
+# there are, as after an undo, are not used.
 point_cache = Cache()
 
 
@@ -19,12 +20,6 @@ def show(guide_curves, points):
         point_cache.invalidate(guide_curves.session_uid)
     else:
         point_cache.keep(guide_curves.session_uid, np.ascontiguousarray(points, np.float32))
-
-
-def points_of(guide_curves, count):
-    """(G, POINT_COUNT, 3) float32 where `count` guides are shown; None as they are combed, or were others."""
-    points = point_cache.get(guide_curves.session_uid)
-    return points if points is not None and len(points) == count else None
 
 
 def is_shown(guide_curves):

@@ -214,8 +214,8 @@ def _read(datablock, bound):
 def _shown_strands(datablock):
     """`read_strands`, where dynamics has moved them if they are guides that it moves."""
     points, radii, randoms, wetness = read_strands(datablock)
-    simulated = simulated_guides.points_of(datablock, len(points))
-    if simulated is None:
+    simulated = simulated_guides.point_cache.get(datablock.session_uid)
+    if simulated is None or len(simulated) != len(points):
         return points, radii, randoms, wetness
     even = np.repeat(radii.mean(axis=1, keepdims=True), simulated.shape[1], axis=1)
     return simulated, even, randoms, wetness
