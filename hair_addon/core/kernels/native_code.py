@@ -22,10 +22,9 @@ def body(module_file: str, name: str, **constants: int | float) -> str:
 
     def read(name):
         path = next((path for path in (folder / name for folder in folders) if path.is_file()), folders[0] / name)
-        return path.read_text(encoding="utf-8")
+        return _INCLUDE.sub(lambda include: read(include[1]), path.read_text(encoding="utf-8"))
 
-    source = _INCLUDE.sub(lambda include: read(include[1]), read(name))
-    return "\n".join([*(_declaration(*constant) for constant in constants.items()), source])
+    return "\n".join([*(_declaration(*constant) for constant in constants.items()), read(name)])
 
 
 def _declaration(name, value):

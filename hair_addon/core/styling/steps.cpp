@@ -31,6 +31,7 @@
 #include "lanes.h"
 #include "lane_rows.h"
 #include "vectors.h"
+#include "style_numbers.h"
 
 using marks = int[LANES];  // a place along the strand of each lane
 const int point_count = points.shape[1];

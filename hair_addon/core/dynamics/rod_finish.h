@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A substep's end: what is still inside is moved out, velocities, and strands that broke are put back to their groom.
+
+lanes stretch = 0.0f, reach = 0.0f, whole = 0.0f;
+ints is_sound = -1;
+const float per_step = 1.0f / h;
+vector last = get_vector(x, 0);
+for (int i = 0; i <= segment_count; ++i) {
+  vector point = get_vector(x, i);
+  if (has_planes && i > pinned) {
+    const float* plane = plane_rows + size_t(8 * i) * STRIDE;
+    const vector n = get_vector(plane, 0);
+    const lanes inside = dot(n, point) - get(plane, 3);
+    point = chosen(inside < 0.0f, point - n * inside, point);
+    put_vector(x, i, point);
+  }
+  put_vector(v, i, (point - get_vector(x_before, i)) * lanes(per_step));
+  if (i > 0) {
+    const vector segment = point - last, from_root = point - root;
+    const lanes size = get(length, i - 1);
+    stretch = higher_of(dot(segment, segment) / (size * size), stretch);
+    reach = higher_of(dot(from_root, from_root), reach);
+    whole += size;
+    is_sound = is_sound & (dot(point, point) < 1.0e30f);  // false where it is not a number
+  }
+  last = point;
+}
+for (int j = 0; j < segment_count; ++j) {
+  const quaternion frame = get_frame(q, j);
+  const quaternion turn = times(frame, conjugate(get_frame(q_before, j)));
+  // Bounded where a frame has turned by nearly half a turn.
+  const lanes scale = 2.0f * per_step * turn.w / higher_of(turn.w * turn.w, lanes(0.01f));
+  put_vector(spin, j, vector{turn.x * scale, turn.y * scale, turn.z * scale});
+  is_sound = is_sound & (dot(vector{frame.x, frame.y, frame.z}, vector{frame.x, frame.y, frame.z}) < 2.0f);
+}
+const lanes most_reach = whole * (1.25f * most_stretch);  // 1.5 lengths for the usual 1.2
+is_sound = is_sound & (stretch < most_stretch * most_stretch) & (reach < most_reach * most_reach);
+if (any_of(is_sound == 0)) {
+  for (int i = 0; i <= segment_count; ++i) {
+    const vector shape = get_vector(groom, i);
+    const vector goal = root + rotated(root_frame, shape), goal_before = root_before + rotated(frame_before, shape);
+    put_vector(x, i, chosen(is_sound, get_vector(x, i), goal));
+    put_vector(v, i, chosen(is_sound, get_vector(v, i), (goal - goal_before) * lanes(per_step)));
+    if (has_planes) put(slip, i, is_sound ? get(slip, i) : lanes(-1.0f));
+  }
+  const vector none{lanes(0.0f), lanes(0.0f), lanes(0.0f)};
+  for (int j = 0; j < segment_count; ++j) {
+    put_frame(q, j, chosen_rotation(is_sound, get_frame(q, j), times(root_frame, get_frame(groom_frame, j))));
+    put_vector(spin, j, chosen(is_sound, get_vector(spin, j), none));
+    put_vector(lambda, 2 * j, chosen(is_sound, get_vector(lambda, 2 * j), none));
+    put_vector(lambda, 2 * j + 1, chosen(is_sound, get_vector(lambda, 2 * j + 1), none));
+  }
+  put(resets, 0, get(resets, 0) + (is_sound ? lanes(0.0f) : lanes(1.0f)));
+}

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A substep's start: where gravity, air and hold take points without the rod's forces, and frames their spin.
+//
+// Air drag and hold are implicit. Both add to a point's mass: m' = m (1 + h c + h² k + 2 h √k), with the rate of drag c
+// [1/s] and the strength of hold k [1/s²]. So an equilibrium does not depend on h: forces upon a point at rest are
+// divided by the same m'. The part of drag along the strand that is less than the part across is explicit.
+
+for (int i = 0; i <= segment_count; ++i) {
+  const vector point = get_vector(x, i);
+  put_vector(x_before, i, point);
+  if (i <= pinned) {
+    put_vector(x, i, root + rotated(root_frame, get_vector(groom, i)));
+    put(mobility, i, lanes(0.0f));
+    continue;
+  }
+  const vector velocity = get_vector(v, i);
+  const vector along = direction_of(get_frame(q, i - 1));
+  const vector wind = has_air ? get_vector(air_rows, i) : vector{lanes(0.0f), lanes(0.0f), lanes(0.0f)};
+  const vector relative = velocity - wind;
+  const lanes along_speed = dot(relative, along);
+  const vector across = relative - along * along_speed;
+  const lanes speed = exact_sqrt_of(dot(across, across));
+  lanes rate = higher_of(slow_drag, drag_square * speed + drag_root * cube_root(speed));
+  if (has_drag) rate *= get(drag_rows, i);
+  vector force{lanes(gravity[0]), lanes(gravity[1]), lanes(gravity[2])};
+  if (has_acceleration) force = force + get_vector(acceleration_rows, i);
+  force = force + wind * rate + along * ((1.0f - DRAG_ALONG) * rate * along_speed);
+  lanes added = h * rate;
+  vector step = velocity * lanes(h);
+  if (hold > 0.0f) {
+    const float strength = hold * (1.0f + (hold_tip - 1.0f) * static_cast<float>(i) / static_cast<float>(segment_count));
+      const lanes critical = 2.0f * h * exact_sqrt_of(lanes(strength));
+    const vector shape = get_vector(groom, i);
+    const vector goal = root + rotated(root_frame, shape), goal_before = root_before + rotated(frame_before, shape);
+    force = force + (goal - point) * lanes(strength);
+    step = step + (goal - goal_before) * critical;
+    added += h * h * strength + critical;
+  }
+  const lanes share = 1.0f / (1.0f + added);
+  put_vector(x, i, point + (step + force * lanes(h * h)) * share);
+  put(mobility, i, get(inverse_mass, i) * share);
+}
+for (int j = 0; j < segment_count; ++j) {
+  const quaternion frame = get_frame(q, j);
+  put_frame(q_before, j, frame);
+  const vector turn = get_vector(spin, j) * lanes(h);
+  put_frame(q, j, j < pinned ? times(root_frame, get_frame(groom_frame, j)) : turned_by(turn, frame));
+}

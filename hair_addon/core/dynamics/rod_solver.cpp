@@ -1,0 +1,194 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Substeps of LANES strands at once: on a processor the lanes of its vectors, on a GPU one strand a thread.
+//
+// The body of `_advance` in rod_solver.py. An array (groups, rows, STRIDE) has a row for each number of a strand, and in
+// it one number of each of STRIDE strands. For M segments, M + 1 points; point 0 and the frame before segment 0 are
+// given by the surface:
+//
+//   int block                              a group of strands on a processor, a strand on a GPU
+//   int stages                             which parts of a substep: PREDICT, SOLVE, FINISH
+//   int first, end, count                  substeps first … end - 1 of the count in a frame
+//   int pinned                             points from the root that follow the surface beside point 0, ≤ M - 1
+//   float h                                a substep [s]
+//   float carried                          (h / h of the substep before the first)²
+//   vec3 gravity                           [m/s²]
+//   float damping_time                     Kelvin-Voigt time τ of bending and twisting [s]
+//   float twist_ratio                      compliance of twisting, in that of bending
+//   float drag_square, drag_root           of the rate of drag, times v [1/m] and ∛v [1/s ∛(s/m)]
+//   float hold, hold_tip                   pull to the groom [1/s²], and its part at the tip
+//   float most_stretch                     length of a segment by its rest length at which a strand is put back
+//   array_t<float> positions, velocities   3 (M + 1) rows [m], [m/s]
+//   array_t<float> frames, spins           4 M, 3 M rows: unit quaternions; angular velocities [1/s]
+//   array_t<float> multipliers             6 M rows λ_b, λ_s
+//   array_t<float> slips                   M + 1 rows: how far a point slid in the last substep, -1 without contact [m]
+//   array_t<float> lengths                 M rows [m]
+//   array_t<float> rests                   4 M rows: half of the rest rotation of a joint
+//   array_t<float> bend_compliances, stretch_compliances    M rows each, in the unit of mass of the inverse masses
+//   array_t<float> inverse_masses          M + 1 rows
+//   array_t<float> inertias                M rows
+//   array_t<float> grooms, groom_frames    3 (M + 1), 4 M rows: the groom in the root's frame
+//   array_t<float> slow_drags              1 row: the rate of drag of slow air [1/s]
+//   array_t<float> roots                   14 rows: position, frame at the frame's start; position, frame at its end
+//   array_t<float> positions_before, frames_before, mobilities    3 (M + 1), 4 M, M + 1 rows: of a substep between stages
+//   array_t<float> planes                  8 (M + 1) rows: n, offset, displacement, friction of each point; or empty
+//   array_t<float> airs, drags, accelerations    3, 1, 3 rows a point: [m/s], factor, [m/s²]; each may be empty
+//   array_t<float> scratches               of a GPU: KEPT M + CONTACT (M + 1) rows
+//   array_t<float> reset_counts            1 row
+//
+// Constants: WIDTH, GROUP, MOST segments; DRAG_ALONG, AWAY, CREEP, CHANGE, LEAST_INERTIA, TURN, STEPS, PASSES.
+
+{
+#if !defined(__CUDA_ARCH__)
+  #pragma clang fp contract(fast)
+#endif
+#include "lanes.h"
+#include "vectors.h"
+#include "rod_rotations.h"
+
+constexpr int PREDICT = 1, SOLVE = 2, FINISH = 4;
+// What a segment keeps between factorisation and back substitution, and a point between contact passes.
+constexpr int LOWER = 0, UPPER = 21, RIGHT = 48, GRADIENT = 54, TURNING = 63, KEPT = 64;
+constexpr int CONTACT = 7;  // n, a, predicted point
+
+#if defined(__CUDA_ARCH__)
+constexpr int STRIDE = GROUP, KEPT_STRIDE = GROUP;
+const int group = block / GROUP, lane = block % GROUP;
+const auto get = [](const float* rows, int row) { return rows[size_t(row) * STRIDE]; };
+const auto put = [](float* rows, int row, lanes value) { rows[size_t(row) * STRIDE] = value; };
+#else
+constexpr int STRIDE = WIDTH;
+const int group = block, lane = 0;
+typedef float lanes_anywhere __attribute__((ext_vector_type(WIDTH), aligned(4)));
+const auto get = [](const float* rows, int row) -> lanes {
+  return *reinterpret_cast<const lanes_anywhere*>(rows + size_t(row) * STRIDE);
+};
+const auto put = [](float* rows, int row, lanes value) {
+  *reinterpret_cast<lanes_anywhere*>(rows + size_t(row) * STRIDE) = value;
+};
+#endif
+const auto get_vector = [&](const float* rows, int i) {
+  return vector{get(rows, 3 * i), get(rows, 3 * i + 1), get(rows, 3 * i + 2)};
+};
+const auto put_vector = [&](float* rows, int i, const vector& value) {
+  put(rows, 3 * i, value.x);
+  put(rows, 3 * i + 1, value.y);
+  put(rows, 3 * i + 2, value.z);
+};
+const auto get_frame = [&](const float* rows, int j) {
+  return quaternion{get(rows, 4 * j), get(rows, 4 * j + 1), get(rows, 4 * j + 2), get(rows, 4 * j + 3)};
+};
+const auto put_frame = [&](float* rows, int j, const quaternion& value) {
+  put(rows, 4 * j, value.x);
+  put(rows, 4 * j + 1, value.y);
+  put(rows, 4 * j + 2, value.z);
+  put(rows, 4 * j + 3, value.w);
+};
+// Cube root of a number that is not negative, by Halley's method.
+const auto cube_root = [&](lanes value) {
+  const lanes a = higher_of(value, lanes(1.0e-9f));
+  lanes root = lanes_of_bits(to_ints(to_lanes(bits_of_lanes(a)) * (1.0f / 3.0f)) + 0x2a514067);
+  for (int k = 0; k < 2; ++k) {
+    const lanes cube = root * root * root;
+    root *= (cube + 2.0f * a) / (2.0f * cube + a);
+  }
+  return root;
+};
+
+const auto rows_of = [&](auto& array) { return array.data + size_t(group) * array.shape[1] * STRIDE + lane; };
+const int segment_count = lengths.shape[1];
+float *const x = rows_of(positions), *const v = rows_of(velocities);
+float *const q = rows_of(frames), *const spin = rows_of(spins);
+float *const lambda = rows_of(multipliers), *const slip = rows_of(slips);
+const float *const length = rows_of(lengths), *const rest = rows_of(rests);
+const float *const bending = rows_of(bend_compliances), *const stretching = rows_of(stretch_compliances);
+const float *const inverse_mass = rows_of(inverse_masses), *const inertia = rows_of(inertias);
+const float *const groom = rows_of(grooms), *const groom_frame = rows_of(groom_frames);
+float *const x_before = rows_of(positions_before), *const q_before = rows_of(frames_before);
+float *const mobility = rows_of(mobilities), *const resets = rows_of(reset_counts);
+const float *const root_rows = rows_of(roots), *const plane_rows = rows_of(planes);
+const float *const air_rows = rows_of(airs), *const drag_rows = rows_of(drags);
+const float *const acceleration_rows = rows_of(accelerations);
+const bool has_planes = planes.shape[0] > 0, has_air = airs.shape[0] > 0, has_drag = drags.shape[0] > 0;
+const bool has_acceleration = accelerations.shape[0] > 0;
+const lanes slow_drag = get(rows_of(slow_drags), 0);
+
+#if defined(__CUDA_ARCH__)
+float* const scratch = rows_of(scratches);
+float* const contacts = scratch + size_t(KEPT * segment_count) * STRIDE;
+#else
+alignas(64) float scratch[MOST * KEPT * WIDTH];
+alignas(64) float contacts[(MOST + 1) * CONTACT * WIDTH];
+#endif
+const auto kept = [&](int j, int row) { return scratch + size_t(KEPT * j + row) * STRIDE; };
+const auto contact = [&](int i) { return contacts + size_t(CONTACT * i) * STRIDE; };
+
+const float inverse_square = 1.0f / (h * h), damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
+for (int substep = first; substep < end; ++substep) {
+  // The root: positions linear, rotations nlerp, between the frame's two poses.
+  const float part = static_cast<float>(substep + 1) / static_cast<float>(count), part_before = static_cast<float>(substep) / static_cast<float>(count);
+  const auto root_at = [&](float at) {
+    const vector from = get_vector(root_rows, 0), to = get_vector(root_rows + 7 * STRIDE, 0);
+    return from * lanes(1.0f - at) + to * lanes(at);
+  };
+  const auto root_frame_at = [&](float at) {
+    return between(get_frame(root_rows + 3 * STRIDE, 0), get_frame(root_rows + 10 * STRIDE, 0), at);
+  };
+  const vector root = root_at(part), root_before = root_at(part_before);
+  const quaternion root_frame = root_frame_at(part), frame_before = root_frame_at(part_before);
+  const float from_last = substep == first ? carried : 1.0f;
+
+  if (stages & PREDICT) {
+#include "rod_predict.h"
+  }
+  if (stages & SOLVE) {
+#include "rod_newton.h"
+#include "rod_contact.h"
+    ints touches = 0;  // lanes with any plane
+    if (has_planes) {
+      for (int i = pinned + 1; i <= segment_count; ++i) {
+        const vector n = get_vector(plane_rows + size_t(8 * i) * STRIDE, 0);
+        touches = touches | (dot(n, n) > 0.5f);
+      }
+    }
+    const bool is_touching = any_of(touches);
+    if (is_touching) {
+      for (int i = 0; i <= segment_count; ++i) {
+        for (int k = 0; k < 3; ++k) put(contact(i), k, lanes(0.0f));
+        put(contact(i), 3, lanes(1.0f));
+        put_vector(contact(i) + 4 * STRIDE, 0, get_vector(x, i));
+      }
+      put_contacts(true, from_last, touches);
+    }
+    ints asked = -1;
+    for (int pass = 0; pass < PASSES; ++pass) {
+      ints stepping = asked;
+      for (int step = 0; step < STEPS && any_of(stepping); ++step) {
+        const bool is_first = pass == 0 && step == 0;
+        const lanes turn = newton_step(is_first, is_first ? from_last : 1.0f, stepping, is_touching);
+        stepping = stepping & (turn >= TURN);
+      }
+      if (!is_touching || pass + 1 == PASSES) break;
+      asked = changed_contacts(asked & touches);
+      if (!any_of(asked)) break;
+      put_contacts(false, 1.0f, asked);
+    }
+    if (has_planes) {
+      for (int i = 0; i <= segment_count; ++i) {
+        lanes slid = -1.0f;
+        if (is_touching && i > pinned) {
+          const vector n = get_vector(contact(i), 0);
+          const vector moved = get_vector(x, i) - get_vector(x_before, i)
+              - get_vector(plane_rows + (size_t(8 * i) + 4) * STRIDE, 0);
+          const vector along = moved - n * dot(n, moved);
+          slid = dot(n, n) > 0.5f ? exact_sqrt_of(dot(along, along)) : lanes(-1.0f);
+        }
+        put(slip, i, slid);
+      }
+    }
+  }
+  if (stages & FINISH) {
+#include "rod_finish.h"
+  }
+}
+}

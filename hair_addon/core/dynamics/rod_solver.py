@@ -1,0 +1,379 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The direct solver of strands as Cosserat rods: substeps of many strands, each a chain of segments.
+
+Points and segment frames [Kugelstadt16] with compliant constraints [Macklin16]; a chain's system of equations is block
+tridiagonal, and is solved directly [Deul18]. rod_solver.cpp and the files it includes are compiled for both kinds of
+device: on a processor `LANES` strands stand in the lanes of its vectors, on a GPU each has a thread.
+
+Arrays are (groups, rows, lanes) float32: a group is as many strands as `lane_count` says, and of each of its rows, one
+number of every strand lies together. `to_lanes` and `from_lanes` convert.
+"""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..kernels import kernel_cache, native_code, parallel
+from ..kernels.checks import require_count
+
+LANES = 8  # strands that a thread of the processor solves at once
+GPU_LANES = 32  # strands whose numbers lie together in the memory of a GPU: those of a warp
+MOST_SEGMENTS = 64
+LEAST_GROUPS = 8  # fewer are not worth a thread
+BLOCK = 32  # threads of a GPU: few, as strands are few and each has much to do
+
+PREDICT, SOLVE, FINISH = 1, 2, 4  # parts of a substep
+WHOLE = PREDICT | SOLVE | FINISH
+
+PLANE_ROWS = 8  # of a point: normal (3), offset n·c + r, displacement (3), friction
+ROOT_ROWS = 14  # position (3) and frame (4) at the frame's start, and at its end
+_KEPT_ROWS, _CONTACT_ROWS = 64, 7
+
+wp.set_module_options({"enable_backward": False, "block_dim": BLOCK})
+
+_CONSTANTS = {
+    "WIDTH": LANES,
+    "GROUP": GPU_LANES,
+    "MOST": MOST_SEGMENTS,
+    "STEPS": 8,  # of Newton's method, at most
+    "PASSES": 4,  # of contact, at most
+    "TURN": 2e-3,  # |Δθ|² of a step that ends the solve: the error left over is half of that
+    "DRAG_ALONG": 0.5,  # drag along a slender body, in that across it
+    "AWAY": 1e-3,  # mobility that contact leaves along the normal: none at all would make the matrix singular
+    "CREEP": 1e-4,  # [m/s] of what friction holds
+    "CHANGE": 0.05,  # of friction, that asks for another pass
+    "LEAST_INERTIA": 1e-5,  # of a frame, in h² / the compliance of its joint
+}
+
+
+@dataclass(frozen=True)
+class RodArrays:
+    """All that a substep reads and writes of S strands of M segments, (groups, rows, lanes) float32 on one device."""
+
+    # The state.
+    positions: wp.array  # 3 (M + 1) rows [m]
+    velocities: wp.array  # 3 (M + 1) [m/s]
+    frames: wp.array  # 4 M, unit quaternions x, y, z, w: a segment lies along its z axis
+    spins: wp.array  # 3 M, angular velocities [1/s]
+    multipliers: wp.array  # 6 M, of each segment λ_b (3), λ_s (3)
+    slips: wp.array  # M + 1, sliding in the last substep [m], -1 without contact
+    # What the material and the groom say.
+    lengths: wp.array  # M [m]
+    rests: wp.array  # 4 M, half rest rotations of joints
+    bend_compliances: wp.array  # M, b / EI in units of the mean mass
+    stretch_compliances: wp.array  # M
+    inverse_masses: wp.array  # M + 1
+    inertias: wp.array  # M
+    grooms: wp.array  # 3 (M + 1), in the root's frame [m]
+    groom_frames: wp.array  # 4 M, in the root's frame
+    slow_drags: wp.array  # 1 [1/s]
+    # What the surface says.
+    roots: wp.array  # ROOT_ROWS
+    # Between the stages of a substep.
+    positions_before: wp.array  # 3 (M + 1)
+    frames_before: wp.array  # 4 M
+    mobilities: wp.array  # M + 1
+    # Counted.
+    resets: wp.array  # 1, how often a strand was put back to its groom
+
+
+_ROWS = {
+    "positions": (0, 3),
+    "velocities": (0, 3),
+    "frames": (4, 0),
+    "spins": (3, 0),
+    "multipliers": (6, 0),
+    "slips": (0, 1),
+    "lengths": (1, 0),
+    "rests": (4, 0),
+    "bend_compliances": (1, 0),
+    "stretch_compliances": (1, 0),
+    "inverse_masses": (0, 1),
+    "inertias": (1, 0),
+    "grooms": (0, 3),
+    "groom_frames": (4, 0),
+    "slow_drags": None,
+    "roots": None,
+    "positions_before": (0, 3),
+    "frames_before": (4, 0),
+    "mobilities": (0, 1),
+    "resets": None,
+}
+_FIXED_ROWS = {"slow_drags": 1, "roots": ROOT_ROWS, "resets": 1}
+
+
+def row_count(name: str, segment_count: int) -> int:
+    """Rows of one of the `RodArrays`."""
+    rows = _ROWS[name]
+    return _FIXED_ROWS[name] if rows is None else rows[0] * segment_count + rows[1] * (segment_count + 1)
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What acts on points in a substep, each optional: (groups, rows a point times points, lanes) float32.
+
+    planes: `plane_row` says where; airs: velocity of the air [m/s], 3 rows a point; drags: factor of air drag, 1;
+    accelerations: [m/s²], 3.
+    """
+
+    planes: wp.array | None = None
+    airs: wp.array | None = None
+    drags: wp.array | None = None
+    accelerations: wp.array | None = None
+
+
+_SURROUNDING_ROWS = {"planes": PLANE_ROWS, "airs": 3, "drags": 1, "accelerations": 3}
+
+
+def plane_row(point: int, field: int) -> int:
+    """The row of a number of a point's plane of contact, in the array of planes.
+
+    field: 0 to 2 the unit normal n, zero for none; 3 the offset n·c + r [m], with a point c of the surface and the
+    distance r to keep; 4 to 6 the displacement of the surface there in this substep [m]; 7 the friction μ.
+    """
+    return PLANE_ROWS * point + field
+
+
+@dataclass(frozen=True)
+class Step:
+    """The numbers of a frame's substeps that all strands share."""
+
+    size: float  # h [s]
+    count: int = 1  # of substeps in the frame
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  # [m/s²]
+    damping_time: float = 0.0  # [s]
+    twist_ratio: float = 1.0  # compliance of twisting in that of bending
+    drag_square: float = 0.0  # rate of air drag for a speed across [1/m]
+    drag_root: float = 0.0  # and for its cube root
+    hold: float = 0.0  # [1/s²]
+    hold_tip: float = 1.0
+    pinned: int = 0  # points from the root that follow the surface, beside the root itself
+    most_stretch: float = 1.2  # longer segments, in their rest length, break a strand
+    carried: float = 1.0  # (h / h of the last substep)²
+
+
+@wp.func_native(native_code.body(__file__, "rod_solver.cpp", **_CONSTANTS))
+def _advance(
+    block: int,
+    stages: int,
+    first: int,
+    end: int,
+    count: int,
+    pinned: int,
+    h: float,
+    carried: float,
+    gravity: wp.vec3,
+    damping_time: float,
+    twist_ratio: float,
+    drag_square: float,
+    drag_root: float,
+    hold: float,
+    hold_tip: float,
+    most_stretch: float,
+    positions: wp.array3d[float],
+    velocities: wp.array3d[float],
+    frames: wp.array3d[float],
+    spins: wp.array3d[float],
+    multipliers: wp.array3d[float],
+    slips: wp.array3d[float],
+    lengths: wp.array3d[float],
+    rests: wp.array3d[float],
+    bend_compliances: wp.array3d[float],
+    stretch_compliances: wp.array3d[float],
+    inverse_masses: wp.array3d[float],
+    inertias: wp.array3d[float],
+    grooms: wp.array3d[float],
+    groom_frames: wp.array3d[float],
+    slow_drags: wp.array3d[float],
+    roots: wp.array3d[float],
+    positions_before: wp.array3d[float],
+    frames_before: wp.array3d[float],
+    mobilities: wp.array3d[float],
+    reset_counts: wp.array3d[float],
+    planes: wp.array3d[float],
+    airs: wp.array3d[float],
+    drags: wp.array3d[float],
+    accelerations: wp.array3d[float],
+    scratches: wp.array3d[float],
+): ...
+
+
+@wp.kernel
+def _advance_blocks(
+    stages: int,
+    first: int,
+    end: int,
+    count: int,
+    pinned: int,
+    h: float,
+    carried: float,
+    gravity: wp.vec3,
+    damping_time: float,
+    twist_ratio: float,
+    drag_square: float,
+    drag_root: float,
+    hold: float,
+    hold_tip: float,
+    most_stretch: float,
+    positions: wp.array3d[float],
+    velocities: wp.array3d[float],
+    frames: wp.array3d[float],
+    spins: wp.array3d[float],
+    multipliers: wp.array3d[float],
+    slips: wp.array3d[float],
+    lengths: wp.array3d[float],
+    rests: wp.array3d[float],
+    bend_compliances: wp.array3d[float],
+    stretch_compliances: wp.array3d[float],
+    inverse_masses: wp.array3d[float],
+    inertias: wp.array3d[float],
+    grooms: wp.array3d[float],
+    groom_frames: wp.array3d[float],
+    slow_drags: wp.array3d[float],
+    roots: wp.array3d[float],
+    positions_before: wp.array3d[float],
+    frames_before: wp.array3d[float],
+    mobilities: wp.array3d[float],
+    reset_counts: wp.array3d[float],
+    planes: wp.array3d[float],
+    airs: wp.array3d[float],
+    drags: wp.array3d[float],
+    accelerations: wp.array3d[float],
+    scratches: wp.array3d[float],
+    first_block: int,
+):
+    _advance(
+        first_block + wp.tid(),
+        stages,
+        first,
+        end,
+        count,
+        pinned,
+        h,
+        carried,
+        gravity,
+        damping_time,
+        twist_ratio,
+        drag_square,
+        drag_root,
+        hold,
+        hold_tip,
+        most_stretch,
+        positions,
+        velocities,
+        frames,
+        spins,
+        multipliers,
+        slips,
+        lengths,
+        rests,
+        bend_compliances,
+        stretch_compliances,
+        inverse_masses,
+        inertias,
+        grooms,
+        groom_frames,
+        slow_drags,
+        roots,
+        positions_before,
+        frames_before,
+        mobilities,
+        reset_counts,
+        planes,
+        airs,
+        drags,
+        accelerations,
+        scratches,
+    )
+
+
+def lane_count(device: wp.DeviceLike) -> int:
+    """Strands of a group on a device."""
+    return LANES if wp.get_device(device).is_cpu else GPU_LANES
+
+
+def to_lanes(values: np.ndarray, lanes: int) -> np.ndarray:
+    """(S, …) numbers of strands → (groups, rows, lanes) float32; the last strand also fills the last group."""
+    rows = np.asarray(values, np.float32).reshape(len(values), -1)
+    group_count = -(-len(rows) // lanes)
+    padded = np.concatenate([rows, np.repeat(rows[-1:], group_count * lanes - len(rows), axis=0)])
+    return np.ascontiguousarray(padded.reshape(group_count, lanes, -1).swapaxes(1, 2))
+
+
+def from_lanes(rows: np.ndarray, strand_count: int) -> np.ndarray:
+    """(groups, rows, lanes) → (S, rows) float32."""
+    return np.ascontiguousarray(rows.swapaxes(1, 2)).reshape(-1, rows.shape[1])[:strand_count]
+
+
+def scratch(segment_count: int, group_count: int, device: wp.DeviceLike) -> wp.array:
+    """Memory of `advance` on a GPU, where threads have none of their own; empty on a processor."""
+    is_cpu = wp.get_device(device).is_cpu
+    row_count = _KEPT_ROWS * segment_count + _CONTACT_ROWS * (segment_count + 1)
+    shape = (0, 0, 0) if is_cpu else (group_count, row_count, GPU_LANES)
+    return wp.empty(shape, dtype=float, device=device)
+
+
+def advance(
+    arrays: RodArrays,
+    step: Step,
+    scratch: wp.array,
+    first: int = 0,
+    end: int | None = None,
+    stages: int = WHOLE,
+    surroundings: Surroundings = Surroundings(),
+    block_dim: int = BLOCK,
+) -> None:
+    """Advance strands by substeps first … end - 1 of a frame's `step.count`; end: all that are left for None.
+
+    stages: PREDICT leaves in `positions` where points go without the rod's forces, for which planes of contact may then
+    be found; SOLVE moves them to where they end; FINISH moves out what is inside planes, and computes velocities. One
+    launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
+    """
+    end = step.count if end is None else end
+    device = arrays.positions.device
+    _check(arrays, step, scratch, surroundings)
+    if first < 0 or end > step.count:
+        raise HairError(f"Substeps {first} to {end} are not among {step.count}.")
+    empty = wp.empty((0, 0, 0), dtype=float, device=device)
+    around = [getattr(surroundings, name) for name in _SURROUNDING_ROWS]
+    inputs = [stages, first, end, step.count, step.pinned, step.size, step.carried, wp.vec3(*step.gravity)]
+    inputs += [step.damping_time, step.twist_ratio, step.drag_square, step.drag_root, step.hold, step.hold_tip]
+    inputs += [step.most_stretch, *(getattr(arrays, field.name) for field in fields(arrays))]
+    inputs += [*(empty if array is None else array for array in around), scratch]
+    group_count = len(arrays.positions)
+    if device.is_cpu:
+        share_count = parallel.share_count(group_count, device, LEAST_GROUPS)
+        parallel.launch_shares(_advance_blocks, group_count, inputs, [[] for _ in range(share_count)], device)
+    else:
+        inputs.append(0)
+        kernel_cache.launch(_advance_blocks, group_count * GPU_LANES, inputs, device=device, block_dim=block_dim)
+
+
+def _check(arrays, step, scratch, surroundings):
+    """Raise `HairError` unless all that the kernel reads is there."""
+    group_count, segment_count = len(arrays.positions), arrays.lengths.shape[1]
+    device = arrays.positions.device
+    if not 1 <= segment_count <= MOST_SEGMENTS:
+        raise HairError(f"Simulated strands need 2 to {MOST_SEGMENTS + 1} points, not {segment_count + 1}.")
+    if not 0 <= step.pinned < segment_count:
+        raise HairError(f"Of strands of {segment_count} segments, {step.pinned} cannot be pinned.")
+    if not (step.size > 0.0 and step.count >= 1):
+        raise HairError(f"A substep of {step.size:g} s cannot be simulated.")
+    expected = {field.name: row_count(field.name, segment_count) for field in fields(arrays)}
+    given = {name: getattr(arrays, name) for name in expected}
+    for name, rows in _SURROUNDING_ROWS.items():
+        array = getattr(surroundings, name)
+        if array is not None:
+            expected[name], given[name] = rows * (segment_count + 1), array
+    if not device.is_cpu:
+        expected["scratch"] = _KEPT_ROWS * segment_count + _CONTACT_ROWS * (segment_count + 1)
+        given["scratch"] = scratch
+    for name, rows in expected.items():
+        array = given[name]
+        require_count(f"groups of {name}", array.shape[0], group_count)
+        require_count(f"rows of {name}", array.shape[1], rows)
+        require_count(f"lanes of {name}", array.shape[2], lane_count(device))
+        if not array.is_contiguous or array.device != device:
+            raise HairError(f"{name} must be contiguous, on the device of the strands.")

@@ -1,0 +1,243 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`Rods`: the state of simulated strands on a device, from a groom and a material.
+
+The surface gives each root a position and a rotation since the groom. The frame before segment 0 is that of segment 0
+in the groom, turned with the surface, so a strand leaves the surface at the angle that it was combed to.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..kernels.checks import require_count
+from . import rod_solver, rotations
+from .material import Material
+from .rod_solver import RodArrays, Step, Surroundings
+from .settings import DynamicsSettings
+
+# What a substep reads and the groom, material and roots do not say.
+STATE = ("positions", "velocities", "frames", "spins", "multipliers", "slips", "roots", "resets")
+MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom
+
+
+@dataclass(frozen=True)
+class RestShape:
+    """The shape that strands have without forces, and the multipliers that hold them in the groom; float64.
+
+    lengths: (S, M) [m]; halves: (S, M, 4) half rest rotations of joints; frames: (S, M, 4) of segments in the groom;
+    multipliers: (S, M, 6) in the groom by h² [N m].
+    """
+
+    lengths: np.ndarray
+    halves: np.ndarray
+    frames: np.ndarray
+    multipliers: np.ndarray
+
+
+def combed_shape(groom: np.ndarray) -> RestShape:
+    """The `RestShape` of strands (S, N, 3) [m] whose groom is their shape without forces: under gravity they sag."""
+    groom = np.asarray(groom, np.float64)
+    frames = rotations.frames_along(groom)
+    lengths = np.linalg.norm(np.diff(groom, axis=1), axis=2)
+    return RestShape(lengths, half_rotations(frames), frames, np.zeros((*lengths.shape, 6)))
+
+
+def half_rotations(frames: np.ndarray) -> np.ndarray:
+    """(S, M, 4) frames of segments → half the rotation from each to the next; the first is that of segment 0 to itself."""
+    before = np.concatenate([frames[:, :1], frames[:, :-1]], axis=1)
+    return rotations.half(rotations.product(rotations.inverse(before), frames))
+
+
+def step_of(
+    settings: DynamicsSettings, material: Material, seconds: float, count: int, gravity: tuple[float, float, float]
+) -> Step:
+    """The `Step` of a frame that takes some seconds, in a number of substeps; gravity: of the scene [m/s²]."""
+    stretched = (
+        20.0
+        * float(np.linalg.norm(gravity))
+        * abs(settings.gravity)
+        * float(
+            np.max(
+                material.masses.sum(axis=1) * material.stretch_compliances.max(axis=1) * material.lengths.max(axis=1),
+                initial=0.0,
+            )
+        )
+    )
+    return Step(
+        seconds / count,
+        count,
+        tuple(settings.gravity * component for component in gravity),
+        material.damping_time,
+        material.twist_ratio,
+        material.drag_square,
+        material.drag_root,
+        settings.hold,
+        settings.hold_tip,
+        int(settings.pinned * material.lengths.shape[1]),
+        MOST_STRETCH + stretched,
+    )
+
+
+class Rods:
+    """S simulated strands of M segments, in the axes that groom and roots are given in [m]."""
+
+    def __init__(
+        self, groom: np.ndarray, material: Material, rest: RestShape | None = None, device: wp.DeviceLike = None
+    ) -> None:
+        """Strands at rest in their groom, (S, M+1, 3) [m]; rest: `combed_shape` of it for None.
+
+        Raises `HairError` for points that are not finite, segments without length, and counts that do not match.
+        """
+        groom = np.asarray(groom, np.float64)
+        if not np.isfinite(groom).all():
+            raise HairError("Simulated strands have non-finite coordinates.")
+        if groom.ndim != 3 or not len(groom):
+            raise HairError("There are no strands to simulate.")
+        self.device = wp.get_device(device)
+        self.strand_count, self.segment_count = len(groom), groom.shape[1] - 1
+        self.step_size = 0.0  # h of the last substep [s]
+        rest = combed_shape(groom) if rest is None else rest
+        self._root_frames = rest.frames[:, 0]  # in the groom, as are these roots
+        self._roots = groom[:, 0]
+        names = [field.name for field in fields(RodArrays)]
+        groups = -(-self.strand_count // self.lanes)
+        rows = {name: rod_solver.row_count(name, self.segment_count) for name in names}
+        shapes = {name: (groups, count, self.lanes) for name, count in rows.items()}
+        self.arrays = RodArrays(**{name: wp.zeros(shapes[name], dtype=float, device=self.device) for name in names})
+        self._scratch = rod_solver.scratch(self.segment_count, groups, self.device)
+        self._mass_unit = 1.0  # [kg]
+        self._held = rest.multipliers
+        self.set_material(material, rest)
+        self.set_groom(groom, rest)
+        self.reset()
+
+    @property
+    def lanes(self) -> int:
+        """Strands of a group."""
+        return rod_solver.lane_count(self.device)
+
+    def set_material(self, material: Material, rest: RestShape) -> None:
+        """Give strands another material or rest shape; they go on from where they are."""
+        for name in ("lengths", "inertias", "bend_compliances", "stretch_compliances"):
+            require_count(name, getattr(material, name).size, self.strand_count * self.segment_count)
+        if not (np.isfinite(rest.lengths).all() and (rest.lengths > 0.0).all()):
+            raise HairError("Simulated strands have segments without length.")
+        # In units of the mean mass, so that nothing nears the ends of single precision.
+        unit = float(material.masses.mean())
+        self.arrays.multipliers.assign(self.arrays.multipliers.numpy() * np.float32(self._mass_unit / unit))
+        self._mass_unit = unit
+        self._put("lengths", rest.lengths)
+        self._put("rests", rest.halves)
+        self._put("bend_compliances", material.bend_compliances * unit)
+        self._put("stretch_compliances", material.stretch_compliances * unit)
+        self._put("inverse_masses", unit / material.masses)
+        self._put("inertias", material.inertias / unit)
+        self._put("slow_drags", material.slow_drags)
+        self._held = rest.multipliers
+
+    def set_groom(self, groom: np.ndarray, rest: RestShape) -> None:
+        """Give strands another groom (S, M+1, 3) [m], to which hold, pinned points and resets take them."""
+        require_count("points", groom.size, self.strand_count * (self.segment_count + 1) * 3)
+        back = rotations.inverse(rest.frames[:, :1])
+        self._root_frames, self._roots = rest.frames[:, 0], np.asarray(groom, np.float64)[:, 0]
+        self._put("grooms", rotations.rotated(back, groom - groom[:, :1]))
+        self._put("groom_frames", rotations.product(back, rest.frames))
+
+    def reset(self, positions: np.ndarray | None = None, turns: np.ndarray | None = None) -> None:
+        """Put strands at rest in their groom, where its surface is for None, else carried as in `move_roots`."""
+        roots = self._root_rows(self._roots if positions is None else positions, turns)
+        grooms, frames = (self.read(name) for name in ("grooms", "groom_frames"))
+        places, root_frames = roots[:, None, :3], roots[:, None, 3:]
+        shape = (self.strand_count, -1)
+        points = places + rotations.rotated(root_frames, grooms.reshape(*shape, 3).astype(np.float64))
+        self._put("positions", points)
+        self._put("frames", rotations.product(root_frames, frames.reshape(*shape, 4).astype(np.float64)))
+        self._put("roots", np.concatenate([roots, roots], axis=1))
+        for name in ("velocities", "spins", "multipliers", "resets"):
+            getattr(self.arrays, name).zero_()
+        self.arrays.slips.fill_(-1.0)
+        self.step_size = 0.0
+
+    def move_roots(self, positions: np.ndarray, turns: np.ndarray | None = None) -> None:
+        """Say where roots are at the end of the next frame, which begins where the last one ended.
+
+        positions: (S, 3) [m]; turns: (S, 4) rotations x, y, z, w of the surface since the groom, none for None.
+        """
+        now = self._root_rows(positions, turns)
+        last = self.read("roots")[:, rod_solver.ROOT_ROWS // 2 :]
+        self._put("roots", np.concatenate([last, now], axis=1))
+
+    def advance(
+        self,
+        step: Step,
+        first: int = 0,
+        end: int | None = None,
+        stages: int = rod_solver.WHOLE,
+        surroundings: Surroundings = Surroundings(),
+        block_dim: int = rod_solver.BLOCK,
+    ) -> None:
+        """Simulate substeps of a frame, as `rod_solver.advance` does."""
+        if self.step_size == 0.0:  # the first: multipliers of the equilibrium, if the rest shape knows them
+            self._put("multipliers", self._held * (step.size**2 / self._mass_unit))
+            self.step_size = step.size
+        step = replace(step, carried=(step.size / self.step_size) ** 2)
+        rod_solver.advance(self.arrays, step, self._scratch, first, end, stages, surroundings, block_dim)
+        if stages & rod_solver.FINISH:
+            self.step_size = step.size
+
+    def positions(self) -> np.ndarray:
+        """(S, M+1, 3) float32 [m]."""
+        return self.read("positions").reshape(self.strand_count, -1, 3)
+
+    def velocities(self) -> np.ndarray:
+        """(S, M+1, 3) float32 [m/s]."""
+        return self.read("velocities").reshape(self.strand_count, -1, 3)
+
+    def reset_counts(self) -> np.ndarray:
+        """(S,) how often each strand broke and was put back to its groom, since `reset`."""
+        return self.read("resets")[:, 0].astype(int)
+
+    def stretch(self) -> np.ndarray:
+        """(S, M) lengths of segments in those at rest, less one."""
+        sizes = np.linalg.norm(np.diff(self.positions().astype(np.float64), axis=1), axis=2)
+        return sizes / self.read("lengths") - 1.0
+
+    def save(self) -> dict[str, np.ndarray]:
+        """All that the next substep reads and the groom, material and settings do not say: {name: (S, rows) float32}.
+
+        `load` of it goes on bit by bit, on any kind of device.
+        """
+        state = {name: self.read(name) for name in STATE}
+        return state | {"step_size": np.array([self.step_size])}
+
+    def load(self, state: Mapping[str, np.ndarray]) -> None:
+        """Go on from a state that `save` gave; raises `HairError` unless it is one of such strands."""
+        for name in STATE:
+            rows = np.asarray(state.get(name, ()))
+            expected = self.strand_count, rod_solver.row_count(name, self.segment_count)
+            if rows.shape != expected or rows.dtype != np.float32:
+                raise HairError(f"The state of the simulation does not match: {name} is of other strands.")
+        size = np.asarray(state.get("step_size", ()))
+        if size.shape != (1,) or not (np.isfinite(size).all() and size[0] >= 0.0):
+            raise HairError("The state of the simulation does not match: it has no size of a step.")
+        for name in STATE:
+            self._put(name, state[name])
+        self.step_size = float(size[0])
+
+    def read(self, name: str) -> np.ndarray:
+        """(S, rows) float32 of one of `RodArrays`."""
+        return rod_solver.from_lanes(getattr(self.arrays, name).numpy(), self.strand_count)
+
+    def _put(self, name, values):
+        getattr(self.arrays, name).assign(rod_solver.to_lanes(np.asarray(values), self.lanes))
+
+    def _root_rows(self, positions, turns):
+        require_count("roots", len(positions), self.strand_count)
+        turned = self._root_frames if turns is None else rotations.product(np.asarray(turns), self._root_frames)
+        rows = np.concatenate([positions, rotations.unit(turned)], axis=1).astype(np.float32)
+        if not np.isfinite(rows).all():
+            raise HairError("Roots of simulated strands have non-finite coordinates.")
+        return rows

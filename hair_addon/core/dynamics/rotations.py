@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rotations as unit quaternions x, y, z, w in NumPy, any shape (…, 4), and frames along polylines.
+
+rod_rotations.h has twins for kernels.
+"""
+
+import numpy as np
+
+IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
+
+
+def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The rotation b, then a."""
+    a_axis, a_real, b_axis, b_real = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
+    axis = a_real * b_axis + b_real * a_axis + np.cross(a_axis, b_axis)
+    return np.concatenate([axis, a_real * b_real - np.sum(a_axis * b_axis, axis=-1, keepdims=True)], axis=-1)
+
+
+def inverse(a: np.ndarray) -> np.ndarray:
+    """The opposite rotation."""
+    return a * np.array([-1.0, -1.0, -1.0, 1.0])
+
+
+def rotated(a: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """Vectors (…, 3), rotated."""
+    twice = 2.0 * np.cross(a[..., :3], v)
+    return v + a[..., 3:] * twice + np.cross(a[..., :3], twice)
+
+
+def unit(a: np.ndarray) -> np.ndarray:
+    """Vectors or quaternions of length one."""
+    return a / np.linalg.norm(a, axis=-1, keepdims=True)
+
+
+def half(a: np.ndarray) -> np.ndarray:
+    """The rotation by half the angle, the shorter way."""
+    return unit(np.where(a[..., 3:] < 0.0, -a, a) + IDENTITY)
+
+
+def least_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """The rotation about the least angle that takes unit vectors a to b; about any axis across where they are opposite."""
+    real = 1.0 + np.sum(a * b, axis=-1, keepdims=True)
+    other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    is_opposite = real < 1e-9
+    axis = np.where(is_opposite, np.cross(a, other), np.cross(a, b))
+    return unit(np.concatenate([axis, np.where(is_opposite, 0.0, real)], axis=-1))
+
+
+def frames_along(points: np.ndarray) -> np.ndarray:
+    """Frames of the segments of polylines (S, N, 3) → (S, N-1, 4), z along each, without twist from one to the next.
+
+    The first follows from its direction by the least rotation from z; a segment without length goes on as the one
+    before [Bishop75].
+    """
+    directions = np.diff(np.asarray(points, np.float64), axis=1)
+    sizes = np.linalg.norm(directions, axis=2, keepdims=True)
+    directions = directions / np.where(sizes > 0.0, sizes, 1.0)
+    frames = np.empty((*directions.shape[:2], 4))
+    last, frame = (
+        np.broadcast_to([0.0, 0.0, 1.0], directions[:, 0].shape),
+        np.broadcast_to(IDENTITY, frames[:, 0].shape),
+    )
+    for j in range(directions.shape[1]):
+        direction = np.where(sizes[:, j] > 0.0, directions[:, j], last)
+        frame = unit(product(least_rotation(last, direction), frame))
+        frames[:, j], last = frame, direction
+    return frames
