@@ -81,16 +81,20 @@ class FrameCache:
 
     def read_frame(self, number: int) -> Frame | None:
         """Return a frame of any simulation that the manifest names, None for a missing one."""
-        arrays = self.manifest and self._read(_name(number, False), self.manifest.frame_layout, number)
-        if not arrays:
+        if self.manifest is None:
+            return None
+        arrays = self._read(self.manifest, _name(number, False), self.manifest.frame_layout, number)
+        if arrays is None:
             return None
         return Frame(arrays["points"], arrays["key"].tobytes().hex(), arrays["digest"].tobytes().hex())
 
     def read_state(self, number: int) -> dict[str, np.ndarray] | None:
         """Return the arrays of the state after a frame of the present simulation, None for a missing one."""
+        if self.manifest is None:
+            return None
         name = _name(number, True)
-        arrays = self.manifest and self._read(name, self.manifest.state_file_layout, number)
-        if not arrays:
+        arrays = self._read(self.manifest, name, self.manifest.state_file_layout, number)
+        if arrays is None:
             return None
         if arrays.pop("key").tobytes().hex() != self.manifest.key:
             self._complain(name, HairError("{path} is a state of another simulation.", path=self.folder / name))
@@ -127,7 +131,7 @@ class FrameCache:
         except OSError:  # a folder that cannot be written
             return False
 
-    def _read(self, name, layout, number):
+    def _read(self, manifest, name, layout, number):
         path = self.folder / name
         if not os.path.lexists(path):
             return None
@@ -137,7 +141,7 @@ class FrameCache:
             self._complain(name, error)
             return None
         key = arrays["key"].tobytes().hex()
-        if int(arrays["frame"]) != number or self.manifest.changed_parts(key) is None:
+        if int(arrays["frame"]) != number or manifest.changed_parts(key) is None:
             self._complain(name, HairError("{path} is a frame of another simulation.", path=path))
             return None
         return arrays
@@ -162,7 +166,7 @@ class Writer:
 
     def write_state(self, number: int, arrays: Mapping[str, np.ndarray]) -> None:
         """Write the state after a frame: all that the next one follows from. Forced onto the disk."""
-        self._write(_name(number, True), self._marked(number) | arrays, self.manifest.state_file_layout, True)
+        self._write(_name(number, True), {**self._marked(number), **arrays}, self.manifest.state_file_layout, True)
 
     def change(self, **changes: object) -> None:
         """Change entries of the manifest, such as notes."""
@@ -251,7 +255,7 @@ def between(
     """
     t = float(part)
     if before is None or after is None:
-        return _mixed(((1.0 - t, start), (t, end)))
+        return np.float32(1.0 - t) * start + np.float32(t) * end
     # Lagrange's polynomials for the times -1, 0, 1 and 2.
     weights = (
         -t * (t - 1.0) * (t - 2.0) / 6.0,
@@ -259,11 +263,8 @@ def between(
         -(t + 1.0) * t * (t - 2.0) / 2.0,
         (t + 1.0) * t * (t - 1.0) / 6.0,
     )
-    return _mixed(zip(weights, (before, start, end, after), strict=True))
-
-
-def _mixed(terms):
-    return sum(np.float32(weight) * points for weight, points in terms).astype(np.float32, copy=False)
+    a, b, c, d = map(np.float32, weights)
+    return a * before + b * start + c * end + d * after
 
 
 def _name(number, is_state):

@@ -133,8 +133,8 @@ def digest(value: Any) -> str:
 
 def write(folder: Path, manifest: Manifest) -> None:
     """Write a folder's manifest, whole and onto the disk. Raises `HairError`."""
-    found = {"format": FORMAT, "version": VERSION, **dataclasses.asdict(manifest)}
-    found["notes"] = [[part[:_MOST_LETTERS] for part in note] for note in manifest.notes[:_MOST_NOTES]]
+    notes = [[part[:_MOST_LETTERS] for part in note] for note in manifest.notes[:_MOST_NOTES]]
+    found = {"format": FORMAT, "version": VERSION} | dataclasses.asdict(manifest) | {"notes": notes}
     with whole_file(folder / NAME) as partial:
         partial.write_text(json.dumps(found, indent=1), encoding="utf-8")
 
@@ -170,13 +170,16 @@ def _from_json(found):
         for text in (*parts, *parts.values()):
             _require_text(text)
     layout = {name: _layout_entry(entry) for name, entry in _require(found["state_layout"], dict).items()}
-    notes = tuple(tuple(_require(note, list)) for note in _require(found["notes"], list))
-    if len(notes) > _MOST_NOTES or not all(len(note) == 2 for note in notes):
-        raise ValueError("notes are invalid")
-    for note in notes:
-        for text in note:
-            _require_text(text)
-    return Manifest(**{**found, "keys": keys, "state_layout": layout, "notes": notes})
+    notes = [_note(note) for note in _require(found["notes"], list)[: _MOST_NOTES + 1]]
+    if len(notes) > _MOST_NOTES:
+        raise ValueError("there are too many notes")
+    read = {"keys": keys, "state_layout": layout, "notes": tuple(notes)}
+    return Manifest(**(found | read))
+
+
+def _note(note):
+    name, reason = _require(note, list)
+    return _require_text(name), _require_text(reason)
 
 
 def _layout_entry(entry):
@@ -187,6 +190,7 @@ def _layout_entry(entry):
 def _require_text(value):
     if len(_require(value, str)) > _MOST_LETTERS or not is_text(value):
         raise ValueError("a text is too long, or invalid")
+    return value
 
 
 def _require(value, kind):
