@@ -6,6 +6,22 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import detail, material, rod_solver, rods, rotations, sag_free, settings
+    from . import (
+        air,
+        closed_parts,
+        colliders,
+        contact,
+        contact_queries,
+        detail,
+        hair_volume,
+        material,
+        rod_solver,
+        rods,
+        root_motion,
+        rotations,
+        sag_free,
+        settings,
+        simulation,
+    )
 else:
     __getattr__ = submodules(__name__)

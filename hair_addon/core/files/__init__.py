@@ -6,6 +6,17 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import file_lock, settings_file, style_presets, table_cache, table_exr, whole_file
+    from . import (
+        array_file,
+        file_lock,
+        frame_cache,
+        frame_manifest,
+        plain_file,
+        settings_file,
+        style_presets,
+        table_cache,
+        table_exr,
+        whole_file,
+    )
 else:
     __getattr__ = submodules(__name__)

@@ -8,21 +8,24 @@ from collections.abc import Generator, Iterable
 from pathlib import Path
 
 from ..errors import HairError, cause_of
+from . import plain_file
 
 
 @contextlib.contextmanager
-def whole_file(path: str | Path, partial: Path | None = None) -> Generator[Path]:
+def whole_file(path: str | Path, partial: Path | None = None, is_forced: bool = True) -> Generator[Path]:
     """`whole_files` of one file; partial: the temporary path, None for a new one."""
-    with whole_files([path], None if partial is None else [partial]) as (there,):
+    with whole_files([path], None if partial is None else [partial], is_forced) as (there,):
         yield there
 
 
 @contextlib.contextmanager
-def whole_files(paths: Iterable[str | Path], partials: list[Path] | None = None) -> Generator[list[Path]]:
+def whole_files(
+    paths: Iterable[str | Path], partials: list[Path] | None = None, is_forced: bool = True
+) -> Generator[list[Path]]:
     """Paths beside `paths` to write to: when all are written they take their places, after an error none does.
 
     partials: those paths, None for new ones. Raises `HairError` where a folder may not be written or its disk is full,
-    of which not every program that writes tells.
+    of which not every program that writes tells: so files are forced onto the disk first, unless `is_forced` is off.
     """
     places = [Path(path) for path in paths]
     for path in places:
@@ -36,9 +39,10 @@ def whole_files(paths: Iterable[str | Path], partials: list[Path] | None = None)
         for path, partial in zip(places, partials, strict=True):
             if not (partial.is_file() and partial.stat().st_size):
                 raise HairError(f"{path} was not written: its exporter left no file, or an empty one.")
-        require_room(partial, 65_536)
+        if is_forced:
+            require_room(partial, 65_536)
         for path, partial in zip(places, partials, strict=True):
-            os.replace(partial, path)
+            plain_file.tried(lambda partial=partial, path=path: os.replace(partial, path))
     except (OSError, RuntimeError) as error:
         raise HairError("{path} cannot be written: {cause}.", path=places[0], cause=cause_of(error)) from error
     finally:

@@ -1,0 +1,232 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes that hair collides with: several as one `wp.Mesh`, between the poses of two frames.
+
+All is checked before Warp sees it: a mesh without faces, an index out of range or one coordinate that is no number
+would end Blender, or silence every query.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..geometry.mesh import TriMesh
+from ..kernels import parallel
+from ..kernels.parallel import Rows
+from .closed_parts import outward, rims
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+FARTHEST = 1.0e6  # [m] from the origin
+MOST_COLLIDERS = 2**20
+
+
+@dataclass(frozen=True)
+class Collider:
+    """One mesh in its pose at the end of a frame; name: unique among colliders.
+
+    friction: Coulomb's coefficient; distance [m]: that hair keeps from it; is_double_sided: a sheet, of which each
+    point keeps the side that it was on. Else its back is its inside.
+    """
+
+    name: str
+    mesh: TriMesh
+    friction: float = 0.3
+    distance: float = 1e-3
+    is_double_sided: bool = False
+
+
+@dataclass
+class _Known:
+    """A collider that takes part, with the triangles that Warp has."""
+
+    mesh: TriMesh  # with the vertices of the last frame
+    triangles: np.ndarray  # with an area, wound outwards
+    rims: np.ndarray
+
+
+class Colliders:
+    """Colliders on a device; `read` once a frame, then `pose` once a substep.
+
+    Triangles without an area when a collider is first read take no part.
+    """
+
+    def __init__(self, device: wp.DeviceLike = "cpu") -> None:
+        self.device = wp.get_device(device)
+        self.notes: list[HairError] = []  # who is left out, or stopped, in the last frame read
+        self.build_count = 0  # of meshes made so far
+        self.mesh: Any = None  # wp.Mesh in its present pose; None where nothing collides
+        self.previous: Any = None  # (V,) vec3: the pose of the substep before
+        self.face_colliders: Any = None  # (F,) int
+        self.rims: Any = None  # (F,) int, of `closed_parts.rims`
+        self.settings: Any = None  # (C,) vec3: friction, distance [m], 1 where double-sided
+        self.names: tuple[str, ...] = ()
+        self.largest_distance = 0.0  # [m]
+        self.largest_motion = 0.0  # [m] of a vertex in this frame
+        self.motion = 0.0  # [m] of a vertex, at most, in this substep
+        self._known: dict[str, _Known] = {}
+        self._before: Any = None
+        self._after: Any = None
+        self._part = 0.0
+        self._is_still = True
+
+    def read(self, colliders: Sequence[Collider], frame: int = 0) -> None:
+        """Take the poses at the end of a frame: its beginning is the end of the frame before.
+
+        A new collider stands still in its first frame. One that cannot be used is left out; one whose topology has
+        changed stays where it was. Either is named in `notes`, with the frame.
+        """
+        self.notes = []
+        taken, known = [], {}
+        for collider in colliders:
+            is_new = collider.name not in self._known
+            problem = problem_of(collider, frame, is_new) or (collider.name in known and _repeated(collider, frame))
+            if problem:
+                self.notes.append(problem)
+                continue
+            known[collider.name], before, after = self._taken(collider, frame)
+            taken.append((collider, before, after))
+        is_same = list(known) == list(self._known) and all(known[name] is self._known[name] for name in known)
+        self._known = known
+        if not is_same or (self.mesh is None and known):
+            self._build()
+        self._put([before for _, before, _ in taken], [after for _, _, after in taken])
+        self._set([collider for collider, _, _ in taken])
+
+    def pose(self, part: float) -> None:
+        """Move to the pose at a part 0..1 of the frame, greater than the last one: vertices on straight lines."""
+        if self.mesh is None:
+            return
+        step, self._part = part - self._part, part
+        self.motion = abs(step) * self.largest_motion
+        if self._is_still:
+            return
+        parallel.launch(
+            _interpolate,
+            len(self._before),
+            inputs=[Rows(self._before), Rows(self._after), float(part)],
+            outputs=[self.previous, self.mesh.points],
+            device=self.device,
+        )
+        self.mesh.refit()
+
+    def _taken(self, collider, frame):
+        """What is known of a collider, and its vertices at the beginning and at the end of the frame."""
+        known, mesh = self._known.get(collider.name), collider.mesh
+        if known is None:
+            known = _first_known(mesh)
+            return known, mesh.vertices, mesh.vertices
+        before = known.mesh
+        if len(mesh.vertices) == len(before.vertices) and np.array_equal(mesh.triangles, before.triangles):
+            known.mesh = TriMesh(mesh.vertices, before.triangles)
+            return known, before.vertices, mesh.vertices
+        sentence = "{name} has other vertices or faces in frame {frame}: for hair it stays where it was before."
+        self.notes.append(HairError(sentence, name=collider.name, frame=frame))
+        return known, before.vertices, before.vertices
+
+    def _build(self):
+        """Make the mesh of all colliders, whose vertices `_put` writes."""
+        self.build_count += 1
+        self.names = tuple(self._known)
+        if not self._known:
+            self.mesh = self.previous = self.face_colliders = self.rims = None
+            return
+        known = list(self._known.values())
+        firsts = np.cumsum([0, *(len(one.mesh.vertices) for one in known)])
+        triangles = np.concatenate([one.triangles + first for one, first in zip(known, firsts[:-1], strict=True)])
+        vertices = np.concatenate([one.mesh.vertices for one in known])
+        owners = np.repeat(np.arange(len(known), dtype=np.int32), [len(one.triangles) for one in known])
+        points = wp.array(vertices, dtype=wp.vec3, device=self.device)
+        self.previous, self._before, self._after = (wp.clone(points) for _ in range(3))
+        indices = wp.array(triangles.astype(np.int32).ravel(), dtype=int, device=self.device)
+        self.mesh = wp.Mesh(points=points, indices=indices)
+        self.face_colliders = wp.array(owners, dtype=int, device=self.device)
+        self.rims = wp.array(np.concatenate([one.rims for one in known]), dtype=int, device=self.device)
+
+    def _put(self, before, after):
+        """Write the vertices at the beginning and at the end of the frame, and pose the mesh at its beginning."""
+        self._part, self.motion, self.largest_motion = 0.0, 0.0, 0.0
+        if self.mesh is None:
+            return
+        before, after = np.concatenate(before), np.concatenate(after)
+        distances = np.linalg.norm(after.astype(np.float64) - before, axis=1)
+        self.largest_motion = float(np.nextafter(np.float32(distances.max()), np.float32(np.inf)))
+        if not distances.any():
+            self.largest_motion = 0.0
+        self._before.assign(before)
+        self._after.assign(after)
+        self.mesh.points.assign(before)
+        self.previous.assign(before)
+        self.mesh.refit()
+        self._is_still = self.largest_motion == 0.0
+
+    def _set(self, colliders):
+        rows = [(one.friction, one.distance, float(one.is_double_sided)) for one in colliders]
+        self.settings = wp.array(np.array(rows, np.float32).reshape(-1, 3), dtype=wp.vec3, device=self.device)
+        self.largest_distance = max((one.distance for one in colliders), default=0.0)
+
+
+def problem_of(collider: Collider, frame: int = 0, is_new: bool = True) -> HairError | None:
+    """Why a collider cannot be used, as a sentence that names it and the frame; None if it can.
+
+    is_new: off for one whose faces are known to have had an area, which takes a while to find out.
+    """
+    cause = _cause(collider, is_new)
+    if cause is None:
+        return None
+    sentence = "{name} does not collide with hair in frame {frame}: {cause}."
+    return HairError(sentence, name=collider.name, frame=frame, cause=cause)
+
+
+def _cause(collider, is_new):
+    mesh = collider.mesh
+    vertices, triangles = mesh.vertices, mesh.triangles
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or vertices.dtype != np.float32:
+        return "its vertices are not an array of positions"
+    if triangles.ndim != 2 or triangles.shape[1] != 3 or triangles.dtype != np.int32:
+        return "its faces are not an array of triangles"
+    if not len(triangles):
+        return "it has no faces"
+    try:
+        _ = mesh.checked_triangles
+    except HairError:
+        return "a face uses a vertex that is missing"
+    if not np.isfinite(vertices).all():
+        return "it has vertices with non-finite coordinates"
+    if np.abs(vertices).max() > FARTHEST:
+        return f"it extends more than {FARTHEST / 1000:g} km from the origin"
+    if not np.ptp(vertices, axis=0).any() or (is_new and not (mesh.areas > 0.0).any()):
+        return "its faces have no area"
+    for name, value, most in (("friction", collider.friction, 100.0), ("distance", collider.distance, 10.0)):
+        if not (math.isfinite(value) and 0.0 <= value <= most):
+            return f"its {name} is not between 0 and {most:g}"
+    return None
+
+
+def _repeated(collider, frame):
+    return HairError("Two colliders are named {name} in frame {frame}.", name=collider.name, frame=frame)
+
+
+def _first_known(mesh):
+    with_area = np.flatnonzero(mesh.areas > 0.0)
+    used = TriMesh(mesh.vertices, mesh.triangles[with_area])
+    return _Known(mesh, outward(used), rims(used))
+
+
+@wp.kernel
+def _interpolate(
+    before: wp.array[wp.vec3],
+    after: wp.array[wp.vec3],
+    part: float,
+    # outputs
+    out_previous: wp.array[wp.vec3],
+    out_points: wp.array[wp.vec3],
+):
+    vertex = wp.tid()
+    out_previous[vertex] = out_points[vertex]
+    out_points[vertex] = (1.0 - part) * before[vertex] + part * after[vertex]

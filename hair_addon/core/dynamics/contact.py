@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Planes of contact between strands and colliders, for the solver to keep points in front of.
+
+Arrays are in lane groups: (groups, rows, lanes), as the solver's. A vector takes three rows, a plane `PLANE` rows:
+n (3), the offset n·c + r, the displacement of the surface at c in this substep (3), and the coefficient of friction.
+A point in front has n·x ≥ offset; n = 0 where there is no contact.
+"""
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..kernels import kernel_cache, parallel
+from ..kernels.checks import require_count
+from . import contact_queries
+from .colliders import Colliders
+from .contact_queries import PLANE
+
+RISE = 0.02  # [m/s] at most, of a point that the groom has inside
+LEAST_ROWS = 256  # points that are worth a thread
+
+_DEEPEST = 0.1  # [m] inside that the groom is measured
+
+
+@dataclass
+class Samples:
+    """Points of strands that ask for a plane, (groups, samples, lanes), and what they keep from substep to substep."""
+
+    rest: Any  # float [m]: the distance in the groom, negative inside, `NOWHERE` where no collider is near
+    sides: Any  # int: ± (1 + collider) of the double-sided one nearby, 0: none
+    asked: Any  # (groups, 3 samples, lanes) float [m]: where the surface was last looked for
+    clear: Any  # float [m]: how far from there it was at least, less its motion since; negative for a point inside
+
+
+class Contacts:
+    """Planes of contact of strands, (groups, vertices × 3, lanes) positions [m], with `Colliders`.
+
+    Each vertex but the root keeps min(the collider's distance, its own in the groom), so that nothing is pushed in the
+    first frame. Raises `HairError` for arrays that do not fit.
+    """
+
+    def __init__(self, groom: Any, colliders: Colliders) -> None:
+        """groom: positions at rest [m], on the colliders' device, to which `colliders` is posed."""
+        if groom.ndim != 3 or groom.shape[1] % 3 or groom.shape[1] < 6 or groom.dtype != wp.float32:
+            raise HairError("Positions of strands are (groups, vertices × 3, lanes) numbers of single precision.")
+        self.colliders = colliders
+        groups, rows, lanes = groom.shape
+        self._vertex_count = rows // 3
+        self._shape = groups, rows, lanes
+        device = colliders.device
+        self._vertices, self._middles = (self._new_samples() for _ in range(2))
+        self.planes = wp.zeros((groups, PLANE * self._vertex_count, lanes), dtype=float, device=device)
+        self._middle_planes = wp.zeros((groups, PLANE * (self._vertex_count - 1), lanes), dtype=float, device=device)
+        self._build_count = colliders.build_count
+        self.measure(groom)
+
+    def measure(self, groom: Any) -> None:
+        """Take other positions at rest: distances that points keep follow from them."""
+        self._require_shape(groom)
+        self.forget()
+        for is_middle, samples in enumerate((self._vertices, self._middles)):
+            samples.rest.fill_(contact_queries.NOWHERE)
+            samples.sides.zero_()
+            if self.colliders.mesh is not None:
+                inputs = [self._surface(), groom, self._vertex_count - 1, is_middle, _DEEPEST]
+                self._launch(contact_queries.measure, inputs, [samples.rest, samples.sides])
+
+    def find(
+        self, positions: Any, last_positions: Any, duration: float, is_final: bool = False, is_skipping: bool = True
+    ) -> Any:
+        """Return `planes` for the predicted positions of a substep, which began at `last_positions`.
+
+        duration [s] of the substep. is_final: afterwards, for points that are still inside: segments are not asked, and
+        nothing rises. is_skipping: off asks the surface for every point, which finds the same.
+        """
+        self._require_shape(positions)
+        self._require_shape(last_positions)
+        if self._build_count != self.colliders.build_count:
+            self._build_count = self.colliders.build_count
+            self.forget()
+        if self.colliders.mesh is None:
+            self.planes.zero_()
+            return self.planes
+        surface, count = self._surface(), self._vertex_count - 1
+        # What the first query of the substep has counted.
+        rise, passed = (0.0, 0.0) if is_final else (RISE * duration, surface.motion)
+        for is_middle, samples in enumerate((self._vertices, self._middles)[: 1 if is_final else 2]):
+            planes = self._middle_planes if is_middle else self.planes
+            kept = [samples.rest, samples.sides, samples.asked, samples.clear]
+            inputs = [surface, positions, last_positions, count, is_middle, rise, passed]
+            inputs += [int(is_skipping), 1 - is_middle]
+            self._launch(contact_queries.ask, inputs, [*kept, planes])
+        if not is_final:
+            self._launch(contact_queries.choose, [positions, self._middle_planes, count], [self.planes])
+        return self.planes
+
+    def forget(self) -> None:
+        """Let every point ask the surface again: colliders or positions are others."""
+        for samples in (self._vertices, self._middles):
+            samples.clear.zero_()
+
+    def state(self) -> dict[str, np.ndarray]:
+        """What later planes follow from, beside positions: as arrays on the processor."""
+        return {name: array.numpy().copy() for name, array in self._arrays()}
+
+    def load(self, state: dict[str, np.ndarray]) -> None:
+        """Take a state of such strands. Raises `HairError` where its arrays do not fit."""
+        for name, there in self._arrays():
+            array = state.get(name)
+            if array is None or array.shape != there.shape or not np.isfinite(array).all():
+                raise HairError("The state of contacts is not that of these strands.")
+            there.assign(array)
+
+    def _arrays(self):
+        for name, samples in (("vertex", self._vertices), ("middle", self._middles)):
+            yield from ((f"{name}_{field.name}", getattr(samples, field.name)) for field in fields(samples))
+
+    def _new_samples(self):
+        groups, _, lanes = self._shape
+        shape, device = (groups, self._vertex_count - 1, lanes), self.colliders.device
+        numbers = [wp.zeros(shape, dtype=float, device=device) for _ in range(2)]
+        asked = wp.zeros((groups, 3 * shape[1], lanes), dtype=float, device=device)
+        return Samples(numbers[0], wp.zeros(shape, dtype=int, device=device), asked, numbers[1])
+
+    def _surface(self):
+        colliders, surface = self.colliders, contact_queries.Surface()
+        surface.mesh, surface.points, surface.indices = colliders.mesh.id, colliders.mesh.points, colliders.mesh.indices
+        surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
+        surface.rims, surface.settings = colliders.rims, colliders.settings
+        surface.largest_distance, surface.motion = colliders.largest_distance, colliders.motion
+        return surface
+
+    def _require_shape(self, positions):
+        for name, count, wanted in zip(("groups", "rows", "lanes"), positions.shape, self._shape, strict=True):
+            require_count(name, count, wanted)
+
+    def _launch(self, kernel, inputs, outputs):
+        """Launch a kernel for every sample, on all cores."""
+        groups, _, lanes = self._shape
+        count, device = groups * (self._vertex_count - 1) * lanes, self.colliders.device
+        kernel_cache.load(device, kernel.module)
+        shares = parallel.share_count(count, device, LEAST_ROWS)
+        parallel.launch_shares(kernel, count, inputs, [outputs] * shares, device)

@@ -1,0 +1,292 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames of simulated guides in a folder, and the states that a simulation goes on from.
+
+A folder has a manifest (frame_manifest.py), `+00000123.npz` for each frame and `state_+00000120.npz` for some. Each
+file appears whole; one that is not what this project writes for the manifest's counts is a missing frame. Only what
+has such a name, in a folder with a manifest, is ever removed.
+"""
+
+import contextlib
+import os
+import re
+import secrets
+from collections.abc import Generator, Iterable, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import HairError, cause_of
+from . import array_file, frame_manifest, plain_file
+from .file_lock import claim, claim_of
+from .frame_manifest import Manifest
+from .whole_file import whole_file
+
+_NAME = re.compile(r"(state_)?([+-](?!0{8})[0-9]{8}|\+0{8})\.npz", re.ASCII)  # frame 0 has one name
+_LEFT_OVER = re.compile(r"\.vellus_[0-9a-f]{8}\.(npz|json)", re.ASCII)  # of a killed process, as whole_file names it
+_IDENTITY = re.compile(r"[0-9a-f]{16}", re.ASCII)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """One frame: points (G, P, 3) float32 [m], the guides as combed ones would be, at rest.
+
+    key: of the simulation; digest: of the animation it was simulated in (`frame_manifest.digest`).
+    """
+
+    points: np.ndarray
+    key: str
+    digest: str
+
+
+def new_identity() -> str:
+    """16 random hexadecimal digits, for guides whose frames are to have a folder of their own."""
+    return secrets.token_hex(8)
+
+
+def folder_of(base: Path, identity: str) -> Path:
+    """The folder of some guides' frames. Raises `HairError` unless the identity is one of `new_identity`."""
+    if not _IDENTITY.fullmatch(identity):
+        raise HairError("The guides name no valid cache: free it, and bake again.")
+    return base / identity
+
+
+class FrameCache:
+    """Frames in a folder, to be read. Files that cannot be are missing frames, and `take_complaints` says why, once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._told: set[str] = set()
+        self._complaints: list[HairError] = []
+        self.manifest: Manifest | None = None
+        self.read_manifest()
+
+    def read_manifest(self) -> Manifest | None:
+        """Read the manifest, again if it may have changed; None where there is none, or an invalid one."""
+        try:
+            self.manifest = frame_manifest.read(self.folder)
+        except HairError as error:
+            self.manifest = None
+            if os.path.lexists(self.folder / frame_manifest.NAME):
+                self._complain(frame_manifest.NAME, error)
+        return self.manifest
+
+    def frame_numbers(self) -> list[int]:
+        """Numbers of the frames that seem to be there, in order: files are not read."""
+        return _numbers(self.folder, False)
+
+    def state_numbers(self) -> list[int]:
+        """Numbers of the frames after which a state seems to be there, in order."""
+        return _numbers(self.folder, True)
+
+    def read_frame(self, number: int) -> Frame | None:
+        """Return a frame of any simulation that the manifest names, None for a missing one."""
+        if self.manifest is None:
+            return None
+        arrays = self._read(self.manifest, _name(number, False), self.manifest.frame_layout, number)
+        if arrays is None:
+            return None
+        return Frame(arrays["points"], arrays["key"].tobytes().hex(), arrays["digest"].tobytes().hex())
+
+    def read_state(self, number: int) -> dict[str, np.ndarray] | None:
+        """Return the arrays of the state after a frame of the present simulation, None for a missing one."""
+        if self.manifest is None:
+            return None
+        name = _name(number, True)
+        arrays = self._read(self.manifest, name, self.manifest.state_file_layout, number)
+        if arrays is None:
+            return None
+        if arrays.pop("key").tobytes().hex() != self.manifest.key:
+            self._complain(name, HairError("{path} is a state of another simulation.", path=self.folder / name))
+            return None
+        arrays.pop("frame")
+        return arrays
+
+    def points_at(self, time: float) -> np.ndarray | None:
+        """(G, P, 3) float32 [m] at a time in frames, which need not be whole; None where a frame is missing.
+
+        Between frames the cubic through four of them, linear where one of the outer two is missing.
+        """
+        number = int(np.floor(time))
+        frame = self.read_frame(number)
+        if frame is None or time == number:
+            return None if frame is None else frame.points
+        there = set(self.frame_numbers())
+        others = [self.read_frame(n) if n in there else None for n in (number - 1, number + 1, number + 2)]
+        before, after, last = (None if other is None else other.points for other in others)
+        return None if after is None else between(before, frame.points, after, last, time - number)
+
+    def take_complaints(self) -> list[HairError]:
+        """Return why files could not be read, each once."""
+        taken, self._complaints = self._complaints, []
+        return taken
+
+    def is_being_baked(self) -> bool:
+        """Whether a process writes to the folder."""
+        if not claim_of(self.folder / frame_manifest.NAME).exists():
+            return False
+        try:
+            with claim(self.folder / frame_manifest.NAME) as is_free:
+                return not is_free
+        except OSError:  # a folder that cannot be written
+            return False
+
+    def _read(self, manifest, name, layout, number):
+        path = self.folder / name
+        if not os.path.lexists(path):
+            return None
+        try:
+            arrays = array_file.read(path, layout)
+        except HairError as error:
+            self._complain(name, error)
+            return None
+        key = arrays["key"].tobytes().hex()
+        if int(arrays["frame"]) != number or manifest.changed_parts(key) is None:
+            self._complain(name, HairError("{path} is a frame of another simulation.", path=path))
+            return None
+        return arrays
+
+    def _complain(self, name, error):
+        if name not in self._told:
+            self._told.add(name)
+            self._complaints.append(error)
+
+
+class Writer:
+    """Writes frames to a folder that this process has claimed: made by `baking`."""
+
+    def __init__(self, folder: Path, manifest: Manifest) -> None:
+        self.folder, self.manifest = folder, manifest
+        self._is_complete = False
+
+    def write_frame(self, number: int, points: np.ndarray, digest: str) -> None:
+        """Write a frame, `Frame`'s arrays. Raises `HairError` where it cannot be: frames that are there stay whole."""
+        arrays = self._marked(number) | {"digest": _bytes_of(digest), "points": points.astype(np.float32, copy=False)}
+        self._write(_name(number, False), arrays, self.manifest.frame_layout, False)
+
+    def write_state(self, number: int, arrays: Mapping[str, np.ndarray]) -> None:
+        """Write the state after a frame: all that the next one follows from. Forced onto the disk."""
+        self._write(_name(number, True), {**self._marked(number), **arrays}, self.manifest.state_file_layout, True)
+
+    def change(self, **changes: object) -> None:
+        """Change entries of the manifest, such as notes."""
+        changed = replace(self.manifest, **changes)  # type: ignore[bad-argument-type]
+        frame_manifest.write(self.folder, changed)
+        self.manifest = changed
+
+    def complete(self) -> None:
+        """Say that all frames have been written."""
+        self._is_complete = True
+
+    def end(self) -> None:
+        """Write how far baking came. Called by `baking`."""
+        with contextlib.suppress(HairError):  # the folder is gone, or the disk is full: as after being killed
+            if self.folder.is_dir():
+                self.change(state="complete" if self._is_complete else "part")
+
+    def _marked(self, number):
+        return {"key": _bytes_of(self.manifest.key), "frame": np.array(number, np.int64)}
+
+    def _write(self, name, arrays, layout, is_forced):
+        path = self.folder / name
+        if array_file.layout_of(arrays) != dict(layout):
+            raise HairError("{path} cannot be written: {cause}.", path=path, cause="its arrays are not the manifest's")
+        if not (self.folder / frame_manifest.NAME).is_file():
+            raise HairError("{path} cannot be written: {cause}.", path=path, cause="its folder has lost its manifest")
+        with whole_file(path, is_forced=is_forced) as partial:
+            array_file.write(partial, arrays)
+
+
+@contextlib.contextmanager
+def baking(folder: Path, manifest: Manifest) -> Generator[Writer]:
+    """Claim a folder, made if missing, and write frames to it. Frames that are there stay, of whichever simulation.
+
+    Raises `HairError` where another process bakes it, where it cannot be written, or where it has frames of other
+    guides. In the end the manifest says whether the frames are complete.
+    """
+    with contextlib.ExitStack() as stack:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            is_ours = stack.enter_context(claim(folder / frame_manifest.NAME))
+            if is_ours:
+                _remove(folder, _LEFT_OVER.fullmatch)
+        except (OSError, ValueError) as error:  # ValueError: a character not allowed in file names
+            raise HairError("{path} cannot be written: {cause}.", path=folder, cause=cause_of(error)) from error
+        if not is_ours:
+            raise HairError("{path} is being baked by another process.", path=folder)
+        before = FrameCache(folder).manifest
+        writer = Writer(folder, manifest if before is None else manifest.continued(before))
+        writer.change(state="baking")
+        stack.callback(writer.end)
+        yield writer
+
+
+def remove(folder: Path, numbers: Iterable[int] | None = None) -> int:
+    """Remove frames and their states: those of some numbers, or all and the manifest. Returns how many files.
+
+    Nothing is removed from a folder without a valid manifest, through a link, or while another process bakes. Raises
+    `HairError`.
+    """
+    frame_manifest.read(folder)
+    wanted = None if numbers is None else set(numbers)
+    try:
+        if folder.is_symlink():
+            raise HairError("{path} is a link: nothing was removed.", path=folder)
+        with claim(folder / frame_manifest.NAME) as is_ours:
+            if not is_ours:
+                raise HairError("{path} is being baked by another process.", path=folder)
+            if wanted is not None:
+                return _remove(folder, lambda name: (found := _NAME.fullmatch(name)) and int(found[2]) in wanted)
+            count = _remove(folder, lambda name: _NAME.fullmatch(name) or _LEFT_OVER.fullmatch(name))
+            _remove(folder, lambda name: name == frame_manifest.NAME)
+    except OSError as error:
+        raise HairError("{path} cannot be removed: {cause}.", path=folder, cause=cause_of(error)) from error
+    with contextlib.suppress(OSError):  # other files are in it
+        folder.rmdir()
+    return count
+
+
+def between(
+    before: np.ndarray | None, start: np.ndarray, end: np.ndarray, after: np.ndarray | None, part: float
+) -> np.ndarray:
+    """Points at a part 0..1 of the time from `start` to `end`, frames next to each other; float32.
+
+    The cubic through all four, exact for cubic motion; linear where one of the outer two is None.
+    """
+    t = float(part)
+    if before is None or after is None:
+        return np.float32(1.0 - t) * start + np.float32(t) * end
+    # Lagrange's polynomials for the times -1, 0, 1 and 2.
+    weights = (
+        -t * (t - 1.0) * (t - 2.0) / 6.0,
+        (t + 1.0) * (t - 1.0) * (t - 2.0) / 2.0,
+        -(t + 1.0) * t * (t - 2.0) / 2.0,
+        (t + 1.0) * t * (t - 1.0) / 6.0,
+    )
+    a, b, c, d = map(np.float32, weights)
+    return a * before + b * start + c * end + d * after
+
+
+def _name(number, is_state):
+    return f"{'state_' if is_state else ''}{number:+09d}.npz"
+
+
+def _bytes_of(digits):
+    return np.frombuffer(bytes.fromhex(digits), np.uint8)
+
+
+def _numbers(folder, is_state):
+    try:
+        found = [_NAME.fullmatch(name) for name in os.listdir(folder)]
+    except OSError:
+        return []
+    return sorted(int(match[2]) for match in found if match and bool(match[1]) == is_state)
+
+
+def _remove(folder, is_chosen):
+    """Remove the plain files of a folder whose names are chosen; returns how many."""
+    with os.scandir(folder) as entries:
+        chosen = [entry.path for entry in entries if is_chosen(entry.name) and entry.is_file(follow_symlinks=False)]
+    for path in chosen:
+        plain_file.tried(lambda path=path: os.unlink(path))
+    return len(chosen)

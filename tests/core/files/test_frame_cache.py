@@ -1,0 +1,529 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Frames come back bit by bit; damaged, foreign and hostile files are missing frames; what is there is whole."""
+
+import dataclasses
+import json
+import os
+import random
+import resource
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hair_addon.core.errors import HairError
+from hair_addon.core.files import array_file, frame_cache, frame_manifest, plain_file
+from hair_addon.core.files.frame_cache import FrameCache, baking, between, remove
+from hair_addon.core.files.frame_manifest import Manifest
+
+ROOT = Path(__file__).resolve().parents[3]
+ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
+DIGEST = "0123456789abcdef" * 2
+
+
+def manifest(guide_count=3, settings=1, **changes):
+    given = {
+        "keys": (frame_manifest.digests_of({"settings": [settings], "guides": np.arange(guide_count)}),),
+        "guide_count": guide_count,
+        "point_count": 5,
+        "first": -2,
+        "last": 9,
+        "fps": 24.0,
+        "state_layout": {"x": ("<f4", (2, 4)), "substep": ("<i8", ())},
+    }
+    return Manifest(**given | changes)
+
+
+def points_of(number, guide_count=3):
+    """A frame's points, each frame's its own."""
+    return np.random.default_rng(number + 100).random((guide_count, 5, 3), dtype=np.float32)
+
+
+def state_of(number):
+    return {"x": np.full((2, 4), number, np.float32), "substep": np.array(number * 7, np.int64)}
+
+
+def bake(folder, numbers, wanted=None):
+    with baking(folder, wanted or manifest()) as writer:
+        for number in numbers:
+            writer.write_frame(number, points_of(number), DIGEST)
+            writer.write_state(number, state_of(number))
+        writer.complete()
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with the frames -2 to 3."""
+    bake(tmp_path / "cache", range(-2, 4))
+    return tmp_path / "cache"
+
+
+def said(cache):
+    return [str(error) for error in cache.take_complaints()]
+
+
+def check_whole(folder, most_complaints=0):
+    """Every frame and state that is listed is what was written; returns their numbers."""
+    cache = FrameCache(folder)
+    for number in cache.frame_numbers():
+        frame = cache.read_frame(number)
+        assert frame is not None and frame.points.tobytes() == points_of(number).tobytes()
+    for number in cache.state_numbers():
+        state = cache.read_state(number)
+        assert state is not None and {name: array.tobytes() for name, array in state.items()} == {
+            name: array.tobytes() for name, array in state_of(number).items()
+        }
+    assert len(said(cache)) <= most_complaints
+    return cache.frame_numbers(), cache.state_numbers()
+
+
+# Round trips.
+
+
+def test_frames_and_states_come_back_bit_by_bit(folder):
+    assert check_whole(folder) == (list(range(-2, 4)), list(range(-2, 4)))
+    cache = FrameCache(folder)
+    assert cache.read_frame(0).digest == DIGEST and cache.read_frame(0).key == manifest().key
+    assert cache.manifest == dataclasses.replace(manifest(), state="complete")
+    assert cache.read_frame(4) is None and cache.read_state(99) is None and said(cache) == []
+    assert sorted(path.name for path in folder.iterdir())[:3] == ["+00000000.npz", "+00000001.npz", "+00000002.npz"]
+
+
+def test_the_manifest_comes_back(tmp_path):
+    wanted = manifest(notes=(("Collider ü", "no faces"),), fps=23.976, state="part", state_layout={})
+    frame_manifest.write(tmp_path, wanted)
+    assert frame_manifest.read(tmp_path) == wanted
+
+
+def test_a_key_follows_from_every_part():
+    """Arrays by type, shape and bits; a part's name counts, their order does not."""
+    zeros = [np.zeros(4, "f4"), np.zeros((2, 2), "f4"), np.zeros(2, "f8"), np.zeros(4, "i4"), -np.zeros(4, "f4")]
+    parts = [{"a": 1}, {"b": 1}, {"a": "1"}, {"a": [1]}, {"a": 1, "b": None}, *({"a": array} for array in zeros)]
+    keys = [frame_manifest.key_of(frame_manifest.digests_of(part)) for part in parts]
+    assert len(set(keys)) == len(keys)
+    one, other = ({"a": 1, "b": zeros[0]}, {"b": np.zeros(8, "f4")[::2], "a": 1})
+    assert frame_manifest.digests_of(one) == frame_manifest.digests_of(other)
+    assert len({frame_manifest.key_of(frame_manifest.digests_of(parts)) for parts in (one, other)}) == 1
+
+
+def test_frames_of_an_earlier_simulation_stay_and_are_told_apart(folder):
+    bake(folder, [2, 3], manifest(settings=2))
+    cache = FrameCache(folder)
+    keys = [cache.read_frame(number).key for number in range(-2, 4)]
+    assert [cache.manifest.changed_parts(key) for key in keys] == [["settings"]] * 4 + [[]] * 2
+    assert cache.read_state(3) is not None and cache.read_state(1) is None
+    assert len(said(cache)) == 1
+    bake(folder, [0], manifest(settings=1))
+    cache = FrameCache(folder)
+    assert [cache.manifest.changed_parts(cache.read_frame(n).key) for n in (-2, 0, 3)] == [[], [], ["settings"]]
+    assert len(cache.manifest.keys) == 2
+
+
+def test_a_folder_keeps_frames_of_one_set_of_guides(folder):
+    with pytest.raises(HairError, match="other guides"), baking(folder, manifest(guide_count=4)):
+        pass
+    check_whole(folder)
+
+
+# Between frames.
+
+
+def test_cubic_motion_is_exact_between_frames(rng):
+    a, b, c, d = rng.normal(size=(4, 2, 3, 3))
+    frames = [(((a * t + b) * t + c) * t + d).astype(np.float32) for t in (-1.0, 0.0, 1.0, 2.0)]
+    for t in (0.0, 0.2, 0.5, 0.9, 1.0):
+        np.testing.assert_allclose(between(*frames, t), ((a * t + b) * t + c) * t + d, atol=2e-6)
+        for ends in ((None, frames[3]), (frames[0], None), (None, None)):
+            linear = frames[1] + t * (frames[2] - frames[1])
+            np.testing.assert_allclose(between(ends[0], frames[1], frames[2], ends[1], t), linear, atol=1e-6)
+
+
+def test_points_at_any_time(folder):
+    cache = FrameCache(folder)
+    np.testing.assert_array_equal(cache.points_at(2.0), points_of(2))
+    np.testing.assert_array_equal(cache.points_at(-2.0), points_of(-2))
+    cubic = between(*(points_of(number) for number in (-1, 0, 1, 2)), 0.25)
+    np.testing.assert_array_equal(cache.points_at(0.25), cubic)
+    np.testing.assert_array_equal(cache.points_at(2.5), between(None, points_of(2), points_of(3), None, 0.5))
+    assert cache.points_at(3.5) is None and cache.points_at(-2.5) is None and said(cache) == []
+
+
+# Damaged, foreign and hostile files.
+
+
+def frame_bytes(number=1):
+    arrays = {
+        "key": np.frombuffer(bytes.fromhex(manifest().key), np.uint8),
+        "frame": np.array(number, np.int64),
+        "digest": np.frombuffer(bytes.fromhex(DIGEST), np.uint8),
+        "points": points_of(number),
+    }
+    return b"".join(map(bytes, array_file.encoded(arrays)))
+
+
+def test_a_frame_cut_at_any_byte_is_missing(folder):
+    path = folder / "+00000001.npz"
+    data = path.read_bytes()
+    assert data == frame_bytes()
+    layout = manifest().frame_layout
+    for length in range(len(data)):
+        assert array_file.decoded(data[:length], layout) is None
+    for length in (0, 1, 60, len(data) // 2, len(data) - 1):
+        path.write_bytes(data[:length])
+        cache = FrameCache(folder)
+        assert cache.read_frame(1) is None and cache.read_frame(1) is None
+        assert len(said(cache)) == 1  # once
+    path.write_bytes(data + b"\0")
+    assert FrameCache(folder).read_frame(1) is None
+
+
+def mutated(data, source):
+    """Bytes changed as accidents, and people who want to know, change them."""
+    data = bytearray(data)
+    for _ in range(source.choice((1, 1, 1, 2, 3, 8))):
+        place = source.randrange(len(data))
+        kind = source.randrange(6)
+        if kind == 0:
+            data[place] ^= 1 << source.randrange(8)
+        elif kind == 1:
+            data[place] = source.choice((0, 1, 0x7F, 0x80, 0xFF, source.randrange(256)))
+        elif kind == 2:
+            size = source.choice((2, 4, 8))
+            data[place : place + size] = source.choice((0, 1, 2**15, 2**16 - 1)).to_bytes(2, "little") * (size // 2)
+        elif kind == 3:
+            del data[place : place + source.randrange(1, 20)]
+        elif kind == 4:
+            data[place:place] = data[source.randrange(len(data)) :][: source.randrange(1, 20)]
+        else:
+            start = source.randrange(len(data))
+            part = data[start : start + source.randrange(1, 64)]
+            data[place : place + len(part)] = part
+        if not data:
+            break
+    return bytes(data)
+
+
+def check_mutants(count, seed):
+    """No mutant is read as another frame, or ends otherwise than by being refused."""
+    source = random.Random(seed)
+    data, layout = frame_bytes(), manifest().frame_layout
+    manifest_data = json.dumps(
+        {"format": frame_manifest.FORMAT, "version": 1} | dataclasses.asdict(manifest())
+    ).encode()
+    assert array_file.decoded(data, layout) is not None
+    assert frame_manifest.parsed(manifest_data, Path("m")) == manifest()
+    for _ in range(count):
+        mutant = mutated(data, source)
+        assert mutant == data or array_file.decoded(mutant, layout) is None
+        try:
+            found = frame_manifest.parsed(mutated(manifest_data, source), Path("m"))
+        except HairError:
+            continue
+        assert array_file.size_of(found.frame_layout) <= array_file.MOST_BYTES
+        assert array_file.size_of(found.state_file_layout) <= array_file.MOST_BYTES
+
+
+def test_mutants_are_refused():
+    check_mutants(3_000, 1)
+
+
+@pytest.mark.long
+def test_a_million_mutants_are_refused():
+    check_mutants(1_000_000, 2)
+
+
+def foreign(kind, path):
+    """Put something else in the place of a frame."""
+    data = path.read_bytes()
+    path.unlink()
+    if kind == "folder":
+        path.mkdir()
+    elif kind == "pipe":
+        os.mkfifo(path)
+    elif kind in ("link", "link to itself", "link to nothing"):
+        targets = {"link": path.with_name("+00000002.npz"), "link to itself": path}
+        os.symlink(targets.get(kind, "/nowhere"), path)
+    elif kind == "future":
+        path.write_bytes(data.replace(b"'<f4'", b"'<f8'"))
+    elif kind == "other frame":
+        path.write_bytes(frame_bytes(2))
+    elif kind == "other key":
+        other = dataclasses.replace(manifest(), keys=manifest(settings=9).keys)
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setitem(globals(), "manifest", lambda: other)
+            path.write_bytes(frame_bytes(1))
+    elif kind == "sparse":
+        with open(path, "wb") as file:
+            file.truncate(2**40)
+    elif kind == "bomb":
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("points.npy", bytes(2**24))
+    elif kind == "huge header":
+        with zipfile.ZipFile(path, "w") as archive:
+            archive.writestr("points.npy", b"\x93NUMPY\x02\x00" + (2**20).to_bytes(4, "little") + b"[" * 2**20)
+    elif kind == "pickle":
+        np.savez(path, points=np.array([{"a": 1}]))
+    elif kind == "NumPy's own":
+        np.savez(path, key=np.zeros(16, np.uint8), points=points_of(1))
+    elif kind == "NaN":
+        forged = array_file.decoded(data, manifest().frame_layout) | {"points": points_of(1) * np.float32(np.nan)}
+        parts = array_file._file_of(manifest().frame_layout, {k: v.tobytes() for k, v in forged.items()})
+        path.write_bytes(b"".join(parts))
+
+
+FOREIGN = [
+    "folder",
+    "pipe",
+    "link",
+    "link to itself",
+    "link to nothing",
+    "future",
+    "other frame",
+    "other key",
+    "sparse",
+]
+FOREIGN += ["bomb", "huge header", "pickle", "NumPy's own", "NaN"]
+
+
+@pytest.mark.parametrize("kind", FOREIGN)
+def test_whatever_else_stands_there_is_a_missing_frame(folder, kind):
+    foreign(kind, folder / "+00000001.npz")
+    cache = FrameCache(folder)
+    assert cache.read_frame(1) is None and cache.points_at(0.5) is None
+    assert len(said(cache)) == 1
+    assert cache.points_at(-1.5) is not None and cache.points_at(2.5) is not None and said(cache) == []
+
+
+@pytest.mark.parametrize("kind", [kind for kind in [*FOREIGN, "gone"] if kind not in {"future", "NaN"}])
+def test_without_a_manifest_nothing_is_read_or_removed(folder, kind):
+    foreign(kind, folder / frame_manifest.NAME)
+    names = sorted(os.listdir(folder))
+    cache = FrameCache(folder)
+    assert cache.manifest is None and cache.read_frame(1) is None and cache.read_state(1) is None
+    with pytest.raises(HairError):
+        remove(folder)
+    assert sorted(os.listdir(folder)) == names
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("guide_count", 0),
+        ("guide_count", 10**30),
+        ("guide_count", 3.0),
+        ("guide_count", True),
+        ("point_count", 258),
+        ("first", 10),
+        ("first", -(10**9)),
+        ("fps", float("nan")),
+        ("fps", 0),
+        ("fps", 10**400),
+        ("fps", "24"),
+        ("state", "baked"),
+        ("keys", []),
+        ("keys", [{"a": 1}]),
+        ("keys", [{}] * 65),
+        ("keys", None),
+        ("state_layout", {"x": ["|O", [1]]}),
+        ("state_layout", {"x": ["<f4", [2**28]]}),
+        ("state_layout", {"frame": ["<f4", [1]]}),
+        ("state_layout", {"x": ["<f4", 3]}),
+        ("notes", [["a"]]),
+        ("notes", [["\ud800", "b"]]),
+        ("version", 2),
+        ("another", 1),
+    ],
+    ids=lambda value: str(value)[:16],
+)
+def test_manifests_of_no_simulation_are_refused(folder, name, value):
+    path = folder / frame_manifest.NAME
+    found = json.loads(path.read_text())
+    path.write_text(json.dumps(found | {name: value}))
+    cache = FrameCache(folder)
+    assert cache.manifest is None and len(said(cache)) == 1
+
+
+# Writing.
+
+
+def test_a_frame_that_is_not_the_manifests_is_refused(folder):
+    with baking(folder, manifest()) as writer:
+        for points in (points_of(1, 4), points_of(1)[:, :4], points_of(1) * np.float32(np.inf)):
+            with pytest.raises(HairError), np.errstate(all="ignore"):
+                writer.write_frame(1, points, DIGEST)
+        with pytest.raises(HairError):
+            writer.write_state(1, {"x": np.zeros((2, 4), np.float32)})
+    check_whole(folder)
+    assert FrameCache(folder).manifest.state == "part"
+
+
+def test_disk_full_at_fifty_places(folder):
+    """A limit on the size of files stands for it: both end a write in the middle."""
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    largest = max(path.stat().st_size for path in folder.iterdir()) + 66_000
+    refused = 0
+    for limit in [*range(0, 1500, 50), *range(1500, largest, (largest - 1500) // 20)]:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, hard))
+        try:
+            bake(folder, [1, 2, 4])
+        except HairError as error:
+            refused += "File too large" in str(error)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+        check_whole(folder)
+        assert not list(folder.glob(".*"))
+    assert refused > 40
+    bake(folder, [4])
+    assert check_whole(folder)[0] == list(range(-2, 5))
+
+
+def test_a_folder_that_goes_away_is_told(folder):
+    with pytest.raises(HairError, match="lost its manifest"), baking(folder, manifest()) as writer:
+        remove_all(folder)
+        writer.write_frame(1, points_of(1), DIGEST)
+    assert not folder.exists()
+    (folder.parent / "file").touch()
+    for place in (folder.parent / "file", folder.parent / "file" / "below", Path("null\0character")):
+        with pytest.raises(HairError), baking(place, manifest()):
+            pass
+
+
+def remove_all(folder):
+    for path in folder.iterdir():
+        path.unlink()
+    folder.rmdir()
+
+
+KILLED = """
+import os, random, signal, sys, time
+from pathlib import Path
+from tests.core.files.test_frame_cache import bake
+folder, count, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
+chance = random.Random(seed)
+for _ in range(count):
+    child = os.fork()
+    if not child:
+        while True:
+            bake(folder, range(-2, 4))
+    time.sleep(chance.uniform(0.001, 0.05))
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+"""
+
+
+def check_killed(folder, rounds, kills):
+    for seed in range(rounds):
+        line = [sys.executable, "-c", KILLED, str(folder), str(kills), str(seed)]
+        subprocess.run(line, env=ENVIRONMENT, cwd=ROOT, check=True, timeout=300)
+        check_whole(folder)
+    bake(folder, range(-2, 4))
+    assert check_whole(folder)[0] == list(range(-2, 4))
+    assert not list(folder.glob(".*"))
+
+
+def test_frames_are_whole_after_kills(tmp_path):
+    check_killed(tmp_path / "cache", 1, 10)
+
+
+@pytest.mark.long
+def test_frames_are_whole_after_each_of_two_hundred_kills(tmp_path):
+    check_killed(tmp_path / "cache", 200, 1)
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from tests.core.files.test_frame_cache import *
+with baking(Path(sys.argv[1]), manifest()) as writer:
+    writer.write_frame(1, points_of(1), DIGEST)
+    print("baking", flush=True)
+    time.sleep(60)
+"""
+
+
+def test_one_process_bakes_while_others_read(folder):
+    line = [sys.executable, "-c", HOLD, str(folder)]
+    with subprocess.Popen(line, env=ENVIRONMENT, cwd=ROOT, stdout=subprocess.PIPE) as holder:
+        assert holder.stdout.readline() == b"baking\n"
+        cache = FrameCache(folder)
+        assert cache.manifest.state == "baking" and cache.is_being_baked()
+        assert cache.read_frame(1) is not None
+        for change in (lambda: bake(folder, [1]), lambda: remove(folder)):
+            with pytest.raises(HairError, match="another process"):
+                change()
+        holder.send_signal(signal.SIGKILL)
+    assert not cache.is_being_baked() and cache.read_manifest().state == "baking"
+    bake(folder, [1])
+    assert cache.read_manifest().state == "complete"
+
+
+def test_a_file_that_another_program_holds_is_tried_three_times(folder, monkeypatch):
+    """As Windows keeps programs from files that a virus scanner reads."""
+    monkeypatch.setattr(time, "sleep", lambda _seconds: None)
+    tries = []
+
+    def held(function, busy):
+        def call(*arguments):
+            tries.append(arguments)
+            if len(tries) % 3 != busy:
+                raise PermissionError(13, "Permission denied")
+            return function(*arguments)
+
+        return call
+
+    cache = FrameCache(folder)
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", held(os.replace, 0))
+        bake(folder, [1])
+    assert len(tries) == 12
+    with monkeypatch.context() as patch:
+        patch.setattr(plain_file.os, "open", held(os.open, 0))
+        assert cache.read_frame(1) is not None
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "replace", held(os.replace, 4))
+        with pytest.raises(HairError, match="Permission denied"):
+            bake(folder, [1])
+    check_whole(folder)
+
+
+# Removing.
+
+
+def test_only_names_of_ours_are_removed_and_never_through_links(folder, tmp_path):
+    kept = tmp_path / "kept.npz"
+    kept.write_bytes(b"kept")
+    others = ["00000001.npz", "+0000001.npz", "+00000001.npz.bak", "-00000000.npz", "x+00000001.npz", "state.npz"]
+    for name in others:
+        (folder / name).touch()
+    os.symlink(kept, folder / "+00000050.npz")
+    (folder / "+00000051.npz").mkdir()
+    (folder / ".vellus_0123abcd.npz").touch()
+    assert remove(folder, [1, 2, 50, 51]) == 4
+    assert FrameCache(folder).frame_numbers() == [-2, -1, 0, 3, 50, 51]
+    assert remove(folder) == 4 * 2 + 1
+    assert sorted(os.listdir(folder)) == sorted([*others, "+00000050.npz", "+00000051.npz"])
+    assert kept.read_bytes() == b"kept"
+
+
+def test_a_folder_of_frames_alone_is_removed_with_them(folder):
+    assert remove(folder) == 12 and not folder.exists()
+
+
+def test_a_folder_that_is_a_link_keeps_its_frames(folder, tmp_path):
+    os.symlink(folder, tmp_path / "link", target_is_directory=True)
+    with pytest.raises(HairError, match="is a link"):
+        remove(tmp_path / "link")
+    check_whole(folder)
+
+
+def test_folders_are_named_by_identities_alone(tmp_path):
+    identity = frame_cache.new_identity()
+    assert frame_cache.folder_of(tmp_path, identity) == tmp_path / identity
+    for other in ("", "..", "../0123456789abcdef", identity + "\n", identity.upper() + "A", "0" * 15, "٠" * 16):
+        with pytest.raises(HairError):
+            frame_cache.folder_of(tmp_path, other)
