@@ -6,6 +6,6 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import settings
+    from . import collider_settings, presets, settings, stiffness_advice
 else:
     __getattr__ = submodules(__name__)
