@@ -9,10 +9,14 @@ from dataclasses import replace
 from ..core.files import settings_file
 from ..core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME
 from ..core.params import is_text, label_of, unit_of
+from . import dynamics_options
 from .console import PROGRAM
 
 # Settings that a shorter word names better on a command line.
 _OPTIONS = {"guide_count": "--guides", "strand_count": "--strands", "eta": "--ior"}
+
+# Sections of a settings file whose settings have an option each.
+_SECTIONS = [name for name in settings_file.SECTIONS if name != "dynamics"]
 
 
 class Parser(argparse.ArgumentParser):
@@ -63,11 +67,10 @@ def add_settings(parser, declarations):
 
 
 def add_groom_settings(parser):
-    """Add --settings, and an option for each setting of such a file."""
+    """Add --settings, an option for each setting of such a file, and those of dynamics."""
     add_settings_file(parser)
-    add_settings(
-        parser, [setting for section in settings_file.SECTIONS for setting in settings_file.declared_in(section)]
-    )
+    add_settings(parser, [setting for section in _SECTIONS for setting in settings_file.declared_in(section)])
+    dynamics_options.add_dynamics(parser)
 
 
 def _add_setting(parser, name, default, details):
@@ -106,11 +109,8 @@ def groom_settings(options):
 
 def changed_groom(settings, options):
     """Return `GroomSettings` with options applied. Raises `HairError`."""
-    sections = {
-        name: changed(getattr(settings, name), options, settings_file.declared_in(name))
-        for name in settings_file.SECTIONS
-    }
-    return replace(settings, **sections)
+    sections = {name: changed(getattr(settings, name), options, settings_file.declared_in(name)) for name in _SECTIONS}
+    return replace(settings, **sections, dynamics=dynamics_options.changed(options, settings.dynamics))
 
 
 def frame_range(text):

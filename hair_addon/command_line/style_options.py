@@ -6,10 +6,8 @@ from dataclasses import replace
 
 from ..core.errors import HairError
 from ..core.files import style_presets
-from ..core.params import declared
 from ..core.styling.kinds import KINDS, MOST_STYLES, OFFERS
-
-_FLAGS = {"true": True, "yes": True, "on": True, "1": True, "false": False, "no": False, "off": False, "0": False}
+from . import setting_pairs
 
 
 def add_styles(parser, has_surface):
@@ -40,35 +38,11 @@ def style(text):
         known = ", ".join(map(str.lower, OFFERS))
         raise argparse.ArgumentTypeError(f"{kind!r} is not a style: choose from {known}")
     offer = OFFERS[identifier]
-    declarations = {name: (default, details) for name, default, details in declared(KINDS[offer.kind])}
-    changes = {}
-    for pair in rest.split(",") if rest else ():
-        name, is_given, value = pair.partition("=")
-        name = name.strip().replace("-", "_")
-        if name not in declarations:
-            known = ", ".join(declarations)
-            raise argparse.ArgumentTypeError(f"{name!r} is not a setting of {kind}: choose from {known}")
-        if name in changes or not is_given:
-            wrong = "is given twice" if name in changes else "needs a value"
-            raise argparse.ArgumentTypeError(f"{name} of {kind} {wrong}, as in {name}=0.01")
-        changes[name] = _value(name, value.strip(), *declarations[name])
+    changes = setting_pairs.parsed(rest, KINDS[offer.kind], kind)
     try:
         return offer.label, replace(offer.settings, **changes), "seed" in changes
     except HairError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
-
-
-def _value(name, text, default, details):
-    """Text as the type of a setting's default; choices in any case."""
-    if isinstance(default, bool):
-        if text.lower() not in _FLAGS:
-            raise argparse.ArgumentTypeError(f"{name} must be yes or no, not {text!r}")
-        return _FLAGS[text.lower()]
-    try:
-        return text.upper() if details.choices else type(default)(text)
-    except (ValueError, OverflowError) as error:
-        kind = "whole number" if isinstance(default, int) else "number"
-        raise argparse.ArgumentTypeError(f"{name} must be a {kind}, not {text!r}") from error
 
 
 def styled(options, settings, fit=None):

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from bpy.types import Curves, Depsgraph, Object
 
+from ...core.dynamics.settings import DynamicsSettings
 from ...core.files.settings_file import GroomSettings
 from ...core.grooming.groom import GuideSettings
 from ...core.long_work import Work
@@ -21,7 +22,8 @@ def settings_of(hair: Curves) -> GroomSettings:
     guide_settings = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
     look, tables = properties.own_look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
     styles, names = style_items.styles_of(hair.vellus), style_items.names_of(hair.vellus)
-    return GroomSettings(guide_settings, hair_settings, look, tables, styles, names)
+    dynamics = properties.dynamics_of(guides.vellus)
+    return GroomSettings(guide_settings, hair_settings, look, tables, styles, names, dynamics)
 
 
 def apply_settings(hair: Curves, settings: GroomSettings) -> None:
@@ -40,7 +42,7 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
         # Otherwise everything would be regenerated without need.
         if setting_properties.to_settings(group, type(wanted)) != wanted:
             setting_properties.assign(group, wanted)
-    _assign_rest(hair, settings)
+    _assign_rest(guides, hair, settings)
 
 
 def assign_look(hair: Curves, look: Appearance) -> None:
@@ -50,10 +52,17 @@ def assign_look(hair: Curves, look: Appearance) -> None:
     looks.apply_look(hair, look)
 
 
+def assign_dynamics(guides: Curves, settings: DynamicsSettings) -> None:
+    """Assign settings of the simulation to guide Curves; the same settings again mark nothing. Raises `HairError`."""
+    curves.require_editable(guides)
+    if properties.dynamics_of(guides.vellus) != setting_properties.as_stored(settings):
+        setting_properties.assign(guides.vellus.dynamics, settings)
+
+
 def adding_hair(surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph) -> Work[tuple[Curves, Curves]]:
     """Guides and hair of some `GroomSettings` on a mesh object, as work in steps; returns the Curves of both."""
     guides, hair = yield from pipeline.adding_hair(surface_object, settings.guides, settings.hair, depsgraph)
-    _assign_rest(hair, settings)
+    _assign_rest(guides, hair, settings)
     return guides, hair
 
 
@@ -64,12 +73,13 @@ def using_as_guides(
     made = yield from hand_made_guides.using_as_guides(
         curves_object, surface_object, depsgraph, hair_settings=settings.hair
     )
-    _assign_rest(made.hair, settings)
+    _assign_rest(made.guides, made.hair, settings)
     return made
 
 
-def _assign_rest(hair, settings):
-    """What is computed after the strands: styles, and shading."""
+def _assign_rest(guides, hair, settings):
+    """What is computed after the strands: styles, shading, and the simulation."""
+    assign_dynamics(guides, settings.dynamics)
     style_items.assign(hair.vellus, settings.styles, settings.style_names)
     setting_properties.assign(hair.vellus.marschner, settings.tables, skip=TABLE_FIELDS)
     assign_look(hair, settings.appearance)

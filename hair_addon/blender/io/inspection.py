@@ -46,6 +46,8 @@ def _guides(datablock):
         "is_combed": curves.is_combed(datablock),
         "hair": [name_of(hair) for hair in followers(datablock)],
         "settings": _settings(lambda: setting_properties.to_settings(datablock.vellus.guides, GuideSettings)),
+        "simulates": datablock.vellus.simulates,
+        "dynamics": _settings(lambda: properties.dynamics_of(datablock.vellus)),
         "warnings": _warnings(datablock),
     }
 

@@ -6,6 +6,7 @@ Blender animates properties without calling their `update`, so their values are 
 
 import bpy
 
+from ...core.dynamics.settings import DynamicsSettings
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables
@@ -16,6 +17,7 @@ from . import setting_properties, style_items
 _GROUPS = {
     "guides": setting_properties.names_of(GuideSettings),
     "hair": setting_properties.names_of(HairSettings),
+    "dynamics": setting_properties.names_of(DynamicsSettings),
     "appearance": setting_properties.names_of(appearance.Appearance),
     "marschner": [n for n in setting_properties.names_of(lookup_tables.Settings) if n not in appearance.TABLE_FIELDS],
 }

@@ -7,16 +7,19 @@ that sets ten properties costs one evaluation, and hair in an undo step always m
 
 import bpy
 
+from ...core.dynamics.collider_settings import ColliderSettings
+from ...core.dynamics.settings import DynamicsSettings
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.imaging.pixel_sampling import PassSettings, RenderSettings
 from ...core.shading import appearance
 from ...core.shading.appearance import Appearance
 from ...core.shading.tables import lookup_tables
 from . import setting_properties, style_items
-from .marks import mark_geometry, mark_shading
+from .marks import mark_colliding, mark_dynamics, mark_geometry, mark_shading
 from .translations import CONTEXT
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
+_NOT_KEYED = set()  # of properties that take no keys
 
 MODELS = (
     ("KAJIYA_KAY", "Kajiya-Kay", "Opaque cylinder with a diffuse part and one highlight"),
@@ -26,6 +29,9 @@ MODELS = (
         "Translucent fiber with reflection, transmission, and internal reflection from lookup tables",
     ),
 )
+
+# Where these change, a simulation starts again.
+_UNKEYED = ("vertex_count", "start_frame", "preroll", "size")
 
 
 def own_look_of(state):
@@ -52,6 +58,11 @@ def dry_look_of(state):
 def own_table_settings_of(state):
     """The `lookup_tables.Settings` of a hair, those at their defaults that follow from its look. Raises `HairError`."""
     return setting_properties.to_settings(state.marschner, lookup_tables.Settings, skip=appearance.TABLE_FIELDS)
+
+
+def dynamics_of(state):
+    """The `DynamicsSettings` of guides as they are set; state: their `VellusCurves`. Raises `HairError`."""
+    return setting_properties.to_settings(state.dynamics, DynamicsSettings)
 
 
 def table_settings_of(state, look=None):
@@ -90,6 +101,18 @@ class VellusMarschnerSettings(bpy.types.PropertyGroup):
     """Settings of the Marschner model's tables that are not in the appearance"""
 
     __annotations__ = setting_properties.annotations(lookup_tables.Settings, mark_shading, skip=appearance.TABLE_FIELDS)
+
+
+class VellusDynamicsSettings(bpy.types.PropertyGroup):
+    """Simulation of guides"""
+
+    __annotations__ = setting_properties.annotations(DynamicsSettings, mark_dynamics, unkeyed=_UNKEYED)
+
+
+class VellusCollider(bpy.types.PropertyGroup):
+    """Collision of hair with a mesh object"""
+
+    __annotations__ = setting_properties.annotations(ColliderSettings, mark_colliding)
 
 
 class VellusCurves(bpy.types.PropertyGroup):
@@ -162,8 +185,18 @@ class VellusCurves(bpy.types.PropertyGroup):
         translation_context=CONTEXT,
         default=True,
     )
+    simulates: bpy.props.BoolProperty(
+        name="Simulate",
+        description="Simulate the guides while the animation plays: they move with the surface, fall and collide",
+        translation_context=CONTEXT,
+        default=False,
+        options=_NOT_KEYED,
+        update=mark_dynamics,
+    )
+    dynamics: bpy.props.PointerProperty(type=VellusDynamicsSettings)
     is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
+    is_dynamics_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     topology: bpy.props.StringProperty(description="Triangulation that the stored roots refer to", options={"HIDDEN"})
     root_key: bpy.props.StringProperty(description="Settings and inputs that placed the roots", options={"HIDDEN"})
     parting_key: bpy.props.StringProperty(description="Settings and inputs that parted the hair", options={"HIDDEN"})
@@ -193,6 +226,8 @@ CLASSES = (
     VellusHairSettings,
     VellusAppearance,
     VellusMarschnerSettings,
+    VellusDynamicsSettings,
+    VellusCollider,
     VellusCurves,
     VellusRenderSettings,
     VellusPassSettings,
@@ -200,8 +235,9 @@ CLASSES = (
 
 
 def register():
-    """Attach the settings to every Curves datablock, scene and view layer."""
+    """Attach the settings to every Curves datablock, object, scene and view layer."""
     bpy.types.Curves.vellus = bpy.props.PointerProperty(type=VellusCurves)
+    bpy.types.Object.vellus = bpy.props.PointerProperty(type=VellusCollider)
     bpy.types.Scene.vellus = bpy.props.PointerProperty(type=VellusRenderSettings)
     bpy.types.ViewLayer.vellus = bpy.props.PointerProperty(type=VellusPassSettings)
 
@@ -210,6 +246,7 @@ def unregister():
     """Unregister the settings; values in files remain."""
     del bpy.types.ViewLayer.vellus
     del bpy.types.Scene.vellus
+    del bpy.types.Object.vellus
     del bpy.types.Curves.vellus
 
 
@@ -225,9 +262,6 @@ def file(description):
     return bpy.props.StringProperty(
         name="File", description=description, subtype="FILE_PATH", options=_RELATIVE, translation_context=CONTEXT
     )
-
-
-_NOT_KEYED = set()  # computed properties have no animation
 
 
 def computed_text(name, description, get, set):

@@ -9,12 +9,14 @@ if TYPE_CHECKING:
     from . import (
         air,
         closed_parts,
+        collider_settings,
         colliders,
         contact,
         contact_queries,
         detail,
         hair_volume,
         material,
+        presets,
         rod_solver,
         rods,
         root_motion,
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
         sag_free,
         settings,
         simulation,
+        stiffness_advice,
     )
 else:
     __getattr__ = submodules(__name__)

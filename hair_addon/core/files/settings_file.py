@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
+from ..dynamics.settings import DynamicsSettings
 from ..errors import HairError
 from ..grooming.groom import GuideSettings, HairSettings
 from ..params import Param, Settings, declared, described, given, is_text, label_of, like, require_class, unit_of
@@ -37,6 +38,7 @@ class GroomSettings:
     tables: lookup_tables.Settings = field(default_factory=lookup_tables.Settings)  # except those in the appearance
     styles: tuple[StyleSettings, ...] = ()  # in the order in which they are applied; a list becomes a tuple
     style_names: tuple[str, ...] = ()  # of each style, empty for any; or no names
+    dynamics: DynamicsSettings = field(default_factory=DynamicsSettings)
 
     def __post_init__(self) -> None:
         for name, settings_class in SECTIONS.items():
