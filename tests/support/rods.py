@@ -45,8 +45,9 @@ class Simulation:
 
     def __init__(self, groom, settings=FIBRE, substeps=4, gravity=GRAVITY, rest=None, device=DEVICE, **changes):
         self.groom = np.asarray(groom, float)
-        self.rest = combed_shape(self.groom) if rest is None else rest
-        self.material = replace(material_of(settings, self.rest.lengths), **changes)
+        combed = combed_shape(self.groom)
+        self.rest = combed if rest is None else rest
+        self.material = replace(material_of(settings, combed.lengths), **changes)
         self.rods = Rods(self.groom, self.material, self.rest, device)
         self.step = step_of(settings, self.material, FRAME, substeps, gravity)
         self.roots, self.turns = self.groom[:, 0], None

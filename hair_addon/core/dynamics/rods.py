@@ -69,7 +69,7 @@ def step_of(
     return Step(
         seconds / count,
         count,
-        tuple(settings.gravity * component for component in gravity),
+        (settings.gravity * gravity[0], settings.gravity * gravity[1], settings.gravity * gravity[2]),
         material.damping_time,
         material.twist_ratio,
         material.drag_square,
@@ -125,8 +125,9 @@ class Rods:
             require_count(name, getattr(material, name).size, self.strand_count * self.segment_count)
         if not (np.isfinite(rest.lengths).all() and (rest.lengths > 0.0).all()):
             raise HairError("Simulated strands have segments without length.")
-        # In units of the mean mass, so that nothing nears the ends of single precision.
-        unit = float(material.masses.mean())
+        # In units near the mean mass, so that nothing nears the ends of single precision; powers of two, which round
+        # nothing: no strand depends on the masses of others.
+        unit = float(2.0 ** np.round(np.log2(material.masses.mean())))
         self.arrays.multipliers.assign(self.arrays.multipliers.numpy() * np.float32(self._mass_unit / unit))
         self._mass_unit = unit
         self._put("lengths", rest.lengths)
