@@ -23,7 +23,8 @@ from .closed_parts import outward, rims
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 FARTHEST = 1.0e6  # [m] from the origin
-MOST_COLLIDERS = 2**20
+
+_STILL = np.eye(3), np.zeros(3)
 
 
 @dataclass(frozen=True)
@@ -68,10 +69,14 @@ class Colliders:
         self.names: tuple[str, ...] = ()
         self.largest_distance = 0.0  # [m]
         self.largest_motion = 0.0  # [m] of a vertex in this frame
-        self.motion = 0.0  # [m] of a vertex, at most, in this substep
+        # (rotation (3, 3), translation [m]) of all in this substep, and since the beginning; a vertex of this substep
+        # moves by `motion` [m] otherwise, at most.
+        self.rigid_motion = self.rigid_motion_so_far = _STILL
+        self.motion = 0.0
         self._known: dict[str, _Known] = {}
         self._before: Any = None
         self._after: Any = None
+        self._poses = (np.zeros((0, 3), np.float32),) * 2
         self._part = 0.0
         self._is_still = True
 
@@ -102,10 +107,15 @@ class Colliders:
         """Move to the pose at a part 0..1 of the frame, greater than the last one: vertices on straight lines."""
         if self.mesh is None:
             return
-        step, self._part = part - self._part, part
-        self.motion = abs(step) * self.largest_motion
         if self._is_still:
             return
+        before, after = self._poses
+        self.rigid_motion, self.motion = rigid_motion(
+            before + np.float32(self._part) * (after - before), before + np.float32(part) * (after - before)
+        )
+        (turn, shift), (turned, moved) = self.rigid_motion, self.rigid_motion_so_far
+        self.rigid_motion_so_far = turn @ turned, turn @ moved + shift
+        self._part = part
         parallel.launch(
             _interpolate,
             len(self._before),
@@ -150,14 +160,13 @@ class Colliders:
 
     def _put(self, before, after):
         """Write the vertices at the beginning and at the end of the frame, and pose the mesh at its beginning."""
-        self._part, self.motion, self.largest_motion = 0.0, 0.0, 0.0
+        self._part, self.motion, self.largest_motion, self.rigid_motion = 0.0, 0.0, 0.0, _STILL
+        self._is_still = True
         if self.mesh is None:
             return
         before, after = np.concatenate(before), np.concatenate(after)
-        distances = np.linalg.norm(after.astype(np.float64) - before, axis=1)
-        self.largest_motion = float(np.nextafter(np.float32(distances.max()), np.float32(np.inf)))
-        if not distances.any():
-            self.largest_motion = 0.0
+        self._poses = before, after
+        self.largest_motion = float(np.linalg.norm(after - before, axis=1).max())
         self._before.assign(before)
         self._after.assign(after)
         self.mesh.points.assign(before)
@@ -169,6 +178,23 @@ class Colliders:
         rows = [(one.friction, one.distance, float(one.is_double_sided)) for one in colliders]
         self.settings = wp.array(np.array(rows, np.float32).reshape(-1, 3), dtype=wp.vec3, device=self.device)
         self.largest_distance = max((one.distance for one in colliders), default=0.0)
+
+
+def rigid_motion(before: np.ndarray, after: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], float]:
+    """The motion of points (V, 3) as a whole, (rotation (3, 3), translation [m]), and how far any moves otherwise [m].
+
+    The rotation of least squares [Kabsch76], or none, where that leaves less.
+    """
+    centres = before.mean(axis=0, dtype=np.float64), after.mean(axis=0, dtype=np.float64)
+    left, _, right = np.linalg.svd((after - centres[1].astype(np.float32)).T @ (before - centres[0].astype(np.float32)))
+    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+    turn = (left @ flip @ right).astype(np.float64)
+    candidates = (turn, centres[1] - turn @ centres[0]), _STILL
+    rests = [
+        float(np.linalg.norm(after - before @ np.float32(turn.T) - np.float32(shift), axis=1).max())
+        for turn, shift in candidates
+    ]
+    return candidates[int(np.argmin(rests))], min(rests)
 
 
 def problem_of(collider: Collider, frame: int = 0, is_new: bool = True) -> HairError | None:

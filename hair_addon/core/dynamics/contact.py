@@ -6,7 +6,7 @@ n (3), the offset n·c + r, the displacement of the surface at c in this substep
 A point in front has n·x ≥ offset; n = 0 where there is no contact.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from .colliders import Colliders
 from .contact_queries import PLANE
 
 RISE = 0.02  # [m/s] at most, of a point that the groom has inside
-LEAST_ROWS = 256  # points that are worth a thread
+LEAST_ROWS = 64  # samples, of all lanes, that are worth a thread
 
 _DEEPEST = 0.1  # [m] inside that the groom is measured
 
@@ -31,7 +31,7 @@ class Samples:
 
     rest: Any  # float [m]: the distance in the groom, negative inside, `NOWHERE` where no collider is near
     sides: Any  # int: ± (1 + collider) of the double-sided one nearby, 0: none
-    asked: Any  # (groups, 3 samples, lanes) float [m]: where the surface was last looked for
+    asked: Any  # (groups, 3 samples, lanes) float [m]: where it last looked for a surface, `Surface.to_rest`
     clear: Any  # float [m]: how far from there it was at least, less its motion since; negative for a point inside
 
 
@@ -65,8 +65,12 @@ class Contacts:
             samples.rest.fill_(contact_queries.NOWHERE)
             samples.sides.zero_()
             if self.colliders.mesh is not None:
-                inputs = [self._surface(), groom, self._vertex_count - 1, is_middle, _DEEPEST]
-                self._launch(contact_queries.measure, inputs, [samples.rest, samples.sides])
+                self._launch(
+                    contact_queries.measure,
+                    [self._surface(), groom],
+                    [is_middle, _DEEPEST],
+                    [samples.rest, samples.sides],
+                )
 
     def find(
         self, positions: Any, last_positions: Any, duration: float, is_final: bool = False, is_skipping: bool = True
@@ -84,17 +88,14 @@ class Contacts:
         if self.colliders.mesh is None:
             self.planes.zero_()
             return self.planes
-        surface, count = self._surface(), self._vertex_count - 1
-        # What the first query of the substep has counted.
-        rise, passed = (0.0, 0.0) if is_final else (RISE * duration, surface.motion)
+        surface, rise = self._surface(), 0.0 if is_final else RISE * duration
         for is_middle, samples in enumerate((self._vertices, self._middles)[: 1 if is_final else 2]):
             planes = self._middle_planes if is_middle else self.planes
             kept = [samples.rest, samples.sides, samples.asked, samples.clear]
-            inputs = [surface, positions, last_positions, count, is_middle, rise, passed]
-            inputs += [int(is_skipping), 1 - is_middle]
-            self._launch(contact_queries.ask, inputs, [*kept, planes])
+            details = [is_middle, rise, int(is_final), int(is_skipping)]
+            self._launch(contact_queries.ask, [surface, positions, last_positions], details, [*kept, planes])
         if not is_final:
-            self._launch(contact_queries.choose, [positions, self._middle_planes, count], [self.planes])
+            self._launch(contact_queries.choose, [positions, self._middle_planes], [], [self.planes])
         return self.planes
 
     def forget(self) -> None:
@@ -104,7 +105,8 @@ class Contacts:
 
     def state(self) -> dict[str, np.ndarray]:
         """What later planes follow from, beside positions: as arrays on the processor."""
-        return {name: array.numpy().copy() for name, array in self._arrays()}
+        state = {name: array.numpy().copy() for name, array in self._arrays()}
+        return {name: np.minimum(array, 0.0) if "clear" in name else array for name, array in state.items()}
 
     def load(self, state: dict[str, np.ndarray]) -> None:
         """Take a state of such strands. Raises `HairError` where its arrays do not fit."""
@@ -116,7 +118,7 @@ class Contacts:
 
     def _arrays(self):
         for name, samples in (("vertex", self._vertices), ("middle", self._middles)):
-            yield from ((f"{name}_{field.name}", getattr(samples, field.name)) for field in fields(samples))
+            yield from ((f"{name}_{what}", getattr(samples, what)) for what in ("rest", "sides", "clear"))
 
     def _new_samples(self):
         groups, _, lanes = self._shape
@@ -131,16 +133,21 @@ class Contacts:
         surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
         surface.rims, surface.settings = colliders.rims, colliders.settings
         surface.largest_distance, surface.motion = colliders.largest_distance, colliders.motion
+        (turn, shift), (turned, moved) = colliders.rigid_motion, colliders.rigid_motion_so_far
+        surface.turn, surface.shift = wp.mat33(turn), wp.vec3(shift)
+        surface.to_rest, surface.moved = wp.mat33(turned.T), wp.vec3(moved)
         return surface
 
     def _require_shape(self, positions):
         for name, count, wanted in zip(("groups", "rows", "lanes"), positions.shape, self._shape, strict=True):
             require_count(name, count, wanted)
 
-    def _launch(self, kernel, inputs, outputs):
-        """Launch a kernel for every sample, on all cores."""
+    def _launch(self, kernel, arrays, details, outputs):
+        """Launch a kernel for all samples: on a processor a thread for the lanes of each, on all cores."""
         groups, _, lanes = self._shape
-        count, device = groups * (self._vertex_count - 1) * lanes, self.colliders.device
+        device, at_once = self.colliders.device, lanes if self.colliders.device.is_cpu else 1
+        count = groups * (self._vertex_count - 1) * lanes // at_once
+        inputs = [*arrays, self._vertex_count - 1, at_once, *details]
         kernel_cache.load(device, kernel.module)
         shares = parallel.share_count(count, device, LEAST_ROWS)
         parallel.launch_shares(kernel, count, inputs, [outputs] * shares, device)

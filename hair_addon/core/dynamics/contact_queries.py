@@ -34,7 +34,13 @@ class Surface:
     rims: wp.array[int]
     settings: wp.array[wp.vec3]
     largest_distance: float
+    # How it moves and turns as a whole in this substep, and how far a vertex moves otherwise.
+    turn: wp.mat33
+    shift: wp.vec3
     motion: float
+    # How it has since the beginning: place at rest = to_rest (x - moved).
+    to_rest: wp.mat33
+    moved: wp.vec3
 
 
 @wp.struct
@@ -195,39 +201,34 @@ def _crossed(surface: Surface, hit: Hit, point: wp.vec3, last: wp.vec3, limit: f
     return hit
 
 
-@wp.kernel
-def ask(
+@wp.func
+def _ask_one(
     surface: Surface,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
-    sample_count: int,
     is_middle: int,
     rise: float,
-    passed: float,
+    is_final: int,
     is_skipping: int,
-    first_row: int,
-    first: int,
-    # outputs
+    group: int,
+    sample: int,
+    lane: int,
     rest: wp.array3d[float],
     sides: wp.array3d[int],
     asked: wp.array3d[float],
     clear: wp.array3d[float],
     out_planes: wp.array3d[float],
 ):
-    thread = first + wp.tid()
-    lane_count = positions.shape[2]
-    lane = thread % lane_count
-    sample = (thread // lane_count) % sample_count
-    group = thread // (lane_count * sample_count)
-    row = sample + first_row
+    row = sample + 1 - is_middle
+    _put_plane(out_planes, group, row, lane, wp.vec3(), 0.0, wp.vec3(), 0.0)
     point = _sample(positions, group, sample, lane, is_middle)
     last = _sample(last_positions, group, sample, lane, is_middle)
     at_rest = rest[group, sample, lane]
     if at_rest < 0.0 and rise > 0.0:
         at_rest = wp.min(at_rest + rise, 0.0)
         rest[group, sample, lane] = at_rest
-    _put_plane(out_planes, group, row, lane, wp.vec3(), 0.0, wp.vec3(), 0.0)
-    motion = wp.length(point - last)
+    # As the surface sees it, which moves and turns as a whole, but for what `surface.motion` says.
+    motion = wp.length(point - (surface.turn * last + surface.shift))
     if not wp.isfinite(motion):
         return
     largest = wp.min(surface.largest_distance, at_rest)
@@ -238,9 +239,11 @@ def ask(
             return
     motion = wp.min(motion, _MOST_MOTION) + surface.motion
     needed = wp.abs(largest) + motion + _MARGIN
-    left = clear[group, sample, lane] - passed
-    away = wp.length(point - _vector(asked, group, sample, lane))
-    if is_skipping == 1 and left - away > needed + _SLACK:
+    left = clear[group, sample, lane]
+    if is_final == 0:
+        left -= surface.motion
+    place = surface.to_rest * (point - surface.moved)
+    if is_skipping == 1 and left - wp.length(place - _vector(asked, group, sample, lane)) > needed + _SLACK:
         clear[group, sample, lane] = left
         sides[group, sample, lane] = 0
         return
@@ -248,7 +251,7 @@ def ask(
         needed = wp.max(needed, motion + _MARGIN - left)
     radius = needed + wp.min(_MARGIN + 4.0 * motion, _AHEAD)
     hit = _nearest(surface, point, last, radius, sides[group, sample, lane])
-    _put_vector(asked, group, sample, lane, point)
+    _put_vector(asked, group, sample, lane, place)
     clear[group, sample, lane] = hit.gap
     if hit.collider >= 0 and hit.distance < 0.0:
         clear[group, sample, lane] = hit.distance
@@ -265,37 +268,81 @@ def ask(
     _put_plane(out_planes, group, row, lane, hit.normal, offset, hit.displacement, settings[0])
 
 
+@wp.kernel
+def ask(
+    surface: Surface,
+    positions: wp.array3d[float],
+    last_positions: wp.array3d[float],
+    sample_count: int,
+    lanes_at_once: int,
+    is_middle: int,
+    rise: float,
+    is_final: int,
+    is_skipping: int,
+    first: int,
+    # outputs
+    rest: wp.array3d[float],
+    sides: wp.array3d[int],
+    asked: wp.array3d[float],
+    clear: wp.array3d[float],
+    out_planes: wp.array3d[float],
+):
+    thread = first + wp.tid()
+    part_count = positions.shape[2] // lanes_at_once
+    first_lane = (thread % part_count) * lanes_at_once
+    sample = (thread // part_count) % sample_count
+    group = thread // (part_count * sample_count)
+    for lane in range(first_lane, first_lane + lanes_at_once):
+        _ask_one(
+            surface,
+            positions,
+            last_positions,
+            is_middle,
+            rise,
+            is_final,
+            is_skipping,
+            group,
+            sample,
+            lane,
+            rest,
+            sides,
+            asked,
+            clear,
+            out_planes,
+        )
+
+
+@wp.func
+def _normal(planes: wp.array3d[float], group: int, row: int, lane: int):
+    x = planes[group, _index(row, PLANE, 0), lane]
+    y = planes[group, _index(row, PLANE, 1), lane]
+    return wp.vec3(x, y, planes[group, _index(row, PLANE, 2), lane])
+
+
 @wp.func
 def _gap(planes: wp.array3d[float], group: int, row: int, lane: int, point: wp.vec3):
     """How far a point is in front of a plane; `NOWHERE` where there is none."""
-    normal = wp.vec3()
-    for component in range(3):
-        normal[component] = planes[group, _index(row, PLANE, component), lane]
+    normal = _normal(planes, group, row, lane)
     if wp.dot(normal, normal) < 0.5:
         return NOWHERE
     return wp.dot(normal, point) - planes[group, _index(row, PLANE, 3), lane]
 
 
-@wp.kernel
-def choose(
+@wp.func
+def _choose_one(
     positions: wp.array3d[float],
     middle_planes: wp.array3d[float],
     sample_count: int,
-    first: int,
-    # outputs
+    group: int,
+    vertex: int,
+    lane: int,
     planes: wp.array3d[float],
 ):
-    thread = first + wp.tid()
-    lane_count = positions.shape[2]
-    lane = thread % lane_count
-    vertex = (thread // lane_count) % sample_count + 1
-    group = thread // (lane_count * sample_count)
     point = _vector(positions, group, vertex, lane)
     least = _gap(planes, group, vertex, lane, point)
     chosen = int(-1)
     for segment in range(vertex - 1, wp.min(vertex + 1, sample_count)):
-        middle = _sample(positions, group, segment, lane, 1)
-        gap = _gap(middle_planes, group, segment, lane, middle)
+        gap = _gap(middle_planes, group, segment, lane, _sample(positions, group, segment, lane, 1))
         if gap < least:
             least = gap
             chosen = segment
@@ -306,15 +353,27 @@ def choose(
         planes[group, _index(vertex, PLANE, row), lane] = value
     # The plane through the vertex that is as far behind it as the middle is behind its own: a segment whose middle
     # touches moves as a whole, and one that lies in the groom as it does is not turned.
-    normal = _vector_of_plane(planes, group, vertex, lane)
+    normal = _normal(planes, group, vertex, lane)
     planes[group, _index(vertex, PLANE, 3), lane] = wp.dot(normal, point) - least
 
 
-@wp.func
-def _vector_of_plane(planes: wp.array3d[float], group: int, row: int, lane: int):
-    x = planes[group, _index(row, PLANE, 0), lane]
-    y = planes[group, _index(row, PLANE, 1), lane]
-    return wp.vec3(x, y, planes[group, _index(row, PLANE, 2), lane])
+@wp.kernel
+def choose(
+    positions: wp.array3d[float],
+    middle_planes: wp.array3d[float],
+    sample_count: int,
+    lanes_at_once: int,
+    first: int,
+    # outputs
+    planes: wp.array3d[float],
+):
+    thread = first + wp.tid()
+    part_count = positions.shape[2] // lanes_at_once
+    first_lane = (thread % part_count) * lanes_at_once
+    vertex = (thread // part_count) % sample_count + 1
+    group = thread // (part_count * sample_count)
+    for lane in range(first_lane, first_lane + lanes_at_once):
+        _choose_one(positions, middle_planes, sample_count, group, vertex, lane, planes)
 
 
 @wp.kernel
@@ -322,6 +381,7 @@ def measure(
     surface: Surface,
     positions: wp.array3d[float],
     sample_count: int,
+    lanes_at_once: int,
     is_middle: int,
     radius: float,
     first: int,
@@ -330,16 +390,16 @@ def measure(
     sides: wp.array3d[int],
 ):
     thread = first + wp.tid()
-    lane_count = positions.shape[2]
-    lane = thread % lane_count
-    sample = (thread // lane_count) % sample_count
-    group = thread // (lane_count * sample_count)
-    point = _sample(positions, group, sample, lane, is_middle)
-    rest[group, sample, lane] = NOWHERE
-    sides[group, sample, lane] = 0
-    if not wp.isfinite(wp.length(point)):
-        return
-    hit = _nearest(surface, point, point, radius, 0)
-    if hit.collider >= 0:
-        rest[group, sample, lane] = hit.distance
-        sides[group, sample, lane] = hit.side
+    part_count = positions.shape[2] // lanes_at_once
+    first_lane = (thread % part_count) * lanes_at_once
+    sample = (thread // part_count) % sample_count
+    group = thread // (part_count * sample_count)
+    for lane in range(first_lane, first_lane + lanes_at_once):
+        point = _sample(positions, group, sample, lane, is_middle)
+        rest[group, sample, lane] = NOWHERE
+        sides[group, sample, lane] = 0
+        if wp.isfinite(wp.length(point)):
+            hit = _nearest(surface, point, point, radius, 0)
+            if hit.collider >= 0:
+                rest[group, sample, lane] = hit.distance
+                sides[group, sample, lane] = hit.side
