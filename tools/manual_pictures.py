@@ -43,6 +43,7 @@ PANELS = {
     "surface": ("surface", "surface_uvs"),
     "guides": ("guides", "guides_growth", "guides_placement"),
     "strands": ("interpolation", "interpolation_parting", "interpolation_advanced"),
+    "dynamics": ("dynamics", "dynamics_material", "dynamics_forces", "dynamics_shape"),
     "styles": ("styles", "styles_profile", "styles_mask"),
     "shading": ("shading", "shading_color", "shading_fibre", "shading_variation"),
     "lookup_tables": ("tables",),

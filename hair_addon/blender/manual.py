@@ -18,6 +18,7 @@ from .ui.operators import guide_tools, styles
 _CLASSES = {
     "guides": (properties.VellusGuideSettings,),
     "strands": (properties.VellusHairSettings, properties.VellusCurves),
+    "dynamics": (properties.VellusDynamicsSettings, properties.VellusCollider),
     "styles": style_items.CLASSES,
     "shading": (properties.VellusAppearance,),
     "lookup_tables": (properties.VellusMarschnerSettings,),
@@ -27,7 +28,7 @@ _CLASSES = {
 }
 
 _PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading", "show_guides": "systems"}
-_PROPERTIES |= {"table_folder": "lookup_tables"}
+_PROPERTIES |= {"table_folder": "lookup_tables", "simulates": "dynamics"}
 
 # Page → the operators that it explains, a heading each.
 _OPERATORS = {
@@ -41,6 +42,7 @@ _OPERATORS = {
         *("smooth_guides", "lift_guides", "attract_guides"),
     ),
     "strands": ("interpolate_hair",),
+    "dynamics": ("apply_dynamics_preset",),
     "styles": (
         *("add_style", "remove_style", "move_style", "duplicate_style", "use_points"),
         *("paint_style_mask", "mask_from_selection"),

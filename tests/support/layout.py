@@ -108,6 +108,8 @@ def draw(panel):
     if hasattr(panel, "poll") and not panel.poll(context):
         return None
     drawing = SimpleNamespace(layout=Layout(), settings=getattr(panel, "settings", ()))
+    if hasattr(panel, "draw_header"):
+        panel.draw_header(drawing, context)
     if hasattr(panel, "draw_header_preset"):
         panel.draw_header_preset(drawing, context)
     panel.draw(drawing, context)

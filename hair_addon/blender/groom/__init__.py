@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         bindings,
         brushes,
         diagnostics,
+        dynamics_notes,
         edited_surfaces,
         edits,
         foreign_curves,

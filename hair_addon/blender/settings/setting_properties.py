@@ -11,7 +11,7 @@ from ...core.errors import HairError
 from ...core.params import declared, from_surface, label_of
 from .translations import CONTEXT
 
-_SMALL_WORDS = {"in", "of", "per", "to"}  # stay lower case in titles
+_SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
 
 
 def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None):

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ...core.dynamics.settings import DynamicsSettings
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import declared
 from ...core.styling.base import ProfiledSettings, StyleSettings
@@ -32,6 +33,14 @@ _PROFILE = tuple(
     for name in setting_properties.names_of(ProfiledSettings)
     if name not in setting_properties.names_of(StyleSettings)
 )
+
+_MATERIAL = ("bend_stiffness", "twist_stiffness", "stretch_stiffness", "tip_stiffness", "damping", "weight", "wetness")
+_FIBRE = ("youngs_modulus", "shear_modulus", "fibre_radius", "density")
+_FORCES = ("gravity", "air_drag", "force_fields", "inertia")
+_SHAPE = ("hold", "hold_tip", "sag_free", "pinned")
+_COLLIDERS = ("collides_with_surface", "colliders")
+_CONTACT = ("keeps_hair_outside", "collision_distance", "friction")
+_VOLUME = ("hair_friction", "hair_pressure", "cell_size")
 
 
 def row(layout, owner, name):
@@ -164,6 +173,56 @@ def style_mask_rows(layout, item, surface):
         search_row(layout, owner, "mask", surface, "vertex_groups", results_are_suggestions=True)
     search_row(layout, owner, "mask_image", bpy.data, "images")
     row(layout, owner, "invert_mask")
+
+
+def material_rows(layout, owner):
+    """Stiffness, damping and weight; owner: has the properties of `DynamicsSettings`, as for the rows below."""
+    rows(layout, owner, DynamicsSettings, _MATERIAL)
+
+
+def fibre_rows(layout, owner):
+    """What a single fiber is."""
+    rows(layout, owner, DynamicsSettings, _FIBRE)
+
+
+def force_rows(layout, owner):
+    """Gravity, air and the motion of the surface."""
+    rows(layout, owner, DynamicsSettings, _FORCES)
+
+
+def hold_rows(layout, owner):
+    """The pull to the combed shape."""
+    hidden = () if owner.hold > 0.0 else ("hold_tip",)
+    rows(layout, owner, DynamicsSettings, [name for name in _SHAPE if name not in hidden])
+
+
+def collision_rows(layout, owner):
+    """Meshes that guides collide with, and how."""
+    row(layout, owner, "collides_with_surface")
+    search_row(layout, owner, "colliders", bpy.data, "collections")
+    if owner.collides_with_surface or owner.colliders:
+        rows(layout, owner, DynamicsSettings, _CONTACT)
+
+
+def volume_rows(layout, owner):
+    """Friction and pressure between strands."""
+    has_grid = owner.hair_friction > 0.0 or owner.hair_pressure > 0.0
+    rows(layout, owner, DynamicsSettings, [name for name in _VOLUME if name != "cell_size" or has_grid])
+
+
+def solver_rows(layout, owner):
+    """All other settings of the simulation."""
+    apart = (_MATERIAL, _FIBRE, _FORCES, _SHAPE, _COLLIDERS, _CONTACT, _VOLUME)
+    rows(layout, owner, DynamicsSettings, others(DynamicsSettings, *apart))
+
+
+def collider_rows(layout, owner):
+    """How hair collides with an object; owner: has the properties of `ColliderSettings`."""
+    for switch, name in (("overrides_friction", "friction"), ("overrides_distance", "collision_distance")):
+        row(layout, owner, switch)
+        if getattr(owner, switch):
+            row(layout, owner, name)
+    row(layout, owner, "is_double_sided")
 
 
 def all_guide_rows(layout, owner, surface):

@@ -15,8 +15,8 @@ class DynamicsSettings(Settings):
 
     bend_stiffness: float = param(
         8.0,
-        "Stiffness of bending, as a multiple of one fibre's; a guide stands for a wisp of hair, which is stiffer the"
-        " more its fibres stick together",
+        "Stiffness of bending, as a multiple of one fiber's; a guide stands for a wisp of hair, which is stiffer the"
+        " more its fibers stick together",
         low=1e-3,
         high=1e4,
         soft_high=1e3,
@@ -41,7 +41,7 @@ class DynamicsSettings(Settings):
         high=0.5,
         precision=4,
     )
-    weight: float = param(1.0, "Weight of the hair, as a multiple of its fibres'", low=0.1, high=10.0, soft_high=4.0)
+    weight: float = param(1.0, "Weight of the hair, as a multiple of its fibers'", low=0.1, high=10.0, soft_high=4.0)
     wetness: float = param(
         0.0,
         "Water in the hair: makes it heavier and softer, and lets it clump and feel less air",
@@ -50,18 +50,30 @@ class DynamicsSettings(Settings):
         subtype="FACTOR",
     )
     youngs_modulus: float = param(
-        4.0, "Young's modulus of a fibre in GPa", label="Young's modulus", above=0.0, high=1e3, soft_high=20.0
+        4.0,
+        "Young's modulus of a fiber in GPa; higher values make hair harder to bend and stretch",
+        label="Young's modulus",
+        above=0.0,
+        high=1e3,
+        soft_high=20.0,
     )
-    shear_modulus: float = param(0.9, "Shear modulus of a fibre in GPa", above=0.0, high=1e3, soft_high=20.0)
+    shear_modulus: float = param(
+        0.9,
+        "Shear modulus of a fiber in GPa; higher values make hair harder to twist",
+        above=0.0,
+        high=1e3,
+        soft_high=20.0,
+    )
     fibre_radius: float = param(
         4e-5,
-        "Radius of a fibre, in metres whatever the scene's units are",
+        "Radius of a fiber in meters, whatever the units of the scene; thicker fibers are stiffer for their weight",
+        label="Fiber radius",
         low=1e-6,
         high=1e-2,
         soft_high=1e-3,
         precision=6,
     )
-    density: float = param(1300.0, "Density of a fibre in kg/m³", low=1.0, high=1e5, soft_high=4e3, precision=1)
+    density: float = param(1300.0, "Density of a fiber in kg/m³", low=1.0, high=1e5, soft_high=4e3, precision=1)
     gravity: float = param(1.0, "Multiple of the scene's gravity", low=-100.0, high=100.0, soft_high=2.0)
     air_drag: float = param(1.0, "Multiple of the drag of the air", low=0.0, high=1e3, soft_high=10.0)
     force_fields: float = param(1.0, "Multiple of the scene's force fields", low=-1e3, high=1e3, soft_high=10.0)
@@ -76,18 +88,27 @@ class DynamicsSettings(Settings):
         0.0, "Strength of the pull back to the combed shape in 1/s²", low=0.0, high=1e4, soft_high=1e3, precision=1
     )
     hold_tip: float = param(
-        1.0, "Strength of that pull at the tip, as a part of that at the root", low=0.0, high=1.0, subtype="FACTOR"
+        1.0,
+        "Strength of the pull to the combed shape at the tip, as a part of that at the root",
+        label="Tip hold",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
     )
     sag_free: bool = param(
-        True, "Let the combed shape be at rest under gravity, so that it does not sag", label="Sag-free"
+        True, "Let the combed shape be at rest under gravity, so that it does not sag", label="Sag-Free"
     )
     pinned: float = param(
         0.0, "Part of each guide, from the root, that only follows the surface", low=0.0, high=1.0, subtype="FACTOR"
     )
-    collides_with_surface: bool = param(True, "Keep the hair outside the surface it grows on")
+    collides_with_surface: bool = param(
+        True, "Keep the hair outside the surface it grows on", label="Collide with surface"
+    )
     colliders: str = param("", "Collection of the meshes that the hair collides with")
     keeps_hair_outside: bool = param(
-        False, "Move the hair between guides out of colliders too, in renders and exports; not while playing"
+        False,
+        "Move the hair between guides out of colliders too, in renders and exports; not while playing",
+        label="Keep hair outside",
     )
     collision_distance: float = param(
         1e-3,
@@ -117,13 +138,17 @@ class DynamicsSettings(Settings):
         precision=4,
     )
     vertex_count: int = param(
-        25, "Number of points of a simulated guide; curls need about 12 a turn", label="Points", low=4, high=65
+        25,
+        "Number of points of a simulated guide; curls need about 12 a turn",
+        label="Points per guide",
+        low=4,
+        high=65,
     )
     automatic_substeps: bool = param(True, "Take more substeps in frames of fast motion")
     substeps: int = param(4, "Least number of steps that a frame is simulated in", low=1, high=64)
     teleport_distance: float = param(
         1.0,
-        "Distance in metres that a root may move in a frame; farther jumps take the hair along",
+        "Distance in meters that a root may move in a frame; farther jumps take the hair along as it is",
         above=0.0,
         high=1e6,
         soft_high=10.0,
@@ -138,5 +163,8 @@ class DynamicsSettings(Settings):
     )
     start_frame: int = param(1, "First frame, which shows the hair as combed", low=-(2**20), high=2**20)
     size: float = param(
-        1.0, "Metres that a unit of length stands for, of characters not modelled to scale", above=0.0, high=1e6
+        1.0,
+        "Real size as a multiple of the modeled size; decrease it for characters modeled larger than life",
+        above=0.0,
+        high=1e6,
     )

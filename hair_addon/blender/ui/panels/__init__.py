@@ -1,7 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Hair tab of the sidebar, in the order of the pipeline: layout only."""
 
-from . import guides, interpolation, output, progress, rendering, shading, styles, surface, systems, tables
+from . import (
+    collider,
+    dynamics,
+    guides,
+    interpolation,
+    output,
+    progress,
+    rendering,
+    shading,
+    styles,
+    surface,
+    systems,
+    tables,
+)
 
 LISTS = (*systems.LISTS, *styles.LISTS)
 
@@ -11,9 +24,11 @@ CLASSES = (
     *surface.CLASSES,
     *guides.CLASSES,
     *interpolation.CLASSES,
+    *dynamics.CLASSES,
     *styles.CLASSES,
     *shading.CLASSES,
     *tables.CLASSES,
     *output.CLASSES,
     *rendering.CLASSES,
+    *collider.CLASSES,
 )

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the settings of dynamics mean for guides of the present length.
+
+Panels ask with every redraw, so geometry is not read.
+"""
+
+import bpy
+from bpy.types import Curves, Scene
+
+from ...core.dynamics.stiffness_advice import bend_under_weight
+from ...core.errors import HairError
+from ..data.curves import is_hand_made
+from ..settings import properties
+from ..settings.translations import error_text, interface_text
+
+LONGEST = 1.5  # [m]: longer hair is probably of a character that is not modeled to scale
+TYPICAL_LENGTH = 0.1  # [m], of hand-made guides: the setting does not apply to them
+
+
+def bend_note(guides: Curves, blender_scene: Scene) -> str:
+    """How far guides bend under their weight, as a translated sentence; empty without gravity."""
+    try:
+        settings = properties.dynamics_of(guides.vellus)
+    except HairError as error:
+        return error_text(error)
+    gravity = blender_scene.gravity.length * abs(settings.gravity) if blender_scene.use_gravity else 0.0
+    length = TYPICAL_LENGTH if is_hand_made(guides) else _length(guides, blender_scene)
+    if gravity == 0.0:
+        return ""
+    return interface_text(
+        "A {length} guide of this material bends by {sink} under its weight.",
+        length=_in_words(length, blender_scene),
+        sink=_in_words(bend_under_weight(settings, length, gravity), blender_scene),
+    )
+
+
+def size_note(guides: Curves, blender_scene: Scene) -> str:
+    """What to do about guides that are too long to be hair, as a translated sentence; empty where they are not."""
+    length = _length(guides, blender_scene)
+    if is_hand_made(guides) or not length > LONGEST:
+        return ""
+    return interface_text(
+        "Guides of {length} move slowly: decrease Size if the character is modeled larger than life.",
+        length=_in_words(length, blender_scene),
+    )
+
+
+def _length(guides, blender_scene):
+    """Of guides as they are grown [m]."""
+    return guides.vellus.guides.length * blender_scene.unit_settings.scale_length * guides.vellus.dynamics.size
+
+
+def _in_words(metres, blender_scene):
+    """A length with two digits, in the units of the scene."""
+    system = blender_scene.unit_settings.system
+    return bpy.utils.units.to_string("METRIC" if system == "NONE" else system, "LENGTH", metres, precision=2)

@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A preset of dynamics → the active guides."""
+
+import bpy
+
+from ....core.dynamics.presets import PRESETS, applied
+from ...groom import groom_settings
+from ...groom.selection import guides_of
+from ...settings import properties
+from .base import HairOperator
+
+
+class VELLUS_OT_apply_dynamics_preset(HairOperator, bpy.types.Operator):
+    """Make the simulated guides move like another kind of hair"""
+
+    bl_idname = "vellus.apply_dynamics_preset"
+    bl_label = "Apply Dynamics Preset"
+    __annotations__ = {
+        "preset": properties.choice(
+            "Preset",
+            "Preset to apply",
+            {identifier: label for identifier, (label, _tooltip, _changes) in PRESETS.items()},
+            {identifier: tooltip for identifier, (_label, tooltip, _changes) in PRESETS.items()},
+        )
+    }
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
+        return guides_of(context.object) is not None
+
+    def change(self, context):
+        guides = guides_of(context.object)
+        wanted = applied(properties.dynamics_of(guides.vellus), self.preset)
+        groom_settings.assign_dynamics(guides, wanted)
+        return PRESETS[self.preset][0], {}

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Dynamics panel: the simulation of the guides."""
+
+import bpy
+
+from ...groom import dynamics_notes
+from ...groom.selection import guides_of
+from .. import setting_rows
+from .tab import HairTab, split, write
+
+
+class VELLUS_PT_dynamics(HairTab, bpy.types.Panel):
+    """Simulation of the guides while the animation plays"""
+
+    bl_label = "Dynamics"
+    bl_idname = "VELLUS_PT_dynamics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+    @classmethod
+    def poll(cls, context):
+        return guides_of(context.object) is not None
+
+    def draw_header(self, context):
+        self.layout.prop(guides_of(context.object).vellus, "simulates", text="")
+
+    def draw_header_preset(self, _context):
+        layout = self.layout
+        layout.emboss = "NONE"
+        layout.operator_menu_enum("vellus.apply_dynamics_preset", "preset", text="", icon="PRESET")
+
+    def draw(self, context):
+        layout = split(self.layout)
+        guides = guides_of(context.object)
+        layout.active = guides.vellus.simulates
+        note = dynamics_notes.size_note(guides, context.scene)
+        if note:
+            write(layout, context, note, "INFO")
+
+
+def _settings_column(layout, context):
+    """(column for rows of settings, their owner)."""
+    state = guides_of(context.object).vellus
+    column = split(layout).column()
+    column.active = state.simulates
+    return column, state.dynamics
+
+
+class _OfDynamics(HairTab):
+    bl_parent_id = "VELLUS_PT_dynamics"
+    bl_options = {"DEFAULT_CLOSED"}
+
+
+class VELLUS_PT_dynamics_material(_OfDynamics, bpy.types.Panel):
+    """Stiffness, damping and weight of the hair"""
+
+    bl_label = "Material"
+    bl_idname = "VELLUS_PT_dynamics_material"
+    bl_options = set()
+
+    def draw(self, context):
+        column, settings = _settings_column(self.layout, context)
+        setting_rows.material_rows(column, settings)
+        note = dynamics_notes.bend_note(guides_of(context.object), context.scene)
+        if note:
+            write(column, context, note, "INFO")
+
+
+class VELLUS_PT_dynamics_fiber(_OfDynamics, bpy.types.Panel):
+    """Material and thickness of a single fiber"""
+
+    bl_label = "Advanced"
+    bl_idname = "VELLUS_PT_dynamics_fiber"
+    bl_parent_id = "VELLUS_PT_dynamics_material"
+
+    def draw(self, context):
+        setting_rows.fibre_rows(*_settings_column(self.layout, context))
+
+
+class VELLUS_PT_dynamics_forces(_OfDynamics, bpy.types.Panel):
+    """Forces that move the guides"""
+
+    bl_label = "Forces"
+    bl_idname = "VELLUS_PT_dynamics_forces"
+
+    def draw(self, context):
+        setting_rows.force_rows(*_settings_column(self.layout, context))
+
+
+class VELLUS_PT_dynamics_shape(_OfDynamics, bpy.types.Panel):
+    """How closely the guides keep their combed shape"""
+
+    bl_label = "Shape"
+    bl_idname = "VELLUS_PT_dynamics_shape"
+
+    def draw(self, context):
+        setting_rows.hold_rows(*_settings_column(self.layout, context))
+
+
+class VELLUS_PT_dynamics_collision(_OfDynamics, bpy.types.Panel):
+    """Meshes that the guides collide with"""
+
+    bl_label = "Collision"
+    bl_idname = "VELLUS_PT_dynamics_collision"
+
+    def draw(self, context):
+        setting_rows.collision_rows(*_settings_column(self.layout, context))
+
+
+class VELLUS_PT_dynamics_hair(_OfDynamics, bpy.types.Panel):
+    """Forces between strands"""
+
+    bl_label = "Between Hairs"
+    bl_idname = "VELLUS_PT_dynamics_hair"
+
+    def draw(self, context):
+        setting_rows.volume_rows(*_settings_column(self.layout, context))
+
+
+class VELLUS_PT_dynamics_solver(_OfDynamics, bpy.types.Panel):
+    """Accuracy, time and units of the simulation"""
+
+    bl_label = "Solver"
+    bl_idname = "VELLUS_PT_dynamics_solver"
+
+    def draw(self, context):
+        setting_rows.solver_rows(*_settings_column(self.layout, context))
+
+
+CLASSES = (
+    VELLUS_PT_dynamics,
+    VELLUS_PT_dynamics_material,
+    VELLUS_PT_dynamics_fiber,
+    VELLUS_PT_dynamics_forces,
+    VELLUS_PT_dynamics_shape,
+    VELLUS_PT_dynamics_collision,
+    VELLUS_PT_dynamics_hair,
+    VELLUS_PT_dynamics_solver,
+)
