@@ -10,7 +10,7 @@ from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import animated
-from . import invalidation, live_hair, reported
+from . import invalidation, live_hair, reported, simulated_hair
 
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
 _is_opening = False
@@ -59,6 +59,7 @@ def after_depsgraph_update(_scene, depsgraph):
                 combed.append(datablock)
     bindings.is_reported()
     animated.follow(depsgraph)
+    simulated_hair.follow_settings(depsgraph)
     _evaluate(depsgraph, combed)
     if running.job() is None:
         live_hair.follow_masks(_painted(depsgraph), depsgraph)
@@ -165,6 +166,8 @@ def after_frame_change(scene, depsgraph):
         _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, [])
         if is_render:
             live_hair.write_all()
+    if scene_time.is_shown(depsgraph):
+        simulated_hair.follow_frame(scene, depsgraph)
 
 
 @persistent

@@ -11,7 +11,7 @@ from ..groom import bindings
 from ..host import notices
 from ..render import hair_cache, region_pictures, viewport
 from ..settings import animated
-from . import reported
+from . import reported, simulated_hair
 
 # Copies of Blender's data, and what was made of them. Undo and redo put other data in its place.
 COPIES = (
@@ -33,6 +33,7 @@ OTHERS = (
     hair_cache.shading_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,
+    simulated_hair.played_cache,
     shaders.complaint_cache,
     notices.said_cache,
 )

@@ -205,6 +205,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     followed: bpy.props.StringProperty(description="Fingerprint of the followed guides", options={"HIDDEN"})
     shading_status: bpy.props.StringProperty(description="Shading error", options={"HIDDEN"})
     uv_status: bpy.props.StringProperty(description="Problem with the surface's UV map", options={"HIDDEN"})
+    dynamics_status: bpy.props.StringProperty(description="Simulation error", options={"HIDDEN"})
     status: bpy.props.StringProperty(description="Update error", options={"HIDDEN"})
 
 

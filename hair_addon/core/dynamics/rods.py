@@ -16,10 +16,13 @@ from ..kernels.checks import require_count
 from . import rod_solver, rotations
 from .material import Material
 from .rod_solver import RodArrays, Step, Surroundings
+from .root_motion import RigidMotion
 from .settings import DynamicsSettings
 
 # What a substep reads and the groom, material and roots do not say.
 STATE = ("positions", "velocities", "frames", "spins", "multipliers", "slips", "roots", "resets")
+# Numbers of a vector or frame, or of a row of several, in what turns with a strand.
+_TURNED = {"positions": 3, "velocities": 3, "frames": 4, "spins": 3, "multipliers": 6, "roots": 7}
 MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom
 
 
@@ -170,6 +173,39 @@ class Rods:
         now = self._root_rows(positions, turns)
         last = self.read("roots")[:, rod_solver.ROOT_ROWS // 2 :]
         self._put("roots", np.concatenate([last, now], axis=1))
+
+    def carry(self, motion: RigidMotion, chosen: np.ndarray | None = None) -> None:
+        """Move strands as they are, (M,) indices or all for None: also where the next frame begins for their roots.
+
+        motion: of all, or of each of the chosen ones. Velocities turn with it, so nothing is felt of it.
+        """
+        rows = np.arange(self.strand_count) if chosen is None else chosen
+        turn = np.asarray(motion.rotation)[..., None, :]
+        state = {name: self.read(name).reshape(self.strand_count, -1, width) for name, width in _TURNED.items()}
+
+        def change(name, changed):
+            state[name][rows] = changed
+
+        center, way = np.asarray(motion.center)[..., None, :], np.asarray(motion.way)[..., None, :]
+        moved = replace(motion, rotation=turn, center=center, way=way)
+        change("positions", moved.moved(state["positions"][rows].astype(np.float64)))
+        change("frames", rotations.product(turn, state["frames"][rows].astype(np.float64)))
+        for name in ("velocities", "spins"):
+            change(name, rotations.rotated(turn, state[name][rows].astype(np.float64)))
+        multipliers = state["multipliers"][rows].astype(np.float64)  # of bending in the strand's frames
+        multipliers[..., 3:] = rotations.rotated(turn, multipliers[..., 3:])
+        change("multipliers", multipliers)
+        roots = state["roots"][rows].astype(np.float64)  # at the start and at the end of the last frame
+        roots[..., :3] = moved.moved(roots[..., :3])
+        roots[..., 3:] = rotations.product(turn, roots[..., 3:])
+        change("roots", roots)
+        for name, values in state.items():
+            self._put(name, values)
+
+    def shift(self, way: np.ndarray) -> None:
+        """Count coordinates from another origin, (3,) [m] from it to the one before."""
+        identity = RigidMotion(rotations.IDENTITY, np.zeros(3), np.asarray(way, np.float64))
+        self.carry(identity)
 
     def advance(
         self,

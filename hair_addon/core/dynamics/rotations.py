@@ -65,3 +65,22 @@ def frames_along(points: np.ndarray) -> np.ndarray:
         frame = unit(product(least_rotation(last, direction), frame))
         frames[:, j], last = frame, direction
     return frames
+
+
+def from_matrices(matrices: np.ndarray) -> np.ndarray:
+    """Rotation matrices (…, 3, 3) → (…, 4), the real part not negative."""
+    m = np.asarray(matrices, np.float64)
+    x, y, z = m[..., 0, 0], m[..., 1, 1], m[..., 2, 2]
+    # The outer product of the quaternion with itself, by four: its longest row is the best one [Bar-Itzhack00].
+    rows = np.empty((*m.shape[:-2], 4, 4))
+    rows[..., 0, 0], rows[..., 1, 1], rows[..., 2, 2] = 1 + x - y - z, 1 - x + y - z, 1 - x - y + z
+    rows[..., 3, 3] = 1 + x + y + z
+    rows[..., 0, 1] = rows[..., 1, 0] = m[..., 1, 0] + m[..., 0, 1]
+    rows[..., 0, 2] = rows[..., 2, 0] = m[..., 2, 0] + m[..., 0, 2]
+    rows[..., 1, 2] = rows[..., 2, 1] = m[..., 2, 1] + m[..., 1, 2]
+    rows[..., 0, 3] = rows[..., 3, 0] = m[..., 2, 1] - m[..., 1, 2]
+    rows[..., 1, 3] = rows[..., 3, 1] = m[..., 0, 2] - m[..., 2, 0]
+    rows[..., 2, 3] = rows[..., 3, 2] = m[..., 1, 0] - m[..., 0, 1]
+    best = np.argmax(np.diagonal(rows, axis1=-2, axis2=-1), axis=-1)
+    found = unit(np.take_along_axis(rows, best[..., None, None], axis=-2)[..., 0, :])
+    return np.where(found[..., 3:] < 0.0, -found, found)

@@ -1,0 +1,99 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The simulation of guides of a scene: begun with their groom, and brought from frame to frame.
+
+`begin` and `read` use Blender's data; `GuideSimulation.advance` does not, and may run in another thread.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from bpy.types import Curves, Depsgraph, Scene
+
+from ...core import dynamics
+from ...core.dynamics.settings import DynamicsSettings
+from ...core.errors import HairError
+from ..data import attributes, curves, guide_poses, simulated_world
+from ..data.guide_poses import GuidePose
+from ..settings import preferences, setting_properties
+from . import staleness
+
+
+@dataclass(frozen=True)
+class FrameInput:
+    """What guides follow in one frame, as read. errors: of colliders that were left out."""
+
+    pose: GuidePose
+    world: "dynamics.simulation.World"
+    seconds: float
+    errors: tuple[HairError, ...] = ()
+
+
+@dataclass
+class GuideSimulation:
+    """Guides that are simulated, and the frame they have come to.
+
+    digest, topology: of guides and surface; start: their pose in the first frame; combed: (G, 3) their roots.
+    """
+
+    digest: str
+    topology: str
+    settings: DynamicsSettings
+    start: GuidePose
+    roots: np.ndarray  # (G, 3) float32 at rest, local
+    simulation: "dynamics.simulation.Simulation"
+
+    def advance(self, frame: FrameInput) -> np.ndarray:
+        """Simulate the next frame: (G, P, 3) float32 points at rest, in local coordinates."""
+        self.simulation.advance(frame.pose.root_pose(self.start), frame.world, frame.seconds)
+        points = frame.pose.to_rest(self.simulation.points())
+        points[:, 0] = self.roots  # to the last bit, as what follows compares roots
+        return points
+
+    def change(self, settings: DynamicsSettings) -> None:
+        """Go on with other settings, from the next frame on."""
+        self.simulation.change(settings)
+        self.settings = settings
+
+    def is_of(self, guides: Curves, settings: DynamicsSettings) -> bool:
+        """Whether it simulates these guides as they are combed now, with as many vertices."""
+        return (
+            self.topology == guides.vellus.topology
+            and self.settings.vertex_count == settings.vertex_count
+            and self.digest == staleness.guides_digest(guides)
+        )
+
+
+def settings_of(guides: Curves) -> DynamicsSettings:
+    """The `DynamicsSettings` of guide Curves. Raises `HairError`."""
+    return setting_properties.to_settings(guides.vellus.dynamics, DynamicsSettings)
+
+
+def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:
+    """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
+    settings = settings_of(guides)
+    frame = read(guides, scene, depsgraph, settings)
+    pose = frame.pose
+    local = combed_points(guides)
+    simulation = dynamics.simulation.Simulation(
+        pose.groom(local), settings, pose.root_pose(pose), frame.world, preferences.device()
+    )
+    digest = staleness.guides_digest(guides)
+    return GuideSimulation(digest, guides.vellus.topology, settings, pose, local[:, 0].copy(), simulation)
+
+
+def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsSettings) -> FrameInput:
+    """What guides follow in the frame that a depsgraph was evaluated for. Raises `HairError`."""
+    pose = guide_poses.read(guides, depsgraph, simulated_world.metres_of(scene, settings))
+    world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface)
+    rate = scene.render.fps / scene.render.fps_base
+    return FrameInput(pose, world, settings.time_scale / rate, tuple(errors))
+
+
+def combed_points(guides: Curves) -> np.ndarray:
+    """(G, POINT_COUNT, 3) float32: guides as combed, local coordinates at rest."""
+    points, offsets = curves.read_points(guides), curves.curve_offsets(guides)
+    if len(offsets) < 2:
+        raise HairError('"{name}" has no guides to simulate.', name=guides.name)
+    if not np.isfinite(points).all():
+        raise HairError('"{name}" has non-finite coordinates: undo, or delete those guides.', name=guides.name)
+    return curves.even_points(points, offsets, lambda: attributes.are_smooth(guides))

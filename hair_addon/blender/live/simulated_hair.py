@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that are simulated while the timeline plays, and hair that follows them.
+
+The frame after the last one is simulated on the spot and kept in memory; a jump simulates nothing. Nothing here holds
+on to Blender's data: simulations are kept by the guides' session UID.
+"""
+
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ..data import simulated_guides
+from ..groom import guide_simulation
+from ..groom.guide_simulation import GuideSimulation
+from ..host import running, scene_time
+from ..host.caches import Cache
+from . import live_hair
+
+MOST_BYTES = 1 << 30  # of frames in memory
+
+
+@dataclass
+class _Played:
+    """Guides that were simulated in this session, and their frames."""
+
+    simulated: GuideSimulation
+    frame: int  # that it has come to
+    frames: dict[int, np.ndarray] = field(default_factory=dict)  # points of frames, local at rest
+    outdated: int | None = None  # the last frame that was simulated with other settings
+    notes: tuple[HairError, ...] = ()
+
+
+played_cache = Cache()  # session_uid of guide Curves → _Played
+
+
+def follow_frame(blender_scene, depsgraph):
+    """Bring all guides that simulate to the scene's frame, and their hair with them; for viewports."""
+    if running.job() is not None:
+        return
+    for guides in simulating():
+        try:
+            _follow(guides, blender_scene, depsgraph)
+            guides.vellus.dynamics_status = ""
+        except HairError as error:
+            played_cache.invalidate(guides.session_uid)
+            _show(guides, None, depsgraph)
+            guides.vellus.dynamics_status = str(error)
+
+
+def follow_settings(depsgraph):
+    """Show guides as they are combed that do not simulate any more, after an update or an undo."""
+    for guides in bpy.data.hair_curves:
+        if simulated_guides.is_shown(guides) and not _simulates(guides):
+            played_cache.invalidate(guides.session_uid)
+            _show(guides, None, depsgraph)
+
+
+def simulating():
+    """Guide Curves that are simulated."""
+    return [guides for guides in bpy.data.hair_curves if _simulates(guides)]
+
+
+def _simulates(guides):
+    state = guides.vellus
+    return state.kind == "GUIDES" and state.simulates and state.is_live
+
+
+def _follow(guides, blender_scene, depsgraph):
+    frame, settings = scene_time.frame_of(blender_scene), guide_simulation.settings_of(guides)
+    if frame <= settings.start_frame:
+        if frame == settings.start_frame:
+            _begin(guides, blender_scene, depsgraph)
+        _show(guides, None, depsgraph)
+        return
+    played = played_cache.get(guides.session_uid)
+    if played is not None and not played.simulated.is_of(guides, settings):
+        played_cache.invalidate(guides.session_uid)
+        played = None
+    if played is None:
+        _show(guides, None, depsgraph)
+        return
+    if frame == played.frame + 1:
+        _advance(played, guides, blender_scene, depsgraph, settings)
+    known = [number for number in played.frames if number <= frame]
+    _show(guides, played.frames[max(known)] if known else None, depsgraph)
+
+
+def _begin(guides, blender_scene, depsgraph):
+    simulated = guide_simulation.begin(guides, blender_scene, depsgraph)
+    played_cache.keep(guides.session_uid, _Played(simulated, scene_time.frame_of(blender_scene)))
+
+
+def _advance(played, guides, blender_scene, depsgraph, settings):
+    """Simulate one frame more, with the settings as they are now."""
+    if settings != played.simulated.settings:
+        played.simulated.change(settings)
+        played.outdated = played.frame
+    read = guide_simulation.read(guides, blender_scene, depsgraph, settings)
+    points = played.simulated.advance(read)
+    played.frame += 1
+    played.notes = read.errors
+    played.frames[played.frame] = points
+    while len(played.frames) > 1 and points.nbytes * len(played.frames) > MOST_BYTES:
+        del played.frames[next(iter(played.frames))]
+
+
+def _show(guides, points, depsgraph):
+    if points is None and not simulated_guides.is_shown(guides):
+        return
+    if points is not None and len(points) != len(guides.curves):
+        return
+    live_hair.show_guides(guides, points, depsgraph)
+
+
+def state_of(guides):
+    """(sentence, values) for the panel: what is simulated of some guides, and what is not."""
+    played = played_cache.get(guides.session_uid)
+    if played is None:
+        return "Play from the start frame to simulate", {}
+    if played.outdated is not None:
+        return "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
+    return "Simulated up to frame {frame}, {count} substeps", {
+        "frame": played.frame,
+        "count": played.simulated.simulation.substeps,
+    }

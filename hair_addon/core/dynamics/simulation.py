@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""`Simulation`: guides that move with their surface, frame by frame.
+
+Guides become strands of fewer points, `Rods`; what these leave of the guides' shape is added to where they go. All
+coordinates are in metres, in axes that do not turn with the surface. The solver's numbers are single, so it counts from
+an origin near the hair, which follows it in steps that they hold exactly.
+"""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..geometry.mesh import TriMesh
+from ..kernels.checks import require_count
+from . import detail, root_motion, rotations, sag_free
+from .colliders import Collider, Colliders
+from .contact import Contacts
+from .material import material_of
+from .rod_solver import FINISH, PREDICT, SOLVE, Surroundings
+from .rods import Rods, combed_shape, step_of
+from .root_motion import RigidMotion, RootPose
+from .settings import DynamicsSettings
+
+MOST_SUBSTEPS = 64
+_LONGEST_WAY = 0.01  # [m] that roots and colliders move in a substep, less where segments are shorter
+_GRID = 0.125  # [m] between the places of the origin
+_MOST_RESETS = 10  # frames running in which a strand breaks, after which it stays in its groom
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """A mesh that hair collides with: vertices (V, 3) float64 [m], triangles (F, 3) int32; the rest as `Collider`."""
+
+    name: str
+    vertices: np.ndarray
+    triangles: np.ndarray
+    friction: float = 0.3
+    distance: float = 1e-3
+    is_double_sided: bool = False
+
+    def moved(self, motion: RigidMotion) -> "Obstacle":
+        """The same after a motion."""
+        return replace(self, vertices=motion.moved(self.vertices))
+
+    def seen_from(self, origin: np.ndarray) -> Collider:
+        """The `Collider` in coordinates from an origin."""
+        mesh = TriMesh((self.vertices - origin).astype(np.float32), self.triangles)
+        return Collider(self.name, mesh, self.friction, self.distance, self.is_double_sided)
+
+
+@dataclass(frozen=True)
+class World:
+    """What acts on hair at the end of a frame: gravity [m/s²], and what it collides with."""
+
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    obstacles: tuple[Obstacle, ...] = ()
+
+
+class Simulation:
+    """Simulated guides, from the frame on in which they are as they were combed."""
+
+    def __init__(
+        self, groom: np.ndarray, settings: DynamicsSettings, pose: RootPose, world: World, device: wp.DeviceLike = None
+    ) -> None:
+        """groom: (G, P, 3) [m], combed guides before the surface turned them; pose: of their roots now.
+
+        Raises `HairError` where these are not finite, or of other guides.
+        """
+        self.settings, self.pose, self.world = settings, pose, world
+        self.substeps = 0  # of the last frame
+        self._device = wp.get_device(device)
+        self._start, self._origin = pose, np.round(pose.positions.mean(axis=0) / _GRID) * _GRID
+        self._scale = pose.scale
+        self._groom = self._checked(groom)
+        combed = self._combed()
+        vertices = detail.vertices_of(combed, settings.vertex_count)
+        self._material, rest = self._shapes(vertices)
+        self._rods = Rods(vertices, self._material, rest, self._device)
+        self._detail = detail.detail_of(combed, self._rods)
+        self._resets = np.zeros((2, len(groom)), int)  # in all, and frames running
+        self._colliders = Colliders(self._device)
+        self._read_obstacles(world.obstacles)
+        self._contacts = Contacts(self._rods.arrays.positions, self._colliders)
+
+    def _checked(self, groom):
+        groom = np.asarray(groom, np.float64)
+        if groom.ndim != 3 or not len(groom) or not np.isfinite(groom).all():
+            raise HairError("Guides to simulate need points with finite coordinates.")
+        require_count("roots", len(self._start.positions), len(groom))
+        return groom - groom[:, :1]
+
+    def _combed(self):
+        """(G, P, 3): the groom where the surface had it in the first frame, from the origin, at its present scale."""
+        return replace(self._start, scale=self._scale).carried(self._groom) - self._origin
+
+    def _shapes(self, vertices):
+        """(`Material`, `RestShape`) of vertices."""
+        material = material_of(self.settings, np.linalg.norm(np.diff(vertices, axis=1), axis=2))
+        if not self.settings.sag_free:
+            return material, combed_shape(vertices)
+        x, y, z = (self.settings.gravity * component for component in self.world.gravity)
+        return material, sag_free.sag_free(vertices, material, (x, y, z)).rest
+
+    def change(self, settings: DynamicsSettings, groom: np.ndarray | None = None) -> None:
+        """Go on with other settings, and with guides combed otherwise; the number of vertices stays.
+
+        Raises `HairError` where it does not.
+        """
+        if settings.vertex_count != self.settings.vertex_count:
+            raise HairError("Another number of points needs a new simulation: play from the start.")
+        self.settings = settings
+        if groom is not None:
+            require_count("guides", len(groom), len(self._groom))
+            self._groom = self._checked(groom)
+        self._renew()
+
+    def _renew(self):
+        """Give the strands the material and shape that follow from settings, groom and scale."""
+        combed = self._combed()
+        vertices = detail.vertices_of(combed, self.settings.vertex_count)
+        self._material, rest = self._shapes(vertices)
+        at_rest = Rods(vertices, self._material, rest, self._device)
+        self._detail = detail.detail_of(combed, at_rest)
+        self._rods.set_material(self._material, rest)
+        self._rods.set_groom(vertices, rest)
+
+    def advance(self, pose: RootPose, world: World, seconds: float) -> None:
+        """Simulate a frame that takes some seconds, at whose end roots have this pose and the world is this one.
+
+        Raises `HairError` for what cannot be simulated; then nothing has changed.
+        """
+        require_count("roots", len(pose.positions), len(self._groom))
+        if not math.isfinite(seconds) or seconds < 0.0:
+            raise HairError("Time does not go on: set the frame rate and the time scale.")
+        if seconds == 0.0:
+            return
+        before = self._carried_along(self.pose, pose)
+        self.pose, self.world = pose, world
+        if pose.scale != self._scale:
+            self._scale = pose.scale
+            self._renew()
+        self._rods.move_roots(*self._roots(pose))
+        self._read_obstacles(world.obstacles)
+        count = self._substep_count(before, pose)
+        step = step_of(self.settings, self._material, seconds, count, world.gravity)
+        if self._colliders.mesh is None:
+            self._rods.advance(step)
+        else:
+            for substep in range(count):
+                self._advance_in_contact(step, substep)
+        self.substeps = count
+        self._put_back_broken()
+
+    def _advance_in_contact(self, step, substep):
+        rods = self._rods
+        self._colliders.pose((substep + 1) / step.count)
+        rods.advance(step, substep, substep + 1, PREDICT)
+        places = rods.arrays.positions, rods.arrays.positions_before
+        planes = self._contacts.find(*places, step.size)
+        rods.advance(step, substep, substep + 1, SOLVE, Surroundings(planes=planes))
+        planes = self._contacts.find(*places, step.size, is_final=True)
+        rods.advance(step, substep, substep + 1, FINISH, Surroundings(planes=planes))
+
+    def _carried_along(self, before, after):
+        """Move all by what hair is not to feel of the surface's motion; the pose from which it feels the rest."""
+        origin = np.round(after.positions.mean(axis=0) / _GRID) * _GRID
+        shared = root_motion.rigid_motion(before, after).part(1.0 - self.settings.inertia)
+        is_shared = self.settings.inertia < 1.0
+        if is_shared:
+            before = before.moved(shared)
+            self._rods.carry(shared.seen_from(self._origin))
+        jumping = np.flatnonzero(root_motion.jumps(before, after, self.settings.teleport_distance))
+        if len(jumping):
+            self._rods.carry(root_motion.jump_of(before, after, jumping).seen_from(self._origin), jumping)
+            before = before.with_rows(jumping, after)
+        if (origin != self._origin).any():
+            self._rods.shift(self._origin - origin)
+        if is_shared or len(jumping) or (origin != self._origin).any():
+            self._origin = origin
+            obstacles = self.world.obstacles
+            self._read_obstacles([one.moved(shared) for one in obstacles] if is_shared else obstacles)
+            self._contacts.forget()
+        return before
+
+    def _read_obstacles(self, obstacles):
+        self._colliders.read([obstacle.seen_from(self._origin) for obstacle in obstacles])
+
+    def _roots(self, pose):
+        """(positions, turns since the first frame) for the rods."""
+        turns = rotations.product(pose.turns, rotations.inverse(self._start.turns))
+        return pose.positions - self._origin, turns
+
+    def _substep_count(self, before, after):
+        """How many substeps the next frame takes."""
+        if not self.settings.automatic_substeps:
+            return self.settings.substeps
+        way = np.linalg.norm(after.positions - before.positions, axis=1).max()
+        way = max(float(way), self._colliders.largest_motion)
+        longest = min(_LONGEST_WAY, float(self._material.lengths.mean()))
+        return min(max(math.ceil(way / longest), self.settings.substeps), MOST_SUBSTEPS)
+
+    def _put_back_broken(self):
+        """Count the strands that broke in this frame; one that did for long stays in its groom from now on."""
+        counts = self._rods.reset_counts()
+        self._resets[1] = np.where(counts > self._resets[0], self._resets[1] + 1, self._resets[1] * self._is_out)
+        self._resets[0] = counts
+
+    @property
+    def _is_out(self):
+        return self._resets[1] >= _MOST_RESETS
+
+    @property
+    def broken(self) -> np.ndarray:
+        """Indices of strands that broke in the last frame, and were put back to their groom."""
+        return np.flatnonzero(self._resets[1])
+
+    @property
+    def notes(self) -> list[HairError]:
+        """Colliders that were left out in the last frame, and why."""
+        return self._colliders.notes
+
+    def points(self) -> np.ndarray:
+        """(G, P, 3) float64 [m]: where guides are."""
+        points = detail.detailed_points(self._detail, self._rods).numpy() + self._origin
+        if self._is_out.any():
+            points[self._is_out] = self.pose.carried(self._groom)[self._is_out]
+        return points
+
+    def stretch(self) -> np.ndarray:
+        """(G, M) of the simulated segments: their lengths in those at rest, less one."""
+        return self._rods.stretch()
+
+    def save(self) -> dict[str, np.ndarray]:
+        """All that later frames follow from, beside what `__init__`, and `load` with it, are given: arrays by name."""
+        rods = {f"rods_{name}": array for name, array in self._rods.save().items()}
+        contacts = {f"contacts_{name}": array for name, array in self._contacts.state().items()}
+        return rods | contacts | {"origin": self._origin, "resets": self._resets}
+
+    def load(self, state: Mapping[str, np.ndarray], pose: RootPose, world: World) -> None:
+        """Go on from a state that `save` gave in a frame with this pose and world. Raises `HairError`."""
+        origin, resets = (np.asarray(state.get(name, ())) for name in ("origin", "resets"))
+        if origin.shape != (3,) or not np.isfinite(origin).all() or resets.shape != self._resets.shape:
+            raise HairError("The state of the simulation is of other guides.")
+        self._rods.load(_of_part(state, "rods_"))
+        self.pose, self.world = pose, world
+        self._origin, self._resets = origin.astype(np.float64), resets.astype(int)
+        if pose.scale != self._scale:
+            self._scale = pose.scale
+            self._renew()
+        self._read_obstacles(world.obstacles)
+        self._contacts.load(_of_part(state, "contacts_"))
+
+
+def _of_part(state, prefix):
+    return {name.removeprefix(prefix): array for name, array in state.items() if name.startswith(prefix)}
