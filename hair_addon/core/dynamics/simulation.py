@@ -230,6 +230,10 @@ class Simulation:
             points[self._is_out] = self.pose.carried(self._groom)[self._is_out]
         return points
 
+    def vertices(self) -> np.ndarray:
+        """(G, vertex_count, 3) float64 [m]: the simulated points of guides."""
+        return self._rods.positions() + self._origin
+
     def stretch(self) -> np.ndarray:
         """(G, M) of the simulated segments: their lengths in those at rest, less one."""
         return self._rods.stretch()

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rigid motion of roots: found, divided and undone."""
+
+import numpy as np
+import pytest
+
+from hair_addon.core.dynamics import root_motion, rotations
+from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
+from hair_addon.core.errors import HairError
+
+
+def random_pose(rng, count=20):
+    return RootPose(rng.normal(size=(count, 3)), rotations.unit(rng.normal(size=(count, 4))), 1.7)
+
+
+def random_motion(rng):
+    return RigidMotion(rotations.unit(rng.normal(size=4)), rng.normal(size=3), rng.normal(size=3))
+
+
+@pytest.mark.parametrize("count", [1, 2, 20])
+def test_a_rigid_motion_is_found(rng, count):
+    before, motion = random_pose(rng, count), random_motion(rng)
+    found = root_motion.rigid_motion(before, before.moved(motion))
+    np.testing.assert_allclose(found.moved(before.positions), motion.moved(before.positions), atol=1e-12)
+    assert abs(found.rotation @ motion.rotation) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_parts_of_a_motion_add_up(rng):
+    """A half, and a half about the place where that leads, is the whole."""
+    motion, points = random_motion(rng), rng.normal(size=(9, 3))
+    half = motion.part(0.5)
+    second = RigidMotion(half.rotation, half.moved(half.center), half.way)
+    np.testing.assert_allclose(second.moved(half.moved(points)), motion.moved(points), atol=1e-12)
+    np.testing.assert_allclose(motion.part(0.0).moved(points), points, atol=1e-15)
+    np.testing.assert_allclose(motion.part(1.0).moved(points), motion.moved(points), atol=1e-12)
+
+
+def test_strands_are_carried_and_carried_back(rng):
+    pose, points = random_pose(rng, 7), rng.normal(size=(7, 5, 3))
+    carried = pose.carried(points)
+    lengths = np.linalg.norm(np.diff(points, axis=1), axis=2)
+    np.testing.assert_allclose(np.linalg.norm(np.diff(carried, axis=1), axis=2), 1.7 * lengths, rtol=1e-12)
+    np.testing.assert_allclose(pose.carried_back(carried), points, atol=1e-12)
+
+
+def test_far_roots_and_turned_ones_jump():
+    turned = np.array([[0.0, 0.0, np.sin(a / 2), np.cos(a / 2)] for a in np.radians([0.0, 119.0, 121.0, 0.0])])
+    before = RootPose(np.zeros((4, 3)), np.tile(rotations.IDENTITY, (4, 1)))
+    after = RootPose(np.array([[0.99, 0, 0], [0, 0, 0], [0, 0, 0], [0, 1.01, 0.0]]), -turned)
+    assert root_motion.jumps(before, after, 1.0).tolist() == [False, False, True, True]
+
+
+@pytest.mark.parametrize("scale", [0.0, -1.0, np.nan])
+def test_a_surface_without_size_is_refused(scale):
+    with pytest.raises(HairError, match="no size"):
+        RootPose(np.zeros((1, 3)), rotations.IDENTITY[None], scale)
+
+
+@pytest.mark.parametrize("name", ["positions", "turns"])
+def test_coordinates_that_are_no_numbers_are_refused(name):
+    values = {"positions": np.zeros((2, 3)), "turns": np.tile(rotations.IDENTITY, (2, 1))}
+    values[name][1, 0] = np.nan
+    with pytest.raises(HairError, match="non-finite"):
+        RootPose(**values)

@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A simulation from frame to frame: what it begins with, what is not felt, what it keeps, and what it follows from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hair_addon.core.dynamics import rotations
+from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
+from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.simulation import Obstacle, Simulation, World
+from hair_addon.core.errors import HairError
+from tests.support.devices import DEVICE
+from tests.support.meshes import subdivided_sphere
+
+RADIUS, LENGTH, FRAME = 0.1, 0.12, 1.0 / 24.0
+BALL = subdivided_sphere(3, 0.99 * RADIUS)
+NONE = World(gravity=(0.0, 0.0, 0.0))
+
+
+def fur(rng, count=24, point_count=41):
+    """(groom, pose): wavy guides that stand on a ball."""
+    normals = rng.normal(size=(count, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    t = np.linspace(0.0, 1.0, point_count)
+    across = np.cross(normals, [0.3, 0.5, 0.8])
+    points = (RADIUS + LENGTH * t)[:, None] * normals[:, None] + 0.004 * np.sin(9.0 * t)[:, None] * across[:, None]
+    return points, RootPose(points[:, 0], np.tile(rotations.IDENTITY, (count, 1)))
+
+
+def ball(motion=None):
+    vertices = BALL.vertices.astype(np.float64)
+    return Obstacle("Ball", vertices if motion is None else motion.moved(vertices), BALL.triangles)
+
+
+def shake(frame, size=0.05):
+    """The motion of the ball at a frame: 3 Hz to the side, and a turn."""
+    angle = 0.2 * np.sin(frame)
+    rotation = np.array([0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)])
+    return RigidMotion(rotation, np.zeros(3), np.array([size * np.sin(2.0 * np.pi * 3.0 * frame * FRAME), 0.0, 0.0]))
+
+
+def play(simulation, pose, frames, gravity=(0.0, 0.0, -9.81), is_colliding=True):
+    for frame in frames:
+        motion = shake(frame)
+        world = World(gravity, (ball(motion),) if is_colliding else ())
+        simulation.advance(pose.moved(motion), world, FRAME)
+    return simulation.points()
+
+
+@pytest.mark.parametrize("sag_free", [False, True])
+def test_it_begins_with_the_groom(rng, sag_free):
+    groom, pose = fur(rng)
+    simulation = Simulation(groom, DynamicsSettings(sag_free=sag_free), pose, World(), DEVICE)
+    np.testing.assert_allclose(simulation.points(), groom, atol=1e-7)
+
+
+def test_a_sag_free_groom_stays_also_on_a_surface_that_is_turned(rng):
+    groom, pose = fur(rng)
+    turn = RigidMotion(rotations.unit(np.array([0.4, 0.2, -0.5, 0.7])), np.zeros(3), np.array([1.0, 2.0, 3.0]))
+    pose = pose.moved(turn)
+    simulation = Simulation(groom, DynamicsSettings(bend_stiffness=100.0), pose, World(), DEVICE)
+    for _ in range(12):
+        simulation.advance(pose, World(), FRAME)
+    np.testing.assert_allclose(simulation.points(), turn.moved(groom), atol=1e-5)
+
+
+def test_without_inertia_hair_moves_with_its_surface(rng):
+    groom, pose = fur(rng)
+    settings = DynamicsSettings(inertia=0.0, air_drag=0.0)
+    simulation = Simulation(groom, settings, pose, replace(NONE, obstacles=(ball(),)), DEVICE)
+    points = play(simulation, pose, range(1, 13), NONE.gravity)
+    np.testing.assert_allclose(points, shake(12).moved(groom), atol=1e-6)
+
+
+def test_a_jump_takes_hair_along_as_it_is(rng):
+    """Shape and speed are those before, seen from the surface, however far it went."""
+    groom, pose = fur(rng)
+    jump = RigidMotion(rotations.unit(np.array([0.0, 0.0, 0.9, 0.1])), np.zeros(3), np.array([30.0, -4.0, 7.0]))
+    staying, jumping = (Simulation(groom, DynamicsSettings(), pose, NONE, DEVICE) for _ in range(2))
+    before = [play(simulation, pose, range(1, 5), NONE.gravity, False) for simulation in (staying, jumping)]
+    assert np.array_equal(*before)
+    moved = pose.moved(shake(4))
+    staying.advance(moved, NONE, FRAME)
+    jumping.advance(moved.moved(jump), NONE, FRAME)
+    np.testing.assert_allclose(jumping.points(), jump.moved(staying.points()), atol=2e-5)
+
+
+def test_a_place_far_away_is_as_good(rng):
+    """A kilometre away single precision would be a tenth of a millimetre, were it not counted from near the hair."""
+    groom, pose = fur(rng)
+    ends = []
+    for far in (np.zeros(3), np.array([1000.0, -512.0, 250.125])):
+        simulation = Simulation(
+            groom + far, DynamicsSettings(), replace(pose, positions=pose.positions + far), World(), DEVICE
+        )
+        for frame in range(1, 9):
+            moved = replace(pose, positions=pose.positions + shake(frame).way + far)
+            simulation.advance(moved, World(), FRAME)
+        ends.append(simulation.points() - far)
+    np.testing.assert_allclose(*ends, atol=1e-5)
+
+
+def test_hair_stays_outside_a_shaken_ball(rng):
+    groom, pose = fur(rng, 60)
+    simulation = Simulation(groom, DynamicsSettings(substeps=8), pose, World(obstacles=(ball(),)), DEVICE)
+    least = []
+    for frame in range(1, 25):
+        play(simulation, pose, [frame])
+        vertices = simulation.vertices()[:, 1:] - shake(frame).way
+        least.append(np.linalg.norm(vertices, axis=2).min())
+    flat = np.linalg.norm(BALL.corners.mean(axis=1), axis=1).min()  # the ball's triangles lie inside its sphere
+    assert min(least) > flat
+    assert abs(simulation.stretch()).max() < 0.03 and not len(simulation.broken)
+
+
+def test_it_goes_on_from_a_state_bit_by_bit(rng):
+    groom, pose = fur(rng)
+
+    def made():
+        return Simulation(groom, DynamicsSettings(inertia=0.5), pose, World(obstacles=(ball(),)), DEVICE)
+
+    whole, first, second = made(), made(), made()
+    play(whole, pose, range(1, 13))
+    play(first, pose, range(1, 7))
+    second.load(first.save(), pose.moved(shake(6)), World(obstacles=(ball(shake(6)),)))
+    assert np.array_equal(play(second, pose, range(7, 13)), whole.points())
+
+
+def test_guides_grow_with_their_surface(rng):
+    groom, pose = fur(rng)
+    simulation = Simulation(groom, DynamicsSettings(), pose, World(), DEVICE)
+    for frame in range(1, 13):
+        scale = 1.0 + frame / 12.0
+        simulation.advance(replace(pose, positions=scale * pose.positions, scale=scale), World(), FRAME)
+    lengths = np.linalg.norm(np.diff(simulation.points(), axis=1), axis=2).sum(axis=1)
+    before = np.linalg.norm(np.diff(groom, axis=1), axis=2).sum(axis=1)
+    np.testing.assert_allclose(lengths, 2.0 * before, rtol=1e-3)
+
+
+def test_other_settings_take_effect_with_the_next_frame(rng):
+    groom, pose = fur(rng)
+    simulation = Simulation(groom, DynamicsSettings(sag_free=False), pose, World(), DEVICE)
+    for _ in range(6):
+        simulation.advance(pose, World(), FRAME)
+    before = simulation.points()
+    simulation.change(DynamicsSettings(sag_free=False, gravity=0.0, bend_stiffness=1000.0, damping=0.1))
+    assert np.array_equal(simulation.points(), before)
+    for _ in range(48):
+        simulation.advance(pose, World(), FRAME)
+    np.testing.assert_allclose(simulation.points(), groom, atol=1e-3)
+    with pytest.raises(HairError, match="Another number of points"):
+        simulation.change(DynamicsSettings(vertex_count=9))
+
+
+def test_guides_without_length_follow_rigidly(rng):
+    groom, pose = fur(rng)
+    groom[3] = groom[3, 0]
+    simulation = Simulation(groom, DynamicsSettings(), pose, World(), DEVICE)
+    points = play(simulation, pose, range(1, 9), is_colliding=False)
+    np.testing.assert_allclose(points[3], np.tile(shake(8).moved(groom[3, 0]), (41, 1)), atol=1e-6)
+
+
+@pytest.mark.parametrize("seconds", [np.nan, np.inf, -1.0])
+def test_time_that_does_not_go_on_changes_nothing(rng, seconds):
+    groom, pose = fur(rng)
+    simulation = Simulation(groom, DynamicsSettings(), pose, World(), DEVICE)
+    before = simulation.points()
+    with pytest.raises(HairError, match="Time"):
+        simulation.advance(pose.moved(shake(1)), World(), seconds)
+    assert np.array_equal(simulation.points(), before) and simulation.pose is pose
