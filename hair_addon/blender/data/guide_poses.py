@@ -47,6 +47,12 @@ class GuidePose:
         """Metres in a unit of local coordinates, the mean."""
         return float(abs(np.linalg.det(self.matrix[:, :3]))) ** (1.0 / 3.0)
 
+    @cached_property
+    def root_positions(self) -> np.ndarray:
+        """(G, 3) float64 [m]: the guides' roots in the world."""
+        vertices, barycentric = self.places
+        return np.einsum("nc,ncx->nx", barycentric.astype(np.float64), self.vertices[vertices])
+
     def groom(self, local: np.ndarray) -> np.ndarray:
         """Points (G, P, 3) of combed guides in local coordinates → (G, P, 3) float64 [m] before any rotation."""
         return local @ self._polar[1].T

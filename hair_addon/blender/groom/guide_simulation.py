@@ -4,6 +4,7 @@
 `begin` and `read` use Blender's data; `GuideSimulation.advance` does not, and may run in another thread.
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from ...core.dynamics.settings import DynamicsSettings
 from ...core.errors import HairError
 from ..data import attributes, curves, guide_poses, simulated_world
 from ..data.guide_poses import GuidePose
-from ..settings import preferences, setting_properties
+from ..settings import preferences, properties
 from . import staleness
 
 
@@ -54,6 +55,10 @@ class GuideSimulation:
         self.simulation.change(settings)
         self.settings = settings
 
+    def go_on(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
+        """Go on from a state that the simulation's `save` gave in the frame that was read. Raises `HairError`."""
+        self.simulation.load(state, frame.pose.root_pose(self.start), frame.world)
+
     def is_of(self, guides: Curves, settings: DynamicsSettings) -> bool:
         """Whether it simulates these guides as they are combed now, with as many vertices."""
         return (
@@ -63,20 +68,17 @@ class GuideSimulation:
         )
 
 
-def settings_of(guides: Curves) -> DynamicsSettings:
-    """The `DynamicsSettings` of guide Curves. Raises `HairError`."""
-    return setting_properties.to_settings(guides.vellus.dynamics, DynamicsSettings)
-
-
 def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:
     """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
-    settings = settings_of(guides)
+    settings = properties.dynamics_of(guides.vellus)
     frame = read(guides, scene, depsgraph, settings)
     pose = frame.pose
     local = combed_points(guides)
     simulation = dynamics.simulation.Simulation(
         pose.groom(local), settings, pose.root_pose(pose), frame.world, preferences.device()
     )
+    for _ in range(settings.preroll):
+        simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
     digest = staleness.guides_digest(guides)
     return GuideSimulation(digest, guides.vellus.topology, settings, pose, local[:, 0].copy(), simulation)
 

@@ -15,6 +15,11 @@ def frame_of(blender_scene):
     return blender_scene.frame_current
 
 
+def time_of(blender_scene):
+    """Return the current time of a scene in frames, between two of them while a render samples motion."""
+    return blender_scene.frame_current_final
+
+
 def present_frame():
     """Return the current frame of the active scene."""
     return frame_of(bpy.context.scene)

@@ -166,8 +166,10 @@ def after_frame_change(scene, depsgraph):
         _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, [])
         if is_render:
             live_hair.write_all()
-    if scene_time.is_shown(depsgraph):
+    if scene_time.may_write(scene, depsgraph):
         simulated_hair.follow_frame(scene, depsgraph)
+        if scene_time.is_rendered(depsgraph):
+            live_hair.write_all()
 
 
 @persistent

@@ -7,7 +7,7 @@ After an event nothing is drawn or computed from what was cached before it. Func
 
 from ..data import simulated_guides
 from ..gpu import lights, shaders, world_texture
-from ..groom import bindings
+from ..groom import bindings, frame_folders
 from ..host import notices
 from ..render import hair_cache, region_pictures, viewport
 from ..settings import animated
@@ -34,6 +34,7 @@ OTHERS = (
     region_pictures.picture_cache,
     viewport.display_table_cache,
     simulated_hair.played_cache,
+    frame_folders.folder_cache,
     shaders.complaint_cache,
     notices.said_cache,
 )

@@ -5,17 +5,19 @@ The frame after the last one is simulated on the spot and kept in memory; a jump
 on to Blender's data: simulations are kept by the guides' session UID.
 """
 
+import sys
 from dataclasses import dataclass, field
 
 import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ..data import simulated_guides
-from ..groom import guide_simulation
+from ..data import scene, simulated_guides
+from ..groom import frame_folders, guide_baking, guide_simulation
 from ..groom.guide_simulation import GuideSimulation
 from ..host import running, scene_time
 from ..host.caches import Cache
+from ..settings import properties
 from . import live_hair
 
 MOST_BYTES = 1 << 30  # of frames in memory
@@ -36,16 +38,25 @@ played_cache = Cache()  # session_uid of guide Curves → _Played
 
 
 def follow_frame(blender_scene, depsgraph):
-    """Bring all guides that simulate to the scene's frame, and their hair with them; for viewports."""
-    if running.job() is not None:
+    """Bring all guides that simulate to the scene's time, and their hair with them.
+
+    For a viewport the next frame is simulated where it is not baked; a render shows what is there already.
+    """
+    if running.job() is not None or guide_baking.is_baking():
         return
+    is_played = scene_time.is_shown(depsgraph) and live_hair.has_window()
+    time = scene_time.time_of(blender_scene)
+    shown_in = depsgraph if scene_time.is_shown(depsgraph) else scene.present_depsgraph()
     for guides in simulating():
         try:
-            _follow(guides, blender_scene, depsgraph)
+            points = _points_at(guides, time)
+            if points is None and is_played and time == int(time):
+                points = _play(guides, blender_scene, depsgraph)
+            _show(guides, points, shown_in)
             guides.vellus.dynamics_status = ""
         except HairError as error:
             played_cache.invalidate(guides.session_uid)
-            _show(guides, None, depsgraph)
+            _show(guides, None, shown_in)
             guides.vellus.dynamics_status = str(error)
 
 
@@ -67,24 +78,36 @@ def _simulates(guides):
     return state.kind == "GUIDES" and state.simulates and state.is_live
 
 
-def _follow(guides, blender_scene, depsgraph):
-    frame, settings = scene_time.frame_of(blender_scene), guide_simulation.settings_of(guides)
+def _points_at(guides, time):
+    """Points of guides at a time in frames where they are baked, or were simulated in this session; else None."""
+    baked = frame_folders.frames_of(guides)
+    if baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves):
+        points = baked.points_at(time)
+        for error in baked.take_complaints():
+            print(f"Vellus: {error}", file=sys.stderr)
+        if points is not None:
+            return points
+    played = played_cache.get(guides.session_uid)
+    return None if played is None else played.frames.get(time)
+
+
+def _play(guides, blender_scene, depsgraph):
+    """Points of guides in a frame that is not known: of the next one, or of the last that is; None as combed."""
+    frame, settings = scene_time.frame_of(blender_scene), properties.dynamics_of(guides.vellus)
     if frame <= settings.start_frame:
         if frame == settings.start_frame:
             _begin(guides, blender_scene, depsgraph)
-        _show(guides, None, depsgraph)
-        return
+        return None
     played = played_cache.get(guides.session_uid)
-    if played is not None and not played.simulated.is_of(guides, settings):
-        played_cache.invalidate(guides.session_uid)
-        played = None
     if played is None:
-        _show(guides, None, depsgraph)
-        return
+        return None
+    if not played.simulated.is_of(guides, settings):
+        played_cache.invalidate(guides.session_uid)
+        return None
     if frame == played.frame + 1:
         _advance(played, guides, blender_scene, depsgraph, settings)
     known = [number for number in played.frames if number <= frame]
-    _show(guides, played.frames[max(known)] if known else None, depsgraph)
+    return played.frames[max(known)] if known else None
 
 
 def _begin(guides, blender_scene, depsgraph):

@@ -194,6 +194,15 @@ class VellusCurves(bpy.types.PropertyGroup):
         update=mark_dynamics,
     )
     dynamics: bpy.props.PointerProperty(type=VellusDynamicsSettings)
+    cache_folder: bpy.props.StringProperty(
+        name="Cache Folder",
+        description="Folder that baked frames are written to, each hair system in a folder of its own",
+        translation_context=CONTEXT,
+        subtype="DIR_PATH",
+        options=_RELATIVE,
+        default="//haircache",
+    )
+    cache_identity: bpy.props.StringProperty(description="Folder of the baked frames", options={"HIDDEN"})
     is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_dynamics_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
