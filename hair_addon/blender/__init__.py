@@ -12,7 +12,7 @@ from .live import first_setup, handlers, invalidation
 from .render import engine, viewport
 from .settings import preferences, properties, translations
 from .ui import engine_panels, keymap, look_previews, menus, operators, panels
-from .ui.operators import guide_tools, styles
+from .ui.operators import dynamics, guide_tools, styles
 
 CLASSES = (
     preferences.VellusPreferences,
@@ -22,6 +22,7 @@ CLASSES = (
     *operators.CLASSES,
     *styles.CLASSES,
     *guide_tools.CLASSES,
+    *dynamics.CLASSES,
     *panels.LISTS,
     *panels.CLASSES,
     *menus.CLASSES,

@@ -12,7 +12,7 @@ import bpy
 from .groom import hair_systems
 from .settings import preferences, properties, style_items
 from .ui import operators
-from .ui.operators import guide_tools, styles
+from .ui.operators import dynamics, guide_tools, styles
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
 _CLASSES = {
@@ -88,7 +88,7 @@ def _properties():
 
 def _operators():
     """Of an operator's properties too, which Blender looks up by their operator."""
-    every = (*operators.CLASSES, *guide_tools.CLASSES, *styles.CLASSES)
+    every = (*operators.CLASSES, *guide_tools.CLASSES, *styles.CLASSES, *dynamics.CLASSES)
     labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in every}
     for page, names in _OPERATORS.items():
         for name in names:

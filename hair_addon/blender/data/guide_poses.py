@@ -10,8 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ...core.dynamics import rotations
-from ...core.dynamics.root_motion import RootPose
+from ...core import dynamics
 from ...core.errors import HairError
 from . import curves, posed_strands
 from .posed_strands import Pose
@@ -57,7 +56,7 @@ class GuidePose:
         """Points (G, P, 3) of combed guides in local coordinates → (G, P, 3) float64 [m] before any rotation."""
         return local @ self._polar[1].T
 
-    def root_pose(self, start: "GuidePose") -> RootPose:
+    def root_pose(self, start: "GuidePose") -> "dynamics.root_motion.RootPose":
         """The `RootPose` now of a groom that `start.groom` gives; roots have to be those of `start`."""
         vertices, barycentric = self.places
         roots = np.einsum("nc,ncx->nx", barycentric.astype(np.float64), self._rest[vertices])
@@ -66,7 +65,8 @@ class GuidePose:
         posed = self._carried(crosses.astype(np.float32)).astype(np.float64)
         axes = np.swapaxes(posed[:, 1:] - posed[:, :1], 1, 2) / size  # columns
         rotation = self._polar[0] @ _nearest_rotations(axes)
-        return RootPose(self._to_world(posed[:, 0]), rotations.from_matrices(rotation), self.scale / start.scale)
+        turns = dynamics.rotations.from_matrices(rotation)
+        return dynamics.root_motion.RootPose(self._to_world(posed[:, 0]), turns, self.scale / start.scale)
 
     def to_rest(self, points: np.ndarray) -> np.ndarray:
         """Points (G, P, 3) [m] in the world → (G, P, 3) float32, local coordinates at rest."""

@@ -4,8 +4,8 @@
 import bpy
 import numpy as np
 
+from ...core import dynamics
 from ...core.dynamics.collider_settings import ColliderSettings, contact_of
-from ...core.dynamics.simulation import Obstacle, World
 from ...core.errors import HairError
 from ..host.notices import name_of
 from ..settings import setting_properties
@@ -39,14 +39,14 @@ def read(blender_scene, depsgraph, settings, guide_pose, surface_object):
             errors.append(error)
             continue
         obstacles.append(_obstacle(collider, vertices, triangles, settings, metres))
-    return World(gravity, tuple(obstacles)), errors
+    return dynamics.simulation.World(gravity, tuple(obstacles)), errors
 
 
 def _obstacle(mesh_object, vertices, triangles, settings, metres):
     own = setting_properties.to_settings(mesh_object.vellus, ColliderSettings)
     friction, distance = contact_of(own, settings)
     name = f"{name_of(mesh_object)} {mesh_object.session_uid}"
-    return Obstacle(name, vertices, triangles, friction, metres * distance, own.is_double_sided)
+    return dynamics.simulation.Obstacle(name, vertices, triangles, friction, metres * distance, own.is_double_sided)
 
 
 def _colliders(collection_name):

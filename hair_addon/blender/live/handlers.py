@@ -20,7 +20,7 @@ _is_undone = False
 
 
 @persistent
-def after_depsgraph_update(_scene, depsgraph):
+def after_depsgraph_update(scene, depsgraph):
     """Invalidate changed GPU data, and regenerate Curves with changed settings or inputs."""
     if not scene_time.is_shown(depsgraph):
         return
@@ -59,7 +59,7 @@ def after_depsgraph_update(_scene, depsgraph):
                 combed.append(datablock)
     bindings.is_reported()
     animated.follow(depsgraph)
-    simulated_hair.follow_settings(depsgraph)
+    simulated_hair.follow_settings(scene, depsgraph)
     _evaluate(depsgraph, combed)
     if running.job() is None:
         live_hair.follow_masks(_painted(depsgraph), depsgraph)

@@ -34,6 +34,7 @@ OTHERS = (
     region_pictures.picture_cache,
     viewport.display_table_cache,
     simulated_hair.played_cache,
+    simulated_hair.state_cache,
     frame_folders.folder_cache,
     shaders.complaint_cache,
     notices.said_cache,

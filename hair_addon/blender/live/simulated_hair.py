@@ -35,6 +35,7 @@ class _Played:
 
 
 played_cache = Cache()  # session_uid of guide Curves → _Played
+state_cache = Cache()  # session_uid of guide Curves → (sentence, values) for the panel
 
 
 def follow_frame(blender_scene, depsgraph):
@@ -53,6 +54,7 @@ def follow_frame(blender_scene, depsgraph):
             if points is None and is_played and time == int(time):
                 points = _play(guides, blender_scene, depsgraph)
             _show(guides, points, shown_in)
+            note_state(guides, blender_scene)
             guides.vellus.dynamics_status = ""
         except HairError as error:
             played_cache.invalidate(guides.session_uid)
@@ -60,12 +62,24 @@ def follow_frame(blender_scene, depsgraph):
             guides.vellus.dynamics_status = str(error)
 
 
-def follow_settings(depsgraph):
-    """Show guides as they are combed that do not simulate any more, after an update or an undo."""
+def follow_settings(blender_scene, depsgraph):
+    """After an update: show guides as they are combed that do not simulate any more, and note changes of settings."""
     for guides in bpy.data.hair_curves:
+        state = guides.vellus
         if simulated_guides.is_shown(guides) and not _simulates(guides):
             played_cache.invalidate(guides.session_uid)
             _show(guides, None, depsgraph)
+        if state.is_dynamics_stale:
+            state.is_dynamics_stale = False
+            _note_change(guides, blender_scene)
+
+
+def _note_change(guides, blender_scene):
+    try:
+        note_state(guides, blender_scene)
+        guides.vellus.dynamics_status = ""
+    except HairError as error:
+        guides.vellus.dynamics_status = str(error)
 
 
 def simulating():
@@ -138,13 +152,32 @@ def _show(guides, points, depsgraph):
 
 
 def state_of(guides):
-    """(sentence, values) for the panel: what is simulated of some guides, and what is not."""
-    played = played_cache.get(guides.session_uid)
-    if played is None:
-        return "Play from the start frame to simulate", {}
-    if played.outdated is not None:
-        return "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
-    return "Simulated up to frame {frame}, {count} substeps", {
-        "frame": played.frame,
-        "count": played.simulated.simulation.substeps,
-    }
+    """(sentence, values) for the panel: what is baked or simulated of some guides, and what has changed since."""
+    return state_cache.get(guides.session_uid) or ("Not simulated yet: play from the start frame, or bake", {})
+
+
+def note_state(guides, blender_scene):
+    """Find out what `state_of` says, after a frame, a bake, or a change of settings."""
+    baked, played = frame_folders.frames_of(guides), played_cache.get(guides.session_uid)
+    if baked is not None and baked.manifest is not None:
+        state = _state_of_baked(baked.manifest, guides, blender_scene)
+    elif played is None:
+        state_cache.invalidate(guides.session_uid)
+        return
+    elif played.outdated is not None:
+        state = "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
+    else:
+        values = {"frame": played.frame, "count": played.simulated.simulation.substeps}
+        state = "Simulated up to frame {frame}, {count} substeps a frame", values
+    state_cache.keep(guides.session_uid, state)
+
+
+def _state_of_baked(manifest, guides, blender_scene):
+    values = {"first": manifest.first, "last": manifest.last}
+    if manifest.guide_count != len(guides.curves):
+        return "The baked frames are of other guides: bake again", {}
+    if manifest.keys[-1] != guide_baking.key_of(guides, blender_scene):
+        return "Frames {first} to {last} are baked with other settings or guides: bake again", values
+    if manifest.state != "complete":
+        return "Frames {first} to {last} are baked in part: Bake Dynamics goes on", values
+    return "Frames {first} to {last} are baked", values

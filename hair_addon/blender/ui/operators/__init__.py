@@ -2,7 +2,6 @@
 """One file per operator: read, compute, write."""
 
 from .add_hair import VELLUS_OT_add_hair
-from .apply_dynamics_preset import VELLUS_OT_apply_dynamics_preset
 from .apply_preset import VELLUS_OT_apply_preset
 from .apply_saved_look import VELLUS_OT_apply_saved_look
 from .apply_scale import VELLUS_OT_apply_scale
@@ -47,7 +46,6 @@ CLASSES = (
     VELLUS_OT_apply_scale,
     VELLUS_OT_restore_guides,
     VELLUS_OT_apply_preset,
-    VELLUS_OT_apply_dynamics_preset,
     VELLUS_OT_apply_saved_look,
     VELLUS_OT_save_look,
     VELLUS_OT_remove_look,

@@ -37,6 +37,10 @@ class LongOperator(HairOperator):
         """(sentence, values) of the report for the work's result."""
         raise NotImplementedError
 
+    def stopped(self):
+        """The report of work that was canceled."""
+        return report_text("Canceled: nothing was changed.")
+
     def prefill(self, context):
         """Read settings from the object to regenerate."""
 
@@ -99,7 +103,7 @@ class LongOperator(HairOperator):
         except StopIteration as end:
             return self._end(context, self._done(context, end.value))
         except Stopped:
-            self.report({"INFO"}, report_text("Canceled: nothing was changed."))
+            self.report({"INFO"}, self.stopped())
             return self._end(context, {"CANCELLED"})
         except HairError as error:
             return self._end(context, self.refuse(error))

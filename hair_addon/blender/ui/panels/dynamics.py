@@ -5,6 +5,8 @@ import bpy
 
 from ...groom import dynamics_notes
 from ...groom.selection import guides_of
+from ...live import simulated_hair
+from ...settings.translations import interface_text
 from .. import setting_rows
 from .tab import HairTab, split, write
 
@@ -32,6 +34,16 @@ class VELLUS_PT_dynamics(HairTab, bpy.types.Panel):
         layout = split(self.layout)
         guides = guides_of(context.object)
         layout.active = guides.vellus.simulates
+        sides = layout.row(align=True)
+        sides.operator("vellus.play_dynamics", icon="PLAY")
+        sides.operator("vellus.bake_dynamics", text="Bake", icon="REC")
+        sides.operator("vellus.free_dynamics", text="", icon="TRASH")
+        layout.prop(guides.vellus, "cache_folder")
+        if guides.vellus.simulates:
+            sentence, values = simulated_hair.state_of(guides)
+            write(layout, context, interface_text(sentence, **values))
+        if guides.vellus.dynamics_status:
+            write(layout, context, guides.vellus.dynamics_status, "ERROR")
         note = dynamics_notes.size_note(guides, context.scene)
         if note:
             write(layout, context, note, "INFO")

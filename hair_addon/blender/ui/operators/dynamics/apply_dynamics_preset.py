@@ -3,11 +3,11 @@
 
 import bpy
 
-from ....core.dynamics.presets import PRESETS, applied
-from ...groom import groom_settings
-from ...groom.selection import guides_of
-from ...settings import properties
-from .base import HairOperator
+from .....core.dynamics.presets import PRESETS, applied
+from ....groom import groom_settings
+from ....groom.selection import guides_of
+from ....settings import properties
+from ..base import HairOperator
 
 
 class VELLUS_OT_apply_dynamics_preset(HairOperator, bpy.types.Operator):

@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Simulated guides → frames in files."""
+
+import bpy
+
+from .....core.errors import HairError
+from .....core.grooming import cost
+from ....groom import guide_baking
+from ....groom.selection import guides_of
+from ....host import scene_time
+from ....settings import properties
+from ....settings.translations import report_text
+from ..modal import LongOperator
+
+
+class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
+    """Simulate the active guides up to the last frame of the scene and keep the frames in files, which renders read"""
+
+    bl_idname = "vellus.bake_dynamics"
+    bl_label = "Bake Dynamics"
+    __annotations__ = {
+        "starts_over": properties.switch(
+            "Start Over", "Simulate all frames again; when off, baking goes on after the frames that are there", False
+        )
+    }
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
+        return guides_of(context.object) is not None
+
+    def seconds(self, context):
+        guides, frames = guides_of(context.object), scene_time.scene_frames()
+        settings = properties.dynamics_of(guides.vellus)
+        return cost.simulation_seconds(settings.vertex_count, len(guides.curves), settings.substeps, len(frames))
+
+    def work(self, context):
+        guides = guides_of(context.object)
+        if not bpy.data.filepath and guides.vellus.cache_folder.startswith("//"):
+            raise HairError("Baked frames are kept beside the .blend file: save the file first.")
+        guides.vellus.simulates = True
+        last = scene_time.scene_frames()[-1]
+        (baked,) = yield from guide_baking.baking([guides], last, context.scene, self.starts_over)
+        return baked
+
+    def message(self, made):
+        if made.broken:
+            sentence = "Frames {first} to {last} baked; strands broke {count} times and were put back to their groom"
+            return sentence, {"first": made.first, "last": made.last, "count": made.broken}
+        return "Frames {first} to {last} baked", {"first": made.first, "last": made.last}
+
+    def stopped(self):
+        """What is reported after Esc."""
+        return report_text("Stopped: the frames up to now are kept. Bake Dynamics goes on after them.")

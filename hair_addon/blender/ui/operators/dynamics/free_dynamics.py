@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Remove baked frames."""
+
+import bpy
+
+from .....core.files import frame_cache
+from ....groom import frame_folders
+from ....groom.selection import guides_of
+from ..base import HairOperator
+
+
+class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
+    """Remove the baked frames of the active guides from the disk; this cannot be undone"""
+
+    bl_idname = "vellus.free_dynamics"
+    bl_label = "Free Baked Frames"
+    bl_options = {"REGISTER"}
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Select guides whose frames have been baked.")
+        guides = guides_of(context.object)
+        return guides is not None and guides.vellus.cache_identity != ""
+
+    def invoke(self, context, event):
+        """Ask first."""
+        return context.window_manager.invoke_confirm(self, event)
+
+    def change(self, context):
+        guides = guides_of(context.object)
+        count = frame_cache.remove(frame_folders.folder_of(guides))
+        frame_folders.forget(guides)
+        return "{count} files removed", {"count": count}
