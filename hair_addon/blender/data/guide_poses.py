@@ -73,6 +73,10 @@ class GuidePose:
         local = (points - self.matrix[:, 3]) @ np.linalg.inv(self.matrix[:, :3]).T
         return self._carried(local.astype(np.float32), is_back=True)
 
+    def to_world(self, points: np.ndarray) -> np.ndarray:
+        """The inverse of `to_rest`, float64 [m]."""
+        return self._to_world(self._carried(np.ascontiguousarray(points, np.float32)))
+
     @property
     def _rest(self):
         return self.pose.surface.rest.astype(np.float64)

@@ -1,0 +1,145 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that are simulated while the timeline plays in a window: what is kept, and what ends it."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import simulated_guides
+from hair_addon.blender.groom import guide_baking
+from hair_addon.blender.live import handlers, invalidation, live_hair, simulated_hair
+from hair_addon.core.long_work import run_now
+from tests.support.reading import points, write_points
+from tests.support.swung import simulate, swing
+
+
+@pytest.fixture
+def swung(hair, tmp_path, monkeypatch):
+    """(guides, hair) whose sphere swings, and that simulate, as in a window."""
+    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    guides = bpy.data.objects["Guides"]
+    swing(bpy.data.objects["Sphere"])
+    simulate(guides, tmp_path)
+    yield guides, hair
+    live_hair.cancel_writing()
+    invalidation.clear()
+
+
+def play(first, last):
+    for frame in range(first, last + 1):
+        bpy.context.scene.frame_set(frame)
+
+
+def shown(guides):
+    """Where simulated guides are shown, or as they are combed."""
+    found = simulated_guides.point_cache.get(guides.data.session_uid)
+    return points(guides) if found is None else found
+
+
+def drawn(hair):
+    live_hair.write_all()
+    return points(hair)
+
+
+def test_playing_is_what_baking_gives(swung):
+    guides, hair = swung
+    play(1, 8)
+    played, strands = shown(guides).copy(), drawn(hair)
+    run_now(guide_baking.baking([guides.data], 9, bpy.context.scene))
+    bpy.context.scene.frame_set(1)
+    bpy.context.scene.frame_set(8)
+    assert np.array_equal(shown(guides), played)
+    assert np.array_equal(drawn(hair), strands)
+
+
+def test_a_jump_simulates_nothing(swung, monkeypatch):
+    guides, _hair = swung
+    play(1, 6)
+    sixth = shown(guides).copy()
+    monkeypatch.setattr(simulated_hair, "_advance", lambda *_: pytest.fail("simulated"))
+    bpy.context.scene.frame_set(40)  # unknown: the last known one before
+    assert np.array_equal(shown(guides), sixth)
+    bpy.context.scene.frame_set(4)
+    assert not np.array_equal(shown(guides), sixth)
+    bpy.context.scene.frame_set(6)
+    assert np.array_equal(shown(guides), sixth)
+
+
+def test_the_start_frame_begins_again(swung):
+    guides, hair = swung
+    before = drawn(hair)
+    play(1, 6)
+    first = shown(guides).copy()
+    bpy.context.scene.frame_set(1)
+    assert np.array_equal(shown(guides), points(guides))
+    assert np.array_equal(drawn(hair), before)
+    play(2, 6)
+    assert np.array_equal(shown(guides), first)
+
+
+def test_a_setting_takes_effect_with_the_next_frame(swung):
+    guides, _hair = swung
+    play(1, 6)
+    sixth = shown(guides).copy()
+    guides.data.vellus.dynamics.gravity = -5.0
+    bpy.context.view_layer.update()
+    assert np.array_equal(shown(guides), sixth)
+    play(7, 9)
+    assert simulated_hair.state_of(guides.data)[1]["frame"] == 6
+    bpy.context.scene.frame_set(1)
+    guides.data.vellus.dynamics.gravity = 1.0
+    other = shown(guides).copy()
+    play(2, 9)
+    assert not np.array_equal(shown(guides), other)
+
+
+def test_switched_off_guides_are_as_combed(swung):
+    guides, hair = swung
+    before = drawn(hair)
+    play(1, 6)
+    guides.data.vellus.simulates = False
+    bpy.context.view_layer.update()
+    assert np.array_equal(shown(guides), points(guides))
+    assert np.array_equal(drawn(hair), before)
+
+
+def test_combed_while_playing(swung):
+    """Other guides end what is played: it begins again in the start frame."""
+    guides, _hair = swung
+    play(1, 6)
+    combed = points(guides)
+    combed[:, 1:] += 0.01
+    write_points(guides, combed)
+    bpy.context.scene.frame_set(7)
+    assert np.array_equal(shown(guides), combed)
+    play(1, 3)
+    assert not np.array_equal(shown(guides), combed)
+
+
+def test_deleted_or_undone_guides_end_what_is_played(swung):
+    guides, hair = swung
+    play(1, 6)
+    handlers.after_undo()
+    bpy.context.scene.frame_set(7)
+    assert guides.data.vellus.dynamics_status == ""
+    bpy.data.objects.remove(guides)
+    bpy.data.hair_curves.remove(bpy.data.hair_curves["Guides"])
+    play(8, 10)
+    assert len(points(hair)) == 500
+
+
+def test_a_surface_without_faces_is_said(swung):
+    guides, hair = swung
+    play(1, 3)
+    bpy.data.objects["Sphere"].data.clear_geometry()
+    bpy.context.scene.frame_set(4)
+    assert guides.data.vellus.dynamics_status != ""
+    assert np.isfinite(drawn(hair)).all()
+
+
+def test_without_a_window_nothing_is_simulated(swung, monkeypatch):
+    """Farms and scripts read baked frames alone."""
+    guides, _hair = swung
+    monkeypatch.setattr(live_hair, "has_window", lambda: False)
+    play(1, 6)
+    assert np.array_equal(shown(guides), points(guides))
