@@ -7,23 +7,29 @@ import bpy
 from bpy.types import Curves
 
 from ...core.errors import HairError
-from ...core.files import frame_cache
+from ...core.files import frame_cache, frame_manifest
 from ...core.files.frame_cache import FrameCache
 from ..host import paths
 from ..host.caches import Cache
+from ..host.notices import name_of
 
 folder_cache = Cache()  # session_uid of guide Curves → (folder, FrameCache): what was read of it
 
 
 def folder_of(guides: Curves) -> Path:
-    """The folder of the frames of some guides. Raises `HairError` where they have none, or it leads nowhere."""
-    return frame_cache.folder_of(paths.resolve(guides.vellus.cache_folder), guides.vellus.cache_identity)
+    """The folder of the frames of some guides, whether it exists or not. Raises `HairError` if it leads nowhere."""
+    identity = guides.vellus.cache_identity or _identity_of_name(guides)
+    return frame_cache.folder_of(paths.resolve(guides.vellus.cache_folder), identity)
+
+
+def _identity_of_name(guides):
+    """The same in every session of a file that was not saved since guides were baked, as by the command line."""
+    return frame_manifest.digest(name_of(guides))[:16]
 
 
 def frames_of(guides: Curves) -> FrameCache | None:
-    """The baked frames of some guides; None where none were ever baked, or their folder leads nowhere."""
-    state = guides.vellus
-    if not state.cache_identity or (state.cache_folder.startswith("//") and not bpy.data.filepath):
+    """The baked frames of some guides, of which there may be none; None where their folder leads nowhere."""
+    if guides.vellus.cache_folder.startswith("//") and not bpy.data.filepath:
         return None
     try:
         folder = folder_of(guides)
@@ -38,12 +44,18 @@ def frames_of(guides: Curves) -> FrameCache | None:
 def new_folder(guides: Curves) -> Path:
     """The folder to bake some guides to: theirs, or a new one where they have none or share it with other guides."""
     state = guides.vellus
-    others = {other.vellus.cache_identity for other in bpy.data.hair_curves if other != guides}
-    if not state.cache_identity or state.cache_identity in others:
-        state.cache_identity = frame_cache.new_identity()
+    others = {other.vellus.cache_identity for other in bpy.data.hair_curves if other != guides} - {""}
+    identity = state.cache_identity or _identity_of_name(guides)
+    state.cache_identity = frame_cache.new_identity() if identity in others else identity
     return folder_of(guides)
 
 
 def forget(guides: Curves) -> None:
     """Read the folder again when it is next asked for: frames were written or removed."""
     folder_cache.invalidate(guides.session_uid)
+
+
+def has_frames(guides: Curves) -> bool:
+    """Whether frames of some guides are known: panels ask with every redraw, so no file is read."""
+    kept = folder_cache.get(guides.session_uid)
+    return kept is not None and kept[1].manifest is not None

@@ -5,8 +5,9 @@ Baking goes on where it was stopped, from the last state that was written, and c
 """
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from bpy.types import Curves, Scene
@@ -20,6 +21,7 @@ from ...core.params import given
 from ..data import scene as scenes
 from ..host import scene_time
 from ..host.datablocks import Remembered
+from ..host.notices import name_of
 from ..settings import properties
 from . import frame_folders, guide_simulation
 from .guide_simulation import FrameInput, GuideSimulation
@@ -46,10 +48,22 @@ class Baked:
     broken: int
 
 
+@dataclass(frozen=True)
+class BakedFrame:
+    """A frame that was simulated and written: of which guides, in how many substeps, how many strands broke."""
+
+    guides: str
+    frame: int
+    substeps: int
+    broken: int
+    folder: Path
+
+
 @dataclass
 class _Task:
     """Guides that are being baked."""
 
+    name: str
     guides: Remembered
     simulated: GuideSimulation
     writer: Writer
@@ -72,10 +86,17 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
     )
 
 
-def baking(guides_list: Sequence[Curves], last: int, scene: Scene, starts_over: bool = False) -> Work[list[Baked]]:
+def baking(
+    guides_list: Sequence[Curves],
+    last: int,
+    scene: Scene,
+    starts_over: bool = False,
+    tell: Callable[[BakedFrame], None] = lambda _frame: None,
+) -> Work[list[Baked]]:
     """Bake guides up to a frame, as work in steps: a computation a frame.
 
-    The scene is at the frame where it was, on every way out. starts_over: simulate frames again that are there.
+    The scene is at the frame where it was, on every way out. starts_over: simulate frames again that are there; tell:
+    called for each frame of each guides when it is written. Raises `HairError`.
     """
     global _baking
     present = scene_time.frame_of(scene)
@@ -96,9 +117,15 @@ def baking(guides_list: Sequence[Curves], last: int, scene: Scene, starts_over: 
             for index, task in due:
                 task.done = frame
                 counts[index] += 1
+                tell(_baked_frame(task, frame))
         for task in tasks:
             task.writer.complete()
     return [Baked(task.simulated.settings.start_frame, last, *pair) for task, pair in _results(tasks, counts)]
+
+
+def _baked_frame(task, frame):
+    simulation = task.simulated.simulation
+    return BakedFrame(task.name, frame, simulation.substeps, len(simulation.broken), task.writer.folder)
 
 
 def _results(tasks, counts):
@@ -126,14 +153,15 @@ def _begin(guides, last, scene, starts_over, stack):
     rate = scene.render.fps / scene.render.fps_base
     layout = array_file.layout_of(simulated.simulation.save())
     combed = guide_simulation.combed_points(guides)
-    manifest = Manifest((key_of(guides, scene),), *combed.shape[:2], start, last, rate, "baking", layout)
+    guide_count, point_count = combed.shape[:2]
+    keys = (key_of(guides, scene),)
+    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout)
     writer = stack.enter_context(frame_cache.baking(folder, manifest))
-    task = _Task(Remembered(guides), simulated, writer, start)
+    task = _Task(name_of(guides), Remembered(guides), simulated, writer, start)
     there = FrameCache(folder)
     if not _is_there(there, start, manifest.key):
-        writer.write_frame(
-            start, combed, _digest(guide_simulation.read(guides, scene, scenes.present_depsgraph(), settings))
-        )
+        read = guide_simulation.read(guides, scene, scenes.present_depsgraph(), settings)
+        writer.write_frame(start, combed, _digest(read))
         return task
     _go_on(task, there, guides, scene, manifest)
     return task

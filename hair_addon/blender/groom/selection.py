@@ -36,6 +36,14 @@ def guides_of(active: Object | None) -> Curves | None:
     return _newest(curves_on(active, "GUIDES"))
 
 
+def guides_named(name: str) -> Curves | None:
+    """The guide Curves of a name, or of the object of that name; None if there are none."""
+    found = bpy.data.hair_curves.get(name)
+    if found is not None and found.vellus.kind == "GUIDES":
+        return found
+    return active_of_kind(bpy.data.objects.get(name), "GUIDES")
+
+
 def hair_of(active: Object | None) -> Curves | None:
     """The active hair, the newest that follows the active guides, or the newest on the active mesh; None if none."""
     if active is None:

@@ -25,6 +25,11 @@ def present_frame():
     return frame_of(bpy.context.scene)
 
 
+def present_scene():
+    """Return the active scene."""
+    return bpy.context.scene
+
+
 def scene_frames():
     """Return the frame range of the active scene."""
     return range(bpy.context.scene.frame_start, bpy.context.scene.frame_end + 1)

@@ -20,7 +20,7 @@ class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
     def poll(cls, context):
         cls.poll_message_set("Select guides whose frames have been baked.")
         guides = guides_of(context.object)
-        return guides is not None and guides.vellus.cache_identity != ""
+        return guides is not None and frame_folders.has_frames(guides)
 
     def invoke(self, context, event):
         """Ask first."""

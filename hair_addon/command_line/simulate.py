@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""simulate: guides of a .blend → baked frames, which render then reads; repeating the command goes on."""
+
+import time
+
+from ..core import lazy
+from ..core.errors import HairError
+from ..core.long_work import run_now
+from . import opening, options
+
+blender = lazy.Package("..blender", __package__)
+
+
+def add(verbs):
+    """Add the command's options."""
+    parser = verbs.add_parser(
+        "simulate",
+        help="simulate the guides of a .blend file",
+        description="Simulate the guides of a .blend file and bake the frames into its cache folder, where render "
+        "finds them. Running the same command again goes on where it stopped.",
+    )
+    parser.add_argument("input", help=".blend file")
+    parser.add_argument(
+        "--last-frame", type=int, metavar="N", help="simulate from the guides' start frame to N [the scene's last]"
+    )
+    parser.add_argument(
+        "--guides", action="append", metavar="NAME", help="guides to simulate; may be repeated [all that simulate]"
+    )
+    parser.add_argument("--overwrite", action="store_true", help="simulate existing frames again")
+    options.add_scripts(parser)
+    options.add_common(parser)
+    parser.set_defaults(run=run)
+
+
+def run(given, console):
+    """Open the file and bake its guides."""
+    blender.io.mesh_files.require_blend(given.input)
+    opening.open_file(given, console)
+    last = blender.host.scene_time.scene_frames()[-1] if given.last_frame is None else given.last_frame
+    guides = [_named(name) for name in given.guides] if given.guides else blender.live.simulated_hair.simulating()
+    if not guides:
+        raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")
+    started = time.perf_counter()
+
+    def tell(baked):
+        nonlocal started
+        seconds, started = time.perf_counter() - started, time.perf_counter()
+        values = {"verb": "simulate", "input": str(given.input), "guides": baked.guides, "frame": baked.frame}
+        values |= {"seconds": round(seconds, 3), "substeps": baked.substeps, "broken": baked.broken}
+        values |= {"out": str(baked.folder)}
+        console.result(values, f"{baked.guides}: frame {baked.frame} in {seconds:.2f} s")
+
+    scene = blender.host.scene_time.present_scene()
+    run_now(blender.groom.guide_baking.baking(guides, last, scene, given.overwrite, tell), console.progress)
+
+
+def _named(name):
+    """The guide Curves of some name, or of an object of that name. Raises `HairError`."""
+    found = blender.groom.selection.guides_named(name)
+    if found is None:
+        raise HairError(f'There are no guides "{name}" in the file.')
+    return found
