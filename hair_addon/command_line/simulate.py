@@ -37,7 +37,7 @@ def run(given, console):
     blender.io.mesh_files.require_blend(given.input)
     opening.open_file(given, console)
     last = blender.host.scene_time.scene_frames()[-1] if given.last_frame is None else given.last_frame
-    guides = [_named(name) for name in given.guides] if given.guides else blender.live.simulated_hair.simulating()
+    guides = [_named(name) for name in given.guides] if given.guides else blender.groom.frame_folders.simulating()
     if not guides:
         raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")
     started = time.perf_counter()

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the baked frames of guides are: a folder of theirs in the cache folder that they name."""
 
+from collections.abc import Iterable
 from pathlib import Path
 
 import bpy
@@ -48,6 +49,32 @@ def new_folder(guides: Curves) -> Path:
     identity = state.cache_identity or _identity_of_name(guides)
     state.cache_identity = frame_cache.new_identity() if identity in others else identity
     return folder_of(guides)
+
+
+def require_baked(numbers: Iterable[int]) -> None:
+    """Raise `HairError` unless all guides that simulate have baked frames of these numbers, from their start frame on.
+
+    Renders of sequences ask: they never simulate.
+    """
+    for guides in simulating():
+        start = guides.vellus.dynamics.start_frame
+        baked = frames_of(guides)
+        there = set() if baked is None else set(baked.frame_numbers())
+        missing = [number for number in numbers if number > start and number not in there]
+        if missing:
+            sentence = 'Frame {frame} of the guides "{name}" is not baked: bake their dynamics first.'
+            raise HairError(sentence, frame=missing[0], name=name_of(guides))
+
+
+def simulating() -> list[Curves]:
+    """Guide Curves that are simulated."""
+    return [guides for guides in bpy.data.hair_curves if is_simulated(guides)]
+
+
+def is_simulated(guides: Curves) -> bool:
+    """Whether guide Curves are simulated."""
+    state = guides.vellus
+    return state.kind == "GUIDES" and state.simulates and state.is_live
 
 
 def forget(guides: Curves) -> None:

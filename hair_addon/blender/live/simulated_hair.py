@@ -48,7 +48,7 @@ def follow_frame(blender_scene, depsgraph):
     is_played = scene_time.is_shown(depsgraph) and live_hair.has_window()
     time = scene_time.time_of(blender_scene)
     shown_in = depsgraph if scene_time.is_shown(depsgraph) else scene.present_depsgraph()
-    for guides in simulating():
+    for guides in frame_folders.simulating():
         try:
             points = _points_at(guides, time)
             if points is None and is_played and time == int(time):
@@ -66,7 +66,7 @@ def follow_settings(blender_scene, depsgraph):
     """After an update: show guides as they are combed that do not simulate any more, and note changes of settings."""
     for guides in bpy.data.hair_curves:
         state = guides.vellus
-        if simulated_guides.is_shown(guides) and not _simulates(guides):
+        if simulated_guides.is_shown(guides) and not frame_folders.is_simulated(guides):
             played_cache.invalidate(guides.session_uid)
             _show(guides, None, depsgraph)
         if state.is_dynamics_stale:
@@ -80,16 +80,6 @@ def _note_change(guides, blender_scene):
         guides.vellus.dynamics_status = ""
     except HairError as error:
         guides.vellus.dynamics_status = str(error)
-
-
-def simulating():
-    """Guide Curves that are simulated."""
-    return [guides for guides in bpy.data.hair_curves if _simulates(guides)]
-
-
-def _simulates(guides):
-    state = guides.vellus
-    return state.kind == "GUIDES" and state.simulates and state.is_live
 
 
 def _points_at(guides, time):

@@ -12,6 +12,7 @@ from ...core.imaging import pixel_sampling
 from ...core.long_work import Stopped, no_progress
 from ..data import scene
 from ..gpu import drawing, world_texture
+from ..groom import frame_folders
 from ..host import scene_time
 from ..settings import setting_properties
 from ..settings.translations import error_text, interface_text
@@ -78,6 +79,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
     def _render(self, depsgraph):
         blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
         _require_supported(blender_scene, self.camera_override)
+        if self.is_animation:
+            frame_folders.require_baked([scene_time.frame_of(blender_scene)])
         size, window = scene.picture_size(blender_scene.render)
         offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)
         sample_count = view_layer.samples or blender_scene.vellus.sample_count
