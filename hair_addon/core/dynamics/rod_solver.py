@@ -43,6 +43,7 @@ _CONSTANTS = {
     "DRAG_ALONG": 0.5,  # drag along a slender body, in that across it
     "AWAY": 1e-3,  # mobility that contact leaves along the normal: none at all would make the matrix singular
     "CREEP": 1e-4,  # [m/s] of what friction holds
+    "ROD_SHARE": 1.0,
     "CHANGE": 0.05,  # of friction, that asks for another pass
     "LEAST_INERTIA": 1e-5,  # of a frame, in h² / the compliance of its joint
 }

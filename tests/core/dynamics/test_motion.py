@@ -87,7 +87,7 @@ def free_rod(substeps, seconds):
         groom, FREE, substeps, (0.0, 0.0, 0.0), bend_compliances=bending, stretch_compliances=stretching
     )
     simulation.step = replace(simulation.step, most_stretch=1e9)
-    thrown = np.cross([3.0, 5.0, -2.0], groom - groom.mean(axis=1, keepdims=True)) + [0.1, -0.2, 0.3]
+    thrown = np.cross([3.0, 5.0, -2.0], groom - groom.mean(axis=1, keepdims=True)) + np.array([0.1, -0.2, 0.3])
     simulation.place(groom, thrown)
     masses = simulation.material.masses[0, 1:]
     before = momenta(simulation, masses)
