@@ -125,6 +125,7 @@ class Surroundings:
     accelerations: wp.array | None = None
 
 
+EMPTY = Surroundings()
 _SURROUNDING_ROWS = {"planes": PLANE_ROWS, "airs": 3, "drags": 1, "accelerations": 3}
 
 
@@ -323,7 +324,7 @@ def advance(
     first: int = 0,
     end: int | None = None,
     stages: int = WHOLE,
-    surroundings: Surroundings = Surroundings(),
+    surroundings: Surroundings = EMPTY,
     block_dim: int = BLOCK,
 ) -> None:
     """Advance strands by substeps first … end - 1 of a frame's `step.count`; end: all that are left for None.
@@ -333,6 +334,8 @@ def advance(
     launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
     """
     end = step.count if end is None else end
+    if step.pinned == arrays.lengths.shape[1]:  # nothing is free
+        stages &= ~SOLVE
     device = arrays.positions.device
     _check(arrays, step, scratch, surroundings)
     if first < 0 or end > step.count:
@@ -358,7 +361,7 @@ def _check(arrays, step, scratch, surroundings):
     device = arrays.positions.device
     if not 1 <= segment_count <= MOST_SEGMENTS:
         raise HairError(f"Simulated strands need 2 to {MOST_SEGMENTS + 1} points, not {segment_count + 1}.")
-    if not 0 <= step.pinned < segment_count:
+    if not 0 <= step.pinned <= segment_count:
         raise HairError(f"Of strands of {segment_count} segments, {step.pinned} cannot be pinned.")
     if not (step.size > 0.0 and step.count >= 1):
         raise HairError(f"A substep of {step.size:g} s cannot be simulated.")
