@@ -18,7 +18,7 @@ from ..errors import HairError
 from ..kernels import kernel_cache, native_code, parallel
 from ..kernels.checks import require_count
 
-LANES = 8  # strands that a thread of the processor solves at once
+LANES = 16  # strands that a thread of the processor solves at once: 8 take a quarter longer, also in vectors of 8
 GPU_LANES = 32  # strands whose numbers lie together in the memory of a GPU: those of a warp
 MOST_SEGMENTS = 64
 LEAST_GROUPS = 8  # fewer are not worth a thread
