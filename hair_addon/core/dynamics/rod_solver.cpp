@@ -52,7 +52,7 @@ constexpr int LOWER = 0, UPPER = 21, RIGHT = 48, GRADIENT = 54, TURNING = 63, KE
 constexpr int CONTACT = 7;  // n, a, predicted point
 
 #if defined(__CUDA_ARCH__)
-constexpr int STRIDE = GROUP, KEPT_STRIDE = GROUP;
+constexpr int STRIDE = GROUP;
 const int group = block / GROUP, lane = block % GROUP;
 const auto get = [](const float* rows, int row) { return rows[size_t(row) * STRIDE]; };
 const auto put = [](float* rows, int row, lanes value) { rows[size_t(row) * STRIDE] = value; };
