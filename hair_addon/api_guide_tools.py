@@ -25,6 +25,7 @@ TOOLS = {
     "SMOOTH": guide_tool_settings.SmoothSettings,
     "LIFT": guide_tool_settings.LiftSettings,
     "ATTRACT": guide_tool_settings.AttractSettings,
+    "DRAPE": guide_tool_settings.DrapeSettings,
 }
 
 
@@ -33,7 +34,7 @@ def change_guides(
 ) -> int:
     """Change guide Curves and keep their combing; returns how many have changed, were mirrored, or are there now.
 
-    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT" or "ATTRACT"; settings: of the tool, from
+    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT" or "DRAPE"; settings: of the tool, from
     core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of the
     view layer.
 
@@ -58,5 +59,6 @@ def change_guides(
         "SMOOTH": tools.smooth,
         "LIFT": tools.lift,
         "ATTRACT": tools.attract,
+        "DRAPE": tools.drape,
     }
     return functions[tool](target, wanted, depsgraph)

@@ -39,10 +39,10 @@ _OPERATORS = {
     "guides": ("distribute_guides",),
     "guide_tools": (
         *("guide_length", "trim_guides", "change_guide_count", "mirror_guides", "copy_guide_shape"),
-        *("smooth_guides", "lift_guides", "attract_guides"),
+        *("smooth_guides", "lift_guides", "attract_guides", "drape_guides"),
     ),
     "strands": ("interpolate_hair",),
-    "dynamics": ("apply_dynamics_preset",),
+    "dynamics": ("play_dynamics", "bake_dynamics", "free_dynamics", "apply_dynamics_preset"),
     "styles": (
         *("add_style", "remove_style", "move_style", "duplicate_style", "use_points"),
         *("paint_style_mask", "mask_from_selection"),

@@ -16,6 +16,7 @@ SHAPING = {
     "smooth_guides": {"strength": 0.9, "iterations": 30},
     "lift_guides": {"amount": 0.8},
     "attract_guides": {"amount": 0.8, "clearance": 0.02},
+    "drape_guides": {"stiffness": 0.1, "seconds": 0.5},
     "copy_guide_shape": {"source": "top"},
 }
 TOOLS = SHAPING | {"change_guide_count": {"factor": 1.5}, "mirror_guides": {}}

@@ -13,22 +13,25 @@ from itertools import pairwise
 import numpy as np
 from bpy.types import Curves, Depsgraph
 
-from ...core import geometry, grooming
+from ...core import dynamics, geometry, grooming
 from ...core.errors import HairError
 from ...core.geometry import mesh as mesh_math
-from ...core.geometry.mesh import SurfacePoints
+from ...core.geometry.mesh import SurfacePoints, TriMesh
 from ...core.grooming.guide_tool_settings import (
     AttractSettings,
     CopySettings,
+    DrapeSettings,
     LengthSettings,
     LiftSettings,
     SmoothSettings,
     ToolSettings,
     TrimSettings,
 )
-from ..data import attributes, curves, cutters, guide_curves, posed_strands, scene
+from ..data import attributes, curves, cutters, guide_curves, posed_strands, scene, simulated_world
 from ..data.scene import Surface
+from ..settings import preferences, properties
 
+LEAST_STIFFNESS = 1e-3  # of dynamics' settings
 _FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still floats
 
 
@@ -74,6 +77,15 @@ class CombedGuides:
         return geometry.resampling.resample(
             self.points, self.starts, point_count, attributes.are_smooth(self.datablock)
         )
+
+    def carried_back(self, posed: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Points (M, P, 3) float32 [m] of chosen guides on the deformed surface → the same on the surface at rest."""
+        pose = posed_strands.pose_of(self.surface)
+        if pose.motion is None:
+            return posed
+        places = tuple(part[chosen] for part in self.surface.places(self.roots))
+        local = self.surface.to_local(posed)
+        return self.surface.from_local(posed_strands.carried(local, pose.motion, places, is_back=True))
 
     def posed(self) -> np.ndarray:
         """(N, 3) float32 [m]: the points on the surface as shape keys and modifiers deform it now."""
@@ -188,6 +200,29 @@ def lift(datablock: Curves, settings: LiftSettings, depsgraph: Depsgraph) -> int
     return reshape(
         guides, lambda points, chosen: lifted(points, guides.normals[chosen], settings, guides.weights[chosen])
     )
+
+
+def drape(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> int:
+    """Let guides fall on their surface as it is deformed now, until they are at rest; returns and raises as above."""
+    guides = read(datablock, settings, depsgraph)
+    dynamics_settings = properties.dynamics_of(datablock.vellus)
+    stiffness = max(settings.stiffness * dynamics_settings.bend_stiffness, LEAST_STIFFNESS)
+    dynamics_settings = replace(dynamics_settings, bend_stiffness=stiffness)
+    blender_scene = depsgraph.scene
+    gravity = tuple(blender_scene.gravity) if blender_scene.use_gravity else simulated_world.NO_GRAVITY
+    metres = simulated_world.metres_of(blender_scene, dynamics_settings)
+    posed, surface = guides.posed(), guides.surface
+    mesh = TriMesh(surface.posed_mesh.vertices * np.float32(metres), surface.posed_mesh.triangles)
+
+    def shaped(points, chosen):
+        there = metres * posed[guides.of_count(points.shape[1], chosen)].astype(np.float64)
+        settled = dynamics.draping.draped(
+            there, mesh, dynamics_settings, gravity, settings.seconds, preferences.device()
+        )
+        at_rest = guides.carried_back(np.float32(settled / metres), chosen)
+        return grooming.guide_segments.blended(points, at_rest, guides.weights[chosen])
+
+    return reshape(guides, shaped)
 
 
 def attract(datablock: Curves, settings: AttractSettings, depsgraph: Depsgraph) -> int:

@@ -15,6 +15,7 @@ _GUIDE_TOOLS = (
         ("smooth_guides", "MOD_SMOOTH"),
         ("lift_guides", "SORT_DESC"),
         ("attract_guides", "SNAP_ON"),
+        ("drape_guides", "FORCE_FORCE"),
     ),
     (
         ("change_guide_count", "PARTICLES"),

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..errors import HairError
 from .settings import DynamicsSettings
 
 AIR_DENSITY = 1.2  # [kg/m³]
@@ -46,8 +47,13 @@ class Material:
 
 
 def material_of(settings: DynamicsSettings, lengths: np.ndarray) -> Material:
-    """The `Material` of strands with lengths (S, M) [m] of segments, root to tip."""
+    """The `Material` of strands with lengths (S, M) [m] of segments in the groom, root to tip.
+
+    Raises `HairError` for segments without length.
+    """
     lengths = np.asarray(lengths, np.float64)
+    if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
+        raise HairError("Simulated strands have segments without length.")
     wet = settings.wetness
     radius = settings.fibre_radius
     section = math.pi * radius**2

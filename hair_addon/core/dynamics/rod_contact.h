@@ -27,18 +27,22 @@ const auto touch_at = [&](int i, bool is_first, float carried) {
   pull = pull * (get(mobility, i) * carried);
   const auto across = [&](const vector& v) { return v - n * dot(n, v); };
   const auto size_of = [&](const vector& v) { return exact_sqrt_of(dot(v, v)); };
+  const lanes friction = get(plane, 7);
   const lanes gap = dot(n, predicted) - get(plane, 3);
   const lanes push = -(gap + dot(n, pull));
   const vector moved_before = get_vector(x_before, i) + slide;
   const vector free_slide = across(predicted - moved_before);
   lanes sliding = size_of(across(get_vector(x, i) - moved_before));
   if (is_first) {
-    const lanes last = get(slip, i);
-    sliding = last < 0.0f ? size_of(free_slide) : last * exact_sqrt_of(lanes(carried));
+    const lanes last = get(slip, i), driven = size_of(across(predicted + pull - moved_before)) - friction * push;
+    const lanes as_last = last < 0.0f ? size_of(free_slide) : last * exact_sqrt_of(lanes(carried));
+    const lanes own = dot(free_slide, free_slide), of_rod = dot(pull, pull);
+    const lanes share = own / (own + ROD_SHARE * of_rod + 1.0e-30f);
+    sliding = as_last + (higher_of(driven, lanes(0.0f)) - as_last) * share;
     pull = vector{lanes(0.0f), lanes(0.0f), lanes(0.0f)};
   }
   const auto is_pressed = (dot(n, n) > 0.5f) & (push > 0.0f);
-  const lanes loose = 1.0f / (1.0f + get(plane, 7) * higher_of(push, lanes(0.0f)) / higher_of(sliding, lanes(CREEP * h)));
+  const lanes loose = 1.0f / (1.0f + friction * higher_of(push, lanes(0.0f)) / higher_of(sliding, lanes(CREEP * h)));
   const lanes a = is_pressed ? loose : lanes(1.0f);
   const vector pressed = predicted - n * gap - free_slide * (1.0f - a) + across(pull) * a + n * (AWAY * dot(n, pull));
   return touch{chosen(is_pressed, n, vector{lanes(0.0f), lanes(0.0f), lanes(0.0f)}),

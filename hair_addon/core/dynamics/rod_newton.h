@@ -2,10 +2,15 @@
 //
 // One Newton step on all constraints of the lanes that are `stepping`; returns the largest |Δθ|² of each lane.
 //
-// (J W Jᵀ + α̃) Δλ = -(C + α̃ λ) is block tridiagonal, with blocks of six a segment: its joint's bend and twist, then its
-// stretch and shear. A Cholesky decomposition runs from root to tip, the back substitution to the root [Deul18]. D and U
-// are made of the same rounded G, d and [d]×: with the identities that hold for exact ones in some of the blocks, the
-// matrix loses its definiteness in single precision.
+// With s_j half of the rest rotation from frame j - 1 to frame j, and e_j = s_j⁻¹ (q_(j-1)⁻¹ q_j) s_j⁻¹:
+//
+//     stretch, shear  C_s = (x_(j+1) - x_j) / l_j - d_j        α_s = 1 / (EA l_j)
+//     bend, twist     C_b = 2 Im e_j                           α_b = b_j diag(1 / EI, 1 / EI, 1 / GJ)
+//
+// Half of the rotation on either side makes the strain of second order. (J W Jᵀ + α̃) Δλ = -(C + α̃ λ) is block
+// tridiagonal, with six rows a segment: C_b of its joint, then C_s. A Cholesky decomposition runs from root to tip, the
+// back substitution to the root [Deul18]. D and U are made of the same rounded G, d and [d]×: with the identities that
+// hold for exact ones in some of the blocks, single precision may lose the matrix's definiteness.
 //
 // is_first: λ starts at zero; the one that is stored is that of the last substep, times `carried`.
 

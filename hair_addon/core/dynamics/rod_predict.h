@@ -29,7 +29,8 @@ for (int i = 0; i <= segment_count; ++i) {
   lanes added = h * rate;
   vector step = velocity * lanes(h);
   if (hold > 0.0f) {
-    const float strength = hold * (1.0f + (hold_tip - 1.0f) * static_cast<float>(i) / static_cast<float>(segment_count));
+    const float along_part = static_cast<float>(i) / static_cast<float>(segment_count);
+    const float strength = hold * (1.0f + (hold_tip - 1.0f) * along_part);
       const lanes critical = 2.0f * h * exact_sqrt_of(lanes(strength));
     const vector shape = get_vector(groom, i);
     const vector goal = root + rotated(root_frame, shape), goal_before = root_before + rotated(frame_before, shape);

@@ -17,7 +17,7 @@ const auto unit = [&](const quaternion& a) {
 const auto chosen_rotation = [&](auto condition, const quaternion& a, const quaternion& b) {
   return quaternion{condition ? a.x : b.x, condition ? a.y : b.y, condition ? a.z : b.z, condition ? a.w : b.w};
 };
-// a turned by the Cayley map of a rotation vector: the angle is 2 atan(½ |turn|). No trigonometry, and an exact inverse.
+// a turned by the Cayley map of a rotation vector, by the angle 2 atan(½ |turn|): its inverse is exact, on all devices.
 const auto turned_by = [&](const vector& turn, const quaternion& a) {
   return unit(times(quaternion{0.5f * turn.x, 0.5f * turn.y, 0.5f * turn.z, lanes(1.0f)}, a));
 };

@@ -2,9 +2,9 @@
 //
 // Substeps of LANES strands at once: on a processor the lanes of its vectors, on a GPU one strand a thread.
 //
-// The body of `_advance` in rod_solver.py. An array (groups, rows, STRIDE) has a row for each number of a strand, and in
-// it one number of each of STRIDE strands. For M segments, M + 1 points; point 0 and the frame before segment 0 are
-// given by the surface:
+// The body of `_advance` in rod_solver.py. An array (groups, rows, STRIDE) has a row for each number of a strand, with
+// that number of STRIDE strands. There are M segments, M + 1 points; the surface gives point 0 and the frame before
+// segment 0.
 //
 //   int block                              a group of strands on a processor, a strand on a GPU
 //   int stages                             which parts of a substep: PREDICT, SOLVE, FINISH
@@ -30,13 +30,13 @@
 //   array_t<float> grooms, groom_frames    3 (M + 1), 4 M rows: the groom in the root's frame
 //   array_t<float> slow_drags              1 row: the rate of drag of slow air [1/s]
 //   array_t<float> roots                   14 rows: position, frame at the frame's start; position, frame at its end
-//   array_t<float> positions_before, frames_before, mobilities    3 (M + 1), 4 M, M + 1 rows: of a substep between stages
+//   array_t<float> positions_before, frames_before, mobilities    3 (M + 1), 4 M, M + 1 rows: between stages
 //   array_t<float> planes                  8 (M + 1) rows: n, offset, displacement, friction of each point; or empty
 //   array_t<float> airs, drags, accelerations    3, 1, 3 rows a point: [m/s], factor, [m/s²]; each may be empty
 //   array_t<float> scratches               of a GPU: KEPT M + CONTACT (M + 1) rows
 //   array_t<float> reset_counts            1 row
 //
-// Constants: WIDTH, GROUP, MOST segments; DRAG_ALONG, AWAY, CREEP, CHANGE, LEAST_INERTIA, TURN, STEPS, PASSES.
+// Constants: WIDTH, GROUP, MOST segments, and those that rod_solver.py explains.
 
 {
 #if !defined(__CUDA_ARCH__)
@@ -52,7 +52,7 @@ constexpr int LOWER = 0, UPPER = 21, RIGHT = 48, GRADIENT = 54, TURNING = 63, KE
 constexpr int CONTACT = 7;  // n, a, predicted point
 
 #if defined(__CUDA_ARCH__)
-constexpr int STRIDE = GROUP, KEPT_STRIDE = GROUP;
+constexpr int STRIDE = GROUP;
 const int group = block / GROUP, lane = block % GROUP;
 const auto get = [](const float* rows, int row) { return rows[size_t(row) * STRIDE]; };
 const auto put = [](float* rows, int row, lanes value) { rows[size_t(row) * STRIDE] = value; };
@@ -126,7 +126,8 @@ const auto contact = [&](int i) { return contacts + size_t(CONTACT * i) * STRIDE
 const float inverse_square = 1.0f / (h * h), damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
 for (int substep = first; substep < end; ++substep) {
   // The root: positions linear, rotations nlerp, between the frame's two poses.
-  const float part = static_cast<float>(substep + 1) / static_cast<float>(count), part_before = static_cast<float>(substep) / static_cast<float>(count);
+  const float part = static_cast<float>(substep + 1) / static_cast<float>(count);
+  const float part_before = static_cast<float>(substep) / static_cast<float>(count);
   const auto root_at = [&](float at) {
     const vector from = get_vector(root_rows, 0), to = get_vector(root_rows + 7 * STRIDE, 0);
     return from * lanes(1.0f - at) + to * lanes(at);

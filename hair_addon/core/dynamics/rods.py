@@ -49,7 +49,7 @@ def combed_shape(groom: np.ndarray) -> RestShape:
 
 
 def half_rotations(frames: np.ndarray) -> np.ndarray:
-    """(S, M, 4) frames of segments → half the rotation from each to the next; the first is that of segment 0 to itself."""
+    """(S, M, 4) frames of segments → half the rotation from the one before to each, none for the first."""
     before = np.concatenate([frames[:, :1], frames[:, :-1]], axis=1)
     return rotations.half(rotations.product(rotations.inverse(before), frames))
 
@@ -213,7 +213,7 @@ class Rods:
         first: int = 0,
         end: int | None = None,
         stages: int = rod_solver.WHOLE,
-        surroundings: Surroundings = Surroundings(),
+        surroundings: Surroundings = rod_solver.EMPTY,
         block_dim: int = rod_solver.BLOCK,
     ) -> None:
         """Simulate substeps of a frame, as `rod_solver.advance` does."""

@@ -38,7 +38,7 @@ def half(a: np.ndarray) -> np.ndarray:
 
 
 def least_rotation(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """The rotation about the least angle that takes unit vectors a to b; about any axis across where they are opposite."""
+    """The least rotation that takes unit vectors a to b; about any axis across where they are opposite."""
     real = 1.0 + np.sum(a * b, axis=-1, keepdims=True)
     other = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
     is_opposite = real < 1e-9

@@ -54,20 +54,9 @@ def sag_free(groom: np.ndarray, material: Material, gravity: tuple[float, float,
     )
     turns = rotations.product(rotations.inverse(before), frames)
     halves = half_rotations(frames)
-    for _ in range(ROUNDS):
-        bend = rotations.product(rotations.product(rotations.inverse(halves), turns), rotations.inverse(halves))
-        bend = np.where(bend[..., 3:] < 0.0, -bend, bend)
-        local = rotations.rotated(rotations.inverse(rotations.product(before, halves)), moments)
-        multipliers = _multipliers(bend, local)
-        sine = -0.5 * compliances * multipliers
-        size = np.linalg.norm(sine, axis=-1, keepdims=True)
-        is_clipped = size[..., 0] > MOST_BEND
-        sine *= np.minimum(1.0, MOST_BEND / np.maximum(size, 1e-30))
-        cosine = np.sqrt(1.0 - np.sum(sine**2, axis=-1, keepdims=True))
-        root = rotations.half(np.concatenate([sine, cosine], axis=-1))
-        middle = rotations.half(rotations.product(rotations.product(root, turns), root))
-        back = rotations.inverse(root)
-        halves = rotations.product(rotations.product(back, middle), back)
+    multipliers, is_clipped, halves = _bent(halves, before, turns, moments, compliances)
+    for _ in range(ROUNDS - 1):
+        multipliers, is_clipped, halves = _bent(halves, before, turns, moments, compliances)
     pulls = -lengths[..., None] * forces
     held = np.concatenate([multipliers, pulls], axis=-1)
     return SagFree(RestShape(lengths, halves, frames, held), is_clipped.sum(axis=1))
@@ -111,6 +100,22 @@ def _moments(lengths, directions, forces):
     """(S, M, 3) [N m] at joints, tip to root."""
     turned = -lengths[..., None] * np.cross(directions, forces)
     return np.cumsum(turned[:, ::-1], axis=1)[:, ::-1]
+
+
+def _bent(halves, before, turns, moments, compliances):
+    """(multipliers, whether a joint is clipped, half rest rotations) from the half rest rotations of the last round."""
+    back = rotations.inverse(halves)
+    bend = rotations.product(rotations.product(back, turns), back)
+    bend = np.where(bend[..., 3:] < 0.0, -bend, bend)
+    multipliers = _multipliers(bend, rotations.rotated(rotations.inverse(rotations.product(before, halves)), moments))
+    sine = -0.5 * compliances * multipliers
+    size = np.linalg.norm(sine, axis=-1, keepdims=True)
+    sine *= np.minimum(1.0, MOST_BEND / np.maximum(size, 1e-30))
+    cosine = np.sqrt(1.0 - np.sum(sine**2, axis=-1, keepdims=True))
+    root = rotations.half(np.concatenate([sine, cosine], axis=-1))
+    middle = rotations.half(rotations.product(rotations.product(root, turns), root))
+    back = rotations.inverse(root)
+    return multipliers, size[..., 0] > MOST_BEND, rotations.product(rotations.product(back, middle), back)
 
 
 def _multipliers(bend, moments):

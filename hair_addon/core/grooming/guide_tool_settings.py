@@ -95,6 +95,26 @@ class LiftSettings(ToolSettings):
 
 
 @dataclass(frozen=True)
+class DrapeSettings(ToolSettings):
+    """Draping of guides."""
+
+    stiffness: float = param(
+        1.0,
+        "Factor of the stiffness that the guides have in the Dynamics panel; lower values let them hang more",
+        low=0.0,
+        high=1e4,
+        soft_high=10.0,
+    )
+    seconds: float = param(
+        3.0,
+        "Longest time in seconds that guides fall; what is at rest sooner stops the tool",
+        above=0.0,
+        high=60.0,
+        soft_high=10.0,
+    )
+
+
+@dataclass(frozen=True)
 class AttractSettings(ToolSettings):
     """Attraction to the surface."""
 

@@ -32,9 +32,9 @@ def shaken(groom, frames=FRAMES, simulation=None, first_frame=0, **details):
 
 
 def floor(groom):
-    """A plane of contact below the middle of all roots."""
+    """A plane of contact below the middle of all roots, of strands that start on the far side none."""
     planes = np.zeros((len(groom), VERTICES, rod_solver.PLANE_ROWS))
-    planes[..., 2], planes[..., 3], planes[..., 7] = 1.0, -0.02, 0.3
+    planes[groom[:, 0, 1] < 0.03] = [0.0, 0.0, 1.0, -0.02, 0.0, 0.0, 0.0, 0.3]
     return rod_solver.Surroundings(planes=in_lanes(planes))
 
 

@@ -4,6 +4,7 @@
 from .attract_guides import VELLUS_OT_attract_guides
 from .change_guide_count import VELLUS_OT_change_guide_count
 from .copy_guide_shape import VELLUS_OT_copy_guide_shape
+from .drape_guides import VELLUS_OT_drape_guides
 from .guide_length import VELLUS_OT_guide_length
 from .lift_guides import VELLUS_OT_lift_guides
 from .mirror_guides import VELLUS_OT_mirror_guides
@@ -19,4 +20,5 @@ CLASSES = (
     VELLUS_OT_smooth_guides,
     VELLUS_OT_lift_guides,
     VELLUS_OT_attract_guides,
+    VELLUS_OT_drape_guides,
 )

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that settle under gravity on a surface that stands still: a groom that hangs and lies where it was grown."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+
+from ..geometry.mesh import TriMesh
+from . import rotations
+from .root_motion import RootPose
+from .settings import DynamicsSettings
+from .simulation import Obstacle, Simulation, World
+
+FRAME = 1.0 / 24.0  # [s]
+REST = 5e-3  # [m/s] below which guides are at rest
+_DAMPING = 0.05  # [s]
+_DRAG = 4.0  # times that of air: equilibria stay, and are come to sooner
+
+
+def draped(
+    points: np.ndarray,
+    mesh: TriMesh,
+    settings: DynamicsSettings,
+    gravity: tuple[float, float, float],
+    seconds: float,
+    device: wp.DeviceLike = None,
+    tell: Callable[[float], None] = lambda _part: None,
+) -> np.ndarray:
+    """Guides (G, P, 3) [m] → (G, P, 3) float64 where they come to rest, or after some seconds if they do not before.
+
+    mesh: the surface that they grow on and lie upon; gravity: [m/s²]; tell: called with the part that is done. Raises
+    `HairError`.
+    """
+    pose = RootPose(np.asarray(points[:, 0], np.float64), np.tile(rotations.IDENTITY, (len(points), 1)))
+    surface = Obstacle(
+        "surface", mesh.vertices.astype(np.float64), mesh.triangles, settings.friction, settings.collision_distance
+    )
+    world = World(gravity, (surface,))
+    falling = replace(
+        settings,
+        sag_free=False,
+        hold=0.0,
+        inertia=1.0,
+        damping=max(settings.damping, _DAMPING),
+        air_drag=max(settings.air_drag, 1.0) * _DRAG,
+    )
+    simulation = Simulation(points, falling, pose, world, device)
+    before, count = simulation.vertices(), max(round(seconds / FRAME), 1)
+    for frame in range(count):
+        tell(frame / count)
+        simulation.advance(pose, world, FRAME)
+        there = simulation.vertices()
+        if np.linalg.norm(there - before, axis=2).max() < REST * FRAME:
+            break
+        before = there
+    return simulation.points()
