@@ -26,7 +26,7 @@ def notes_of(colliders):
 
 def finds(colliders, place):
     """Whether a point at a place finds a plane."""
-    strand = np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1)
+    strand = np.repeat(np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1), 8, axis=2)
     positions = wp.array(strand, dtype=float, device=colliders.device)
     far = wp.array(strand + np.float32(9.0), dtype=float, device=colliders.device)
     return bool(Contacts(far, colliders).find(positions, positions, 0.01).numpy().any())
