@@ -68,6 +68,7 @@ const auto turned = [](const wp::mat33& m, const vector& v) {
       m.data[1][0] * v.x + m.data[1][1] * v.y + m.data[1][2] * v.z,
       m.data[2][0] * v.x + m.data[2][1] * v.y + m.data[2][2] * v.z};
 };
+const auto where = [](int condition) { return condition ? ints(-1) : ints(0); };  // in all lanes
 const auto is_some = [](const vector& v) { return (v.x != 0.0f) | (v.y != 0.0f) | (v.z != 0.0f); };
 
 vector point = get_vector(positions, sample + 1), last = get_vector(last_positions, sample + 1);
@@ -96,13 +97,13 @@ lanes needed = abs_of(most) + moving + MARGIN;
 const lanes before = get(row_of(clear, sample));
 const lanes left = is_final ? before : before - motion;
 const vector place = turned(to_rest, vector{point.x - moved[0], point.y - moved[1], point.z - moved[2]});
-const auto is_spared = (left - length_of(minus(place, get_vector(asked, sample))) > needed + SLACK) & (is_skipping != 0);
-needed = left < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper
+const auto is_spared = (left - length_of(minus(place, get_vector(asked, sample))) > needed + SLACK) & where(is_skipping);
+needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper
 const auto is_number = length - length == 0.0f;
-const auto is_short = (segment <= 2.0f * most) & (is_middle != 0);
+const auto is_short = (segment <= 2.0f * most) & where(is_middle);
 const auto is_asking = is_number & !is_spared & !is_short;
 
-put(row_of(clear, sample), is_spared ? left : before);
+put(row_of(clear, sample), is_spared ? left : lanes(0.0f));
 put_ints(row_of(sides, sample), is_asking ? get_ints(row_of(sides, sample)) : ints(0));
 const int plane_row = PLANE * (is_middle ? sample : sample + 1);
 for (int k = 0; k < PLANE; ++k) put(row_of(out_planes, plane_row + k), lanes(0.0f));

@@ -136,10 +136,9 @@ def _look(
     sides[group, sample, lane] = 0
     _put_vector(asked, group, sample, lane, surface.to_rest * (point - surface.moved))
     clear[group, sample, lane] = hit.gap
-    if hit.collider >= 0 and hit.distance < 0.0:
-        clear[group, sample, lane] = hit.distance
     if hit.collider < 0 or hit.gap > needed:
         return
+    clear[group, sample, lane] = hit.distance
     if at_rest >= 0.0:
         hit = crossed(surface, hit, point, last, wp.min(surface.largest_distance, at_rest))
     sides[group, sample, lane] = hit.side
