@@ -71,6 +71,18 @@ def test_what_turns_as_a_whole_moves_not_otherwise(rng):
     assert rigid_motion(points, points)[1] < 1e-6
 
 
+def test_rigid_motions_lead_back_to_the_beginning(rng):
+    colliders = Colliders()
+    for frame in range(5):
+        turn = Rotation.from_rotvec(0.3 * rng.normal(size=3)) if frame else Rotation.identity()
+        now = TriMesh((turn.apply(BALL.vertices) + 0.02 * frame).astype(np.float32), BALL.triangles)
+        colliders.read([Collider("a", now)])
+        for part in (0.3, 1.0):
+            colliders.pose(part)
+    turned, moved_by = colliders.rigid_motion_so_far
+    np.testing.assert_allclose((colliders.mesh.points.numpy() - moved_by) @ turned, BALL.vertices, atol=2e-6)
+
+
 def with_nan(mesh):
     vertices = mesh.vertices.copy()
     vertices[3, 1] = np.nan
