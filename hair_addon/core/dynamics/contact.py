@@ -17,7 +17,8 @@ from ..kernels import kernel_cache, parallel
 from ..kernels.checks import require_count
 from . import contact_queries
 from .colliders import Colliders
-from .contact_queries import PLANE
+from .contact_queries import PLANE, WIDTH
+from .nearest_surface import Surface
 
 RISE = 0.02  # [m/s] at most, of a point that the groom has inside
 LEAST_ROWS = 64  # samples, of all lanes, that are worth a thread
@@ -48,6 +49,8 @@ class Contacts:
             raise HairError("Positions of strands are (groups, vertices × 3, lanes) numbers of single precision.")
         self.colliders = colliders
         groups, rows, lanes = groom.shape
+        if colliders.device.is_cpu and lanes % WIDTH:
+            raise HairError("Strands come in groups of {width} lanes on a processor.", width=WIDTH)
         self._vertex_count = rows // 3
         self._shape = groups, rows, lanes
         device = colliders.device
@@ -89,13 +92,15 @@ class Contacts:
             self.planes.zero_()
             return self.planes
         surface, rise = self._surface(), 0.0 if is_final else RISE * duration
-        for is_middle, samples in enumerate((self._vertices, self._middles)[: 1 if is_final else 2]):
-            planes = self._middle_planes if is_middle else self.planes
+        for is_middle in (0,) if is_final else (1, 0):
+            samples = self._middles if is_middle else self._vertices
             kept = [samples.rest, samples.sides, samples.asked, samples.clear]
-            details = [is_middle, rise, int(is_final), int(is_skipping)]
-            self._launch(contact_queries.ask, [surface, positions, last_positions], details, [*kept, planes])
-        if not is_final:
-            self._launch(contact_queries.choose, [positions, self._middle_planes], [], [self.planes])
+            self._launch(
+                contact_queries.find_planes,
+                [surface, positions, last_positions, self._middle_planes],
+                [is_middle, rise, int(is_final), int(is_skipping)],
+                [*kept, self._middle_planes if is_middle else self.planes],
+            )
         return self.planes
 
     def forget(self) -> None:
@@ -128,7 +133,7 @@ class Contacts:
         return Samples(numbers[0], wp.zeros(shape, dtype=int, device=device), asked, numbers[1])
 
     def _surface(self):
-        colliders, surface = self.colliders, contact_queries.Surface()
+        colliders, surface = self.colliders, Surface()
         surface.mesh, surface.points, surface.indices = colliders.mesh.id, colliders.mesh.points, colliders.mesh.indices
         surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
         surface.rims, surface.settings = colliders.rims, colliders.settings
@@ -141,11 +146,13 @@ class Contacts:
     def _require_shape(self, positions):
         for name, count, wanted in zip(("groups", "rows", "lanes"), positions.shape, self._shape, strict=True):
             require_count(name, count, wanted)
+        if not positions.is_contiguous or positions.device != self.colliders.device:
+            raise HairError("Positions of strands must be one block of memory, on the colliders' device.")
 
     def _launch(self, kernel, arrays, details, outputs):
-        """Launch a kernel for all samples: on a processor a thread for the lanes of each, on all cores."""
+        """Launch a kernel for all samples: on a processor a thread for `WIDTH` lanes of each, on all cores."""
         groups, _, lanes = self._shape
-        device, at_once = self.colliders.device, lanes if self.colliders.device.is_cpu else 1
+        device, at_once = self.colliders.device, WIDTH if self.colliders.device.is_cpu else 1
         count = groups * (self._vertex_count - 1) * lanes // at_once
         inputs = [*arrays, self._vertex_count - 1, at_once, *details]
         kernel_cache.load(device, kernel.module)

@@ -26,7 +26,7 @@ def notes_of(colliders):
 
 def finds(colliders, place):
     """Whether a point at a place finds a plane."""
-    strand = np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1)
+    strand = np.repeat(np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1), 8, axis=2)
     positions = wp.array(strand, dtype=float, device=colliders.device)
     far = wp.array(strand + np.float32(9.0), dtype=float, device=colliders.device)
     return bool(Contacts(far, colliders).find(positions, positions, 0.01).numpy().any())
@@ -69,6 +69,18 @@ def test_what_turns_as_a_whole_moves_not_otherwise(rng):
     assert rigid_motion(flat, -flat)[1] < 1e-6  # half a turn, never a mirror
     assert np.linalg.det(rigid_motion(points, -points)[0][0]) > 0.99
     assert rigid_motion(points, points)[1] < 1e-6
+
+
+def test_rigid_motions_lead_back_to_the_beginning(rng):
+    colliders = Colliders()
+    for frame in range(5):
+        turn = Rotation.from_rotvec(0.3 * rng.normal(size=3)) if frame else Rotation.identity()
+        now = TriMesh((turn.apply(BALL.vertices) + 0.02 * frame).astype(np.float32), BALL.triangles)
+        colliders.read([Collider("a", now)])
+        for part in (0.3, 1.0):
+            colliders.pose(part)
+    turned, moved_by = colliders.rigid_motion_so_far
+    np.testing.assert_allclose((colliders.mesh.points.numpy() - moved_by) @ turned, BALL.vertices, atol=2e-6)
 
 
 def with_nan(mesh):

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// Which of LANES samples of strands look for a surface, and how far: on a processor the lanes of its vectors, on a GPU
+// one sample a thread. A sample that was farther away than it has come since, seen from the surface, is spared.
+//
+// The body of `_put_needs` in contact_queries.py. Parameters, of arrays (groups, rows, lanes):
+//
+//   int group, int sample, int first_lane    which samples
+//   int is_middle                            1: the middle of segment `sample`; 0: the vertex after it
+//   array_t<float> positions, last_positions 3 rows a vertex [m], now and when the substep began
+//   array_t<float> middle_planes             PLANE rows a segment
+//   mat33 turn, vec3 shift, float motion     the surface's motion in this substep, and what it moves otherwise [m]
+//   mat33 to_rest, vec3 moved                from places now to places at rest
+//   float largest_distance                   that any collider keeps [m]
+//   float rise                               of samples that the groom has inside [m]
+//   int is_final, int is_skipping            after the substep; 0: every sample looks
+//   array_t<float> rest                      distance in the groom [m]; changed by `rise`
+//   array_t<int> sides                       0 for those that do not look
+//   array_t<float> asked                     3 rows: place at rest where it last looked [m]
+//   array_t<float> clear                     how far from there it was [m], less the surface's motion since; changed
+//   array_t<float> out_planes                PLANE rows: zero, but for how far it looks [m] in place of the offset, and 1
+//                                            in place of the friction where the middle of a segment beside has a plane
+//
+// Constants: WIDTH, PLANE, MARGIN [m], MOST_MOTION [m], SLACK [m].
+
+{
+#include "lanes.h"
+
+const size_t stride = positions.shape[2];
+const auto row_of = [&](auto& array, int row) {
+  return array.data + (size_t(group) * array.shape[1] + row) * stride + first_lane;
+};
+#if defined(__CUDA_ARCH__)
+const auto get = [](const float* row) { return *row; };
+const auto put = [](float* row, lanes values) { *row = values; };
+const auto put_ints = [](int* row, ints values) { *row = values; };
+const auto get_ints = [](const int* row) { return *row; };
+#else
+const auto get = [](const float* row) {
+  lanes values;
+  __builtin_memcpy(&values, row, sizeof(values));
+  return values;
+};
+const auto put = [](float* row, lanes values) { __builtin_memcpy(row, &values, sizeof(values)); };
+const auto get_ints = [](const int* row) {
+  ints values;
+  __builtin_memcpy(&values, row, sizeof(values));
+  return values;
+};
+const auto put_ints = [](int* row, ints values) { __builtin_memcpy(row, &values, sizeof(values)); };
+#endif
+struct vector {
+  lanes x, y, z;
+};
+const auto length_of = [&](const vector& v) { return exact_sqrt_of(v.x * v.x + v.y * v.y + v.z * v.z); };
+const auto lower_of = [](lanes a, lanes b) { return a < b ? a : b; };
+const auto higher_of = [](lanes a, lanes b) { return a > b ? a : b; };
+const auto get_vector = [&](auto& array, int row) {
+  return vector{get(row_of(array, 3 * row)), get(row_of(array, 3 * row + 1)), get(row_of(array, 3 * row + 2))};
+};
+const auto between = [](const vector& a, const vector& b) {
+  return vector{0.5f * (a.x + b.x), 0.5f * (a.y + b.y), 0.5f * (a.z + b.z)};
+};
+const auto minus = [](const vector& a, const vector& b) { return vector{a.x - b.x, a.y - b.y, a.z - b.z}; };
+const auto turned = [](const wp::mat33& m, const vector& v) {
+  return vector{
+      m.data[0][0] * v.x + m.data[0][1] * v.y + m.data[0][2] * v.z,
+      m.data[1][0] * v.x + m.data[1][1] * v.y + m.data[1][2] * v.z,
+      m.data[2][0] * v.x + m.data[2][1] * v.y + m.data[2][2] * v.z};
+};
+const auto where = [](int condition) { return condition ? ints(-1) : ints(0); };  // in all lanes
+const auto is_some = [](const vector& v) { return (v.x != 0.0f) | (v.y != 0.0f) | (v.z != 0.0f); };
+
+vector point = get_vector(positions, sample + 1), last = get_vector(last_positions, sample + 1);
+lanes segment = lanes(0.0f);
+if (is_middle) {
+  const vector root = get_vector(positions, sample);
+  segment = length_of(minus(point, root));
+  point = between(root, point);
+  last = between(get_vector(last_positions, sample), last);
+}
+
+lanes at_rest = get(row_of(rest, sample));
+if (rise > 0.0f) {
+  at_rest = at_rest < 0.0f ? lower_of(at_rest + rise, lanes(0.0f)) : at_rest;
+  put(row_of(rest, sample), at_rest);
+}
+const lanes most = lower_of(lanes(largest_distance), at_rest);
+
+// As the surface sees it, which moves and turns as a whole, but for `motion`.
+const vector carried = turned(turn, last);
+const vector way = minus(point, vector{carried.x + shift[0], carried.y + shift[1], carried.z + shift[2]});
+const lanes length = length_of(way);
+const lanes moving = lower_of(length, lanes(MOST_MOTION)) + motion;
+lanes needed = abs_of(most) + moving + MARGIN;
+
+const lanes before = get(row_of(clear, sample));
+const lanes left = is_final ? before : before - motion;
+const vector place = turned(to_rest, vector{point.x - moved[0], point.y - moved[1], point.z - moved[2]});
+const auto is_spared = (left - length_of(minus(place, get_vector(asked, sample))) > needed + SLACK) & where(is_skipping);
+needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper
+const auto is_number = length - length == 0.0f;
+const auto is_short = (segment <= 2.0f * most) & where(is_middle);
+const auto is_asking = is_number & !is_spared & !is_short;
+
+put(row_of(clear, sample), is_spared ? left : lanes(0.0f));
+put_ints(row_of(sides, sample), is_asking ? get_ints(row_of(sides, sample)) : ints(0));
+const int plane_row = PLANE * (is_middle ? sample : sample + 1);
+for (int k = 0; k < PLANE; ++k) put(row_of(out_planes, plane_row + k), lanes(0.0f));
+put(row_of(out_planes, plane_row + 3), is_asking ? needed : lanes(0.0f));
+if (!is_middle && !is_final) {
+  const int segment_count = positions.shape[1] / 3 - 1;
+  const auto has_plane = [&](int index) {
+    const int row = PLANE * index;
+    return is_some(vector{
+        get(row_of(middle_planes, row)), get(row_of(middle_planes, row + 1)), get(row_of(middle_planes, row + 2))});
+  };
+  auto is_beside = has_plane(sample);
+  if (sample + 1 < segment_count) is_beside = is_beside | has_plane(sample + 1);
+  put(row_of(out_planes, plane_row + 7), is_beside ? lanes(1.0f) : lanes(0.0f));
+}
+}

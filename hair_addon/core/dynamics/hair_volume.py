@@ -1,0 +1,309 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair among hair: friction, pressure and cohesion of all strands as a volume, on a grid [Petrovic06, McAdams09].
+
+Each region of the surface has a grid of its own, so that hair on both sides of a parting does not mix. Sums over
+points are of whole numbers: in any order, on any number of cores, they are the same to the last bit.
+
+    ρ_c = Σ w m,  P_c = Σ w m v                                   trilinear weights w; ρ⁰ of the groom
+    v_i ← (1 - f) v_i + f Σ w P_c / ρ_c,  f = 1 - exp(-k_f Δt)    friction: keeps momentum
+    v_i ← v_i - Δt (k_p / ρ̄) Σ_c (ρ_c - 1.2 ρ⁰_c)₊ ∇w_ic          pressure, |Δv| ≤ ½ cell / Δt
+    wet: the same with (ρ_c - 0.8 ρ⁰_c)₋ where ρ_c > 0.2 ρ⁰_c      cohesion
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..kernels import kernel_cache, parallel
+from ..kernels.checks import require_count, require_indices
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+LEAST_CELL = 0.004  # [m]
+MOST_CELLS_ALONG = 96
+MOST_CELLS = 4 * MOST_CELLS_ALONG**3  # of all regions
+
+_MOST_SHARES = 4  # each has a grid of its own while it adds
+_LEAST_ROWS = 20_000  # points that are worth a thread
+_UNIT = wp.constant(2.0**20)  # of sums, in a mean mass
+_FASTEST = wp.constant(1.0e4)  # [m/s] of points that count
+_FARTHEST = wp.constant(1.0e5)  # [m]
+_DENSE, _THIN, _GONE = wp.constant(1.2), wp.constant(0.8), wp.constant(0.2)
+
+
+@wp.struct
+class Grid:
+    """Cells of each region, whose corners are whole multiples of the cell size."""
+
+    low: wp.vec3i
+    counts: wp.vec3i
+    per_cell: float  # [1/m]
+
+
+class HairVolume:
+    """The volume of strands whose points have masses (groups, points, lanes) > 0, in units of their mean.
+
+    Points without a mass, as those of lanes without a strand, take no part. Positions and velocities are (groups,
+    points × 3, lanes), as the solver's.
+    """
+
+    def __init__(self, masses: Any, regions: np.ndarray | None = None, cell_size: float = LEAST_CELL) -> None:
+        """regions: (groups, lanes) whole numbers from 0, of each strand's region; cell_size [m], at least."""
+        self.device = masses.device
+        self._shape = groups, _, lanes = masses.shape
+        self._masses = masses
+        regions = np.zeros((groups, lanes), np.int32) if regions is None else np.asarray(regions, np.int32)
+        require_count("groups", regions.shape[0], groups)
+        require_count("lanes", regions.shape[1], lanes)
+        self._region_count = int(regions.max(initial=0)) + 1
+        require_indices("regions", regions, self._region_count)
+        if self._region_count * 64 > MOST_CELLS:
+            raise HairError("There are too many regions for hair to have a volume.")
+        if not (math.isfinite(cell_size) and cell_size > 0.0):
+            raise HairError("The cell size must be positive, not {size} m.", size=cell_size)
+        self._regions = wp.array(regions, dtype=int, device=self.device)
+        self._least_cell = cell_size
+        self.cell_size = cell_size
+        self.grid: Any = None
+        self._rest: Any = None
+        self._mean: Any = None
+
+    def fit(self, positions: Any, groom: Any) -> None:
+        """Lay the grid over strands, and over the groom as it is carried by the surface; once a frame. [m]"""
+        self._require_shape(positions)
+        self._require_shape(groom)
+        bounds = wp.array(np.repeat([[np.inf], [-np.inf]], 3, axis=1), dtype=float, device=self.device)
+        for there in (positions, groom):
+            kernel_cache.launch(_bound, self._shape, inputs=[self._masses, there], outputs=[bounds], device=self.device)
+        low, high = bounds.numpy().astype(np.float64)
+        if not np.isfinite([low, high]).all():
+            self.grid = None
+            return
+        self.cell_size, first, counts = self._cells(low, high)
+        self.grid = Grid()
+        self.grid.low, self.grid.counts = wp.vec3i(*map(int, first)), wp.vec3i(*map(int, counts))
+        self.grid.per_cell = 1.0 / self.cell_size
+        self._rest = self._sums(groom, None)
+        self._mean = wp.zeros(2, dtype=wp.int64, device=self.device)
+        kernel_cache.launch(_average, len(self._rest), inputs=[self._rest], outputs=[self._mean], device=self.device)
+
+    def rub(
+        self, positions: Any, velocities: Any, duration: float, friction: float, pressure: float, wetness: float = 0.0
+    ) -> None:
+        """Change velocities [m/s] by what hair does to hair in a time [s]; roots keep theirs.
+
+        friction k_f [1/s], pressure k_p [m²/s²], wetness 0..1: of cohesion. After `fit` in this frame; points that
+        have left the grid since are left alone.
+        """
+        self._require_shape(positions)
+        self._require_shape(velocities)
+        values = duration, friction, pressure, wetness
+        if self.grid is None or not all(map(math.isfinite, values)) or not duration > 0.0:
+            return
+        sums = self._sums(positions, velocities)
+        mixed = -math.expm1(-max(friction, 0.0) * duration)
+        groups, points, lanes = self._shape
+        inputs = [self.grid, self._masses, self._regions, positions, sums, self._rest, self._mean]
+        inputs += [mixed, duration * pressure, wetness, 0.5 * self.cell_size / duration]
+        kernel_cache.load(self.device, _rub.module)
+        shares = parallel.share_count(groups * points * lanes, self.device, _LEAST_ROWS // 8)
+        parallel.launch_shares(_rub, groups * points * lanes, inputs, [[velocities]] * shares, self.device)
+
+    def _cells(self, low, high):
+        """(cell size, first cell, number of cells along each axis) of a grid over a box, with a cell around it."""
+        size = self._least_cell
+        while True:
+            first = np.floor(low / size) - 1.0
+            counts = np.floor(high / size) + 3.0 - first
+            if counts.max() <= MOST_CELLS_ALONG and counts.prod() * self._region_count <= MOST_CELLS:
+                return size, first, counts
+            size *= 1.25
+
+    def _sums(self, positions, velocities):
+        """(cells, 4) int64: mass and momentum of each cell; velocities None: mass alone."""
+        groups, points, lanes = self._shape
+        cell_count = self._region_count * math.prod(self.grid.counts)
+        count = groups * points * lanes
+        shares = min(_MOST_SHARES, parallel.share_count(count, self.device, _LEAST_ROWS))
+        width = 1 if velocities is None else 4
+        sums = [wp.zeros((cell_count, width), dtype=wp.int64, device=self.device) for _ in range(shares)]
+        inputs = [self.grid, self._masses, self._regions, positions, positions if velocities is None else velocities]
+        kernel_cache.load(self.device, _scatter.module)
+        parallel.launch_shares(_scatter, count, inputs, [[each] for each in sums], self.device)
+        for other in sums[1:]:  # on the processor, where each thread has its own
+            total = sums[0].numpy()
+            total += other.numpy()
+        return sums[0]
+
+    def _require_shape(self, array):
+        groups, points, lanes = self._shape
+        wanted_shape = groups, 3 * points, lanes
+        for name, count, wanted in zip(("groups", "rows", "lanes"), array.shape, wanted_shape, strict=True):
+            require_count(name, count, wanted)
+
+
+@wp.func
+def _vector(values: wp.array3d[float], group: int, point: int, lane: int):
+    x = values[group, 3 * point, lane]
+    y = values[group, 3 * point + 1, lane]
+    return wp.vec3(x, y, values[group, 3 * point + 2, lane])
+
+
+@wp.func
+def _is_near(position: wp.vec3):
+    return wp.isfinite(wp.length(position)) and wp.max(wp.abs(position)) < _FARTHEST
+
+
+@wp.func
+def _cell_of(grid: Grid, place: wp.vec3, region: int):
+    """The number of the cell before a place [cells], -1 outside of the grid."""
+    x = int(wp.floor(place[0])) - grid.low[0]
+    y = int(wp.floor(place[1])) - grid.low[1]
+    z = int(wp.floor(place[2])) - grid.low[2]
+    if wp.min(x, wp.min(y, z)) < 0:
+        return -1
+    if x + 1 >= grid.counts[0] or y + 1 >= grid.counts[1] or z + 1 >= grid.counts[2]:
+        return -1
+    return ((region * grid.counts[0] + x) * grid.counts[1] + y) * grid.counts[2] + z
+
+
+@wp.func
+def _part(place: wp.vec3, axis: int, step: int):
+    """The weight along an axis of the cell `step` after the one before a place."""
+    part = place[axis] - wp.floor(place[axis])
+    if step == 0:
+        return 1.0 - part
+    return part
+
+
+@wp.kernel
+def _bound(
+    masses: wp.array3d[float],
+    positions: wp.array3d[float],
+    # outputs
+    bounds: wp.array2d[float],
+):
+    group, point, lane = wp.tid()
+    position = _vector(positions, group, point, lane)
+    if masses[group, point, lane] > 0.0 and _is_near(position):
+        for axis in range(3):
+            wp.atomic_min(bounds, 0, axis, position[axis])
+            wp.atomic_max(bounds, 1, axis, position[axis])
+
+
+@wp.kernel
+def _scatter(
+    grid: Grid,
+    masses: wp.array3d[float],
+    regions: wp.array2d[int],
+    positions: wp.array3d[float],
+    velocities: wp.array3d[float],
+    first: int,
+    # outputs
+    out_sums: wp.array2d[wp.int64],
+):
+    thread = first + wp.tid()
+    lane_count = masses.shape[2]
+    lane = thread % lane_count
+    point = (thread // lane_count) % masses.shape[1]
+    group = thread // (lane_count * masses.shape[1])
+    mass = masses[group, point, lane]
+    place = grid.per_cell * _vector(positions, group, point, lane)
+    velocity = _vector(velocities, group, point, lane)
+    with_momentum = out_sums.shape[1] > 1
+    if not (mass > 0.0 and _is_near(place)):
+        return
+    if with_momentum and not wp.length(velocity) < _FASTEST:
+        return
+    cell = _cell_of(grid, place, regions[group, lane])
+    if cell < 0:
+        return
+    for corner in range(8):
+        dx = corner >> 2
+        dy = (corner >> 1) & 1
+        dz = corner & 1
+        weight = _part(place, 0, dx) * _part(place, 1, dy) * _part(place, 2, dz) * mass * _UNIT
+        row = cell + (dx * grid.counts[1] + dy) * grid.counts[2] + dz
+        wp.atomic_add(out_sums, row, 0, wp.int64(wp.rint(weight)))
+        if with_momentum:
+            for axis in range(3):
+                wp.atomic_add(out_sums, row, axis + 1, wp.int64(wp.rint(weight * velocity[axis])))
+
+
+@wp.kernel
+def _average(
+    sums: wp.array2d[wp.int64],
+    # outputs
+    out_mean: wp.array[wp.int64],
+):
+    cell = wp.tid()
+    if sums[cell, 0] > wp.int64(0):
+        wp.atomic_add(out_mean, 0, sums[cell, 0])
+        wp.atomic_add(out_mean, 1, wp.int64(1))
+
+
+@wp.kernel
+def _rub(
+    grid: Grid,
+    masses: wp.array3d[float],
+    regions: wp.array2d[int],
+    positions: wp.array3d[float],
+    sums: wp.array2d[wp.int64],
+    rest: wp.array2d[wp.int64],
+    mean: wp.array[wp.int64],
+    mixed: float,
+    pressure: float,
+    wetness: float,
+    fastest: float,
+    first: int,
+    # outputs
+    velocities: wp.array3d[float],
+):
+    thread = first + wp.tid()
+    lane_count = masses.shape[2]
+    lane = thread % lane_count
+    point = (thread // lane_count) % masses.shape[1]
+    group = thread // (lane_count * masses.shape[1])
+    place = grid.per_cell * _vector(positions, group, point, lane)
+    velocity = _vector(velocities, group, point, lane)
+    if point == 0 or not (masses[group, point, lane] > 0.0 and _is_near(place)):
+        return
+    if not wp.length(velocity) < _FASTEST:
+        return
+    cell = _cell_of(grid, place, regions[group, lane])
+    if cell < 0:
+        return
+    around = wp.vec3()
+    push = wp.vec3()
+    scale = 1.0
+    if mean[0] > wp.int64(0):
+        scale = float(mean[1]) / float(mean[0])
+    for corner in range(8):
+        dx = corner >> 2
+        dy = (corner >> 1) & 1
+        dz = corner & 1
+        wx = _part(place, 0, dx)
+        wy = _part(place, 1, dy)
+        wz = _part(place, 2, dz)
+        row = cell + (dx * grid.counts[1] + dy) * grid.counts[2] + dz
+        density = float(sums[row, 0])
+        if density > 0.0:
+            momentum = wp.vec3(float(sums[row, 1]), float(sums[row, 2]), float(sums[row, 3]))
+            around += (wx * wy * wz / density) * momentum
+        at_rest = float(rest[row, 0])
+        excess = wp.max(density - _DENSE * at_rest, 0.0)
+        if density > _GONE * at_rest:
+            excess += wetness * wp.min(density - _THIN * at_rest, 0.0)
+        slope = wp.vec3(float(2 * dx - 1) * wy * wz, float(2 * dy - 1) * wx * wz, float(2 * dz - 1) * wx * wy)
+        push -= excess * scale * grid.per_cell * slope
+    change = pressure * push
+    size = wp.length(change)
+    if size > fastest:
+        change *= fastest / size
+    velocity = (1.0 - mixed) * velocity + mixed * around + change
+    for axis in range(3):
+        velocities[group, 3 * point + axis, lane] = velocity[axis]
