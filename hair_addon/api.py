@@ -31,6 +31,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .api_dynamics import DynamicsSettings, dynamics_of, set_dynamics
 from .api_guide_tools import change_guides
 from .api_styles import (
     Bend,
@@ -76,6 +77,7 @@ __all__ = [
     "Braid",
     "Clump",
     "Curl",
+    "DynamicsSettings",
     "Frizz",
     "GroomSettings",
     "GuideSettings",
@@ -93,11 +95,13 @@ __all__ = [
     "change_guides",
     "distribute_guides",
     "draw",
+    "dynamics_of",
     "interpolate_hair",
     "load_settings",
     "points",
     "render",
     "save_settings",
+    "set_dynamics",
     "set_styles",
     "settings_of",
     "shade",
@@ -270,7 +274,6 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     >>> api.settings_of(bpy.data.objects["Hair"]).appearance.roughness
     0.25
     """
-
     target = _curves(hair, "HAIR")
     present = blender.settings.properties.own_look_of(target.vellus)
     if isinstance(look, str):
@@ -296,7 +299,6 @@ def draw(*, progress: Progress = no_progress, **settings: Any) -> np.ndarray:
     >>> api.draw(width=64, height=48).shape
     (48, 64, 4)
     """
-
     sampling = imaging.pixel_sampling
     wanted = changed(sampling.PictureSettings, None, settings, sampling.FRAME_FIELDS)
     return run_now(blender.render.offscreen.drawing_picture(wanted), heard(progress))
@@ -335,7 +337,6 @@ def render(
 
 def settings_of(hair: Curves) -> GroomSettings:
     """Return the `GroomSettings` of hair Curves and their guides."""
-
     return blender.groom.groom_settings.settings_of(_curves(hair, "HAIR"))
 
 
@@ -364,7 +365,6 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
     >>> api.apply_settings(bpy.data.objects["Hair"], settings)
     >>> bpy.context.view_layer.update()  # the strands are made here
     """
-
     require_class(settings, GroomSettings, "settings")
     blender.groom.groom_settings.apply_settings(_curves(hair, "HAIR"), settings)
 

@@ -30,6 +30,7 @@ PURE = {
     "blender/gpu/drawing.py: _parts",
     "blender/gpu/uniforms.py: settings_block",
     "blender/host/paths.py: addon_version",
+    "core/dynamics/stiffness_advice.py: tip_sink",
     "core/geometry/bspline.py: basis_matrix",
     "core/geometry/bspline.py: _device_matrix",
     "core/geometry/bspline.py: _flat_matrix",

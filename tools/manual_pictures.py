@@ -139,6 +139,7 @@ def save_sample(path):
     bpy.ops.vellus.delete_hair()
     bpy.ops.vellus.add_hair(density_group="scalp", length=0.1, gravity=0.8, strand_count=5000)
     bpy.data.hair_curves["Hair"].vellus.marschner.size = 64
+    bpy.data.hair_curves["Guides"].vellus.simulates = True  # else its panel is gray
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
 
 
@@ -195,14 +196,15 @@ class Window:
         yield from pause(0.5)
 
     def show_panels(self, names):
-        """Show these panels of the tab and no others, all of them open."""
+        """Show these panels of the tab and no others, all of them open; None: all that there are."""
         pictured = {f"VELLUS_PT_{name}" for shown in PANELS.values() for name in shown}
-        panels = [panel for panel in self.blender.panels.CLASSES if panel.bl_idname in pictured]
+        # A panel whose parent is not there would stand at the top of the tab.
+        panels = [p for p in self.blender.panels.CLASSES if {p.bl_idname, getattr(p, "bl_parent_id", "")} & pictured]
         for panel in reversed(panels):
             if panel.is_registered:
                 self.bpy.utils.unregister_class(panel)
         for panel in panels:
-            if panel.bl_idname.removeprefix("VELLUS_PT_") in names:
+            if names is None or panel.bl_idname.removeprefix("VELLUS_PT_") in names:
                 panel.bl_options = set()
                 self.bpy.utils.register_class(panel)
 
@@ -254,7 +256,7 @@ def take(pictures):
     for name, taking in others.items():
         if name in pictures or not pictures:
             yield from taking(window)
-    window.show_panels(every)
+    window.show_panels(None)  # the add-on unregisters them when Blender ends
 
 
 def take_looks(window):

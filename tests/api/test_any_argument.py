@@ -175,6 +175,13 @@ CALLS = {
     "settings_of": lambda d: api.settings_of(target(d, "HAIR")),
     "save_settings": lambda d: api.save_settings(anything(d, "a.json"), settings(d)),
     "load_settings": lambda d: api.load_settings(anything(d, "a.json")),
+    "dynamics_of": lambda d: api.dynamics_of(target(d, "GUIDES")),
+    "set_dynamics": lambda d: api.set_dynamics(
+        target(d, "GUIDES"),
+        anything(d, None, "STYLED", api.DynamicsSettings()),
+        simulates=anything(d, None, True),
+        **changes(d, api.DynamicsSettings, ()),
+    ),
     "apply_settings": lambda d: api.apply_settings(target(d, "HAIR"), settings(d)),
 }
 
@@ -183,6 +190,7 @@ def set_property(dice):
     """A property of a random hair's settings, which Blender may refuse."""
     hair = dice.choice([c for c in bpy.data.hair_curves if c.vellus.kind != "NONE"])
     groups = {"guides": api.GuideSettings, "hair": api.HairSettings, "appearance": api.Appearance}
+    groups["dynamics"] = api.DynamicsSettings
     name, settings_class = dice.choice([*groups.items(), ("marschner", lookup_tables.Settings)])
     setting, default, details = dice.choice(declared(settings_class))
     if name == "marschner" and not hasattr(hair.vellus.marschner, setting):

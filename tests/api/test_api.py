@@ -13,17 +13,18 @@ import numpy as np
 import pytest
 import warp
 
-from hair_addon import api, api_guide_tools, api_styles, api_tables
+from hair_addon import api, api_dynamics, api_guide_tools, api_styles, api_tables
 from tests.support.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
 ROOT = Path(__file__).resolve().parents[2]
+MODULES = (api, api_dynamics, api_guide_tools, api_styles, api_tables)
 WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'): sys.modules[name] = None\n"
 
 
 def examples():
     """The doctests of the functions, in the order of the files; the module's own is the first."""
-    return [test for module in (api, api_guide_tools, api_styles, api_tables) for test in examples_of(module)]
+    return [test for module in MODULES for test in examples_of(module)]
 
 
 def examples_of(module):

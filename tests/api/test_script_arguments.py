@@ -94,6 +94,16 @@ REFUSED = {
     "a number for a look": (lambda: api.shade(data("Hair"), 3), "settings must be"),
     "a list for a model": (lambda: api.shade(data("Hair"), model=["MARSCHNER"]), "Unknown model a value of type list"),
     "a model and a wrong look": (lambda: api.shade(data("Hair"), model="KAJIYA_KAY", melanin=3), "Melanin must be"),
+    "a preset of styles": (lambda: api.set_dynamics(data("Guides"), "CURLY"), "Unknown dynamics preset 'CURLY'"),
+    "a preset and a wrong weight": (
+        lambda: api.set_dynamics(data("Guides"), "WET", weight=0),
+        "Weight must be between",
+    ),
+    "a number for a switch": (
+        lambda: api.set_dynamics(data("Guides"), "WET", simulates=1),
+        "simulates must be True or",
+    ),
+    "dynamics of hair": (lambda: api.set_dynamics(data("Hair"), "WET"), "'Hair' is not Vellus guides"),
     "plots of none": (lambda: api.bake_tables("tables", has_plots=None, size=16), "has_plots must be True or False"),
     # Objects.
     "bytes for a surface": (lambda: api.distribute_guides(b"Sphere"), "neither a mesh object"),

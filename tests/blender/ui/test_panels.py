@@ -94,6 +94,7 @@ def test_the_tab_follows_the_pipeline():
         "Surface",
         "Guides",
         "Strands",
+        "Dynamics",
         "Styles",
         "Shading",
         "Advanced: Lookup Tables",

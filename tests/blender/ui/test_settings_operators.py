@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.groom import groom_settings
+from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.files import settings_file
 from hair_addon.core.files.settings_file import GroomSettings
 from hair_addon.core.grooming import groom_defaults
@@ -25,6 +26,7 @@ WANTED = GroomSettings(
     lookup_tables.Settings(size=64, eccentricity=0.9),
     (clump.Settings(size=0.3, levels=3), curl.Settings(radius=0.004), curl.Settings(is_on=False, seed=7)),
     ("Locks", "Curl", "Curl.001"),
+    DynamicsSettings(bend_stiffness=20.0, hold=0.3, colliders="Body", vertex_count=33),
 )
 
 
@@ -49,6 +51,7 @@ def test_settings_are_saved_as_they_are(hair, tmp_path, active):
     assert saved.hair == HairSettings(strand_count=500, radius=0.004, influence_distance=0.03)
     assert saved.appearance == Appearance(mode="classic")
     assert saved.tables == lookup_tables.Settings()
+    assert saved.dynamics == DynamicsSettings()
 
 
 @pytest.mark.parametrize("active", ["Sphere", "Guides", "Hair"])

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import settings_file
 from hair_addon.core.files.settings_file import SECTIONS, GroomSettings, declared_in
@@ -157,6 +158,16 @@ def test_files_of_version_2_have_no_styles(tmp_path):
     assert settings_file.read(path) == GroomSettings(hair=HairSettings(strand_count=5))
 
 
+def test_files_without_dynamics_are_read(tmp_path):
+    """As they were saved before there was any: at its default, or as it is."""
+    found = settings_file.to_object(GroomSettings(GuideSettings(seed=4)))
+    del found["dynamics"]
+    path = write(tmp_path / "a.json", found)
+    assert settings_file.read(path) == GroomSettings(GuideSettings(seed=4))
+    present = GroomSettings(dynamics=DynamicsSettings(hold=3.0))
+    assert settings_file.read_partial(path).changed(present).dynamics == present.dynamics
+
+
 @given(wanted=GROOMS, present=GROOMS, kept=st.sets(st.sampled_from([*SECTIONS, "styles"])))
 @settings(max_examples=30)
 def test_what_a_partial_file_leaves_out_stays(tmp_path_factory, wanted, present, kept):
@@ -213,6 +224,10 @@ def test_names_of_styles_are_as_many_strings(names):
         (head(hair={"strand_cuont": 5}), 'unknown setting "hair.strand_cuont"'),
         (head(styling={}), 'unknown section "styling"'),
         (head(hair=[1]), '"hair" must be a group'),
+        (head(dynamics={"bend_stifness": 3}), 'unknown setting "dynamics.bend_stifness"'),
+        (head(dynamics={"simulates": True}), 'unknown setting "dynamics.simulates"'),
+        (head(dynamics={"substeps": 1.5}), '"dynamics.substeps" must be a whole number'),
+        (head(dynamics={"hold": -1}), 'invalid value for "dynamics.hold": Hold must be between 0 and 10000'),
         (head(tables={"roughness": 0.3}), 'unknown setting "tables.roughness"'),
         (head(hair={"strand_count": "many"}), '"hair.strand_count" must be a whole number'),
         (head(hair={"strand_count": 5.5}), '"hair.strand_count" must be a whole number'),

@@ -11,16 +11,18 @@ from .. import setting_rows
 from .tab import HairTab, split, write
 
 
-class VELLUS_PT_dynamics(HairTab, bpy.types.Panel):
+class _OfGuides(HairTab):
+    @classmethod
+    def poll(cls, context):
+        return guides_of(context.object) is not None
+
+
+class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
     """Simulation of the guides while the animation plays"""
 
     bl_label = "Dynamics"
     bl_idname = "VELLUS_PT_dynamics"
     bl_options = {"DEFAULT_CLOSED"}
-
-    @classmethod
-    def poll(cls, context):
-        return guides_of(context.object) is not None
 
     def draw_header(self, context):
         self.layout.prop(guides_of(context.object).vellus, "simulates", text="")
@@ -57,7 +59,7 @@ def _settings_column(layout, context):
     return column, state.dynamics
 
 
-class _OfDynamics(HairTab):
+class _OfDynamics(_OfGuides):
     bl_parent_id = "VELLUS_PT_dynamics"
     bl_options = {"DEFAULT_CLOSED"}
 

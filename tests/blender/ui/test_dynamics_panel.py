@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Dynamics panel: a row for each setting that matters, and what the settings mean in a sentence."""
+
+import bpy
+import pytest
+
+from hair_addon.blender.groom import dynamics_notes
+from hair_addon.blender.ui import panels
+from hair_addon.core.dynamics.collider_settings import ColliderSettings
+from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.stiffness_advice import bend_under_weight
+from hair_addon.core.params import declared
+from tests.support.layout import draw, draw_all
+
+OURS = [panel for panel in panels.CLASSES if panel.bl_idname.startswith("VELLUS_PT_dynamics")]
+
+
+@pytest.fixture
+def state(hair):
+    return bpy.data.objects["Guides"].data.vellus
+
+
+def drawn():
+    return draw_all(OURS)
+
+
+@pytest.mark.parametrize("active", ["Sphere", "Guides", "Hair"])
+def test_every_setting_has_a_row(state, active):
+    bpy.context.view_layer.objects.active = bpy.data.objects[active]
+    state.dynamics.hold = 1.0
+    names = [name for name, *_ in declared(DynamicsSettings)]
+    found = drawn()
+    assert {name: found[name] for name in names} == dict.fromkeys(names, 1)
+    assert found["simulates"] == found["vellus.apply_dynamics_preset"] == 1
+
+
+HIDDEN = {
+    "nothing to collide with": (
+        {"collides_with_surface": False},
+        {"keeps_hair_outside", "collision_distance", "friction"},
+    ),
+    "a collection": ({"collides_with_surface": False, "colliders": "Body"}, set()),
+    "no forces between strands": ({"hair_friction": 0.0, "hair_pressure": 0.0}, {"cell_size"}),
+    "friction alone": ({"hair_pressure": 0.0}, set()),
+    "no pull": ({"hold": 0.0}, {"hold_tip"}),
+}
+
+
+@pytest.mark.parametrize("case", HIDDEN)
+def test_settings_without_effect_are_hidden(state, case):
+    changes, hidden = HIDDEN[case]
+    for name, value in ({"hold": 1.0} | changes).items():
+        setattr(state.dynamics, name, value)
+    found = drawn()
+    assert {name for name, *_ in declared(DynamicsSettings) if not found[name]} == hidden
+
+
+def test_colliders_are_picked_among_collections(state):
+    assert draw(bpy.types.VELLUS_PT_dynamics_collision).picked == {"colliders": bpy.data.collections}
+
+
+def test_only_guides_have_dynamics(sphere):
+    assert [panel for panel in OURS if panel.bl_idname == "VELLUS_PT_dynamics" and draw(panel) is not None] == []
+
+
+def test_meshes_have_a_panel_where_there_are_guides(sphere):
+    """Its overrides are shown where they are used."""
+    panel, collider = bpy.types.VELLUS_PT_collider, sphere.vellus
+    assert draw(panel) is None
+    bpy.ops.vellus.distribute_guides(guide_count=10)
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    assert draw(panel) is None
+    bpy.context.view_layer.objects.active = sphere
+    assert {*draw(panel).drawn} == {"overrides_friction", "overrides_distance", "is_double_sided", "label"}
+    collider.overrides_friction = collider.overrides_distance = True
+    found = draw(panel).drawn
+    assert all(found[name] == 1 for name, *_ in declared(ColliderSettings))
+    bpy.context.view_layer.objects.active = None
+    assert draw(panel) is None
+
+
+# What the settings mean.
+
+
+def bends(length, **settings):
+    return bend_under_weight(DynamicsSettings(**settings), length, 9.81)
+
+
+def sentence(state):
+    return dynamics_notes.bend_note(state.id_data, bpy.context.scene)
+
+
+def test_the_bend_is_that_of_the_guides_length(state):
+    bpy.data.objects["Hair"].data.vellus.is_live = state.is_live = False
+    scene = bpy.context.scene
+    state.guides.length = 0.15
+    assert sentence(state) == f"A 15 cm guide of this material bends by {100 * bends(0.15):.1f} cm under its weight."
+    state.dynamics.bend_stiffness = 1000.0
+    stiff = 1000 * bends(0.15, bend_stiffness=1000.0)
+    assert sentence(state) == f"A 15 cm guide of this material bends by {stiff:.2g} mm under its weight."
+    scene.unit_settings.system = "IMPERIAL"
+    assert sentence(state).startswith('A 5.9" guide')
+    scene.unit_settings.system = "NONE"
+    assert sentence(state).startswith("A 15 cm guide")
+    scene.unit_settings.scale_length = 0.1
+    assert sentence(state).startswith("A 1.5 cm guide")
+    state.dynamics.size = 10.0
+    assert sentence(state).startswith("A 15 cm guide")
+    assert sentence(state) in " ".join(draw(bpy.types.VELLUS_PT_dynamics_material).texts)
+
+
+def test_without_gravity_nothing_bends(state):
+    upright = sentence(state)
+    state.dynamics.gravity = -1.0
+    assert sentence(state) == upright
+    state.dynamics.gravity = 0.0
+    assert sentence(state) == ""
+    state.dynamics.gravity = 1.0
+    bpy.context.scene.use_gravity = False
+    assert sentence(state) == ""
+
+
+def test_what_cannot_be_read_is_said(state):
+    state.dynamics.damping = float("nan")
+    assert sentence(state) == "Damping must be between 0 and 0.5, not nan."
+
+
+def test_guides_too_long_for_hair_are_told_to_be_scaled(state):
+    state.is_live = False
+    title = bpy.types.VELLUS_PT_dynamics
+    assert draw(title).texts == [""]
+    state.guides.length = 4.0
+    assert "Guides of 4 m move slowly: decrease Size" in " ".join(draw(title).texts)
+    state.dynamics.size = 0.1
+    assert draw(title).texts == [""]
+
+
+def test_hand_made_guides_have_a_length_of_their_own(imported):
+    """No setting says how long they are."""
+    imported.select_set(True)
+    bpy.context.view_layer.objects.active = imported
+    bpy.ops.vellus.use_as_guides()
+    guides = imported.data
+    guides.vellus.guides.length = 4.0
+    assert sentence(guides.vellus).startswith("A 10 cm guide")
+    assert dynamics_notes.size_note(guides, bpy.context.scene) == ""
