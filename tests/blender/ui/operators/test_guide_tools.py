@@ -85,7 +85,8 @@ def test_only_selected_guides_change(waved, name, domain, kind):
     assert not has_changed[~chosen].any() and has_changed[chosen].any()
     bpy.ops.ed.undo()
     every, _strands = use_tool(name, selected_only=False)
-    assert np.array_equal(every[chosen], after[chosen])
+    # Falling guides are counted in masses and from a place that all of them have in common.
+    np.testing.assert_allclose(every[chosen], after[chosen], rtol=0.0, atol=1e-5 if name == "drape_guides" else 0.0)
     assert (every != before).any(axis=(1, 2))[~chosen].any()
 
 
