@@ -34,9 +34,9 @@ def change_guides(
 ) -> int:
     """Change guide Curves and keep their combing; returns how many have changed, were mirrored, or are there now.
 
-    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT" or "DRAPE"; settings: of the tool, from
-    core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of the
-    view layer.
+    tool: "LENGTH", "TRIM", "COUNT", "MIRROR", "COPY", "SMOOTH", "LIFT", "ATTRACT" or "DRAPE"; settings: of the
+    tool, from core/grooming/guide_tool_settings.py; changes: its fields by name. Hair follows at the next update of
+    the view layer.
 
     >>> guides = bpy.data.objects["Guides"]
     >>> api.change_guides(guides, "LENGTH", method="MAXIMUM", length=0.2)

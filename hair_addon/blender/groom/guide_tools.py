@@ -219,7 +219,7 @@ def drape(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> i
         settled = dynamics.draping.draped(
             there, mesh, dynamics_settings, gravity, settings.seconds, preferences.device()
         )
-        at_rest = guides.carried_back(np.float32(settled / metres), chosen)
+        at_rest = guides.carried_back((settled / metres).astype(np.float32), chosen)
         return grooming.guide_segments.blended(points, at_rest, guides.weights[chosen])
 
     return reshape(guides, shaped)
