@@ -7,9 +7,10 @@ import numpy as np
 from ...core import dynamics
 from ...core.dynamics.collider_settings import ColliderSettings, contact_of
 from ...core.errors import HairError
+from ..host import scene_time
 from ..host.notices import name_of
 from ..settings import setting_properties
-from . import scene
+from . import force_fields, scene
 
 NO_GRAVITY = (0.0, 0.0, 0.0)
 
@@ -39,7 +40,10 @@ def read(blender_scene, depsgraph, settings, guide_pose, surface_object):
             errors.append(error)
             continue
         obstacles.append(_obstacle(collider, vertices, triangles, settings, metres))
-    return dynamics.simulation.World(gravity, tuple(obstacles)), errors
+    fields, refused = force_fields.read(depsgraph, metres)
+    rate = blender_scene.render.fps / blender_scene.render.fps_base
+    time = scene_time.time_of(blender_scene) / rate
+    return dynamics.simulation.World(gravity, tuple(obstacles), fields, time), errors + refused
 
 
 def _obstacle(mesh_object, vertices, triangles, settings, metres):

@@ -42,6 +42,8 @@ def draped(
         settings,
         sag_free=False,
         hold=0.0,
+        hair_friction=0.0,
+        hair_pressure=0.0,
         inertia=1.0,
         damping=max(settings.damping, _DAMPING),
         air_drag=max(settings.air_drag, 1.0) * _DRAG,

@@ -6,8 +6,10 @@ points are of whole numbers: in any order, on any number of cores, they are the 
 
     ρ_c = Σ w m,  P_c = Σ w m v                                   trilinear weights w; ρ⁰ of the groom
     v_i ← (1 - f) v_i + f Σ w P_c / ρ_c,  f = 1 - exp(-k_f Δt)    friction: keeps momentum
-    v_i ← v_i - Δt (k_p / ρ̄) Σ_c (ρ_c - 1.2 ρ⁰_c)₊ ∇w_ic          pressure, |Δv| ≤ ½ cell / Δt
+    v_i ← v_i - Δt (k_p / ρ̄) Σ_c (ρ_c - 1.2 max(ρ⁰_c, ρ̄))₊ ∇w_ic  pressure, |Δv| ≤ ½ cell / Δt
     wet: the same with (ρ_c - 0.8 ρ⁰_c)₋ where ρ_c > 0.2 ρ⁰_c      cohesion
+
+ρ̄ is the mean of ρ⁰ over its cells. Without it in the pressure, hair could not fall where the groom has none.
 """
 
 import math
@@ -295,7 +297,7 @@ def _rub(
             momentum = wp.vec3(float(sums[row, 1]), float(sums[row, 2]), float(sums[row, 3]))
             around += (wx * wy * wz / density) * momentum
         at_rest = float(rest[row, 0])
-        excess = wp.max(density - _DENSE * at_rest, 0.0)
+        excess = wp.max(density - _DENSE * wp.max(at_rest, 1.0 / scale), 0.0)
         if density > _GONE * at_rest:
             excess += wetness * wp.min(density - _THIN * at_rest, 0.0)
         slope = wp.vec3(float(2 * dx - 1) * wy * wz, float(2 * dy - 1) * wx * wz, float(2 * dz - 1) * wx * wy)

@@ -174,6 +174,22 @@ class Rods:
         last = self.read("roots")[:, rod_solver.ROOT_ROWS // 2 :]
         self._put("roots", np.concatenate([last, now], axis=1))
 
+    def in_lanes(self, values: np.ndarray, is_padded: bool = True) -> wp.array:
+        """(S, rows) numbers → (groups, rows, lanes) float32 on the device; is_padded: lanes without a strand repeat.
+
+        Otherwise these are zero.
+        """
+        rows = rod_solver.to_lanes(np.asarray(values), self.lanes)
+        if not is_padded:
+            rows[-1, :, self.strand_count - (len(rows) - 1) * self.lanes :] = 0.0
+        return wp.array(rows, dtype=float, device=self.device)
+
+    def carried_groom(self) -> wp.array:
+        """(groups, 3 (M + 1), lanes) float32 [m]: the groom where the surface has it at the end of the frame."""
+        grooms = self.read("grooms").reshape(self.strand_count, -1, 3)
+        roots = self.read("roots")[:, None, rod_solver.ROOT_ROWS // 2 :]
+        return self.in_lanes(roots[..., :3] + rotations.rotated(roots[..., 3:], grooms))
+
     def carry(self, motion: RigidMotion, chosen: np.ndarray | None = None) -> None:
         """Move strands as they are, (M,) indices or all for None: also where the next frame begins for their roots.
 

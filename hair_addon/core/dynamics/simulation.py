@@ -17,8 +17,10 @@ from ..errors import HairError
 from ..geometry.mesh import TriMesh
 from ..kernels.checks import require_count
 from . import detail, root_motion, rotations, sag_free
+from .air import Air, ForceField
 from .colliders import Collider, Colliders
 from .contact import Contacts
+from .hair_volume import LEAST_CELL, HairVolume
 from .material import material_of
 from .rod_solver import FINISH, PREDICT, SOLVE, Surroundings
 from .rods import Rods, combed_shape, step_of
@@ -28,6 +30,8 @@ from .settings import DynamicsSettings
 MOST_SUBSTEPS = 64
 _LONGEST_WAY = 0.01  # [m] that roots and colliders move in a substep, less where segments are shorter
 _GRID = 0.125  # [m] between the places of the origin
+_RUBBING = 0.01  # [s] between effects of hair on hair, at least
+_ASKED = 256  # guides that are asked how far others are
 _MOST_RESETS = 10  # frames running in which a strand breaks, after which it stays in its groom
 
 
@@ -54,10 +58,12 @@ class Obstacle:
 
 @dataclass(frozen=True)
 class World:
-    """What acts on hair at the end of a frame: gravity [m/s²], and what it collides with."""
+    """What acts on hair at the end of a frame: gravity [m/s²], what it collides with, and force fields; time [s]."""
 
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
     obstacles: tuple[Obstacle, ...] = ()
+    fields: tuple[ForceField, ...] = ()
+    time: float = 0.0
 
 
 class Simulation:
@@ -85,6 +91,15 @@ class Simulation:
         self._colliders = Colliders(self._device)
         self._read_obstacles(world.obstacles)
         self._contacts = Contacts(self._rods.arrays.positions, self._colliders)
+        self._air = Air(self._rods.arrays.slips.shape, self._device)
+        self._volume = self._new_volume()
+        self._since_rubbed = 0.0  # [s]
+
+    def _new_volume(self):
+        """Hair among hair, with cells as large as guides are apart."""
+        masses = self._material.masses / self._material.masses.mean()
+        cell = self.settings.cell_size or max(LEAST_CELL, _mean_distance(self._start.positions))
+        return HairVolume(self._rods.in_lanes(masses, is_padded=False), cell_size=cell)
 
     def _checked(self, groom):
         groom = np.asarray(groom, np.float64)
@@ -127,6 +142,7 @@ class Simulation:
         self._detail = detail.detail_of(combed, at_rest)
         self._rods.set_material(self._material, rest)
         self._rods.set_groom(vertices, rest)
+        self._volume = self._new_volume()
 
     def advance(self, pose: RootPose, world: World, seconds: float) -> None:
         """Simulate a frame that takes some seconds, at whose end roots have this pose and the world is this one.
@@ -147,23 +163,53 @@ class Simulation:
         self._read_obstacles(world.obstacles)
         count = self._substep_count(before, pose)
         step = step_of(self.settings, self._material, seconds, count, world.gravity)
-        if self._colliders.mesh is None:
+        if self._is_free:
             self._rods.advance(step)
         else:
+            self._volume.fit(self._rods.arrays.positions, self._rods.carried_groom())
+            fields = [self._seen(field) for field in world.fields]
             for substep in range(count):
-                self._advance_in_contact(step, substep)
+                self._advance(step, substep, fields, world.time - seconds * (1.0 - substep / count))
         self.substeps = count
         self._put_back_broken()
 
-    def _advance_in_contact(self, step, substep):
-        rods = self._rods
-        self._colliders.pose((substep + 1) / step.count)
-        rods.advance(step, substep, substep + 1, PREDICT)
-        places = rods.arrays.positions, rods.arrays.positions_before
-        planes = self._contacts.find(*places, step.size)
-        rods.advance(step, substep, substep + 1, SOLVE, Surroundings(planes=planes))
-        planes = self._contacts.find(*places, step.size, is_final=True)
-        rods.advance(step, substep, substep + 1, FINISH, Surroundings(planes=planes))
+    @property
+    def _is_free(self):
+        """Whether nothing acts on strands but their surface's motion, gravity and still air."""
+        return self._colliders.mesh is None and not self.world.fields and not self._is_rubbing
+
+    @property
+    def _is_rubbing(self):
+        settings = self.settings
+        return settings.hair_friction > 0.0 or settings.hair_pressure > 0.0
+
+    def _advance(self, step, substep, fields, time):
+        rods, around = self._rods, Surroundings()
+        state = rods.arrays.positions, rods.arrays.velocities
+        if fields:
+            self._air.blow(fields, *state, time)
+            around = Surroundings(airs=self._air.airs, drags=self._air.drags, accelerations=self._air.accelerations)
+        if self._colliders.mesh is None:
+            rods.advance(step, substep, substep + 1, surroundings=around)
+        else:
+            self._colliders.pose((substep + 1) / step.count)
+            rods.advance(step, substep, substep + 1, PREDICT, around)
+            places = rods.arrays.positions, rods.arrays.positions_before
+            planes = self._contacts.find(*places, step.size)
+            rods.advance(step, substep, substep + 1, SOLVE, Surroundings(planes=planes))
+            planes = self._contacts.find(*places, step.size, is_final=True)
+            rods.advance(step, substep, substep + 1, FINISH, Surroundings(planes=planes))
+        self._since_rubbed += step.size
+        if self._is_rubbing and self._since_rubbed >= _RUBBING - 1e-9:
+            settings = self.settings
+            values = settings.hair_friction, settings.hair_pressure, settings.wetness
+            self._volume.rub(*state, self._since_rubbed, *values)
+            self._since_rubbed = 0.0
+
+    def _seen(self, field):
+        """A force field from the origin, as strong as the settings let it be."""
+        x, y, z = np.asarray(field.origin) - self._origin
+        return replace(field, origin=(x, y, z), strength=self.settings.force_fields * field.strength)
 
     def _carried_along(self, before, after):
         """Move all by what hair is not to feel of the surface's motion; the pose from which it feels the rest."""
@@ -242,13 +288,16 @@ class Simulation:
         """All that later frames follow from, beside what `__init__`, and `load` with it, are given: arrays by name."""
         rods = {f"rods_{name}": array for name, array in self._rods.save().items()}
         contacts = {f"contacts_{name}": array for name, array in self._contacts.state().items()}
-        return rods | contacts | {"origin": self._origin, "resets": self._resets}
+        own = {"origin": self._origin, "resets": self._resets, "since_rubbed": np.array([self._since_rubbed])}
+        return rods | contacts | own
 
     def load(self, state: Mapping[str, np.ndarray], pose: RootPose, world: World) -> None:
         """Go on from a state that `save` gave in a frame with this pose and world. Raises `HairError`."""
-        origin, resets = (np.asarray(state.get(name, ())) for name in ("origin", "resets"))
-        if origin.shape != (3,) or not np.isfinite(origin).all() or resets.shape != self._resets.shape:
+        origin, resets, rubbed = (np.asarray(state.get(name, ())) for name in ("origin", "resets", "since_rubbed"))
+        is_finite = all(np.isfinite(array).all() for array in (origin, rubbed))
+        if not is_finite or (origin.shape, resets.shape, rubbed.shape) != ((3,), self._resets.shape, (1,)):
             raise HairError("The state of the simulation is of other guides.")
+        self._since_rubbed = float(rubbed[0])
         self._rods.load(_of_part(state, "rods_"))
         self.pose, self.world = pose, world
         self._origin, self._resets = origin.astype(np.float64), resets.astype(int)
@@ -257,6 +306,17 @@ class Simulation:
             self._renew()
         self._read_obstacles(world.obstacles)
         self._contacts.load(_of_part(state, "contacts_"))
+
+
+def _mean_distance(places):
+    """The mean distance of places (G, 3) from the nearest other one, of some of them; 0 for a single one."""
+    if len(places) < 2:
+        return 0.0
+    some = places[:: max(len(places) // _ASKED, 1)]
+    distances = np.linalg.norm(some[:, None] - places, axis=2)
+    distances[distances == 0.0] = np.inf  # of itself, and of another in the same place
+    nearest = distances.min(axis=1)
+    return float(nearest[np.isfinite(nearest)].mean()) if np.isfinite(nearest).any() else 0.0
 
 
 def _of_part(state, prefix):

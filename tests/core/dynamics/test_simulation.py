@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.dynamics import rotations
+from hair_addon.core.dynamics.air import ForceField
 from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
 from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.dynamics.simulation import Obstacle, Simulation, World
@@ -77,8 +78,9 @@ def test_without_inertia_hair_moves_with_its_surface(rng):
 def test_a_jump_takes_hair_along_as_it_is(rng):
     """Shape and speed are those before, seen from the surface, however far it went."""
     groom, pose = fur(rng)
+    settings = DynamicsSettings(hair_friction=0.0, hair_pressure=0.0)  # whose grid does not turn with the hair
     jump = RigidMotion(rotations.unit(np.array([0.0, 0.0, 0.9, 0.1])), np.zeros(3), np.array([30.0, -4.0, 7.0]))
-    staying, jumping = (Simulation(groom, DynamicsSettings(), pose, NONE, DEVICE) for _ in range(2))
+    staying, jumping = (Simulation(groom, settings, pose, NONE, DEVICE) for _ in range(2))
     before = [play(simulation, pose, range(1, 5), NONE.gravity, False) for simulation in (staying, jumping)]
     assert np.array_equal(*before)
     moved = pose.moved(shake(4))
@@ -170,3 +172,34 @@ def test_time_that_does_not_go_on_changes_nothing(rng, seconds):
     with pytest.raises(HairError, match="Time"):
         simulation.advance(pose.moved(shake(1)), World(), seconds)
     assert np.array_equal(simulation.points(), before) and simulation.pose is pose
+
+
+def test_wind_blows_hair_over_as_far_as_it_is_strong(rng):
+    groom, pose = fur(rng)
+    tips = []
+    for strength in (0.0, 0.4, 1.0):
+        simulation = Simulation(groom, DynamicsSettings(bend_stiffness=1.0), pose, World(), DEVICE)
+        for frame in range(24):
+            fields = (ForceField("WIND", axis=(1.0, 0.0, 0.0), strength=strength),)
+            simulation.advance(pose, World(fields=fields, time=frame * FRAME), FRAME)
+        tips.append(simulation.points()[:, -1, 0].mean())
+    assert np.diff(tips).min() > 0.01
+
+
+def test_friction_between_hairs_makes_them_move_together(rng):
+    """Guides that swing apart in a thick coat come to rest sooner, and nothing moves a groom that is at rest."""
+    groom, pose = fur(rng, 200)
+    kicks = rng.normal(0.0, 0.01, pose.positions.shape)
+    speeds = []
+    for friction in (0.0, 20.0):
+        settings = DynamicsSettings(hair_friction=friction, hair_pressure=0.0, air_drag=0.0, damping=0.0)
+        simulation = Simulation(groom, settings, pose, NONE, DEVICE)
+        kicked = replace(pose, positions=pose.positions + kicks)
+        for _ in range(12):
+            before = simulation.points()
+            simulation.advance(kicked, NONE, FRAME)
+        speeds.append(np.linalg.norm(simulation.points() - before, axis=2).mean())
+    assert speeds[1] < 0.9 * speeds[0]
+    simulation = Simulation(groom, DynamicsSettings(hair_pressure=100.0), pose, World(), DEVICE)
+    simulation.advance(pose, World(), FRAME)
+    np.testing.assert_allclose(simulation.points(), groom, atol=1e-5)
