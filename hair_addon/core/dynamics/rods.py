@@ -171,6 +171,40 @@ class Rods:
         last = self.read("roots")[:, rod_solver.ROOT_ROWS // 2 :]
         self._put("roots", np.concatenate([last, now], axis=1))
 
+    def carry(self, chosen: np.ndarray, turns: np.ndarray, pivots: np.ndarray, places: np.ndarray) -> None:
+        """Take some strands along rigidly, as after a jump of the surface: x becomes place + turn (x - pivot).
+
+        chosen: (S,) bool; turns: (S, 4) rotations x, y, z, w; pivots, places: (S, 3) [m]. Velocities turn with them,
+        and so do the roots, from where the next frame begins.
+        """
+        for count in (len(chosen), len(turns), len(pivots), len(places)):
+            require_count("strands", count, self.strand_count)
+        turns = rotations.unit(np.asarray(turns, np.float64))[:, None]
+        if not (np.isfinite(turns).all() and np.isfinite(pivots).all() and np.isfinite(places).all()):
+            raise HairError("Roots of simulated strands have non-finite coordinates.")
+
+        def turned(name, of_each, change):
+            rows = self.read(name)
+            values = rows.reshape(self.strand_count, -1, of_each).astype(np.float64)
+            carried = change(values).reshape(rows.shape)
+            self._put(name, np.where(np.asarray(chosen)[:, None], carried, rows))
+
+        def moved(points):
+            return places[:, None] + rotations.rotated(turns, points - pivots[:, None])
+
+        def roots_moved(halves):
+            return np.concatenate([moved(halves[..., :3]), rotations.product(turns, halves[..., 3:])], axis=-1)
+
+        def pulls_turned(multipliers):  # those of joints are in their own frames
+            return np.concatenate([multipliers[..., :3], rotations.rotated(turns, multipliers[..., 3:])], axis=-1)
+
+        turned("positions", 3, moved)
+        turned("velocities", 3, lambda velocities: rotations.rotated(turns, velocities))
+        turned("spins", 3, lambda spins: rotations.rotated(turns, spins))
+        turned("frames", 4, lambda frames: rotations.product(turns, frames))
+        turned("multipliers", 6, pulls_turned)
+        turned("roots", 7, roots_moved)
+
     def advance(
         self,
         step: Step,
