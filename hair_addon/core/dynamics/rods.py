@@ -20,7 +20,7 @@ from .settings import DynamicsSettings
 
 # What a substep reads and the groom, material and roots do not say.
 STATE = ("positions", "velocities", "frames", "spins", "multipliers", "slips", "roots", "resets")
-MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom
+MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom; more where hair is made to stretch
 
 
 @dataclass(frozen=True)
@@ -55,17 +55,6 @@ def step_of(
     settings: DynamicsSettings, material: Material, seconds: float, count: int, gravity: tuple[float, float, float]
 ) -> Step:
     """The `Step` of a frame that takes some seconds, in a number of substeps; gravity: of the scene [m/s²]."""
-    stretched = (
-        20.0
-        * float(np.linalg.norm(gravity))
-        * abs(settings.gravity)
-        * float(
-            np.max(
-                material.masses.sum(axis=1) * material.stretch_compliances.max(axis=1) * material.lengths.max(axis=1),
-                initial=0.0,
-            )
-        )
-    )
     return Step(
         seconds / count,
         count,
@@ -77,7 +66,7 @@ def step_of(
         settings.hold,
         settings.hold_tip,
         int(settings.pinned * material.lengths.shape[1]),
-        MOST_STRETCH + stretched,
+        MOST_STRETCH / settings.stretch_stiffness**0.5,
     )
 
 
