@@ -24,13 +24,14 @@ class Plane:
 
 @dataclass(frozen=True)
 class Ball:
-    """A sphere about the origin; of which axes (3,) are zero, a cylinder along those."""
+    """A sphere; where entries of axes are zero, a cylinder along those."""
 
     radius: float
     axes: tuple = (1.0, 1.0, 1.0)
+    center: tuple = (0.0, 0.0, 0.0)
 
     def heights_and_normals(self, points):
-        across = points * self.axes
+        across = (points - self.center) * self.axes
         distances = np.linalg.norm(across, axis=-1)
         return distances - self.radius, across / distances[..., None]
 

@@ -30,11 +30,13 @@ const auto rotated = [&](const quaternion& a, const vector& v) {
   const vector twice = cross(axis, v) * lanes(2.0f);
   return v + twice * a.w + cross(axis, twice);
 };
-// From a (part 0) to b (part 1), the shorter way.
+// From a (part 0) to b (part 1), the shorter way; exact at either end, and everywhere where they are the same.
 const auto between = [&](const quaternion& a, const quaternion& b, float part) {
+  if (part == 1.0f) return unit(b);
   const auto is_far = a.x * b.x + a.y * b.y + a.z * b.z + a.w * b.w < 0.0f;
-  const lanes from = 1.0f - part, to = is_far ? lanes(-part) : lanes(part);
-  return unit(quaternion{from * a.x + to * b.x, from * a.y + to * b.y, from * a.z + to * b.z, from * a.w + to * b.w});
+  const quaternion c = chosen_rotation(is_far, quaternion{-b.x, -b.y, -b.z, -b.w}, b);
+  return unit(quaternion{a.x + part * (c.x - a.x), a.y + part * (c.y - a.y), a.z + part * (c.z - a.z),
+                         a.w + part * (c.w - a.w)});
 };
 // The bend of a joint, e = s⁻¹ (a⁻¹ b) s⁻¹ with a positive real part; s is half the rest rotation from frame a to b.
 const auto bend_of = [&](const quaternion& a, const quaternion& b, const quaternion& s) {

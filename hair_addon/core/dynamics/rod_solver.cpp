@@ -130,7 +130,7 @@ for (int substep = first; substep < end; ++substep) {
   const float part_before = static_cast<float>(substep) / static_cast<float>(count);
   const auto root_at = [&](float at) {
     const vector from = get_vector(root_rows, 0), to = get_vector(root_rows + 7 * STRIDE, 0);
-    return from * lanes(1.0f - at) + to * lanes(at);
+    return at == 1.0f ? to : from + (to - from) * lanes(at);
   };
   const auto root_frame_at = [&](float at) {
     return between(get_frame(root_rows + 3 * STRIDE, 0), get_frame(root_rows + 10 * STRIDE, 0), at);

@@ -16,14 +16,11 @@ from ..kernels.checks import require_count
 from . import rod_solver, rotations
 from .material import Material
 from .rod_solver import RodArrays, Step, Surroundings
-from .root_motion import RigidMotion
 from .settings import DynamicsSettings
 
 # What a substep reads and the groom, material and roots do not say.
 STATE = ("positions", "velocities", "frames", "spins", "multipliers", "slips", "roots", "resets")
-# Numbers of a vector or frame, or of a row of several, in what turns with a strand.
-_TURNED = {"positions": 3, "velocities": 3, "frames": 4, "spins": 3, "multipliers": 6, "roots": 7}
-MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom
+MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom; more where hair is made to stretch
 
 
 @dataclass(frozen=True)
@@ -58,17 +55,6 @@ def step_of(
     settings: DynamicsSettings, material: Material, seconds: float, count: int, gravity: tuple[float, float, float]
 ) -> Step:
     """The `Step` of a frame that takes some seconds, in a number of substeps; gravity: of the scene [m/s²]."""
-    stretched = (
-        20.0
-        * float(np.linalg.norm(gravity))
-        * abs(settings.gravity)
-        * float(
-            np.max(
-                material.masses.sum(axis=1) * material.stretch_compliances.max(axis=1) * material.lengths.max(axis=1),
-                initial=0.0,
-            )
-        )
-    )
     return Step(
         seconds / count,
         count,
@@ -80,7 +66,7 @@ def step_of(
         settings.hold,
         settings.hold_tip,
         int(settings.pinned * material.lengths.shape[1]),
-        MOST_STRETCH + stretched,
+        MOST_STRETCH / settings.stretch_stiffness**0.5,
     )
 
 
@@ -190,38 +176,39 @@ class Rods:
         roots = self.read("roots")[:, None, rod_solver.ROOT_ROWS // 2 :]
         return self.in_lanes(roots[..., :3] + rotations.rotated(roots[..., 3:], grooms))
 
-    def carry(self, motion: RigidMotion, chosen: np.ndarray | None = None) -> None:
-        """Move strands as they are, (M,) indices or all for None: also where the next frame begins for their roots.
+    def carry(self, chosen: np.ndarray, turns: np.ndarray, pivots: np.ndarray, places: np.ndarray) -> None:
+        """Take some strands along rigidly, as after a jump of the surface: x becomes place + turn (x - pivot).
 
-        motion: of all, or of each of the chosen ones. Velocities turn with it, so nothing is felt of it.
+        chosen: (S,) bool; turns: (S, 4) rotations x, y, z, w; pivots, places: (S, 3) [m]. Velocities turn with them,
+        and so do the roots, from where the next frame begins.
         """
-        rows = np.arange(self.strand_count) if chosen is None else chosen
-        turn = np.asarray(motion.rotation)[..., None, :]
-        state = {name: self.read(name).reshape(self.strand_count, -1, width) for name, width in _TURNED.items()}
+        for count in (len(chosen), len(turns), len(pivots), len(places)):
+            require_count("strands", count, self.strand_count)
+        turns = rotations.unit(np.asarray(turns, np.float64))[:, None]
+        if not (np.isfinite(turns).all() and np.isfinite(pivots).all() and np.isfinite(places).all()):
+            raise HairError("Roots of simulated strands have non-finite coordinates.")
 
-        def change(name, changed):
-            state[name][rows] = changed
+        def turned(name, of_each, change):
+            rows = self.read(name)
+            values = rows.reshape(self.strand_count, -1, of_each).astype(np.float64)
+            carried = change(values).reshape(rows.shape)
+            self._put(name, np.where(np.asarray(chosen)[:, None], carried, rows))
 
-        center, way = np.asarray(motion.center)[..., None, :], np.asarray(motion.way)[..., None, :]
-        moved = replace(motion, rotation=turn, center=center, way=way)
-        change("positions", moved.moved(state["positions"][rows].astype(np.float64)))
-        change("frames", rotations.product(turn, state["frames"][rows].astype(np.float64)))
-        for name in ("velocities", "spins"):
-            change(name, rotations.rotated(turn, state[name][rows].astype(np.float64)))
-        multipliers = state["multipliers"][rows].astype(np.float64)  # of bending in the strand's frames
-        multipliers[..., 3:] = rotations.rotated(turn, multipliers[..., 3:])
-        change("multipliers", multipliers)
-        roots = state["roots"][rows].astype(np.float64)  # at the start and at the end of the last frame
-        roots[..., :3] = moved.moved(roots[..., :3])
-        roots[..., 3:] = rotations.product(turn, roots[..., 3:])
-        change("roots", roots)
-        for name, values in state.items():
-            self._put(name, values)
+        def moved(points):
+            return places[:, None] + rotations.rotated(turns, points - pivots[:, None])
 
-    def shift(self, way: np.ndarray) -> None:
-        """Count coordinates from another origin, (3,) [m] from it to the one before."""
-        identity = RigidMotion(rotations.IDENTITY, np.zeros(3), np.asarray(way, np.float64))
-        self.carry(identity)
+        def roots_moved(halves):
+            return np.concatenate([moved(halves[..., :3]), rotations.product(turns, halves[..., 3:])], axis=-1)
+
+        def pulls_turned(multipliers):  # those of joints are in their own frames
+            return np.concatenate([multipliers[..., :3], rotations.rotated(turns, multipliers[..., 3:])], axis=-1)
+
+        turned("positions", 3, moved)
+        turned("velocities", 3, lambda velocities: rotations.rotated(turns, velocities))
+        turned("spins", 3, lambda spins: rotations.rotated(turns, spins))
+        turned("frames", 4, lambda frames: rotations.product(turns, frames))
+        turned("multipliers", 6, pulls_turned)
+        turned("roots", 7, roots_moved)
 
     def advance(
         self,

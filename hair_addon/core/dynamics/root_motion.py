@@ -70,10 +70,6 @@ class RigidMotion:
         """The same motion for a share 0..1 of the time."""
         return RigidMotion(_power(self.rotation, share), self.center, share * self.way)
 
-    def seen_from(self, origin: np.ndarray) -> "RigidMotion":
-        """The same in coordinates from an origin."""
-        return replace(self, center=self.center - origin)
-
     def moved(self, points: np.ndarray) -> np.ndarray:
         """Points (…, 3) [m] after the motion."""
         return self.center + rotations.rotated(self.rotation, points - self.center) + self.way

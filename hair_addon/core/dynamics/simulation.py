@@ -218,19 +218,30 @@ class Simulation:
         is_shared = self.settings.inertia < 1.0
         if is_shared:
             before = before.moved(shared)
-            self._rods.carry(shared.seen_from(self._origin))
+            self._carry(shared)
         jumping = np.flatnonzero(root_motion.jumps(before, after, self.settings.teleport_distance))
         if len(jumping):
-            self._rods.carry(root_motion.jump_of(before, after, jumping).seen_from(self._origin), jumping)
+            self._carry(root_motion.jump_of(before, after, jumping), jumping)
             before = before.with_rows(jumping, after)
         if (origin != self._origin).any():
-            self._rods.shift(self._origin - origin)
+            self._carry(RigidMotion(rotations.IDENTITY, np.zeros(3), self._origin - origin))
         if is_shared or len(jumping) or (origin != self._origin).any():
             self._origin = origin
             obstacles = self.world.obstacles
             self._read_obstacles([one.moved(shared) for one in obstacles] if is_shared else obstacles)
             self._contacts.forget()
         return before
+
+    def _carry(self, motion, chosen=None):
+        """Move strands rigidly as they are: all, or (M,) indices of some, each with a motion of its own."""
+        count = len(self._groom)
+        rows = np.arange(count) if chosen is None else chosen
+        is_chosen = np.zeros(count, bool)
+        is_chosen[rows] = True
+        turns, pivots, places = np.tile(rotations.IDENTITY, (count, 1)), np.zeros((count, 3)), np.zeros((count, 3))
+        turns[rows], pivots[rows] = motion.rotation, motion.center - self._origin
+        places[rows] = motion.center + motion.way - self._origin
+        self._rods.carry(is_chosen, turns, pivots, places)
 
     def _read_obstacles(self, obstacles):
         self._colliders.read([obstacle.seen_from(self._origin) for obstacle in obstacles])

@@ -2,10 +2,12 @@
 """The same strands move alike, bit by bit: again, resumed, in another order, on other numbers of threads."""
 
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import warp as wp
+from scipy.spatial.transform import Rotation
 
 from hair_addon.core.dynamics import rod_solver
 from tests.support.devices import DEVICE
@@ -83,6 +85,38 @@ def test_stage_by_stage_and_substep_by_substep(groom):
         simulation.rods.move_roots(groom[:, 0] + 0.02 * np.sin([frame, 2.0 * frame, 0.5 * frame]))
         advance_in_parts(simulation)
     assert_equal(shaken(groom), simulation.rods.save())
+
+
+def test_at_other_frame_rates(groom):
+    """24, 30 and 60 frames a second, in substeps of one size: a third of a second above still roots."""
+    ends = []
+    for count in (10, 8, 4):
+        simulation = Simulation(groom)
+        simulation.step = replace(simulation.step, size=1.0 / 240.0, count=count)
+        ends.append(simulation.advance(240 // 3 // count).points)
+    np.testing.assert_array_equal(ends[1], ends[0])
+    np.testing.assert_array_equal(ends[2], ends[0])
+
+
+def test_carried_strands_go_on_as_before(groom):
+    """Gravity, roots and motion turn with the jump, so all is as if it had not been; others do not notice."""
+    turn = Rotation.from_rotvec([0.5, -1.0, 0.3])
+    here, there = Simulation(groom).advance(3), Simulation(groom).advance(3)
+    chosen = np.arange(COUNT) % 3 == 0
+    places = groom[:, 0] + [0.3, -0.2, 0.1]
+    turns = np.tile(turn.as_quat(), (COUNT, 1))
+    there.rods.carry(chosen, turns, groom[:, 0], places)
+    there.step = replace(there.step, gravity=tuple(turn.apply(there.step.gravity)))
+    there.roots = np.where(chosen[:, None], places, groom[:, 0])
+    there.turns = np.where(chosen[:, None], turns, [0.0, 0.0, 0.0, 1.0])
+    here.advance(3), there.advance(3)
+    back = turn.inv().apply((there.points - there.roots[:, None])[chosen].reshape(-1, 3))
+    stayed = (here.points - groom[:, :1])[chosen].reshape(-1, 3)
+    assert abs(back - stayed).max() < 1e-5
+    there = Simulation(groom).advance(3)
+    there.rods.carry(chosen, turns, groom[:, 0], places)
+    here = Simulation(groom).advance(3)
+    np.testing.assert_array_equal(there.rods.save()["frames"][~chosen], here.rods.save()["frames"][~chosen])
 
 
 @pytest.mark.skipif(wp.get_device(DEVICE).is_cpu, reason="threads of a GPU stand in blocks")
