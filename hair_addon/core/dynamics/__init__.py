@@ -6,6 +6,6 @@ from typing import TYPE_CHECKING
 from ..lazy import submodules
 
 if TYPE_CHECKING:
-    from . import air, closed_parts, colliders, contact, contact_queries, hair_volume, nearest_surface
+    from . import air, closed_parts, colliders, contact, contact_queries, hair_volume, nearest_surface, rigid_motion
 else:
     __getattr__ = submodules(__name__)
