@@ -4,11 +4,11 @@
 import numpy as np
 import warp as wp
 
-from hair_addon.core.dynamics.contact import PLANE, Contacts
+from hair_addon.core.dynamics.contact import PLANE, WIDTH, Contacts
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.support.meshes import flat_grid, subdivided_sphere
 
-LANES = 8
+LANES = WIDTH
 STEP = 1.0 / 192.0  # [s]
 FAR = 10.0  # [m] from any collider
 

@@ -21,7 +21,7 @@ from .contact_queries import PLANE, WIDTH
 from .nearest_surface import Surface
 
 RISE = 0.02  # [m/s] at most, of a point that the groom has inside
-LEAST_ROWS = 32  # times `WIDTH` strands that are worth a thread
+LEAST_ROWS = 128  # times `WIDTH` strands that are worth a thread
 
 _DEEPEST = 0.1  # [m] inside that the groom is measured
 

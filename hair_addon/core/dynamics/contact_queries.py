@@ -15,7 +15,7 @@ from .nearest_surface import Surface, crossed, nearest
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 PLANE = wp.constant(8)  # rows of an array that a plane takes
-WIDTH = 8  # samples that a thread of the processor takes at once
+WIDTH = 16  # samples that a thread of the processor takes at once
 NOWHERE = wp.constant(1e9)  # [m] from any collider
 
 _AHEAD = wp.constant(0.01)  # [m] at most, looked for beyond what is needed, to spare later queries
@@ -179,7 +179,7 @@ def _choose(
 
 
 @wp.func
-def _find_of(
+def _look_in(
     surface: Surface,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
@@ -187,9 +187,6 @@ def _find_of(
     sample_count: int,
     lanes_at_once: int,
     is_middle: int,
-    rise: float,
-    is_final: int,
-    is_skipping: int,
     group: int,
     sample: int,
     first_lane: int,
@@ -199,31 +196,7 @@ def _find_of(
     clear: wp.array3d[float],
     out_planes: wp.array3d[float],
 ):
-    is_any = _put_needs(
-        group,
-        sample,
-        first_lane,
-        is_middle,
-        positions,
-        last_positions,
-        middle_planes,
-        surface.turn,
-        surface.shift,
-        surface.motion,
-        surface.to_rest,
-        surface.moved,
-        surface.largest_distance,
-        rise,
-        is_final,
-        is_skipping,
-        rest,
-        sides,
-        asked,
-        clear,
-        out_planes,
-    )
-    if is_any == 0:
-        return
+    """Look for a surface in those lanes of which `_put_needs` said so."""
     row = sample + 1 - is_middle
     for lane in range(first_lane, first_lane + lanes_at_once):
         needed = out_planes[group, _index(row, PLANE, 3), lane]
@@ -278,26 +251,47 @@ def find_planes(
     first_sample = ((thread // part_count) % run_count) * samples_at_once
     group = thread // (part_count * run_count)
     for sample in range(first_sample, first_sample + samples_at_once):
-        _find_of(
-            surface,
-            positions,
-            last_positions,
-            middle_planes,
-            sample_count,
-            lanes_at_once,
-            is_middle,
-            rise,
-            is_final,
-            is_skipping,
+        is_any = _put_needs(
             group,
             sample,
             first_lane,
+            is_middle,
+            positions,
+            last_positions,
+            middle_planes,
+            surface.turn,
+            surface.shift,
+            surface.motion,
+            surface.to_rest,
+            surface.moved,
+            surface.largest_distance,
+            rise,
+            is_final,
+            is_skipping,
             rest,
             sides,
             asked,
             clear,
             out_planes,
         )
+        if is_any != 0:
+            _look_in(
+                surface,
+                positions,
+                last_positions,
+                middle_planes,
+                sample_count,
+                lanes_at_once,
+                is_middle,
+                group,
+                sample,
+                first_lane,
+                rest,
+                sides,
+                asked,
+                clear,
+                out_planes,
+            )
 
 
 @wp.kernel

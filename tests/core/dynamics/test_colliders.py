@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hair_addon.core.dynamics.colliders import Collider, Colliders
-from hair_addon.core.dynamics.contact import Contacts
+from hair_addon.core.dynamics.contact import WIDTH, Contacts
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.support.meshes import flat_grid, subdivided_sphere
 
@@ -26,7 +26,7 @@ def notes_of(colliders):
 
 def finds(colliders, place):
     """Whether a point at a place finds a plane."""
-    strand = np.repeat(np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1), 8, axis=2)
+    strand = np.repeat(np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1), WIDTH, axis=2)
     positions = wp.array(strand, dtype=float, device=colliders.device)
     far = wp.array(strand + np.float32(9.0), dtype=float, device=colliders.device)
     return bool(Contacts(far, colliders).find(positions, positions, 0.01).numpy().any())

@@ -147,10 +147,10 @@ def test_positions_that_are_no_numbers_and_absurd_ones_have_no_plane(device):
 
 def test_arrays_of_other_shapes_are_refused(device):
     colliders = Colliders(device)
-    for shape in ((2, 7, 8), (2, 3, 8)):
+    for shape in ((2, 7, LANES), (2, 3, LANES)):
         with pytest.raises(HairError):
             Contacts(wp.zeros(shape, dtype=float, device=device), colliders)
-    contacts = Contacts(wp.zeros((2, 9, 8), dtype=float, device=device), colliders)
-    for shape in ((1, 9, 8), (2, 12, 8), (2, 9, 4)):
+    contacts = Contacts(wp.zeros((2, 9, LANES), dtype=float, device=device), colliders)
+    for shape in ((1, 9, LANES), (2, 12, LANES), (2, 9, 4)):
         with pytest.raises(HairError):
             contacts.find(wp.zeros(shape, dtype=float, device=device), contacts.planes, STEP)
