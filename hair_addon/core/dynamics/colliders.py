@@ -25,6 +25,8 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 FARTHEST = 1.0e6  # [m] from the origin
 
+_LEAST_ROWS = 32_768  # vertices that are worth a thread
+
 
 @dataclass(frozen=True)
 class Collider:
@@ -118,6 +120,7 @@ class Colliders:
             inputs=[Rows(self._before), Rows(self._after), float(part)],
             outputs=[self.previous, self.mesh.points],
             device=self.device,
+            least_rows=_LEAST_ROWS,
         )
         self.mesh.refit()
 
