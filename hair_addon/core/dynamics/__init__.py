@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         material,
         nearest_surface,
         presets,
+        rigid_motion,
         rod_solver,
         rods,
         root_motion,

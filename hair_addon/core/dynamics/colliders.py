@@ -18,13 +18,14 @@ from ..geometry.mesh import TriMesh
 from ..kernels import parallel
 from ..kernels.parallel import Rows
 from .closed_parts import outward, rims
+from .rigid_motion import STILL, RigidMotion
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 FARTHEST = 1.0e6  # [m] from the origin
 
-_STILL = np.eye(3), np.zeros(3)
+_LEAST_ROWS = 32_768  # vertices that are worth a thread
 
 
 @dataclass(frozen=True)
@@ -71,12 +72,12 @@ class Colliders:
         self.largest_motion = 0.0  # [m] of a vertex in this frame
         # (rotation (3, 3), translation [m]) of all in this substep, and since the beginning; a vertex of this substep
         # moves by `motion` [m] otherwise, at most.
-        self.rigid_motion = self.rigid_motion_so_far = _STILL
+        self.rigid_motion = self.rigid_motion_so_far = STILL
         self.motion = 0.0
         self._known: dict[str, _Known] = {}
         self._before: Any = None
         self._after: Any = None
-        self._poses = (np.zeros((0, 3), np.float32),) * 2
+        self._way: Any = None  # RigidMotion of the frame
         self._part = 0.0
         self._is_still = True
 
@@ -109,10 +110,7 @@ class Colliders:
             return
         if self._is_still:
             return
-        before, after = self._poses
-        self.rigid_motion, self.motion = rigid_motion(
-            before + np.float32(self._part) * (after - before), before + np.float32(part) * (after - before)
-        )
+        self.rigid_motion, self.motion = self._way.between(self._part, part)
         (turn, shift), (turned, moved) = self.rigid_motion, self.rigid_motion_so_far
         self.rigid_motion_so_far = turn @ turned, turn @ moved + shift
         self._part = part
@@ -122,6 +120,7 @@ class Colliders:
             inputs=[Rows(self._before), Rows(self._after), float(part)],
             outputs=[self.previous, self.mesh.points],
             device=self.device,
+            least_rows=_LEAST_ROWS,
         )
         self.mesh.refit()
 
@@ -160,12 +159,12 @@ class Colliders:
 
     def _put(self, before, after):
         """Write the vertices at the beginning and at the end of the frame, and pose the mesh at its beginning."""
-        self._part, self.motion, self.largest_motion, self.rigid_motion = 0.0, 0.0, 0.0, _STILL
+        self._part, self.motion, self.largest_motion, self.rigid_motion = 0.0, 0.0, 0.0, STILL
         self._is_still = True
         if self.mesh is None:
             return
         before, after = np.concatenate(before), np.concatenate(after)
-        self._poses = before, after
+        self._way = RigidMotion(before, after)
         self.largest_motion = float(np.linalg.norm(after - before, axis=1).max())
         self._before.assign(before)
         self._after.assign(after)
@@ -178,23 +177,6 @@ class Colliders:
         rows = [(one.friction, one.distance, float(one.is_double_sided)) for one in colliders]
         self.settings = wp.array(np.array(rows, np.float32).reshape(-1, 3), dtype=wp.vec3, device=self.device)
         self.largest_distance = max((one.distance for one in colliders), default=0.0)
-
-
-def rigid_motion(before: np.ndarray, after: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], float]:
-    """The motion of points (V, 3) as a whole, (rotation (3, 3), translation [m]), and how far any moves otherwise [m].
-
-    The rotation of least squares [Kabsch76], or none, where that leaves less.
-    """
-    centres = before.mean(axis=0, dtype=np.float64), after.mean(axis=0, dtype=np.float64)
-    left, _, right = np.linalg.svd((after - centres[1].astype(np.float32)).T @ (before - centres[0].astype(np.float32)))
-    flip = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
-    turn = (left @ flip @ right).astype(np.float64)
-    candidates = (turn, centres[1] - turn @ centres[0]), _STILL
-    rests = [
-        float(np.linalg.norm(after - before @ np.float32(turn.T) - np.float32(shift), axis=1).max())
-        for turn, shift in candidates
-    ]
-    return candidates[int(np.argmin(rests))], min(rests)
 
 
 def problem_of(collider: Collider, frame: int = 0, is_new: bool = True) -> HairError | None:

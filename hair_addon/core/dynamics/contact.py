@@ -21,7 +21,7 @@ from .contact_queries import PLANE, WIDTH
 from .nearest_surface import Surface
 
 RISE = 0.02  # [m/s] at most, of a point that the groom has inside
-LEAST_ROWS = 64  # samples, of all lanes, that are worth a thread
+LEAST_ROWS = 128  # times `WIDTH` strands that are worth a thread
 
 _DEEPEST = 0.1  # [m] inside that the groom is measured
 
@@ -150,11 +150,11 @@ class Contacts:
             raise HairError("Positions of strands must be one block of memory, on the colliders' device.")
 
     def _launch(self, kernel, arrays, details, outputs):
-        """Launch a kernel for all samples: on a processor a thread for `WIDTH` lanes of each, on all cores."""
+        """Launch a kernel for all samples: on a processor a thread for `WIDTH` strands each, on all cores."""
         groups, _, lanes = self._shape
-        device, at_once = self.colliders.device, WIDTH if self.colliders.device.is_cpu else 1
-        count = groups * (self._vertex_count - 1) * lanes // at_once
-        inputs = [*arrays, self._vertex_count - 1, at_once, *details]
+        device, count = self.colliders.device, self._vertex_count - 1
+        at_once = (count, WIDTH) if device.is_cpu else (1, 1)
+        thread_count = groups * count * lanes // (at_once[0] * at_once[1])
         kernel_cache.load(device, kernel.module)
-        shares = parallel.share_count(count, device, LEAST_ROWS)
-        parallel.launch_shares(kernel, count, inputs, [outputs] * shares, device)
+        shares = parallel.share_count(thread_count, device, LEAST_ROWS)
+        parallel.launch_shares(kernel, thread_count, [*arrays, count, *at_once, *details], [outputs] * shares, device)

@@ -18,8 +18,10 @@
 //   array_t<int> sides                       0 for those that do not look
 //   array_t<float> asked                     3 rows: place at rest where it last looked [m]
 //   array_t<float> clear                     how far from there it was [m], less the surface's motion since; changed
-//   array_t<float> out_planes                PLANE rows: zero, but for how far it looks [m] in place of the offset, and 1
-//                                            in place of the friction where the middle of a segment beside has a plane
+//   array_t<float> out_planes                PLANE rows: zero, but for how far it looks [m] in place of the offset, and
+//                                            1 in place of the friction where a segment beside has a plane
+//
+// Returns whether any of them looks, or has such a segment beside.
 //
 // Constants: WIDTH, PLANE, MARGIN [m], MOST_MOTION [m], SLACK [m].
 
@@ -97,7 +99,8 @@ lanes needed = abs_of(most) + moving + MARGIN;
 const lanes before = get(row_of(clear, sample));
 const lanes left = is_final ? before : before - motion;
 const vector place = turned(to_rest, vector{point.x - moved[0], point.y - moved[1], point.z - moved[2]});
-const auto is_spared = (left - length_of(minus(place, get_vector(asked, sample))) > needed + SLACK) & where(is_skipping);
+const lanes away = length_of(minus(place, get_vector(asked, sample)));
+const auto is_spared = (left - away > needed + SLACK) & where(is_skipping);
 needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper
 const auto is_number = length - length == 0.0f;
 const auto is_short = (segment <= 2.0f * most) & where(is_middle);
@@ -108,6 +111,7 @@ put_ints(row_of(sides, sample), is_asking ? get_ints(row_of(sides, sample)) : in
 const int plane_row = PLANE * (is_middle ? sample : sample + 1);
 for (int k = 0; k < PLANE; ++k) put(row_of(out_planes, plane_row + k), lanes(0.0f));
 put(row_of(out_planes, plane_row + 3), is_asking ? needed : lanes(0.0f));
+ints is_any = is_asking ? ints(1) : ints(0);
 if (!is_middle && !is_final) {
   const int segment_count = positions.shape[1] / 3 - 1;
   const auto has_plane = [&](int index) {
@@ -118,5 +122,7 @@ if (!is_middle && !is_final) {
   auto is_beside = has_plane(sample);
   if (sample + 1 < segment_count) is_beside = is_beside | has_plane(sample + 1);
   put(row_of(out_planes, plane_row + 7), is_beside ? lanes(1.0f) : lanes(0.0f));
+  is_any = is_any | (is_beside ? ints(1) : ints(0));
 }
+return any_of(is_any);
 }

@@ -15,7 +15,7 @@ from .nearest_surface import Surface, crossed, nearest
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 PLANE = wp.constant(8)  # rows of an array that a plane takes
-WIDTH = 8  # samples that a thread of the processor takes at once
+WIDTH = 16  # samples that a thread of the processor takes at once
 NOWHERE = wp.constant(1e9)  # [m] from any collider
 
 _AHEAD = wp.constant(0.01)  # [m] at most, looked for beyond what is needed, to spare later queries
@@ -107,7 +107,7 @@ def _put_needs(
     asked: wp.array3d[float],
     clear: wp.array3d[float],
     out_planes: wp.array3d[float],
-): ...
+) -> int: ...
 
 
 @wp.func
@@ -178,8 +178,8 @@ def _choose(
     planes[group, _index(vertex, PLANE, 3), lane] = wp.dot(normal, point) - least
 
 
-@wp.kernel
-def find_planes(
+@wp.func
+def _look_in(
     surface: Surface,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
@@ -187,45 +187,16 @@ def find_planes(
     sample_count: int,
     lanes_at_once: int,
     is_middle: int,
-    rise: float,
-    is_final: int,
-    is_skipping: int,
-    first: int,
-    # outputs
+    group: int,
+    sample: int,
+    first_lane: int,
     rest: wp.array3d[float],
     sides: wp.array3d[int],
     asked: wp.array3d[float],
     clear: wp.array3d[float],
     out_planes: wp.array3d[float],
 ):
-    thread = first + wp.tid()
-    part_count = positions.shape[2] // lanes_at_once
-    first_lane = (thread % part_count) * lanes_at_once
-    sample = (thread // part_count) % sample_count
-    group = thread // (part_count * sample_count)
-    _put_needs(
-        group,
-        sample,
-        first_lane,
-        is_middle,
-        positions,
-        last_positions,
-        middle_planes,
-        surface.turn,
-        surface.shift,
-        surface.motion,
-        surface.to_rest,
-        surface.moved,
-        surface.largest_distance,
-        rise,
-        is_final,
-        is_skipping,
-        rest,
-        sides,
-        asked,
-        clear,
-        out_planes,
-    )
+    """Look for a surface in those lanes of which `_put_needs` said so."""
     row = sample + 1 - is_middle
     for lane in range(first_lane, first_lane + lanes_at_once):
         needed = out_planes[group, _index(row, PLANE, 3), lane]
@@ -253,10 +224,82 @@ def find_planes(
 
 
 @wp.kernel
+def find_planes(
+    surface: Surface,
+    positions: wp.array3d[float],
+    last_positions: wp.array3d[float],
+    middle_planes: wp.array3d[float],
+    sample_count: int,
+    samples_at_once: int,
+    lanes_at_once: int,
+    is_middle: int,
+    rise: float,
+    is_final: int,
+    is_skipping: int,
+    first: int,
+    # outputs
+    rest: wp.array3d[float],
+    sides: wp.array3d[int],
+    asked: wp.array3d[float],
+    clear: wp.array3d[float],
+    out_planes: wp.array3d[float],
+):
+    thread = first + wp.tid()
+    part_count = positions.shape[2] // lanes_at_once
+    run_count = sample_count // samples_at_once
+    first_lane = (thread % part_count) * lanes_at_once
+    first_sample = ((thread // part_count) % run_count) * samples_at_once
+    group = thread // (part_count * run_count)
+    for sample in range(first_sample, first_sample + samples_at_once):
+        is_any = _put_needs(
+            group,
+            sample,
+            first_lane,
+            is_middle,
+            positions,
+            last_positions,
+            middle_planes,
+            surface.turn,
+            surface.shift,
+            surface.motion,
+            surface.to_rest,
+            surface.moved,
+            surface.largest_distance,
+            rise,
+            is_final,
+            is_skipping,
+            rest,
+            sides,
+            asked,
+            clear,
+            out_planes,
+        )
+        if is_any != 0:
+            _look_in(
+                surface,
+                positions,
+                last_positions,
+                middle_planes,
+                sample_count,
+                lanes_at_once,
+                is_middle,
+                group,
+                sample,
+                first_lane,
+                rest,
+                sides,
+                asked,
+                clear,
+                out_planes,
+            )
+
+
+@wp.kernel
 def measure(
     surface: Surface,
     positions: wp.array3d[float],
     sample_count: int,
+    samples_at_once: int,
     lanes_at_once: int,
     is_middle: int,
     radius: float,
@@ -267,15 +310,17 @@ def measure(
 ):
     thread = first + wp.tid()
     part_count = positions.shape[2] // lanes_at_once
+    run_count = sample_count // samples_at_once
     first_lane = (thread % part_count) * lanes_at_once
-    sample = (thread // part_count) % sample_count
-    group = thread // (part_count * sample_count)
-    for lane in range(first_lane, first_lane + lanes_at_once):
-        point = _sample(positions, group, sample, lane, is_middle)
-        rest[group, sample, lane] = NOWHERE
-        sides[group, sample, lane] = 0
-        if wp.isfinite(wp.length(point)):
-            hit = nearest(surface, point, point, radius, 0)
-            if hit.collider >= 0:
-                rest[group, sample, lane] = hit.distance
-                sides[group, sample, lane] = hit.side
+    first_sample = ((thread // part_count) % run_count) * samples_at_once
+    group = thread // (part_count * run_count)
+    for sample in range(first_sample, first_sample + samples_at_once):
+        for lane in range(first_lane, first_lane + lanes_at_once):
+            point = _sample(positions, group, sample, lane, is_middle)
+            rest[group, sample, lane] = NOWHERE
+            sides[group, sample, lane] = 0
+            if wp.isfinite(wp.length(point)):
+                hit = nearest(surface, point, point, radius, 0)
+                if hit.collider >= 0:
+                    rest[group, sample, lane] = hit.distance
+                    sides[group, sample, lane] = hit.side

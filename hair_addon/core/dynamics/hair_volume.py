@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair among hair: friction, pressure and cohesion of all strands as a volume, on a grid [Petrovic06, McAdams09].
+"""Hair among hair: friction, pressure and cohesion of all strands as a volume, on a grid [Petrovic06] [McAdams09].
 
 Each region of the surface has a grid of its own, so that hair on both sides of a parting does not mix. Sums over
 points are of whole numbers: in any order, on any number of cores, they are the same to the last bit.

@@ -2,7 +2,7 @@
 """Arrays in an uncompressed .npz file, read only if it is, byte for byte, what would be written for its arrays.
 
 So no parser meets a file that somebody else has made: names, types and shapes are known before it is opened, and with
-them every byte but those of the arrays and their checksums [PKZIP].
+them every byte but those of the arrays and their checksums.
 """
 
 import binascii

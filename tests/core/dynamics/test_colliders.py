@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hair_addon.core.dynamics.colliders import Collider, Colliders, rigid_motion
-from hair_addon.core.dynamics.contact import Contacts
+from hair_addon.core.dynamics.colliders import Collider, Colliders
+from hair_addon.core.dynamics.contact import WIDTH, Contacts
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.support.meshes import flat_grid, subdivided_sphere
 
@@ -26,7 +26,7 @@ def notes_of(colliders):
 
 def finds(colliders, place):
     """Whether a point at a place finds a plane."""
-    strand = np.repeat(np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1), 8, axis=2)
+    strand = np.repeat(np.tile(np.array(place, np.float32), 2).reshape(1, 6, 1), WIDTH, axis=2)
     positions = wp.array(strand, dtype=float, device=colliders.device)
     far = wp.array(strand + np.float32(9.0), dtype=float, device=colliders.device)
     return bool(Contacts(far, colliders).find(positions, positions, 0.01).numpy().any())
@@ -48,8 +48,7 @@ def test_poses_lie_on_lines_between_frames(device, rng):
         np.testing.assert_array_equal(colliders.previous.numpy(), last)
         turn, shift = colliders.rigid_motion
         others = np.linalg.norm(points - last @ turn.T - shift, axis=1).max()
-        np.testing.assert_allclose(colliders.motion, others, atol=1e-6)
-        assert colliders.motion <= np.linalg.norm(points - last, axis=1).max() + 1e-6
+        assert others <= colliders.motion + 1e-6
         last = points
     np.testing.assert_array_equal(last, second)
     colliders.read([Collider("a", other), Collider("b", moved(flat_grid(2), (0.0, 0.5, 0.0)))])
@@ -58,27 +57,15 @@ def test_poses_lie_on_lines_between_frames(device, rng):
     np.testing.assert_array_equal(colliders.previous.numpy(), second)
 
 
-def test_what_turns_as_a_whole_moves_not_otherwise(rng):
-    points = rng.normal(size=(500, 3)).astype(np.float32)
-    turn, shift = Rotation.from_rotvec([0.3, -1.0, 0.5]), np.array([2.0, -1.0, 0.5])
-    (found, by), rest = rigid_motion(points, (turn.apply(points) + shift).astype(np.float32))
-    np.testing.assert_allclose(found, turn.as_matrix(), atol=1e-6)
-    np.testing.assert_allclose(by, shift, atol=1e-6)
-    assert rest < 2e-6
-    flat = points * np.float32([1, 1, 0])
-    assert rigid_motion(flat, -flat)[1] < 1e-6  # half a turn, never a mirror
-    assert np.linalg.det(rigid_motion(points, -points)[0][0]) > 0.99
-    assert rigid_motion(points, points)[1] < 1e-6
-
-
 def test_rigid_motions_lead_back_to_the_beginning(rng):
     colliders = Colliders()
     for frame in range(5):
-        turn = Rotation.from_rotvec(0.3 * rng.normal(size=3)) if frame else Rotation.identity()
+        turn = Rotation.from_rotvec(0.1 * rng.normal(size=3)) if frame else Rotation.identity()
         now = TriMesh((turn.apply(BALL.vertices) + 0.02 * frame).astype(np.float32), BALL.triangles)
         colliders.read([Collider("a", now)])
         for part in (0.3, 1.0):
             colliders.pose(part)
+            assert colliders.motion < 0.05 * 0.1
     turned, moved_by = colliders.rigid_motion_so_far
     np.testing.assert_allclose((colliders.mesh.points.numpy() - moved_by) @ turned, BALL.vertices, atol=2e-6)
 

@@ -1,59 +1,31 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Frames come back bit by bit; damaged, foreign and hostile files are missing frames; what is there is whole."""
+"""Frames come back bit by bit, between frames hair moves smoothly, and what is written is whole or not there."""
 
 import dataclasses
-import json
 import os
-import random
 import resource
 import signal
 import subprocess
 import sys
 import time
-import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hair_addon.core.errors import HairError
-from hair_addon.core.files import array_file, frame_cache, frame_manifest, plain_file
+from hair_addon.core.files import frame_cache, frame_manifest, plain_file
 from hair_addon.core.files.frame_cache import FrameCache, baking, between, remove
-from hair_addon.core.files.frame_manifest import Manifest
-
-ROOT = Path(__file__).resolve().parents[3]
-ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
-DIGEST = "0123456789abcdef" * 2
-
-
-def manifest(guide_count=3, settings=1, **changes):
-    given = {
-        "keys": (frame_manifest.digests_of({"settings": [settings], "guides": np.arange(guide_count)}),),
-        "guide_count": guide_count,
-        "point_count": 5,
-        "first": -2,
-        "last": 9,
-        "fps": 24.0,
-        "state_layout": {"x": ("<f4", (2, 4)), "substep": ("<i8", ())},
-    }
-    return Manifest(**given | changes)
-
-
-def points_of(number, guide_count=3):
-    """A frame's points, each frame's its own."""
-    return np.random.default_rng(number + 100).random((guide_count, 5, 3), dtype=np.float32)
-
-
-def state_of(number):
-    return {"x": np.full((2, 4), number, np.float32), "substep": np.array(number * 7, np.int64)}
-
-
-def bake(folder, numbers, wanted=None):
-    with baking(folder, wanted or manifest()) as writer:
-        for number in numbers:
-            writer.write_frame(number, points_of(number), DIGEST)
-            writer.write_state(number, state_of(number))
-        writer.complete()
+from tests.support.cached_frames import (
+    DIGEST,
+    ENVIRONMENT,
+    ROOT,
+    bake,
+    check_whole,
+    manifest,
+    points_of,
+    said,
+)
 
 
 @pytest.fixture
@@ -61,25 +33,6 @@ def folder(tmp_path):
     """A folder with the frames -2 to 3."""
     bake(tmp_path / "cache", range(-2, 4))
     return tmp_path / "cache"
-
-
-def said(cache):
-    return [str(error) for error in cache.take_complaints()]
-
-
-def check_whole(folder, most_complaints=0):
-    """Every frame and state that is listed is what was written; returns their numbers."""
-    cache = FrameCache(folder)
-    for number in cache.frame_numbers():
-        frame = cache.read_frame(number)
-        assert frame is not None and frame.points.tobytes() == points_of(number).tobytes()
-    for number in cache.state_numbers():
-        state = cache.read_state(number)
-        assert state is not None and {name: array.tobytes() for name, array in state.items()} == {
-            name: array.tobytes() for name, array in state_of(number).items()
-        }
-    assert len(said(cache)) <= most_complaints
-    return cache.frame_numbers(), cache.state_numbers()
 
 
 # Round trips.
@@ -153,201 +106,6 @@ def test_points_at_any_time(folder):
     assert cache.points_at(3.5) is None and cache.points_at(-2.5) is None and said(cache) == []
 
 
-# Damaged, foreign and hostile files.
-
-
-def frame_bytes(number=1):
-    arrays = {
-        "key": np.frombuffer(bytes.fromhex(manifest().key), np.uint8),
-        "frame": np.array(number, np.int64),
-        "digest": np.frombuffer(bytes.fromhex(DIGEST), np.uint8),
-        "points": points_of(number),
-    }
-    return b"".join(map(bytes, array_file.encoded(arrays)))
-
-
-def test_a_frame_cut_at_any_byte_is_missing(folder):
-    path = folder / "+00000001.npz"
-    data = path.read_bytes()
-    assert data == frame_bytes()
-    layout = manifest().frame_layout
-    for length in range(len(data)):
-        assert array_file.decoded(data[:length], layout) is None
-    for length in (0, 1, 60, len(data) // 2, len(data) - 1):
-        path.write_bytes(data[:length])
-        cache = FrameCache(folder)
-        assert cache.read_frame(1) is None and cache.read_frame(1) is None
-        assert len(said(cache)) == 1  # once
-    path.write_bytes(data + b"\0")
-    assert FrameCache(folder).read_frame(1) is None
-
-
-def mutated(data, source):
-    """Bytes changed as accidents, and people who want to know, change them."""
-    data = bytearray(data)
-    for _ in range(source.choice((1, 1, 1, 2, 3, 8))):
-        place = source.randrange(len(data))
-        kind = source.randrange(6)
-        if kind == 0:
-            data[place] ^= 1 << source.randrange(8)
-        elif kind == 1:
-            data[place] = source.choice((0, 1, 0x7F, 0x80, 0xFF, source.randrange(256)))
-        elif kind == 2:
-            size = source.choice((2, 4, 8))
-            data[place : place + size] = source.choice((0, 1, 2**15, 2**16 - 1)).to_bytes(2, "little") * (size // 2)
-        elif kind == 3:
-            del data[place : place + source.randrange(1, 20)]
-        elif kind == 4:
-            data[place:place] = data[source.randrange(len(data)) :][: source.randrange(1, 20)]
-        else:
-            start = source.randrange(len(data))
-            part = data[start : start + source.randrange(1, 64)]
-            data[place : place + len(part)] = part
-        if not data:
-            break
-    return bytes(data)
-
-
-def check_mutants(count, seed):
-    """No mutant is read as another frame, or ends otherwise than by being refused."""
-    source = random.Random(seed)
-    data, layout = frame_bytes(), manifest().frame_layout
-    manifest_data = json.dumps(
-        {"format": frame_manifest.FORMAT, "version": 1} | dataclasses.asdict(manifest())
-    ).encode()
-    assert array_file.decoded(data, layout) is not None
-    assert frame_manifest.parsed(manifest_data, Path("m")) == manifest()
-    for _ in range(count):
-        mutant = mutated(data, source)
-        assert mutant == data or array_file.decoded(mutant, layout) is None
-        try:
-            found = frame_manifest.parsed(mutated(manifest_data, source), Path("m"))
-        except HairError:
-            continue
-        assert array_file.size_of(found.frame_layout) <= array_file.MOST_BYTES
-        assert array_file.size_of(found.state_file_layout) <= array_file.MOST_BYTES
-
-
-def test_mutants_are_refused():
-    check_mutants(3_000, 1)
-
-
-@pytest.mark.long
-def test_a_million_mutants_are_refused():
-    check_mutants(1_000_000, 2)
-
-
-def foreign(kind, path):
-    """Put something else in the place of a frame."""
-    data = path.read_bytes()
-    path.unlink()
-    if kind == "folder":
-        path.mkdir()
-    elif kind == "pipe":
-        os.mkfifo(path)
-    elif kind in ("link", "link to itself", "link to nothing"):
-        targets = {"link": path.with_name("+00000002.npz"), "link to itself": path}
-        os.symlink(targets.get(kind, "/nowhere"), path)
-    elif kind == "future":
-        path.write_bytes(data.replace(b"'<f4'", b"'<f8'"))
-    elif kind == "other frame":
-        path.write_bytes(frame_bytes(2))
-    elif kind == "other key":
-        other = dataclasses.replace(manifest(), keys=manifest(settings=9).keys)
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setitem(globals(), "manifest", lambda: other)
-            path.write_bytes(frame_bytes(1))
-    elif kind == "sparse":
-        with open(path, "wb") as file:
-            file.truncate(2**40)
-    elif kind == "bomb":
-        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr("points.npy", bytes(2**24))
-    elif kind == "huge header":
-        with zipfile.ZipFile(path, "w") as archive:
-            archive.writestr("points.npy", b"\x93NUMPY\x02\x00" + (2**20).to_bytes(4, "little") + b"[" * 2**20)
-    elif kind == "pickle":
-        np.savez(path, points=np.array([{"a": 1}]))
-    elif kind == "NumPy's own":
-        np.savez(path, key=np.zeros(16, np.uint8), points=points_of(1))
-    elif kind == "NaN":
-        forged = array_file.decoded(data, manifest().frame_layout) | {"points": points_of(1) * np.float32(np.nan)}
-        parts = array_file._file_of(manifest().frame_layout, {k: v.tobytes() for k, v in forged.items()})
-        path.write_bytes(b"".join(parts))
-
-
-FOREIGN = [
-    "folder",
-    "pipe",
-    "link",
-    "link to itself",
-    "link to nothing",
-    "future",
-    "other frame",
-    "other key",
-    "sparse",
-]
-FOREIGN += ["bomb", "huge header", "pickle", "NumPy's own", "NaN"]
-
-
-@pytest.mark.parametrize("kind", FOREIGN)
-def test_whatever_else_stands_there_is_a_missing_frame(folder, kind):
-    foreign(kind, folder / "+00000001.npz")
-    cache = FrameCache(folder)
-    assert cache.read_frame(1) is None and cache.points_at(0.5) is None
-    assert len(said(cache)) == 1
-    assert cache.points_at(-1.5) is not None and cache.points_at(2.5) is not None and said(cache) == []
-
-
-@pytest.mark.parametrize("kind", [kind for kind in [*FOREIGN, "gone"] if kind not in {"future", "NaN"}])
-def test_without_a_manifest_nothing_is_read_or_removed(folder, kind):
-    foreign(kind, folder / frame_manifest.NAME)
-    names = sorted(os.listdir(folder))
-    cache = FrameCache(folder)
-    assert cache.manifest is None and cache.read_frame(1) is None and cache.read_state(1) is None
-    with pytest.raises(HairError):
-        remove(folder)
-    assert sorted(os.listdir(folder)) == names
-
-
-@pytest.mark.parametrize(
-    ("name", "value"),
-    [
-        ("guide_count", 0),
-        ("guide_count", 10**30),
-        ("guide_count", 3.0),
-        ("guide_count", True),
-        ("point_count", 258),
-        ("first", 10),
-        ("first", -(10**9)),
-        ("fps", float("nan")),
-        ("fps", 0),
-        ("fps", 10**400),
-        ("fps", "24"),
-        ("state", "baked"),
-        ("keys", []),
-        ("keys", [{"a": 1}]),
-        ("keys", [{}] * 65),
-        ("keys", None),
-        ("state_layout", {"x": ["|O", [1]]}),
-        ("state_layout", {"x": ["<f4", [2**28]]}),
-        ("state_layout", {"frame": ["<f4", [1]]}),
-        ("state_layout", {"x": ["<f4", 3]}),
-        ("notes", [["a"]]),
-        ("notes", [["\ud800", "b"]]),
-        ("version", 2),
-        ("another", 1),
-    ],
-    ids=lambda value: str(value)[:16],
-)
-def test_manifests_of_no_simulation_are_refused(folder, name, value):
-    path = folder / frame_manifest.NAME
-    found = json.loads(path.read_text())
-    path.write_text(json.dumps(found | {name: value}))
-    cache = FrameCache(folder)
-    assert cache.manifest is None and len(said(cache)) == 1
-
-
 # Writing.
 
 
@@ -402,7 +160,7 @@ def remove_all(folder):
 KILLED = """
 import os, random, signal, sys, time
 from pathlib import Path
-from tests.core.files.test_frame_cache import bake
+from tests.support.cached_frames import bake
 folder, count, seed = Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3])
 chance = random.Random(seed)
 for _ in range(count):
@@ -438,7 +196,7 @@ def test_frames_are_whole_after_each_of_two_hundred_kills(tmp_path):
 HOLD = """
 import sys, time
 from pathlib import Path
-from tests.core.files.test_frame_cache import *
+from tests.support.cached_frames import *
 with baking(Path(sys.argv[1]), manifest()) as writer:
     writer.write_frame(1, points_of(1), DIGEST)
     print("baking", flush=True)
