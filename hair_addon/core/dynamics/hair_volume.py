@@ -29,6 +29,7 @@ LEAST_CELL = 0.004  # [m]
 MOST_CELLS_ALONG = 96
 MOST_CELLS = 4 * MOST_CELLS_ALONG**3  # of all regions
 
+_FEWEST_CELLS = 4096  # of a region, that are always allowed
 _MOST_SHARES = 4  # each has a grid of its own while it adds
 _LEAST_ROWS = 20_000  # points that are worth a thread
 _UNIT = wp.constant(2.0**20)  # of sums, in a mean mass
@@ -68,6 +69,8 @@ class HairVolume:
         if not (math.isfinite(cell_size) and cell_size > 0.0):
             raise HairError("The cell size must be positive, not {size} m.", size=cell_size)
         self._regions = wp.array(regions, dtype=int, device=self.device)
+        # A grid of more cells than points would be mostly empty, and take longer to clear than to fill.
+        self._most_cells = min(max(2 * math.prod(masses.shape), _FEWEST_CELLS * self._region_count), MOST_CELLS)
         self._least_cell = cell_size
         self.cell_size = cell_size
         self.grid: Any = None
@@ -121,7 +124,7 @@ class HairVolume:
         while True:
             first = np.floor(low / size) - 1.0
             counts = np.floor(high / size) + 3.0 - first
-            if counts.max() <= MOST_CELLS_ALONG and counts.prod() * self._region_count <= MOST_CELLS:
+            if counts.max() <= MOST_CELLS_ALONG and counts.prod() * self._region_count <= self._most_cells:
                 return size, first, counts
             size *= 1.25
 
