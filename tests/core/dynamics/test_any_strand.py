@@ -34,7 +34,7 @@ def mixed(materials):
     kick=st.floats(0.0, 0.5),
     seed=st.integers(0, 2**32 - 1),
 )
-# Where a matrix whose blocks are not made of the same rounded numbers is indefinite.
+# Strong damping, where rounding shows first.
 @example(vertex_count=16, substeps=8, gravity=0.0, damping=0.1875, drag=5.0, kick=0.5, seed=176)
 def test_any_strand_settles(vertex_count, substeps, gravity, damping, drag, kick, seed):
     rng = np.random.default_rng(seed)
