@@ -10,8 +10,10 @@
 //     a = 1 / (1 + μ p / max(t, CREEP h))     Coulomb: slides under μ p, creeps where it sticks
 //     x = x̃ - g n - (1 - a) T (x̃ - x_before - s) + F U,    F = AWAY n nᵀ + a T;    x = x̃ + U where it is not active
 //
-// F filters masses in the solve [Baraff98]. In the first pass U is that of the last substep, which says who is pressed
-// and who is lifted, and t as it was then.
+// F filters masses in the solve [Baraff98], and x follows from λ and the contact's state, so passes may change that at
+// will. In the first pass U is that of the last substep: it says who is pressed and who is lifted. There t is what
+// Coulomb's law gives, |T (x̃ + U - x_before - s)| - μ p, for a point that the rod hardly pulls; for one that the rod
+// drags along it is the last slide, as such a pull depends on a so much that the law would overshoot.
 
 struct touch {
   vector n, point;
@@ -34,11 +36,12 @@ const auto touch_at = [&](int i, bool is_first, float carried) {
   const vector free_slide = across(predicted - moved_before);
   lanes sliding = size_of(across(get_vector(x, i) - moved_before));
   if (is_first) {
-    const lanes last = get(slip, i), driven = size_of(across(predicted + pull - moved_before)) - friction * push;
-    const lanes as_last = last < 0.0f ? size_of(free_slide) : last * exact_sqrt_of(lanes(carried));
+    const lanes last = get(slip, i);
+    const lanes dragged = last < 0.0f ? size_of(free_slide) : last * exact_sqrt_of(lanes(carried));
+    const lanes alone = higher_of(size_of(across(predicted + pull - moved_before)) - friction * push, lanes(0.0f));
     const lanes own = dot(free_slide, free_slide), of_rod = dot(pull, pull);
     const lanes share = own / (own + ROD_SHARE * of_rod + 1.0e-30f);
-    sliding = as_last + (higher_of(driven, lanes(0.0f)) - as_last) * share;
+    sliding = dragged + (alone - dragged) * share;
     pull = vector{lanes(0.0f), lanes(0.0f), lanes(0.0f)};
   }
   const auto is_pressed = (dot(n, n) > 0.5f) & (push > 0.0f);

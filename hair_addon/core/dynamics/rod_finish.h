@@ -42,7 +42,7 @@ if (any_of(is_sound == 0)) {
     const vector goal = root + rotated(root_frame, shape), goal_before = root_before + rotated(frame_before, shape);
     put_vector(x, i, chosen(is_sound, get_vector(x, i), goal));
     put_vector(v, i, chosen(is_sound, get_vector(v, i), (goal - goal_before) * lanes(per_step)));
-    if (has_planes) put(slip, i, is_sound ? get(slip, i) : lanes(-1.0f));
+    put(slip, i, is_sound ? get(slip, i) : lanes(-1.0f));
   }
   const vector none{lanes(0.0f), lanes(0.0f), lanes(0.0f)};
   for (int j = 0; j < segment_count; ++j) {

@@ -37,7 +37,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     const lanes geometric = carried * (exact_sqrt_of(dot(tension, tension)) + 0.5f * (moment + next_moment));
     moment = next_moment;
     // A frame lighter than this is stiffer than single precision can tell from what it is joined to.
-    const lanes least_inertia = LEAST_INERTIA * h * h / compliance;
+    const lanes least_inertia = LEAST_INERTIA * h * h * (1.0f + damping) / compliance;
     const lanes turning = 1.0f / (higher_of(get(inertia, j), least_inertia) + geometric);
     put(kept(j, TURNING), 0, turning);
 

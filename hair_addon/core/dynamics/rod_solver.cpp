@@ -174,18 +174,16 @@ for (int substep = first; substep < end; ++substep) {
       if (!any_of(asked)) break;
       put_contacts(false, 1.0f, asked);
     }
-    if (has_planes) {
-      for (int i = 0; i <= segment_count; ++i) {
-        lanes slid = -1.0f;
-        if (is_touching && i > pinned) {
-          const vector n = get_vector(contact(i), 0);
-          const vector moved = get_vector(x, i) - get_vector(x_before, i)
-              - get_vector(plane_rows + (size_t(8 * i) + 4) * STRIDE, 0);
-          const vector along = moved - n * dot(n, moved);
-          slid = dot(n, n) > 0.5f ? exact_sqrt_of(dot(along, along)) : lanes(-1.0f);
-        }
-        put(slip, i, slid);
+    for (int i = 0; i <= segment_count; ++i) {
+      lanes slid = -1.0f;
+      if (is_touching && i > pinned) {
+        const vector n = get_vector(contact(i), 0);
+        const vector slide = get_vector(plane_rows + (size_t(8 * i) + 4) * STRIDE, 0);
+        const vector moved = get_vector(x, i) - get_vector(x_before, i) - slide;
+        const vector along = moved - n * dot(n, moved);
+        slid = dot(n, n) > 0.5f ? exact_sqrt_of(dot(along, along)) : lanes(-1.0f);
       }
+      put(slip, i, slid);
     }
   }
   if (stages & FINISH) {
