@@ -143,7 +143,9 @@ def _begin(guides, last, scene, starts_over, stack):
     settings = properties.dynamics_of(guides.vellus)
     start = settings.start_frame
     if last < start:
-        raise HairError(f"The simulation begins in frame {start}, after the last frame to bake, {last}.")
+        raise HairError(
+            "The simulation begins in frame {start}, after the last frame to bake, {last}.", start=start, last=last
+        )
     folder = frame_folders.new_folder(guides)
     frame_folders.forget(guides)
     if starts_over and (folder / frame_manifest.NAME).exists():

@@ -143,7 +143,11 @@ def _show(guides, points, depsgraph):
 
 def state_of(guides):
     """(sentence, values) for the panel: what is baked or simulated of some guides, and what has changed since."""
-    return state_cache.get(guides.session_uid) or ("Not simulated yet: play from the start frame, or bake", {})
+    return state_cache.get(guides.session_uid) or _unknown_state()
+
+
+def _unknown_state():
+    return "Not simulated yet: play from the start frame, or bake", {}
 
 
 def note_state(guides, blender_scene):
@@ -151,23 +155,29 @@ def note_state(guides, blender_scene):
     baked, played = frame_folders.frames_of(guides), played_cache.get(guides.session_uid)
     if baked is not None and baked.manifest is not None:
         state = _state_of_baked(baked.manifest, guides, blender_scene)
-    elif played is None:
-        state_cache.invalidate(guides.session_uid)
-        return
-    elif played.outdated is not None:
-        state = "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
+    elif played is not None:
+        state = _state_of_played(played)
     else:
-        values = {"frame": played.frame, "count": played.simulated.simulation.substeps}
-        state = "Simulated up to frame {frame}, {count} substeps a frame", values
+        state = _unknown_state()
     state_cache.keep(guides.session_uid, state)
 
 
+def _state_of_played(played):
+    if played.outdated is not None:
+        return "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
+    substeps = played.simulated.simulation.substeps
+    return "Simulated up to frame {frame}, in {count} substeps a frame", {"frame": played.frame, "count": substeps}
+
+
 def _state_of_baked(manifest, guides, blender_scene):
-    values = {"first": manifest.first, "last": manifest.last}
+    first, last = manifest.first, manifest.last
     if manifest.guide_count != len(guides.curves):
         return "The baked frames are of other guides: bake again", {}
     if manifest.keys[-1] != guide_baking.key_of(guides, blender_scene):
-        return "Frames {first} to {last} are baked with other settings or guides: bake again", values
+        return (
+            "Frames {first} to {last} are baked with other settings or guides: bake again",
+            {"first": first, "last": last},
+        )
     if manifest.state != "complete":
-        return "Frames {first} to {last} are baked in part: Bake Dynamics goes on", values
-    return "Frames {first} to {last} are baked", values
+        return "Frames {first} to {last} are baked in part: Bake Dynamics goes on", {"first": first, "last": last}
+    return "Frames {first} to {last} are baked", {"first": first, "last": last}
