@@ -28,7 +28,7 @@ _CLASSES = {
 }
 
 _PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading", "show_guides": "systems"}
-_PROPERTIES |= {"table_folder": "lookup_tables", "simulates": "dynamics"}
+_PROPERTIES |= {"table_folder": "lookup_tables", "simulates": "dynamics", "cache_folder": "dynamics"}
 
 # Page → the operators that it explains, a heading each.
 _OPERATORS = {

@@ -62,8 +62,11 @@ def require_baked(numbers: Iterable[int]) -> None:
         there = set() if baked is None else set(baked.frame_numbers())
         missing = [number for number in numbers if number > start and number not in there]
         if missing:
-            sentence = 'Frame {frame} of the guides "{name}" is not baked: bake their dynamics first.'
-            raise HairError(sentence, frame=missing[0], name=name_of(guides))
+            raise HairError(
+                'Frame {frame} of the guides "{name}" is not baked: bake their dynamics first.',
+                frame=missing[0],
+                name=name_of(guides),
+            )
 
 
 def simulating() -> list[Curves]:

@@ -19,6 +19,7 @@ from ...core.files.frame_manifest import Manifest
 from ...core.long_work import Stage, Work
 from ...core.params import given
 from ..data import scene as scenes
+from ..data import simulated_guides
 from ..host import scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -102,7 +103,7 @@ def baking(
     present = scene_time.frame_of(scene)
     _baking = True
     with contextlib.ExitStack() as stack:
-        stack.callback(_end, scene, present)
+        stack.callback(_end, scene, present, [Remembered(guides) for guides in guides_list])
         tasks = [_begin(guides, last, scene, starts_over, stack) for guides in guides_list]
         yield Stage("Baking", 0.0)
         first = min((task.done for task in tasks), default=last)
@@ -132,10 +133,18 @@ def _results(tasks, counts):
     return [(task, (count, task.broken)) for task, count in zip(tasks, counts, strict=True)]
 
 
-def _end(scene, present):
+def _end(scene, present, baked):
+    """Go back to the frame where the scene was; guides are shown there, as baked, after the next update."""
     global _baking
     scene_time.go_to(scene, present)
     _baking = False
+    for remembered in baked:
+        with contextlib.suppress(HairError):  # deleted meanwhile, by a script
+            guides = remembered.find()
+            simulated_guides.show(guides, None)
+            frame_folders.forget(guides)
+            guides.vellus.is_dynamics_stale = True
+            guides.update_tag()
 
 
 def _begin(guides, last, scene, starts_over, stack):
@@ -143,7 +152,9 @@ def _begin(guides, last, scene, starts_over, stack):
     settings = properties.dynamics_of(guides.vellus)
     start = settings.start_frame
     if last < start:
-        raise HairError(f"The simulation begins in frame {start}, after the last frame to bake, {last}.")
+        raise HairError(
+            "The simulation begins in frame {start}, after the last frame to bake, {last}.", start=start, last=last
+        )
     folder = frame_folders.new_folder(guides)
     frame_folders.forget(guides)
     if starts_over and (folder / frame_manifest.NAME).exists():

@@ -44,6 +44,7 @@ def after_depsgraph_update(scene, depsgraph):
     reported.remember_axes()
     if _is_undone:
         _is_undone = False
+        simulated_hair.follow_undo(scene, depsgraph)
         for datablock in _of_kind("HAIR"):
             if datablock.vellus.is_live and live_hair.is_left_by_undo(datablock):
                 datablock.vellus.is_stale = True

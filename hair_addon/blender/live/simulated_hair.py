@@ -71,7 +71,27 @@ def follow_settings(blender_scene, depsgraph):
             _show(guides, None, depsgraph)
         if state.is_dynamics_stale:
             state.is_dynamics_stale = False
+            if frame_folders.is_simulated(guides) and not simulated_guides.is_shown(guides):
+                _show_known(guides, blender_scene, depsgraph)  # baked just now
             _note_change(guides, blender_scene)
+
+
+def follow_undo(blender_scene, depsgraph):
+    """After an undo, a redo or a load, which show guides as they are combed: show them where they were simulated."""
+    for guides in frame_folders.simulating():
+        _show_known(guides, blender_scene, depsgraph)
+
+
+def _show_known(guides, blender_scene, depsgraph):
+    """Show guides where they are known to be at the scene's time: nothing is simulated."""
+    try:
+        points = _points_at(guides, scene_time.time_of(blender_scene))
+        played = _played_now(guides)
+        if points is None and played is not None:
+            points = _last_known(played, scene_time.frame_of(blender_scene))
+        _show(guides, points, depsgraph)
+    except HairError as error:
+        guides.vellus.dynamics_status = str(error)
 
 
 def _note_change(guides, blender_scene):
@@ -91,7 +111,7 @@ def _points_at(guides, time):
             print(f"Vellus: {error}", file=sys.stderr)
         if points is not None:
             return points
-    played = played_cache.get(guides.session_uid)
+    played = _played_now(guides)
     return None if played is None else played.frames.get(time)
 
 
@@ -102,14 +122,25 @@ def _play(guides, blender_scene, depsgraph):
         if frame == settings.start_frame:
             _begin(guides, blender_scene, depsgraph)
         return None
-    played = played_cache.get(guides.session_uid)
+    played = _played_now(guides)
     if played is None:
-        return None
-    if not played.simulated.is_of(guides, settings):
-        played_cache.invalidate(guides.session_uid)
         return None
     if frame == played.frame + 1:
         _advance(played, guides, blender_scene, depsgraph, settings)
+    return _last_known(played, frame)
+
+
+def _played_now(guides):
+    """What was simulated of guides in this session; None where they are others now, and begin again."""
+    played = played_cache.get(guides.session_uid)
+    if played is not None and not played.simulated.is_of(guides, properties.dynamics_of(guides.vellus)):
+        played_cache.invalidate(guides.session_uid)
+        return None
+    return played
+
+
+def _last_known(played, frame):
+    """Points of guides in a frame, or in the last one before it that is known; None without any."""
     known = [number for number in played.frames if number <= frame]
     return played.frames[max(known)] if known else None
 
@@ -143,7 +174,11 @@ def _show(guides, points, depsgraph):
 
 def state_of(guides):
     """(sentence, values) for the panel: what is baked or simulated of some guides, and what has changed since."""
-    return state_cache.get(guides.session_uid) or ("Not simulated yet: play from the start frame, or bake", {})
+    return state_cache.get(guides.session_uid) or _unknown_state()
+
+
+def _unknown_state():
+    return "Not simulated yet: play from the start frame, or bake", {}
 
 
 def note_state(guides, blender_scene):
@@ -151,23 +186,29 @@ def note_state(guides, blender_scene):
     baked, played = frame_folders.frames_of(guides), played_cache.get(guides.session_uid)
     if baked is not None and baked.manifest is not None:
         state = _state_of_baked(baked.manifest, guides, blender_scene)
-    elif played is None:
-        state_cache.invalidate(guides.session_uid)
-        return
-    elif played.outdated is not None:
-        state = "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
+    elif played is not None:
+        state = _state_of_played(played)
     else:
-        values = {"frame": played.frame, "count": played.simulated.simulation.substeps}
-        state = "Simulated up to frame {frame}, {count} substeps a frame", values
+        state = _unknown_state()
     state_cache.keep(guides.session_uid, state)
 
 
+def _state_of_played(played):
+    if played.outdated is not None:
+        return "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
+    substeps = played.simulated.simulation.substeps
+    return "Simulated up to frame {frame}, in {count} substeps a frame", {"frame": played.frame, "count": substeps}
+
+
 def _state_of_baked(manifest, guides, blender_scene):
-    values = {"first": manifest.first, "last": manifest.last}
+    first, last = manifest.first, manifest.last
     if manifest.guide_count != len(guides.curves):
         return "The baked frames are of other guides: bake again", {}
     if manifest.keys[-1] != guide_baking.key_of(guides, blender_scene):
-        return "Frames {first} to {last} are baked with other settings or guides: bake again", values
+        return (
+            "Frames {first} to {last} are baked with other settings or guides: bake again",
+            {"first": first, "last": last},
+        )
     if manifest.state != "complete":
-        return "Frames {first} to {last} are baked in part: Bake Dynamics goes on", values
-    return "Frames {first} to {last} are baked", values
+        return "Frames {first} to {last} are baked in part: Bake Dynamics goes on", {"first": first, "last": last}
+    return "Frames {first} to {last} are baked", {"first": first, "last": last}

@@ -130,8 +130,11 @@ class Air:
                 require_count(name, count, wanted)
         problems = [(index, field.problem()) for index, field in enumerate(fields)]
         acting = [field for field, (_, problem) in zip(fields, problems, strict=True) if problem is None]
-        sentence = "Force field {number} does not act on hair: {cause}."
-        notes = [HairError(sentence, number=index + 1, cause=problem) for index, problem in problems if problem]
+        notes = [
+            HairError("Force field {number} does not act on hair: {cause}.", number=index + 1, cause=problem)
+            for index, problem in problems
+            if problem
+        ]
         rows = wp.array([_row_of(field) for field in acting[:MOST_FIELDS]], dtype=_Field, device=self.device)
         kernel_cache.load(self.device, _blow.module)
         count = groups * points * lanes

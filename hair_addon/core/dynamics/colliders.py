@@ -134,8 +134,13 @@ class Colliders:
         if len(mesh.vertices) == len(before.vertices) and np.array_equal(mesh.triangles, before.triangles):
             known.mesh = TriMesh(mesh.vertices, before.triangles)
             return known, before.vertices, mesh.vertices
-        sentence = "{name} has other vertices or faces in frame {frame}: for hair it stays where it was before."
-        self.notes.append(HairError(sentence, name=collider.name, frame=frame))
+        self.notes.append(
+            HairError(
+                "{name} has other vertices or faces in frame {frame}: for hair it stays where it was before.",
+                name=collider.name,
+                frame=frame,
+            )
+        )
         return known, before.vertices, before.vertices
 
     def _build(self):
@@ -187,8 +192,9 @@ def problem_of(collider: Collider, frame: int = 0, is_new: bool = True) -> HairE
     cause = _cause(collider, is_new)
     if cause is None:
         return None
-    sentence = "{name} does not collide with hair in frame {frame}: {cause}."
-    return HairError(sentence, name=collider.name, frame=frame, cause=cause)
+    return HairError(
+        "{name} does not collide with hair in frame {frame}: {cause}.", name=collider.name, frame=frame, cause=cause
+    )
 
 
 def _cause(collider, is_new):

@@ -112,6 +112,8 @@ def test_combed_while_playing(swung):
     write_points(guides, combed)
     bpy.context.scene.frame_set(7)
     assert np.array_equal(shown(guides), combed)
+    bpy.context.scene.frame_set(5)  # simulated with other guides
+    assert np.array_equal(shown(guides), combed)
     play(1, 3)
     assert not np.array_equal(shown(guides), combed)
 
@@ -126,6 +128,29 @@ def test_deleted_or_undone_guides_end_what_is_played(swung):
     bpy.data.hair_curves.remove(bpy.data.hair_curves["Guides"])
     play(8, 10)
     assert len(points(hair)) == 500
+
+
+def test_undo_shows_the_frame_that_was_shown(swung):
+    """It brings Blender's data back, where guides are as they were combed."""
+    guides, hair = swung
+    play(1, 6)
+    sixth, strands = shown(guides).copy(), drawn(hair)
+    handlers.after_undo()
+    bpy.context.view_layer.objects.active.update_tag()
+    bpy.context.view_layer.update()
+    assert np.array_equal(shown(guides), sixth)
+    np.testing.assert_allclose(drawn(hair), strands, atol=1e-6)  # bound anew
+
+
+def test_undone_combing_ends_what_is_played(swung):
+    guides, _hair = swung
+    play(1, 6)
+    combed = points(guides)
+    combed[:, 1:] += 0.01
+    handlers.after_undo()
+    write_points(guides, combed)
+    bpy.context.view_layer.update()
+    assert np.array_equal(shown(guides), combed)
 
 
 def test_a_surface_without_faces_is_said(swung):

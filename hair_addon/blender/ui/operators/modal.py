@@ -120,6 +120,7 @@ class LongOperator(HairOperator):
 
     def _end(self, context, outcome):
         running.end(context)
+        self._work.close()  # now, not when Python comes to it: what was stopped leaves all as it was
         context.workspace.status_text_set(None)
         _redraw(context)
         return outcome

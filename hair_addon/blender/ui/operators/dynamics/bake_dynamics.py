@@ -14,7 +14,7 @@ from ..modal import LongOperator
 
 
 class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
-    """Simulate the active guides up to the last frame of the scene and keep the frames in files, which renders read"""
+    """Simulate the active guides up to the last frame of the scene and write the frames to files, which renders read"""
 
     bl_idname = "vellus.bake_dynamics"
     bl_label = "Bake Dynamics"
@@ -45,10 +45,12 @@ class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
 
     def message(self, made):
         if made.broken:
-            sentence = "Frames {first} to {last} baked; strands broke {count} times and were put back to their groom"
-            return sentence, {"first": made.first, "last": made.last, "count": made.broken}
+            return (
+                "Frames {first} to {last} baked; strands broke {count} times and were put back as they were combed",
+                {"first": made.first, "last": made.last, "count": made.broken},
+            )
         return "Frames {first} to {last} baked", {"first": made.first, "last": made.last}
 
     def stopped(self):
         """What is reported after Esc."""
-        return report_text("Stopped: the frames up to now are kept. Bake Dynamics goes on after them.")
+        return report_text("Stopped: the frames so far are kept, and Bake Dynamics goes on after them.")
