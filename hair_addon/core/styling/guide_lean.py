@@ -73,9 +73,15 @@ def _lean(
                 sideways = wp.length(away - height * normal)
                 part = sideways / (0.5 * wp.length(away) + 0.1 * wanted + 1.0e-6 * size)
                 lift = hold * wp.clamp(1.5 - part, 0.0, 1.0) * wp.max(wanted - height, 0.0)
-                kept_off = ahead + lift * normal - position
-                if lift > 0.0 and wp.length(kept_off) > 1.0e-3 * size:
-                    forward = wp.normalize(kept_off)
+                if lift > 0.0:
+                    # Turned towards the normal until it ends higher by the lift.
+                    rise = wp.dot(forward, normal)
+                    along = forward - rise * normal
+                    if wp.length(along) < 1.0e-3:
+                        edge = wp.mesh_eval_position(surface, face, 1.0, 0.0) - wp.mesh_eval_position(surface, face, 0.0, 1.0)
+                        along = edge - wp.dot(edge, normal) * normal
+                    rise = wp.min(rise + lift / size, 1.0)
+                    forward = rise * normal + wp.sqrt(1.0 - rise * rise) * wp.normalize(along)
         position += size * forward
         out_points[guide, i] = position
 
