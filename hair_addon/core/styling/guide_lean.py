@@ -2,7 +2,7 @@
 """Guides that lean, kept off the surface: the styles Lean and Wet (lean.py, wet.py) on guides.
 
 t'_i = unit((1 - A) t_i + A D), t_i where that is shorter than 1e-3. A segment that would end nearer to the surface than
-the clearance points at the place above it instead; lengths stay.
+the clearance is turned towards the surface's normal until it ends as high as that; lengths stay.
 """
 
 import numpy as np
@@ -32,6 +32,7 @@ def _lean(
     out_points: wp.array2d[wp.vec3],
 ):
     guide = wp.tid()
+    corners = wp.mesh_get(surface).points
     indices = wp.mesh_get(surface).indices
     position = points[guide, 0]
     out_points[guide, 0] = position
@@ -78,7 +79,8 @@ def _lean(
                     rise = wp.dot(forward, normal)
                     along = forward - rise * normal
                     if wp.length(along) < 1.0e-3:
-                        edge = wp.mesh_eval_position(surface, face, 1.0, 0.0) - wp.mesh_eval_position(surface, face, 0.0, 1.0)
+                        # Straight at the surface every direction along it is as good: that of an edge.
+                        edge = corners[indices[3 * face + 1]] - corners[indices[3 * face]]
                         along = edge - wp.dot(edge, normal) * normal
                     rise = wp.min(rise + lift / size, 1.0)
                     forward = rise * normal + wp.sqrt(1.0 - rise * rise) * wp.normalize(along)

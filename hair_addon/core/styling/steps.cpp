@@ -43,7 +43,8 @@ lanes lengths[2][MOST];
 vector directions[2][MOST];
 lanes *length = lengths[0], *next_length = lengths[1];
 vector *t = directions[0], *next = directions[1];
-// Points and their arc lengths, of styles that ask for them by `put_points`.
+// Points from the root on, which round less than places do, and their arc lengths, for styles that ask for them by
+// `put_points`.
 vector place[MOST];
 lanes along[MOST];
 constexpr int MOST_KEPT = LANES == 1 ? 1 : MOST;
@@ -99,7 +100,7 @@ read_points(rows, [&](int i, const vector& point) {
   point_before = point;
 });
 const auto put_points = [&]() {
-  place[0] = root;
+  place[0] = {};
   along[0] = 0.0f;
   for (int i = 1; i < point_count; ++i) {
     place[i] = place[i - 1] + t[i] * length[i];
@@ -206,9 +207,9 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
 }
 
 // Strands that no style has touched keep their bits.
-vector point = root;
+vector from_root = {};
 write_points(rows, is_touched, [&](int i) {
-  if (i > 0) point = point + t[i] * length[i];
-  return point;
+  if (i > 0) from_root = from_root + t[i] * length[i];
+  return root + from_root;
 });
 }
