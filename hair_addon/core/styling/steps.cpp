@@ -159,12 +159,18 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   }
   const float at_root = number[2], at_tip = number[3], exponent = number[4], from = number[6];
   const bool is_even = at_root == at_tip, is_linear = exponent == 1.0f, is_flipped = number[5] != 0.0f;
+  // Within half a segment of its beginning it rises straight: a power would begin vertically, and points jump.
+  const lanes least = 0.5f / (point_count - 1), slope = 1.0f / power(least, lanes(1.0f - exponent));
   const auto profile = [&](lanes x) {
     if (is_even) return lanes(at_root);
     // x of the tip is 1 but for rounding, which steep profiles are sensitive to.
     const lanes part = exact_quotient_of(1.000001f * x - from, lanes(1.0f - from));
     lanes y = clamped(part, lanes(0.0f), lanes(1.0f));
-    if (!is_linear) y = is_flipped ? 1.0f - power(1.0f - y, lanes(exponent)) : power(y, lanes(exponent));
+    if (is_flipped) {
+      y = 1.0f - power(1.0f - y, lanes(exponent));
+    } else if (!is_linear) {
+      y = y < least ? y * slope : power(y, lanes(exponent));
+    }
     return lanes(at_root + (at_tip - at_root) * y);
   };
   const lanes per_total = exact_quotient_of(lanes(1.0f), higher_of(total, lanes(1.0e-20f)));
