@@ -45,23 +45,19 @@ class Slid:
         return wp.clone(self._plain[id(binding)])
 
 
-def halvings(points_at, values, chosen=6, most=14):
-    """[(step, largest move [m])] of steps that are halved where strands move the most, the longest step first.
+def steepest_moves(points_at, values, chosen=6):
+    """Largest moves [m] between values, then of ever shorter steps: the steepest ones are halved again and again.
 
-    points_at(value): strands; values: rising, whose intervals are the first steps; chosen: how many of them are halved
-    each time; most: how often. Moves of rounding alone, below 20 µm, end it.
+    points_at(value): strands; values: rising; chosen: how many steps are halved each time.
     """
     made = [points_at(value) for value in values]
     steps = [
-        (largest_move(*pair), values[k], values[k + 1], *pair)
-        for k, pair in enumerate(zip(made[:-1], made[1:], strict=True))
+        (largest_move(before, after), low, high, before, after)
+        for low, high, before, after in zip(values[:-1], values[1:], made[:-1], made[1:], strict=True)
     ]
-    found = []
-    for _ in range(most + 1):
+    while True:
         steps = sorted(steps, key=lambda step: -step[0])[:chosen]
-        found.append((steps[0][2] - steps[0][1], steps[0][0]))
-        if steps[0][0] < 2e-5:
-            break
+        yield steps[0][0]
         halves = []
         for _move, low, high, before, after in steps:
             middle = 0.5 * (low + high)
@@ -69,4 +65,3 @@ def halvings(points_at, values, chosen=6, most=14):
             halves.append((largest_move(before, between), low, middle, before, between))
             halves.append((largest_move(between, after), middle, high, between, after))
         steps = halves
-    return found

@@ -3,9 +3,11 @@
 // Strands that gather around their centre strand: they follow the curve of points q that are drawn to it, as far as
 // their own length goes. So what is drawn onto the centre lies on it.
 //
-// offset(arc length of the centre, how far it is drawn, out u, out v) moves q in the centre's frames, if `is_woven`.
+// offset(arc length of the centre, how far it is drawn, out u, out v) moves q in the centre's frames, by `width` at most
+// [m]; 0 for none.
 
-const auto gather = [&](float thickness, float twist, lanes joined, bool is_woven, auto offset) {
+const auto gather = [&](float thickness, float twist, lanes joined, float width, auto offset) {
+  const bool is_woven = width > 0.0f;
   const float* rows[LANES];
   for (int lane = 0; lane < LANES; ++lane) {
     rows[lane] = reinterpret_cast<const float*>(centre_points.data) + size_t(centre[lane]) * point_count * 4;
@@ -25,8 +27,8 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
   const auto is_apart = root_distance > 1.0e-9f;
   const lanes per_root_distance = is_apart ? 1.0f / (is_apart ? root_distance : lanes(1.0f)) : lanes(1.0e9f);
   vector point = {}, place = {}, drawn_before = {}, middle_before = low;
-  vector axis_before = centre_normal, frame = reference(), run = {};
-  lanes arc = 0.0f, ahead = 0.0f, rate = 1.0f, lead = 0.0f, weight = 0.0f;
+  vector axis_before = centre_normal, frame = reference(), run = {}, own_run = t[1];
+  lanes arc = 0.0f, ahead = 0.0f, rate = 1.0f, lead = 0.0f, weight = 0.0f, pull_before = 0.0f;
   for (int i = 1; i < point_count; ++i) {
     const lanes d = length[i];
     arc += d;
@@ -53,7 +55,9 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
     const vector middle = low + (high - low) * part;
     const lanes x = arc * per_total;
     lanes course = profile(x);
-    vector away = point - t[i] * (arc - ahead) - middle;
+    // Where the strand is level with its progress along the centre: by its direction over about that length.
+    own_run = own_run + (t[i] - own_run) * share;
+    vector away = point - own_run * (arc - ahead) - middle;
     vector axis = axis_before;
     if (is_woven || twist != 0.0f) {
       // The centre's direction over about that length, which has no steps.
@@ -68,7 +72,10 @@ const auto gather = [&](float thickness, float twist, lanes joined, bool is_wove
       away = away * cosine + cross(axis, away) * sine + axis * (dot(axis, away) * (1.0f - cosine));
     }
     if (at_root > 0.0f) course = course - at_root * (1.0f - smoothstep(arc * per_root_distance));
-    const lanes pull = base * joined * course;
+    // No faster than the strand can follow, however steep the profile is.
+    const lanes most_turned = d / higher_of(sqrt_of(dot(away, away)) + width, 1.0e-3f * d);
+    const lanes pull = clamped(base * joined * course, pull_before - most_turned, pull_before + most_turned);
+    pull_before = pull;
     vector drawn = middle + away * (1.0f - pull * (1.0f - thickness));
     if (is_woven) {
       frame = turned(frame, axis_before, axis);

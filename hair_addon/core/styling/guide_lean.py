@@ -17,6 +17,8 @@ from ..kernels.checks import require_count
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _LEAST_AMOUNT = wp.constant(0.05)  # from which on guides are kept off the surface fully
+_STEEPEST = wp.constant(0.9)  # sine of the angle at which guides rise: near a right angle they would turn in jumps
+_UNKNOWN = wp.constant(1.0e30)
 _CORRECTIONS = wp.constant(4)  # of a segment: a point that is lifted comes nearer to the surface at another place
 
 
@@ -55,6 +57,7 @@ def _lean(
         # A guide leaves the surface by degrees, and one that hardly leans stays where it was combed.
         wanted = wp.min(clearance, 0.5 * arc)
         hold = wp.min(largest_amount / _LEAST_AMOUNT, 1.0)
+        goal = float(_UNKNOWN)
         for _correction in range(_CORRECTIONS):
             ahead = position + size * forward
             query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * (clearance + size))
@@ -73,7 +76,9 @@ def _lean(
                 # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
                 sideways = wp.length(away - height * normal)
                 part = sideways / (0.5 * wp.length(away) + 0.1 * wanted + 1.0e-6 * size)
-                lift = hold * wp.clamp(1.5 - part, 0.0, 1.0) * wp.max(wanted - height, 0.0)
+                if goal == _UNKNOWN:
+                    goal = height + hold * wp.max(wanted - height, 0.0)
+                lift = wp.clamp(1.5 - part, 0.0, 1.0) * wp.max(goal - height, 0.0)
                 if lift > 0.0:
                     # Turned towards the normal until it ends higher by the lift.
                     rise = wp.dot(forward, normal)
@@ -82,7 +87,7 @@ def _lean(
                         # Straight at the surface every direction along it is as good: that of an edge.
                         edge = corners[indices[3 * face + 1]] - corners[indices[3 * face]]
                         along = edge - wp.dot(edge, normal) * normal
-                    rise = wp.min(rise + lift / size, 1.0)
+                    rise = wp.max(rise, wp.min(rise + lift / size, _STEEPEST))
                     forward = rise * normal + wp.sqrt(1.0 - rise * rise) * wp.normalize(along)
         position += size * forward
         out_points[guide, i] = position
