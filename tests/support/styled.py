@@ -75,7 +75,7 @@ def beard(strand_count=800, device=DEVICE, seed=1):
 
 def lawn(strand_count=800, device=DEVICE, seed=1):
     """Strands on a square, each leaning another way."""
-    guides = GuideSettings(guide_count=60, length=0.15, tilt=1.0, gravity=0.4, seed=seed)
+    guides = GuideSettings(guide_count=60, length=0.15, tilt=0.5, gravity=0.4, seed=seed)
     return Groom(flat_grid(8, 0.3), guides, HairSettings(strand_count=strand_count, radius=4e-5), device)
 
 
@@ -85,9 +85,9 @@ def straight(strand_count=400, length=0.2, size=0.1, device=DEVICE):
     return Groom(flat_grid(8, size), guides, HairSettings(strand_count=strand_count, radius=4e-5), device)
 
 
-def ball(strand_count=800, device=DEVICE, seed=1, **hair):
-    """Fur on a sphere; seed: of guides."""
-    guides = GuideSettings(guide_count=60, length=0.3, gravity=0.5, seed=seed)
+def ball(strand_count=800, device=DEVICE, seed=1, size=0.5, **hair):
+    """Fur on a sphere; seed: of guides; size: its radius [m]."""
+    guides = GuideSettings(guide_count=60, length=0.6 * size, gravity=0.5, seed=seed)
     return Groom(
-        subdivided_sphere(3, 0.5), guides, HairSettings(strand_count=strand_count, radius=1e-3, **hair), device
+        subdivided_sphere(3, size), guides, HairSettings(strand_count=strand_count, radius=1e-3, **hair), device
     )

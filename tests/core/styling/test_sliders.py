@@ -18,7 +18,7 @@ from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean
 from tests.support import styled
 from tests.support.slid import Slid, steepest_moves
 
-PLACES = 48  # along the slider, at first
+PLACES = 32  # along the slider, at first
 FEWEST_HALVINGS, MOST_HALVINGS = 5, 14
 ROUNDING = 2e-5  # [m]: what moves strands less is no jump
 
@@ -26,7 +26,8 @@ ROUNDING = 2e-5  # [m]: what moves strands less is no jump
 RANGES = {
     (trim.Settings, "to_length"): (0.002, 1.0),  # 0 is no limit
     (smooth.Settings, "length"): (0.0001, 0.1),  # shorter chords are those of one segment
-    (clump.Settings, "twist"): (-4.0, 4.0),  # a tenth of a turn a segment: with more the points of a lock are scattered
+    (clump.Settings, "twist"): (-1.0, 1.0),  # more turns take more length than strands have
+    (braid.Settings, "radius"): (0.0, 0.02),  # as do wider braids
     # Phases are lengths divided by these: of shorter waves, which points cannot carry, many turns pass in a step.
     (curl.Settings, "pitch"): (0.01, 0.2),
     (curl.Settings, "switchback"): (0.02, 0.2),
@@ -38,7 +39,6 @@ RANGES = {
 WITH = {
     trim.Settings: {"factor": 0.7, "random": 0.3},
     bend.Settings: {"random_turn": 0.2},
-    clump.Settings: {"size": 0.03},
     wet.Settings: {"lock": 0.2},
     lean.Settings: {"clearance": 0.02},
     braid.Settings: {"pitch": 0.08, "radius": 0.008},
@@ -54,7 +54,7 @@ WITH = {
 
 # The second head has strands that turn back by 170°.
 HAIR = [partial(styled.head, 160, 40), partial(styled.head, 160, 40, seed=5)]
-HAIR += [partial(maker, 160) for maker in (styled.beard, styled.lawn, styled.ball)]
+HAIR += [partial(styled.beard, 160), partial(styled.lawn, 160), partial(styled.ball, 160, size=0.1)]
 # For what keeps guides off the surface, whose nearest point jumps on a head.
 FUR = [partial(styled.ball, 60, seed=seed) for seed in range(1, 6)]
 GROOMINGS = len(HAIR)
