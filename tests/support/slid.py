@@ -3,7 +3,6 @@
 
 from dataclasses import replace
 
-import numpy as np
 import warp as wp
 
 from hair_addon.core.grooming import following
