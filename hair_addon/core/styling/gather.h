@@ -3,8 +3,8 @@
 // Strands that gather around their centre strand: they follow the curve of points q that are drawn to it, as far as
 // their own length goes. So what is drawn onto the centre lies on it.
 //
-// offset(arc length of the centre, how far it is drawn, out u, out v) moves q in the centre's frames, by `width` at most
-// [m]; 0 for none.
+// offset(arc length of the centre, how far it is drawn, out u, out v) moves q in the centre's frames, by `width` [m] at
+// most; 0 for none.
 
 const auto gather = [&](float thickness, float twist, lanes joined, float width, auto offset) {
   const bool is_woven = width > 0.0f;
@@ -73,8 +73,13 @@ const auto gather = [&](float thickness, float twist, lanes joined, float width,
     }
     if (at_root > 0.0f) course = course - at_root * (1.0f - smoothstep(arc * per_root_distance));
     // No faster than the strand can follow, however steep the profile is.
-    const lanes most_turned = d / higher_of(sqrt_of(dot(away, away)) + width, 1.0e-3f * d);
-    const lanes pull = clamped(base * joined * course, pull_before - most_turned, pull_before + most_turned);
+    lanes pull = base * joined * course;
+    const lanes change = pull - pull_before, way_square = dot(away, away) + width * width;
+    const auto is_steep = change * change * way_square > d * d;
+    if (any_of(is_steep)) {
+      const lanes most_change = d / sqrt_of(is_steep ? way_square : lanes(1.0f));
+      pull = is_steep ? pull_before + clamped(change, -most_change, most_change) : pull;
+    }
     pull_before = pull;
     vector drawn = middle + away * (1.0f - pull * (1.0f - thickness));
     if (is_woven) {
@@ -93,10 +98,10 @@ const auto gather = [&](float thickness, float twist, lanes joined, float width,
     const vector forwards = way_on * (1.0f / (is_far ? distance : lanes(1.0f)));
     // A strand that is far from the curve keeps its direction to it, whichever way the curve goes.
     const lanes spacing = higher_of(0.025f * total, d);
-    const vector lag = drawn_before - place;
-    const lanes lag_size = sqrt_of(dot(lag, lag));
-    const auto is_lost = lag_size > spacing;
-    const vector off = lag * (is_lost ? spacing / (is_lost ? lag_size : lanes(1.0f)) : lanes(1.0f));
+    vector off = drawn_before - place;
+    const lanes off_square = dot(off, off);
+    const auto is_lost = off_square > spacing * spacing;
+    if (any_of(is_lost)) off = off * (is_lost ? spacing / sqrt_of(is_lost ? off_square : lanes(1.0f)) : lanes(1.0f));
     const vector beside = off - forwards * dot(off, forwards);
     const lanes square = dot(beside, beside), most = 0.25f * spacing * spacing;
     const auto is_off = square > most;
