@@ -74,7 +74,7 @@ const auto gather = [&](float thickness, float twist, lanes joined, float width,
     if (at_root > 0.0f) course = course - at_root * (1.0f - smoothstep(arc * per_root_distance));
     // No faster than the strand can follow, however steep the profile is.
     lanes pull = base * joined * course;
-    const lanes change = pull - pull_before, way_square = dot(away, away) + width * width;
+    const lanes change = pull - pull_before, way_square = dot(away, away) + 4.0f * width * width;
     const auto is_steep = change * change * way_square > d * d;
     if (any_of(is_steep)) {
       const lanes most_change = d / sqrt_of(is_steep ? way_square : lanes(1.0f));
