@@ -15,7 +15,7 @@ from ...core.geometry import mesh as mesh_math
 from ...core.geometry import strands
 from ...core.geometry.mesh import SurfacePoints
 from ...core.grooming import groom
-from . import attributes, follow_nodes
+from . import attributes, follow_nodes, simulated_guides
 
 _GUIDE_MAP = ("guide_index", "guide_weight")
 
@@ -344,6 +344,13 @@ def read_guides(curves, surface, device, known=None):
     roots = None if has_known_roots else read_roots(curves, surface, firsts)
     points = even_points(points, offsets, lambda: attributes.are_smooth(curves))
     return known.moved(points) if has_known_roots else strands.from_numpy(points, roots, device)
+
+
+def read_shown_guides(curves, surface, device, known=None):
+    """Guides as hair follows them in this frame: where dynamics has moved them, else as `read_guides` reads them."""
+    guides = read_guides(curves, surface, device, known)
+    shown = simulated_guides.point_cache.get(curves.session_uid)
+    return guides if shown is None or len(shown) != len(guides) else guides.moved(surface.from_local(shown))
 
 
 def even_points(points, offsets, are_smooth):

@@ -304,7 +304,8 @@ def restyle(target: Curves, depsgraph: Depsgraph) -> bool:
     guide_curves, settings = inputs_of(target)
     if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
-    guides = curves.read_guides(guide_curves, bound.surface, bound.binding.positions.device, bound.guides)
+    device = bound.binding.positions.device
+    guides = curves.read_shown_guides(guide_curves, bound.surface, device, bound.guides)
     combed = following.combed(guides, bound.guides)
     if combed is None or len(combed):
         return False

@@ -5,6 +5,7 @@ After an event nothing is drawn or computed from what was cached before it. Func
 `functools.cache`, never become stale.
 """
 
+from ..data import simulated_guides
 from ..gpu import lights, shaders, world_texture
 from ..groom import bindings
 from ..host import notices
@@ -21,6 +22,7 @@ COPIES = (
     world_texture.light_cache,
     lights.frame_cache,
     animated.value_cache,
+    simulated_guides.point_cache,
     reported.guide_cache,
     reported.painting_cache,
     reported.axes_cache,

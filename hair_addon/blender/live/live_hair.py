@@ -10,7 +10,7 @@ import sys
 import bpy
 
 from ...core.errors import HairError
-from ..data import curves, drawn_lines, masks
+from ..data import curves, drawn_lines, masks, simulated_guides
 from ..groom import bindings, edited_surfaces, painted_masks, pipeline, staleness, writing
 from ..render import hair_cache
 from ..settings import style_items
@@ -32,13 +32,13 @@ def follow_guides(hair, depsgraph):
     """Update a hair's strands after combing: no search, unless guides were added, removed or slid."""
     bound = bindings.of(hair)
     if bound is None:
-        if hair.vellus.followed and not is_left_by_undo(hair):
+        is_simulated = simulated_guides.is_shown(hair.vellus.guide_curves)
+        if hair.vellus.followed and not is_simulated and not is_left_by_undo(hair):
             return  # written for these guides, in another session or before an undo
         make_again(hair, depsgraph)
         return
     try:
-        device = bound.binding.positions.device
-        moved = bound.follow(curves.read_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides))
+        moved = bound.follow(_shown_guides(hair, bound))
     except HairError as error:
         hair.vellus.status = str(error)
         return
@@ -49,10 +49,21 @@ def follow_guides(hair, depsgraph):
         _write_soon(hair)
 
 
+def show_guides(guides, points, depsgraph):
+    """Show guides at (G, POINT_COUNT, 3) simulated points, as `simulated_guides.show`, and let their hair follow."""
+    simulated_guides.show(guides, points)
+    invalidation.strands_made(guides)
+    for hair in curves.followers(guides):
+        if hair.vellus.is_live:
+            follow_guides(hair, depsgraph)
+
+
 def make_again(hair, depsgraph):
     """Bind hair to its guides again and compute all strands, after changes of settings, surface or guides."""
     if not has_window():
         pipeline.evaluate(hair, depsgraph)
+        if _follow_simulated(hair):
+            _write(hair)
         invalidation.strands_made(hair)
         return
     try:
@@ -65,12 +76,27 @@ def make_again(hair, depsgraph):
             _restyled(hair)
             return
         bindings.keep(hair, pipeline.bind_hair(guide_curves, settings, depsgraph, hair))
+        _follow_simulated(hair)
     except HairError as error:
         hair.vellus.is_stale = False
         hair.vellus.status = str(error)
         return
     invalidation.strands_made(hair)
     _write_soon(hair)
+
+
+def _follow_simulated(hair):
+    """Let hair that was bound to combed guides follow where dynamics has moved them; whether it had to."""
+    bound = bindings.of(hair)
+    if bound is None or not simulated_guides.is_shown(hair.vellus.guide_curves):
+        return False
+    bound.follow(_shown_guides(hair, bound))
+    return True
+
+
+def _shown_guides(hair, bound):
+    device = bound.binding.positions.device
+    return curves.read_shown_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides)
 
 
 def _restyled(hair):

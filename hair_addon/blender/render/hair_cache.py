@@ -19,7 +19,7 @@ from ...core.geometry import strands
 from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables, strand_tables
-from ..data import curves, posed_strands
+from ..data import curves, posed_strands, simulated_guides
 from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
 from ..host import paths
@@ -200,7 +200,7 @@ def _read(datablock, bound):
     """`_KeptStrands` of a datablock as it is now, or of what it is bound by."""
     if bound is None:
         places = None if datablock.surface is None else curves.read_root_places(datablock, np.inf)
-        return _KeptStrands(*read_strands(datablock), places, _rooted_on(datablock, datablock.vellus.topology))
+        return _KeptStrands(*_shown_strands(datablock), places, _rooted_on(datablock, datablock.vellus.topology))
     if bound.is_written or bound.has_moved_only:
         randoms, wetness = curves.read_randoms(datablock), curves.read_wetness(datablock)
     else:
@@ -209,6 +209,16 @@ def _read(datablock, bound):
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
     radii = np.tile(bound.radii, (len(bound.points), 1))
     return _KeptStrands(bound.points, radii, randoms, wetness, places, rooted_on, bound.growing)
+
+
+def _shown_strands(datablock):
+    """`read_strands`, where dynamics has moved them if they are guides that it moves."""
+    points, radii, randoms, wetness = read_strands(datablock)
+    simulated = simulated_guides.point_cache.get(datablock.session_uid)
+    if simulated is None or len(simulated) != len(points):
+        return points, radii, randoms, wetness
+    even = np.repeat(radii.mean(axis=1, keepdims=True), simulated.shape[1], axis=1)
+    return simulated, even, randoms, wetness
 
 
 def read_strands(datablock):

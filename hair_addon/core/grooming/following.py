@@ -46,8 +46,14 @@ def strands_now(
     """
     points = _weighted_sum(binding, guides, weights, chosen, out)
     if styling is not None:
-        styling.apply(points, lambda other: _weighted_sum(other, guides, weights_now(other, guides)), chosen)
+        styling.apply(points, lambda other, some: _some_now(other, guides, some), chosen)
     return points
+
+
+def _some_now(binding, guides, chosen):
+    """(M, P) vec3: strands without styles, all or (M,) indices of some."""
+    rows = None if chosen is None else _rows(binding, chosen)
+    return _weighted_sum(binding, guides, weights_now(binding, guides, chosen), rows)
 
 
 def _weighted_sum(binding, guides, weights, chosen=None, out=None):

@@ -17,7 +17,7 @@ from .. import geometry, interpolation
 from ..geometry.strands import Strands
 from ..interpolation.hair_binding import HairBinding
 from ..kernels import kernel_cache
-from ..kernels.checks import require_count
+from ..kernels.checks import require_count, require_indices
 from . import program as programs
 from . import steps, strand_wetness
 from .base import StyleSettings
@@ -36,8 +36,8 @@ wp.set_module_options({"enable_backward": False})
 
 HAIR = "hair"  # what the strands are known by to the clump trees
 
-# Points of strands (N, P) [m] of a binding, for guides as they are followed now.
-StrandsOf = Callable[[HairBinding], "wp.array2d[wp.vec3]"]
+# Points (N, P) [m] of strands of a binding, all or (N,) indices of some, for guides as they are followed now.
+StrandsOf = Callable[[HairBinding, np.ndarray | None], "wp.array2d[wp.vec3]"]
 
 
 @dataclass
@@ -80,19 +80,36 @@ class Styling:
         """Style strands in place: points (M, P) [m] of all strands, or of (M,) chosen ones."""
         if not len(self.program):
             return
-        for level in self.levels:
-            centres = strands_of(level.binding)
-            steps.apply_steps(centres, level.steps, level.data, self.axes)
-            self._keep_centres(centres, level.first)
+        read = [None] * len(self.levels) if chosen is None else self._centres_of(chosen.numpy())
+        for level, some in zip(self.levels, read, strict=True):
+            if some is not None and not len(some):
+                continue
+            centres = strands_of(level.binding, some)
+            rows = None if some is None else wp.array(some, dtype=int, device=centres.device)
+            steps.apply_steps(centres, level.steps, level.data, self.axes, rows)
+            self._keep_centres(centres, np.arange(len(centres)) if some is None else some, level.first)
         steps.apply_steps(points, self.program, self.data, self.axes, chosen)
 
-    def _keep_centres(self, centres, first):
-        """Write the points of a level's centres, and their arc lengths, where the kernel reads them."""
-        count = len(centres)
-        into = self.data.centre_points[first : first + count]
-        require_count("clump points", len(into), count)
+    def _centres_of(self, chosen):
+        """For each level, the indices (M,) of the centres that some strands are gathered around, themselves or others.
+
+        A centre is styled as a strand is, so it reads the centres of levels before its own.
+        """
+        members = self.data.members.numpy()[:, chosen]
+        read = [_present(members[row]) for row in range(len(self.levels))]
+        for row in range(len(self.levels) - 1, 0, -1):
+            above = self.levels[row].data.members.numpy()[:row, read[row]]
+            read[:row] = [_present(np.append(*pair)) for pair in zip(read[:row], above, strict=True)]
+        return read
+
+    def _keep_centres(self, centres, rows, first):
+        """Write the points of centres of a level, and their arc lengths, where the kernel reads them."""
+        into = self.data.centre_points
+        require_count("clump centres", len(rows), len(centres))
+        require_indices("clump centres", rows + first, len(into))
         require_count("points of a centre strand", into.shape[1], centres.shape[1])
-        kernel_cache.launch(_with_arcs, count, inputs=[centres], outputs=[into], device=centres.device)
+        rows = wp.array(rows + first, dtype=int, device=centres.device)
+        kernel_cache.launch(_with_arcs, len(centres), inputs=[centres, rows], outputs=[into], device=centres.device)
 
     def reached(self, combed: np.ndarray, moved: np.ndarray) -> np.ndarray:
         """Indices (M,), rising, of the strands that move when some guides are combed.
@@ -140,19 +157,26 @@ class Styling:
         return strand_wetness.of_strands(self.styles, masks, self.data.identities.numpy())
 
 
+def _present(members):
+    """The indices that some members name, without -1."""
+    return np.unique(members[members >= 0])
+
+
 @wp.kernel
 def _with_arcs(
     points: wp.array2d[wp.vec3],
+    rows: wp.array[int],
     # outputs
     out_points: wp.array2d[wp.vec4],
 ):
     strand = wp.tid()
+    row = rows[strand]
     before = points[strand, 0]
     arc = float(0.0)
     for i in range(points.shape[1]):
         point = points[strand, i]
         arc += wp.length(point - before)
-        out_points[strand, i] = wp.vec4(point[0], point[1], point[2], arc)
+        out_points[row, i] = wp.vec4(point[0], point[1], point[2], arc)
         before = point
 
 
