@@ -34,7 +34,9 @@ class Slid:
         program = programs.compiled(made, [], first_centres)
         of_levels = [replace(level, steps=program.before(row)) for row, level in enumerate(levels)]
         points = self._plain_strands(self._hair.binding)
-        replace(self._styling, program=program, levels=of_levels).apply(points, self._plain_strands)
+        replace(self._styling, program=program, levels=of_levels).apply(
+            points, lambda binding, _chosen: self._plain_strands(binding)
+        )
         return points.numpy()
 
     def _plain_strands(self, binding):
