@@ -55,13 +55,28 @@ class Groom:
         return following.strands_now(self.binding, followed, weights, styling, rows).numpy()
 
 
-def head(strand_count=1500, guide_count=120, device=DEVICE, **hair):
-    """Long hair that hangs, on the sample head's upper half."""
+def head(strand_count=1500, guide_count=120, device=DEVICE, seed=1, **hair):
+    """Long hair that hangs, on the sample head's upper half; seed: of guides."""
     mesh = read_obj(HEAD)
     height = mesh.vertices[:, 2]
     density = (height > np.quantile(height, 0.6)).astype(np.float32)
-    guides = GuideSettings(guide_count=guide_count, length=0.2, gravity=0.7)
+    guides = GuideSettings(guide_count=guide_count, length=0.2, gravity=0.7, seed=seed)
     return Groom(mesh, guides, HairSettings(strand_count=strand_count, radius=4e-5, **hair), device, density=density)
+
+
+def beard(strand_count=800, device=DEVICE, seed=1):
+    """Short hair on the sample head's lower third."""
+    mesh = read_obj(HEAD)
+    height = mesh.vertices[:, 2]
+    density = (height < np.quantile(height, 0.35)).astype(np.float32)
+    guides = GuideSettings(guide_count=60, length=0.06, gravity=0.5, seed=seed)
+    return Groom(mesh, guides, HairSettings(strand_count=strand_count, radius=4e-5), device, density=density)
+
+
+def lawn(strand_count=800, device=DEVICE, seed=1):
+    """Strands on a square, each leaning another way."""
+    guides = GuideSettings(guide_count=60, length=0.15, tilt=0.5, gravity=0.4, seed=seed)
+    return Groom(flat_grid(8, 0.3), guides, HairSettings(strand_count=strand_count, radius=4e-5), device)
 
 
 def straight(strand_count=400, length=0.2, size=0.1, device=DEVICE):
@@ -70,9 +85,9 @@ def straight(strand_count=400, length=0.2, size=0.1, device=DEVICE):
     return Groom(flat_grid(8, size), guides, HairSettings(strand_count=strand_count, radius=4e-5), device)
 
 
-def ball(strand_count=800, device=DEVICE, **hair):
-    """Fur on a sphere."""
-    guides = GuideSettings(guide_count=60, length=0.3, gravity=0.5)
+def ball(strand_count=800, device=DEVICE, seed=1, size=0.5, **hair):
+    """Fur on a sphere; seed: of guides; size: its radius [m]."""
+    guides = GuideSettings(guide_count=60, length=0.6 * size, gravity=0.5, seed=seed)
     return Groom(
-        subdivided_sphere(3, 0.5), guides, HairSettings(strand_count=strand_count, radius=1e-3, **hair), device
+        subdivided_sphere(3, size), guides, HairSettings(strand_count=strand_count, radius=1e-3, **hair), device
     )

@@ -71,16 +71,21 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
     const lanes part = clamped(
         is_between ? (middle - below) / (is_between ? range : lanes(1.0f)) : lanes(0.0f), lanes(0.0f), lanes(1.0f)
     );
-    const vector t_between = t_below + (t_above - t_below) * part;
-    const vector u_between = u_below + (u_above - u_below) * part;
-    // Segments that turn back cancel each other: there the frame of the first holds.
-    const auto is_facing = dot(t_between, t_between) > 0.01f;
-    const vector forwards = unit_or(chosen(is_facing, t_between, t_below), lanes(1.0e-6f), t_below);
-    const vector flat = u_between - forwards * dot(u_between, forwards);
-    const auto is_flat = dot(flat, flat) > 0.01f;
-    const vector sideways = unit_or(
-        chosen(is_flat, flat, u_below - forwards * dot(u_below, forwards)), lanes(1.0e-6f), u_below
-    );
+    vector t_between = t_below + (t_above - t_below) * part;
+    vector u_between = u_below + (u_above - u_below) * part;
+    // Opposite directions cancel each other: from a right angle on the frame halfway takes part.
+    const lanes facing = dot(t_below, t_above);
+    if (any_of(facing < 0.0f)) {
+      const lanes bulge = higher_of(-facing, lanes(0.0f)) * 4.0f * part * (1.0f - part);
+      const auto has_middle = facing > 1.0e-6f - 1.0f;
+      const vector half = unit_or(
+          chosen(has_middle, t_below + t_above, cross(t_below, u_below)), lanes(1.0e-6f), t_below
+      );
+      t_between = t_between + half * bulge;
+      u_between = u_between + turned(u_below, t_below, half) * bulge;
+    }
+    const vector forwards = unit_or(t_between, lanes(1.0e-6f), t_below);
+    const vector sideways = unit_or(u_between - forwards * dot(u_between, forwards), lanes(1.0e-6f), u_below);
     const vector made = forwards * forward + sideways * w_u + cross(forwards, sideways) * w_v;
     const auto has_length = d > 1.0e-12f;
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));

@@ -7,7 +7,8 @@ The amount of a style at point i of strand s, with x_i the part of the strand's 
     profile(x) = root + (tip - root) · g(clamp((x - start) / (1 - start), 0, 1))
 
 h_s is a random number of the strand (random_numbers.py) and g the curve of Blender's hair nodes with their Shape σ:
-x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)).
+x^e up to σ = ½, 1 - (1 - x)^e above, with e = -log2(1 - min(σ, 1 - σ)). Within half a segment of where it begins x^e is
+a straight line: it would begin vertically, and points would jump where its beginning passes them.
 """
 
 import math
@@ -73,9 +74,13 @@ EVERYWHERE = Profile()
 
 
 def evaluated(profile: Profile, x: np.ndarray) -> np.ndarray:
-    """The profile at x, parts of the length from 0 to 1; any shape."""
+    """The profile at x (…, P), parts of the length of strands of P points, from 0 to 1."""
     y = np.clip((x - profile.start) / (1.0 - profile.start), 0.0, 1.0)
-    y = 1.0 - _power(1.0 - y, profile.exponent) if profile.is_flipped else _power(y, profile.exponent)
+    if profile.is_flipped:
+        y = 1.0 - _power(1.0 - y, profile.exponent)
+    else:
+        least = 0.5 / (x.shape[-1] - 1)
+        y = np.where(y < least, y * least ** (profile.exponent - 1.0), _power(y, profile.exponent))
     return profile.root + (profile.tip - profile.root) * y
 
 

@@ -2,7 +2,7 @@
 """Guides that lean, kept off the surface: the styles Lean and Wet (lean.py, wet.py) on guides.
 
 t'_i = unit((1 - A) t_i + A D), t_i where that is shorter than 1e-3. A segment that would end nearer to the surface than
-the clearance points at the place above it instead; lengths stay.
+the clearance is turned towards the surface's normal until it ends as high as that; lengths stay.
 """
 
 import numpy as np
@@ -17,6 +17,8 @@ from ..kernels.checks import require_count
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 _LEAST_AMOUNT = wp.constant(0.05)  # from which on guides are kept off the surface fully
+_STEEPEST = wp.constant(0.9)  # sine of the angle at which guides rise: near a right angle they would turn in jumps
+_UNKNOWN = wp.constant(1.0e30)
 _CORRECTIONS = wp.constant(4)  # of a segment: a point that is lifted comes nearer to the surface at another place
 
 
@@ -32,6 +34,7 @@ def _lean(
     out_points: wp.array2d[wp.vec3],
 ):
     guide = wp.tid()
+    corners = wp.mesh_get(surface).points
     indices = wp.mesh_get(surface).indices
     position = points[guide, 0]
     out_points[guide, 0] = position
@@ -54,6 +57,7 @@ def _lean(
         # A guide leaves the surface by degrees, and one that hardly leans stays where it was combed.
         wanted = wp.min(clearance, 0.5 * arc)
         hold = wp.min(largest_amount / _LEAST_AMOUNT, 1.0)
+        goal = float(_UNKNOWN)
         for _correction in range(_CORRECTIONS):
             ahead = position + size * forward
             query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * (clearance + size))
@@ -72,10 +76,19 @@ def _lean(
                 # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
                 sideways = wp.length(away - height * normal)
                 part = sideways / (0.5 * wp.length(away) + 0.1 * wanted + 1.0e-6 * size)
-                lift = hold * wp.clamp(1.5 - part, 0.0, 1.0) * wp.max(wanted - height, 0.0)
-                kept_off = ahead + lift * normal - position
-                if lift > 0.0 and wp.length(kept_off) > 1.0e-3 * size:
-                    forward = wp.normalize(kept_off)
+                if goal == _UNKNOWN:
+                    goal = height + hold * wp.max(wanted - height, 0.0)
+                lift = wp.clamp(1.5 - part, 0.0, 1.0) * wp.max(goal - height, 0.0)
+                if lift > 0.0:
+                    # Turned towards the normal until it ends higher by the lift.
+                    rise = wp.dot(forward, normal)
+                    along = forward - rise * normal
+                    if wp.length(along) < 1.0e-3:
+                        # Straight at the surface every direction along it is as good: that of an edge.
+                        edge = corners[indices[3 * face + 1]] - corners[indices[3 * face]]
+                        along = edge - wp.dot(edge, normal) * normal
+                    rise = wp.max(rise, wp.min(rise + lift / size, _STEEPEST))
+                    forward = rise * normal + wp.sqrt(1.0 - rise * rise) * wp.normalize(along)
         position += size * forward
         out_points[guide, i] = position
 

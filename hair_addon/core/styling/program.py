@@ -15,6 +15,7 @@ _WET_RATIO = 0.32  # of the small wet locks to the large ones
 _WET_THICKNESS = 0.10
 _WET_SMOOTHING = 2.0  # lengths of locks that water smooths over
 _WET_CLUMP = 0.92
+_WET_START = 0.01  # below, small locks join evenly: by the square root they would begin at once
 _TWO_PI = 2.0 * math.pi
 NO_LIMIT = 1e30  # [m], of a length
 
@@ -187,7 +188,7 @@ def _of_wet(settings, step):
     smoothing = step(program_rows.SMOOTH, (settings.lock * _WET_SMOOTHING,), settings.relax * wetness, EVERYWHERE)
     own = _WET_THICKNESS, 0.0, 0.0
     large = step(program_rows.CLUMP, own, _WET_CLUMP * wetness**1.5, along, 0)
-    small = step(program_rows.CLUMP, own, _WET_CLUMP * wetness**0.5, along, 1)
+    small = step(program_rows.CLUMP, own, _WET_CLUMP * wetness / max(wetness, _WET_START) ** 0.5, along, 1)
     return [smoothing, large, small]
 
 

@@ -44,7 +44,8 @@ lanes lengths[2][MOST];
 vector directions[2][MOST];
 lanes *length = lengths[0], *next_length = lengths[1];
 vector *t = directions[0], *next = directions[1];
-// Points and their arc lengths, of styles that ask for them by `put_points`.
+// Points from the root on, which round less than places do, and their arc lengths, for styles that ask for them by
+// `put_points`.
 vector place[MOST];
 lanes along[MOST];
 constexpr int MOST_KEPT = LANES == 1 ? 1 : MOST;
@@ -100,7 +101,7 @@ read_points(rows, [&](int i, const vector& point) {
   point_before = point;
 });
 const auto put_points = [&]() {
-  place[0] = root;
+  place[0] = {};
   along[0] = 0.0f;
   for (int i = 1; i < point_count; ++i) {
     place[i] = place[i - 1] + t[i] * length[i];
@@ -159,12 +160,18 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   }
   const float at_root = number[2], at_tip = number[3], exponent = number[4], from = number[6];
   const bool is_even = at_root == at_tip, is_linear = exponent == 1.0f, is_flipped = number[5] != 0.0f;
+  // Within half a segment of its beginning it rises straight: a power would begin vertically, and points jump.
+  const lanes least = 0.5f / (point_count - 1), slope = 1.0f / power(least, lanes(1.0f - exponent));
   const auto profile = [&](lanes x) {
     if (is_even) return lanes(at_root);
     // x of the tip is 1 but for rounding, which steep profiles are sensitive to.
     const lanes part = exact_quotient_of(1.000001f * x - from, lanes(1.0f - from));
     lanes y = clamped(part, lanes(0.0f), lanes(1.0f));
-    if (!is_linear) y = is_flipped ? 1.0f - power(1.0f - y, lanes(exponent)) : power(y, lanes(exponent));
+    if (is_flipped) {
+      y = 1.0f - power(1.0f - y, lanes(exponent));
+    } else if (!is_linear) {
+      y = y < least ? y * slope : power(y, lanes(exponent));
+    }
     return lanes(at_root + (at_tip - at_root) * y);
   };
   const lanes per_total = exact_quotient_of(lanes(1.0f), higher_of(total, lanes(1.0e-20f)));
@@ -207,9 +214,9 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
 }
 
 // Strands that no style has touched keep their bits.
-vector point = root;
+vector from_root = {};
 write_points(rows, is_touched, [&](int i) {
-  if (i > 0) point = point + t[i] * length[i];
-  return point;
+  if (i > 0) from_root = from_root + t[i] * length[i];
+  return root + from_root;
 });
 }

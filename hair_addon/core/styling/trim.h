@@ -11,11 +11,11 @@ lanes wanted = lower_of(total * factor * (1.0f - random_part * random(LENGTH)), 
 wanted *= 1.0f + (undercoat_length - 1.0f) * coat;
 put_points();
 const vector axis = {number[15], number[16], number[17]};
-const float plane = number[18];
+const lanes plane = number[18] - dot(root, axis);
 lanes is_at_plane = 0.0f;
 if (has_plane) {
   // The first point that lies on the far side, and where its segment crosses the plane.
-  lanes before = dot(root, axis) - plane;
+  lanes before = -plane;
   lanes crossing = before > 0.0f ? lanes(0.0f) : lanes(3.0e38f);
   for (int i = 1; i < point_count; ++i) {
     const lanes beyond = dot(place[i], axis) - plane;
@@ -38,7 +38,7 @@ if (is_cut) {
     marks at;
     for (int lane = 0; lane < LANES; ++lane) at[lane] = 0;
     lanes sum = 0.0f;
-    vector before = root, direction = t[1];
+    vector before = {}, direction = t[1];
     for (int i = 1; i < point_count; ++i) {
       const lanes reached = along[i] * scale;
       lanes below, above;
@@ -79,7 +79,7 @@ if (is_cut) {
     }
     exact = wanted / higher_of(sum, lanes(1.0e-20f));
     if (has_plane) {
-      vector tip = root;
+      vector tip = {};
       for (int i = 1; i < point_count; ++i) tip = tip + next[i] * (length_made[i] * exact);
       const lanes slope = higher_of(dot(direction, axis), lanes(0.1f));
       wanted -= is_at_plane * (dot(tip, axis) - plane) / slope;

@@ -21,7 +21,7 @@ if (tress_count == 2) {
   tress = up > abs_of(right) * 0.57735027f ? lanes(0.0f) : right > 0.0f ? lanes(1.0f / 3.0f) : lanes(2.0f / 3.0f);
 }
 const lanes phase = random_number(lock, seed, ints(CLUMP_PHASE)) + tress;
-gather(thickness, 0.0f, lanes(1.0f), true, [&](lanes arc, lanes amount, lanes& to_u, lanes& to_v) {
+gather(thickness, 0.0f, lanes(1.0f), radius, [&](lanes arc, lanes amount, lanes& to_u, lanes& to_v) {
   lanes sine, cosine;
   sine_and_cosine(phase + arc * (1.0f / pitch), sine, cosine);
   to_u = radius * amount * (tress_count == 2 ? cosine : sine);

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Laws of Curl: helices on straight strands, waves in a plane, locks in one phase."""
 
+from dataclasses import replace
+from itertools import islice
+
 import numpy as np
 import pytest
 
-from hair_addon.core.styling import curl
+from hair_addon.core.styling import curl, frizz
+from tests.support.slid import steepest_moves
 from tests.support.stepped import stepped, straight_strands
 
 ALL = {"root": 1.0, "tip": 1.0, "start": 0.0}
@@ -112,3 +116,15 @@ def test_switchbacks_that_are_far_apart_leave_most_coils_alone():
     is_same = np.abs(np.abs(far) / np.abs(kept) - 1.0) < 1e-3
     assert is_same.mean() > 0.7
     assert (far[is_same] < 0.0).mean() == pytest.approx(0.5, abs=0.1)
+
+
+@pytest.mark.parametrize("style", [curl.Settings(), frizz.Settings()], ids=["curl", "frizz"])
+def test_strands_that_turn_back_change_by_degrees(style):
+    """Where a strand turns by 170° from segment to segment its frames turn with it, without a jump."""
+    strands = straight_strands(8)
+    angles = np.radians(170.0) * (np.arange(40) >= 20)
+    segments = 0.005 * np.stack([np.sin(angles), 0.0 * angles, np.cos(angles)], axis=1)
+    strands[:, 1:] = strands[:, :1] + np.cumsum(segments, axis=0)
+    amounts = np.linspace(0.0, 1.0, 33)
+    moves = list(islice(steepest_moves(lambda amount: stepped(strands, replace(style, amount=amount)), amounts), 12))
+    assert moves[-1] < 0.01 * moves[0]

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Laws of Lean: guides turn where they are told, and none goes through the surface."""
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -66,10 +68,15 @@ def test_a_missing_target_leaves_guides(fur):
     np.testing.assert_array_equal(leaned(fur, settings), fur.guides.numpy())
 
 
-@pytest.mark.parametrize("clearance", [0.002, 0.01, 0.03])
+@pytest.mark.parametrize("clearance", [0.0005, 0.002, 0.01, 0.03])
 @pytest.mark.parametrize("amount", [0.2, 1.0])
-def test_no_guide_ends_under_the_surface(fur, clearance, amount):
-    """Guides that hug a ball keep the clearance, once they have left their root by twice as much."""
+@pytest.mark.parametrize("seed", [1, 4, 7])
+def test_no_guide_ends_under_the_surface(seed, clearance, amount):
+    """Guides that hug a ball keep the clearance, once they have left their root by twice as much.
+
+    Some stand at the top of the ball, and are told to go straight into it.
+    """
+    fur = groomed(seed)
     made = leaned(fur, lean.Settings(amount=amount, clearance=clearance, **ALL))
     mesh = fur.mesh
     nearest = SurfaceQuery(mesh).nearest(made.reshape(-1, 3))
@@ -78,8 +85,13 @@ def test_no_guide_ends_under_the_surface(fur, clearance, amount):
     outward = places / np.linalg.norm(places, axis=2, keepdims=True)
     heights = ((made - places) * outward).sum(axis=2)
     arcs = np.pad(np.cumsum(segment_lengths(made), axis=1), ((0, 0), (1, 0)))
-    assert heights[arcs > 2.5 * clearance].min() > 0.75 * clearance
+    assert heights[arcs > 2.5 * clearance].min() > 0.98 * clearance
     assert heights.min() > -1e-4
+
+
+@cache
+def groomed(seed):
+    return ball(10, seed=seed)
 
 
 def test_a_guide_without_amount_keeps_its_bits(fur):

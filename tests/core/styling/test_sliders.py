@@ -1,82 +1,63 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A slider moves hair by degrees: half a step moves strands half as far, so a keyed setting does not jump."""
+"""A slider moves hair by degrees, over its whole range and on any hair, so a keyed setting does not jump.
+
+The largest move m(h) of any point over steps h of a slider obeys m(h) ≤ 2 m(h/2), by the triangle inequality. As h
+falls, m(h)/h rises to the slider's steepest slope: m(h)/m(h/2) tends to 2 where strands move by degrees, and to 1 where
+they jump. How short the steps must be depends on the hair: phases at tips run, and strands in tight bends swing. So
+steps are halved where strands move the most, until two halvings in turn halve the moves, within 1.7; a jump would stay.
+"""
 
 from dataclasses import fields, replace
+from functools import cache, partial
+from itertools import islice
 
 import numpy as np
 import pytest
 
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
-from tests.support.stepped import largest_move
-from tests.support.styled import ball, head
+from tests.support import styled
+from tests.support.slid import Slid, steepest_moves
 
-PLACES = 8  # along the slider
-STEPS = 200
+PLACES = 32  # along the slider, at first
+FEWEST_HALVINGS, MOST_HALVINGS = 5, 14
+ROUNDING = 2e-5  # [m]: what moves strands less is no jump
 
-# Where sliders are tried, a limit of 0 being none; and with what else, so that they do something.
+# Where sliders are tried other than from their lowest to their highest value; lengths by even ratios.
 RANGES = {
-    (trim.Settings, "to_length"): (0.02, 0.2),
-    (trim.Settings, "factor"): (0.0, 2.0),
-    (clump.Settings, "fine_amount"): (0.0, 1.0),
-    (clump.Settings, "twist"): (-1.0, 1.0),
-    (curl.Settings, "radius"): (0.0, 0.02),
-    (curl.Settings, "pitch"): (0.01, 0.1),
-    (curl.Settings, "switchback"): (0.05, 0.2),
-    (frizz.Settings, "amplitude"): (0.0, 0.005),
-    (frizz.Settings, "wavelength"): (0.02, 0.1),
-    (frizz.Settings, "spread"): (0.02, 0.1),
-    (frizz.Settings, "stray_gain"): (0.0, 5.0),
-    (bend.Settings, "angle"): (-6.0, 6.0),
-    (smooth.Settings, "length"): (0.002, 0.1),
-    (wet.Settings, "amount"): (0.1, 1.0),  # small locks join by its square root
-    (braid.Settings, "pitch"): (0.1, 0.3),
-    (braid.Settings, "radius"): (0.0, 0.02),
-    (braid.Settings, "root"): (0.0, 0.5),
+    (trim.Settings, "to_length"): (0.002, 1.0),  # 0 is no limit
+    (smooth.Settings, "length"): (0.0001, 0.1),  # shorter chords are those of one segment
+    (clump.Settings, "twist"): (-1.0, 1.0),  # more turns take more length than strands have
+    (braid.Settings, "radius"): (0.0, 0.02),  # as do wider braids
+    # Phases are lengths divided by these: of shorter waves, which points cannot carry, many turns pass in a step.
+    (curl.Settings, "pitch"): (0.01, 0.2),
+    (curl.Settings, "switchback"): (0.02, 0.2),
+    (frizz.Settings, "wavelength"): (0.01, 0.2),
+    (frizz.Settings, "spread"): (0.01, 0.2),
+    (braid.Settings, "pitch"): (0.04, 0.2),
 }
+# What else is set, so that a slider does something.
 WITH = {
+    trim.Settings: {"factor": 0.7, "random": 0.3},
+    bend.Settings: {"random_turn": 0.2},
+    wet.Settings: {"lock": 0.2},
+    lean.Settings: {"clearance": 0.02},
+    braid.Settings: {"pitch": 0.08, "radius": 0.008},
     (trim.Settings, "undercoat_length"): {"undercoat": 0.5},
     (frizz.Settings, "spread"): {"coherence": 1.0},
+    # A profile that begins steeply moves points as steeply where its beginning passes them.
+    (clump.Settings, "start"): {"shape": 0.5},
+    (braid.Settings, "start"): {"shape": 0.5},
     (smooth.Settings, "shape"): {"root": 0.0},
     (smooth.Settings, "start"): {"root": 0.0},
     (curl.Settings, "switchback"): {"left_handed": 0.0},
 }
-# Phases at tips run along steep sliders.
-MORE_STEPS = {
-    (clump.Settings, "start"): 1600,
-    (clump.Settings, "stray"): 1600,
-    (clump.Settings, "twist"): 3200,
-    (curl.Settings, "amount"): 1600,
-    (curl.Settings, "tip"): 1600,
-    (frizz.Settings, "coherence"): 6400,
-    (braid.Settings, "amount"): 3200,
-    (braid.Settings, "vary"): 3200,
-    (braid.Settings, "root"): 3200,
-    (braid.Settings, "tip"): 3200,
-    (braid.Settings, "shape"): 3200,
-    (braid.Settings, "thickness"): 3200,
-    (braid.Settings, "start"): 1600,
-    (frizz.Settings, "wavelength"): 3200,
-    (frizz.Settings, "spread"): 25600,
-    (curl.Settings, "pitch"): 1600,
-    (curl.Settings, "switchback"): 3200,
-    (braid.Settings, "pitch"): 3200,
-    (lean.Settings, "amount"): 6400,
-    (lean.Settings, "tip"): 6400,
-    (lean.Settings, "start"): 3200,
-    (lean.Settings, "clearance"): 1600,
-    (wet.Settings, "amount"): 6400,
-    (wet.Settings, "cling"): 6400,
-}
-DEFAULTS = {
-    trim.Settings: {"factor": 0.7, "random": 0.3},
-    bend.Settings: {"random_turn": 0.2},
-    clump.Settings: {"size": 0.03},
-    wet.Settings: {"lock": 0.2},
-    braid.Settings: {"size": 0.3, "radius": 0.015, "pitch": 0.15},
-    lean.Settings: {"clearance": 0.02},
-}
-# Of all styles: a profile that begins vertically moves by a power of the step where its beginning passes a point.
-PROFILES = {"shape": ((0.1, 0.9), {}), "start": ((0.0, 0.8), {"shape": 0.5})}
+
+# The second head has strands that turn back by 170°.
+HAIR = [partial(styled.head, 160, 40), partial(styled.head, 160, 40, seed=5)]
+HAIR += [partial(styled.beard, 160), partial(styled.lawn, 160), partial(styled.ball, 160, size=0.1)]
+# For what keeps guides off the surface, whose nearest point jumps on a head.
+FUR = [partial(styled.ball, 60, seed=seed) for seed in range(1, 6)]
+GROOMINGS = len(HAIR)
 
 
 def sliders():
@@ -94,32 +75,42 @@ def sliders():
     return found
 
 
-@pytest.fixture(scope="module")
-def hair():
-    return head(160, 40)
+def cases():
+    """Each slider on each grooming; all but one of them take long."""
+    for place, (settings_class, name) in enumerate(sliders()):
+        for grooming in range(GROOMINGS):
+            marks = () if grooming == place % GROOMINGS else pytest.mark.long
+            case = f"{settings_class.__module__.rpartition('.')[2]}-{name}-{grooming}"
+            yield pytest.param(settings_class, name, grooming, id=case, marks=marks)
 
 
-@pytest.fixture(scope="module")
-def fur():
-    """For what keeps off the surface, whose nearest point jumps on a head, and for braids, which need gentle curves."""
-    return ball(160)
+def is_by_degrees(moves):
+    """Whether the last two of ever shorter steps, each half as long as the one before, moved strands half as far."""
+    if len(moves) <= FEWEST_HALVINGS:
+        return False
+    return min(moves[-3] / moves[-2], moves[-2] / moves[-1]) > 1.7
 
 
-@pytest.mark.parametrize("settings_class, name", sliders(), ids=lambda value: getattr(value, "__module__", value))
-def test_half_a_step_moves_strands_half_as_far(hair, fur, settings_class, name):
+@cache
+def groomed(maker):
+    return maker()
+
+
+@pytest.mark.parametrize("settings_class, name, grooming", list(cases()))
+def test_half_a_step_moves_strands_half_as_far(settings_class, name, grooming):
+    hair = groomed((FUR if settings_class in {lean.Settings, wet.Settings} else HAIR)[grooming])
     key = settings_class, name
-    hair = fur if settings_class in {lean.Settings, wet.Settings, braid.Settings} else hair
     details = settings_class.__dataclass_fields__[name].metadata["param"]
-    limits, others = PROFILES.get(name, ((details.low, min(details.high, details.soft_high)), {}))
-    low, high = RANGES.get(key, limits)
-    base = settings_class(**(DEFAULTS.get(settings_class, {}) | WITH.get(key, {}) | others))
-    step = (high - low) / MORE_STEPS.get(key, STEPS)
-    moves = [], []
-    for place in np.linspace(low, high - step, PLACES):
-        # Zero is off, and is as far from the smallest amount as that is.
-        points = [hair.styled(replace(base, **{name: place + part * step})) for part in (0.0, 0.5, 1.0)]
-        moves[0].append(largest_move(points[2], points[0]))
-        moves[1].append(max(largest_move(*pair) for pair in (points[:2], points[1:])))
-    whole, half = max(moves[0]), max(moves[1])
-    assert whole > 1e-6
-    assert 1.7 < whole / half < 2.3, f"{1e3 * whole:.3f} mm, of half a step {1e3 * half:.3f} mm"
+    low, high = RANGES.get(key, (details.low, min(details.high, details.soft_high)))
+    is_length = key in RANGES and low > 0.0
+    values = (np.geomspace if is_length else np.linspace)(low, high, PLACES + 1)
+    base = settings_class(**WITH.get(settings_class, {}) | WITH.get(key, {}))
+    in_effect = base if name == "amount" else replace(base, **{name: values[PLACES // 2]})
+    moves = []
+    for move in islice(steepest_moves(Slid(hair, in_effect, name).at, values), MOST_HALVINGS + 1):
+        moves.append(move)
+        if move < ROUNDING or is_by_degrees(moves):
+            break
+    else:
+        pytest.fail(f"Ever shorter steps move strands by {', '.join(f'{1e3 * move:.3f}' for move in moves)} mm.")
+    assert moves[0] > 1e-5

@@ -142,8 +142,25 @@ def test_the_width_of_vectors_does_not_matter(rng, width):
         assert largest_move(*made) < 2e-6 * 0.2
 
 
+@pytest.mark.parametrize("point_count", [41, 257])
+def test_rounding_is_not_amplified(rng, point_count):
+    """Strands whose coordinates are rounded the other way are styled alike, however many points they have.
+
+    Half of the strands are longer than their lock's centre: the direction of its last segment carries them on.
+    """
+    strands = curved_strands(rng, 100, point_count=point_count)
+    members = rng.integers(0, 5, 100)
+    toward = np.where(rng.random(strands.shape) < 0.5, -1.0, 1.0).astype(np.float32)
+    others = np.nextafter(strands, toward)
+    others[:, 0] = strands[:, 0]
+    for settings in [*(STYLES[name] for name in ON_STRANDS), STACK]:
+        styles = settings if isinstance(settings, tuple) else (settings,)
+        made = [stepped(points, *styles, members=members) for points in (strands, others)]
+        assert largest_move(*made) < 1e-4 * 0.2
+
+
 @pytest.mark.skipif(DEVICE == "cpu", reason="VELLUS_TEST_DEVICE names no GPU")
-@pytest.mark.parametrize("point_count", [41, 121])
+@pytest.mark.parametrize("point_count", [41, 121, 257])
 def test_the_processor_and_a_gpu_agree(rng, point_count):
     strands = curved_strands(rng, 100, point_count=point_count)
     members = rng.integers(0, 5, 100)
