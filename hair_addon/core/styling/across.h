@@ -7,9 +7,10 @@
 // where a is the strand's own progress Σ e_j, so it goes around the head where the strand did before, and every
 // segment is as long as it was. With `keep_length` κ below 1 the progress is (1 - κ) d_i + κ e_i, and the strand
 // becomes longer.
-// offset(i, s, x, out u, out v) gives ρ_i [m] at the arc length s [m], x of the strand's length.
+// offset(i, s, x, out u, out v) gives ρ_i [m] at the arc length s [m], x of the strand's length;
+// turn(a, e, t, u) may turn the frame of a segment about t, with the progress at its end.
 
-const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
+const auto move_across = [&](auto offset, lanes before_u, lanes before_v, auto turn) {
   const float keep_length = number[7];
   // The segments around each lane's progress, which are kept while it stays between their middles: there their frames
   // hold. `end` is the arc length at the end of the second.
@@ -78,9 +79,10 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
     const vector forwards = unit_or(chosen(is_facing, t_between, t_below), lanes(1.0e-6f), t_below);
     const vector flat = u_between - forwards * dot(u_between, forwards);
     const auto is_flat = dot(flat, flat) > 0.01f;
-    const vector sideways = unit_or(
+    vector sideways = unit_or(
         chosen(is_flat, flat, u_below - forwards * dot(u_below, forwards)), lanes(1.0e-6f), u_below
     );
+    turn(progress, forward, forwards, sideways);
     const vector made = forwards * forward + sideways * w_u + cross(forwards, sideways) * w_v;
     const auto has_length = d > 1.0e-12f;
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));

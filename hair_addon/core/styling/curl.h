@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// Curl (curl.py): a helix or a wave around the strand's own path.
+// Curl (curl.py): a helix or a wave around the strand's own path, in step with the centre of its lock. Stands after
+// beside.h.
 
 const float radius = number[8], pitch = number[9], roundness = number[10], coherence = number[11];
 const float stretch = number[12], left_handed = number[13], switchback = number[14], keep = number[7];
@@ -12,7 +13,7 @@ const lanes side = random_number(lock, seed, ints(CLUMP_HAND)) - left_handed * 1
 const lanes hand = clamped(side * 40.0f, lanes(-1.0f), lanes(1.0f));
 lanes turns = random_number(lock, seed, ints(CLUMP_PHASE)) + (1.0f - coherence) * (random(PHASE) - 0.5f);
 const lanes shift = random_number(lock, seed, ints(CLUMP_SHIFT));
-lanes before = 0.0f, radius_before = 0.0f;
+lanes before = 0.0f, radius_before = 0.0f, lead_before = 0.0f;
 move_across(
     [&](int, lanes s, lanes x, lanes& to_u, lanes& to_v) {
       const lanes wound = base * radius * profile(x) * smoothstep(s * (2.0f / turn));
@@ -20,18 +21,20 @@ move_across(
       const lanes rise = pitch * (1.0f + stretch * (1.0f - x));
       lanes rate = 1.0f / sqrt_of(per_square * middle * middle + rise * rise);
       if (keep != 1.0f) rate = (1.0f - keep) / rise + keep * rate;
+      lanes more = (s - before) * rate + (lead - lead_before) / rise;
       if (switchback > 0.0f) {
         // The sense of winding is a noise of the lock: -1 or 1 in each cell, and a short passage from cell to cell.
-        const lanes place = s * (1.0f / switchback) + shift;
+        const lanes place = (s + lead * (turn / pitch)) * (1.0f / switchback) + shift;
         const lanes cell = floor_of(place);
         const auto sense_of = [&](lanes which) {
           return random_number(lock, seed, to_ints(which) + CLUMP_CELLS) < 0.5f ? lanes(-1.0f) : lanes(1.0f);
         };
         const lanes here = sense_of(cell);
-        rate *= here + (sense_of(cell + 1.0f) - here) * smoothstep((place - cell - 0.7f) * (1.0f / 0.3f));
+        more *= here + (sense_of(cell + 1.0f) - here) * smoothstep((place - cell - 0.7f) * (1.0f / 0.3f));
       }
-      turns += (s - before) * rate;
+      turns += more;
       before = s;
+      lead_before = lead;
       radius_before = wound;
       lanes sine, cosine;
       sine_and_cosine(turns, sine, cosine);
@@ -39,5 +42,6 @@ move_across(
       to_v = wound * sine * roundness * hand;
     },
     lanes(0.0f),
-    lanes(0.0f)
+    lanes(0.0f),
+    keep_beside
 );

@@ -1,0 +1,77 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A strand beside the centre strand of its lock, for styles by which the strands of a lock are to move together.
+//
+// `lead` [m] is how far the strand is ahead along the centre of where it would be, had they begun together: what lies
+// across the centre's line has one place along it. The frames of the strand turn to those of the centre, carried over
+// by the least rotation between their directions. Both follow by degrees, over a part of the style's pitch; a strand that turns away from its centre goes on by itself, and so does one without a centre, or where centres
+// have no points.
+//
+// keep_beside(progress, forward, forwards, sideways) is told how far along its path the strand is after a segment, the
+// segment's share of that and its direction; it turns `sideways`, which is across it.
+
+const float settling = number[9] / 12.0f;
+const bool is_beside = level >= 0 && first_centre < centre_points.shape[0];
+lanes lead = 0.0f, turn_cosine = 1.0f, turn_sine = 0.0f;
+const float* centre_rows[LANES];
+ints at_centre = 0;
+vector centre_low, centre_high, centre_axis, centre_frame, beside_place = root;
+lanes centre_below = 0.0f, centre_above = 0.0f;
+const auto read_centre = [&](ints at, vector& point, lanes& arc) {
+  lanes row[4];
+  read_rows(centre_rows, at * 4, row);
+  point = {row[0], row[1], row[2]};
+  arc = row[3];
+};
+// The centre's frame in the strand's: cosine and sine of the angle between them.
+const auto centre_angle = [&](const vector& forwards, const vector& sideways, lanes& cosine, lanes& sine) {
+  const vector carried = turned(centre_frame, centre_axis, forwards);
+  cosine = dot(carried, sideways);
+  sine = dot(carried, cross(forwards, sideways));
+};
+const auto turn_by = [&](lanes part, lanes cosine, lanes sine) {
+  const lanes x = turn_cosine + (cosine - turn_cosine) * part, y = turn_sine + (sine - turn_sine) * part;
+  const lanes size = sqrt_of(x * x + y * y);
+  const auto is_long = size > 1.0e-3f;
+  const lanes scale = 1.0f / (is_long ? size : lanes(1.0f));
+  turn_cosine = is_long ? x * scale : turn_cosine;
+  turn_sine = is_long ? y * scale : turn_sine;
+};
+if (is_beside) {
+  for (int lane = 0; lane < LANES; ++lane) {
+    centre_rows[lane] = reinterpret_cast<const float*>(centre_points.data) + size_t(centre[lane]) * point_count * 4;
+  }
+  read_centre(at_centre, centre_low, centre_below);
+  read_centre(at_centre + 1, centre_high, centre_above);
+  centre_axis = unit_or(centre_high - centre_low, lanes(1.0e-12f), centre_normal);
+  centre_frame = turned(reference(), centre_normal, centre_axis);
+  const lanes facing = in_lock * smoothstep(dot(t[1], centre_axis));
+  lead = facing * dot(root - centre_low, centre_axis);
+  lanes cosine, sine;
+  centre_angle(t[1], first_frame(), cosine, sine);
+  turn_by(facing, cosine, sine);
+}
+const auto keep_beside = [&](lanes progress, lanes forward, const vector& forwards, vector& sideways) {
+  if (!is_beside) return;
+  beside_place = beside_place + forwards * forward;
+  const lanes ahead = progress + lead;
+  for (;;) {
+    const auto is_past = centre_above <= ahead && at_centre < point_count - 2;
+    if (!any_of(is_past)) break;
+    at_centre = is_past ? at_centre + 1 : at_centre;
+    centre_low = chosen(is_past, centre_high, centre_low);
+    centre_below = is_past ? centre_above : centre_below;
+    read_centre(at_centre + 1, centre_high, centre_above);
+    const vector axis = unit_or(centre_high - centre_low, lanes(1.0e-12f), centre_axis);
+    centre_frame = turned(centre_frame, centre_axis, axis);
+    centre_axis = axis;
+  }
+  const lanes facing = in_lock * smoothstep(dot(forwards, centre_axis));
+  const lanes part = facing * lower_of(forward / (forward + settling), lanes(0.45f));
+  const lanes off = dot(beside_place - centre_low, centre_axis) + centre_below - ahead;
+  lead += clamped(part * off, -0.5f * forward, 0.5f * forward);
+  lanes cosine, sine;
+  centre_angle(forwards, sideways, cosine, sine);
+  turn_by(part, cosine, sine);
+  sideways = sideways * turn_cosine + cross(forwards, sideways) * turn_sine;
+};
