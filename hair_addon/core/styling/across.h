@@ -8,7 +8,7 @@
 // segment is as long as it was. With `keep_length` κ below 1 the progress is (1 - κ) d_i + κ e_i, and the strand
 // becomes longer.
 // offset(i, s, x, out u, out v) gives ρ_i [m] at the arc length s [m], x of the strand's length;
-// turn(a, e, t, u) may turn the frame of a segment about t, with the progress at its end.
+// turn(progress at the end of a segment, e, t, u, v, w_u, w_v) may turn w.
 
 const auto move_across = [&](auto offset, lanes before_u, lanes before_v, auto turn) {
   const float keep_length = number[7];
@@ -79,11 +79,12 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v, auto t
     const vector forwards = unit_or(chosen(is_facing, t_between, t_below), lanes(1.0e-6f), t_below);
     const vector flat = u_between - forwards * dot(u_between, forwards);
     const auto is_flat = dot(flat, flat) > 0.01f;
-    vector sideways = unit_or(
+    const vector sideways = unit_or(
         chosen(is_flat, flat, u_below - forwards * dot(u_below, forwards)), lanes(1.0e-6f), u_below
     );
-    turn(progress, forward, forwards, sideways);
-    const vector made = forwards * forward + sideways * w_u + cross(forwards, sideways) * w_v;
+    const vector upward = cross(forwards, sideways);
+    turn(progress, forward, forwards, sideways, upward, w_u, w_v);
+    const vector made = forwards * forward + sideways * w_u + upward * w_v;
     const auto has_length = d > 1.0e-12f;
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));
     // Unit but for rounding, which a step of Newton's method takes away.

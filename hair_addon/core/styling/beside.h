@@ -7,10 +7,10 @@
 // by the least rotation between their directions. Both follow by degrees, over a part of the style's pitch; a strand that turns away from its centre goes on by itself, and so does one without a centre, or where centres
 // have no points.
 //
-// keep_beside(progress, forward, forwards, sideways) is told how far along its path the strand is after a segment, the
-// segment's share of that and its direction; it turns `sideways`, which is across it.
+// keep_beside(progress, forward, t, u, v, w_u, w_v) is told how far along its path the strand is after a segment, the
+// segment's share of that and its frame; it turns what the segment is moved across.
 
-const float settling = number[9] / 12.0f;
+const float per_settling = 6.0f / number[9];
 const bool is_beside = level >= 0 && first_centre < centre_points.shape[0];
 lanes lead = 0.0f, turn_cosine = 1.0f, turn_sine = 0.0f;
 const float* centre_rows[LANES];
@@ -24,10 +24,16 @@ const auto read_centre = [&](ints at, vector& point, lanes& arc) {
   arc = row[3];
 };
 // The centre's frame in the strand's: cosine and sine of the angle between them.
-const auto centre_angle = [&](const vector& forwards, const vector& sideways, lanes& cosine, lanes& sine) {
+const auto centre_angle = [&](const vector& forwards, const vector& u, const vector& v, lanes& cosine, lanes& sine) {
   const vector carried = turned(centre_frame, centre_axis, forwards);
-  cosine = dot(carried, sideways);
-  sine = dot(carried, cross(forwards, sideways));
+  cosine = dot(carried, u);
+  sine = dot(carried, v);
+};
+const auto read_axis = [&]() {
+  const lanes range = centre_above - centre_below;
+  const auto has_range = range > 1.0e-12f;
+  const vector along_it = (centre_high - centre_low) * (1.0f / (has_range ? range : lanes(1.0f)));
+  return chosen(has_range, along_it, centre_axis);
 };
 const auto turn_by = [&](lanes part, lanes cosine, lanes sine) {
   const lanes x = turn_cosine + (cosine - turn_cosine) * part, y = turn_sine + (sine - turn_sine) * part;
@@ -43,15 +49,19 @@ if (is_beside) {
   }
   read_centre(at_centre, centre_low, centre_below);
   read_centre(at_centre + 1, centre_high, centre_above);
-  centre_axis = unit_or(centre_high - centre_low, lanes(1.0e-12f), centre_normal);
+  centre_axis = centre_normal;
+  centre_axis = read_axis();
   centre_frame = turned(reference(), centre_normal, centre_axis);
   const lanes facing = in_lock * smoothstep(dot(t[1], centre_axis));
   lead = facing * dot(root - centre_low, centre_axis);
   lanes cosine, sine;
-  centre_angle(t[1], first_frame(), cosine, sine);
+  const vector u = first_frame();
+  centre_angle(t[1], u, cross(t[1], u), cosine, sine);
   turn_by(facing, cosine, sine);
 }
-const auto keep_beside = [&](lanes progress, lanes forward, const vector& forwards, vector& sideways) {
+const auto keep_beside = [&](
+    lanes progress, lanes forward, const vector& forwards, const vector& u, const vector& v, lanes& w_u, lanes& w_v
+) {
   if (!is_beside) return;
   beside_place = beside_place + forwards * forward;
   const lanes ahead = progress + lead;
@@ -62,16 +72,18 @@ const auto keep_beside = [&](lanes progress, lanes forward, const vector& forwar
     centre_low = chosen(is_past, centre_high, centre_low);
     centre_below = is_past ? centre_above : centre_below;
     read_centre(at_centre + 1, centre_high, centre_above);
-    const vector axis = unit_or(centre_high - centre_low, lanes(1.0e-12f), centre_axis);
-    centre_frame = turned(centre_frame, centre_axis, axis);
+    const vector axis = read_axis();
+    centre_frame = chosen(is_past, turned(centre_frame, centre_axis, axis), centre_frame);
     centre_axis = axis;
   }
   const lanes facing = in_lock * smoothstep(dot(forwards, centre_axis));
-  const lanes part = facing * lower_of(forward / (forward + settling), lanes(0.45f));
+  const lanes part = facing * lower_of(forward * per_settling, lanes(0.45f));
   const lanes off = dot(beside_place - centre_low, centre_axis) + centre_below - ahead;
   lead += clamped(part * off, -0.5f * forward, 0.5f * forward);
   lanes cosine, sine;
-  centre_angle(forwards, sideways, cosine, sine);
+  centre_angle(forwards, u, v, cosine, sine);
   turn_by(part, cosine, sine);
-  sideways = sideways * turn_cosine + cross(forwards, sideways) * turn_sine;
+  const lanes turned_u = w_u * turn_cosine - w_v * turn_sine;
+  w_v = w_u * turn_sine + w_v * turn_cosine;
+  w_u = turned_u;
 };
