@@ -8,9 +8,9 @@
 // segment is as long as it was. With `keep_length` κ below 1 the progress is (1 - κ) d_i + κ e_i, and the strand
 // becomes longer.
 // offset(i, s, x, out u, out v) gives ρ_i [m] at the arc length s [m], x of the strand's length;
-// turn(progress at the end of a segment, e, t, u, v, w_u, w_v) may turn w.
+// passed(progress at the end of a segment, e, t, u, v) is called after each.
 
-const auto move_across = [&](auto offset, lanes before_u, lanes before_v, auto turn) {
+const auto move_across = [&](auto offset, lanes before_u, lanes before_v, auto passed) {
   const float keep_length = number[7];
   // The segments around each lane's progress, which are kept while it stays between their middles: there their frames
   // hold. `end` is the arc length at the end of the second.
@@ -83,7 +83,7 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v, auto t
         chosen(is_flat, flat, u_below - forwards * dot(u_below, forwards)), lanes(1.0e-6f), u_below
     );
     const vector upward = cross(forwards, sideways);
-    turn(progress, forward, forwards, sideways, upward, w_u, w_v);
+    passed(progress, forward, forwards, sideways, upward);
     const vector made = forwards * forward + sideways * w_u + upward * w_v;
     const auto has_length = d > 1.0e-12f;
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));

@@ -7,8 +7,9 @@
 // by the least rotation between their directions. Both follow by degrees, over a part of the style's pitch; a strand that turns away from its centre goes on by itself, and so does one without a centre, or where centres
 // have no points.
 //
-// keep_beside(progress, forward, t, u, v, w_u, w_v) is told how far along its path the strand is after a segment, the
-// segment's share of that and its frame; it turns what the segment is moved across.
+// keep_beside(progress, forward, t, u, v) is told how far along its path the strand is after a segment, the segment's
+// share of that and its frame. in_centre_frame(u, v) turns an offset from the centre's frame into the strand's: the
+// offset itself and not its differences, by which a turning frame would move the strand off its path.
 
 const float per_settling = 6.0f / number[9];
 const bool is_beside = level >= 0 && first_centre < centre_points.shape[0];
@@ -60,9 +61,8 @@ if (is_beside) {
   turn_by(facing, cosine, sine);
 }
 const auto keep_beside = [&](
-    lanes progress, lanes forward, const vector& forwards, const vector& u, const vector& v, lanes& w_u, lanes& w_v
+    lanes progress, lanes forward, const vector& forwards, const vector& u, const vector& v
 ) {
-  if (!is_beside) return;
   beside_place = beside_place + forwards * forward;
   const lanes ahead = progress + lead;
   for (;;) {
@@ -83,7 +83,9 @@ const auto keep_beside = [&](
   lanes cosine, sine;
   centre_angle(forwards, u, v, cosine, sine);
   turn_by(part, cosine, sine);
-  const lanes turned_u = w_u * turn_cosine - w_v * turn_sine;
-  w_v = w_u * turn_sine + w_v * turn_cosine;
-  w_u = turned_u;
+};
+const auto in_centre_frame = [&](lanes& u, lanes& v) {
+  const lanes turned_u = u * turn_cosine - v * turn_sine;
+  v = u * turn_sine + v * turn_cosine;
+  u = turned_u;
 };
