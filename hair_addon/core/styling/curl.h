@@ -52,6 +52,7 @@ move_across(
     },
     lanes(0.0f),
     lanes(0.0f),
+    u_first,
     [&](lanes progress, lanes forward, const vector& forwards, const vector& u, const vector& v) {
       const lanes lead_before = lead;
       if (is_beside) keep_beside(progress, forward, forwards, u, v);

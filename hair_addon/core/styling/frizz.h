@@ -63,5 +63,6 @@ move_across(
     [&](int, lanes s, lanes x, lanes& to_u, lanes& to_v) { noise(s, x, to_u, to_v); },
     root_u,
     root_v,
+    first_frame(reference()),
     [](lanes, lanes, const vector&, const vector&, const vector&) {}
 );
