@@ -153,7 +153,9 @@ def test_a_clumped_lock_is_one_ringlet(normal, rng):
     lock, wound = (stepped(strands, *styles, **where) for styles in ((gathered,), (gathered, ringlet)))
     assert np.abs(wound - lock)[:, 60:].max() > 0.01
     spreads = [
-        np.mean([root_mean_square(distances_to(points[1:, i], points[0].astype(np.float64))) for i in range(50, 115, 5)])
+        np.mean(
+            [root_mean_square(distances_to(points[1:, i], points[0].astype(np.float64))) for i in range(50, 115, 5)]
+        )
         for points in (lock, wound)
     ]
     assert spreads[1] < 1.4 * spreads[0]

@@ -143,7 +143,9 @@ def test_hair_against_the_normals_is_as_coherent_as_hair_along_them(sign, rng):
     hair = straight(600)
     tilts = rng.normal(0.0, 0.15, (len(hair.guides), 1, 2))
     along = np.linspace(0.0, 1.0, hair.guides.point_count)[None, :, None] * 0.2
-    shape = np.concatenate([along * tilts, np.broadcast_to(sign * along, (*tilts.shape[:1], along.shape[1], 1))], axis=2)
+    shape = np.concatenate(
+        [along * tilts, np.broadcast_to(sign * along, (*tilts.shape[:1], along.shape[1], 1))], axis=2
+    )
     hair.guides = hair.guides.moved((hair.guides.numpy()[:, :1] + shape).astype(np.float32))
     settings = curl.Settings(radius=2e-3, pitch=0.1, coherence=1.0, flatness=1.0, root=1.0, tip=1.0, start=0.0)
     away = hair.styled(settings) - hair.plain
