@@ -14,79 +14,86 @@
 const vector at_centre = reference(), u_first = first_frame(at_centre);
 const float per_settling = 6.0f / number[9];
 const bool is_beside = level >= 0 && first_centre < centre_points.shape[0];
-lanes lead = 0.0f, turn_cosine = 1.0f, turn_sine = 0.0f;
+lanes lead = 0.0f;
 const float* centre_rows[LANES];
 ints centre_at = 0;
-// The segment of the centre beside the strand: its frame and its end.
-vector centre_axis, centre_frame, centre_end, beside_place = root;
-lanes centre_arc = 0.0f;
-const auto read_centre = [&](ints at, vector& point, lanes& arc) {
+// What is known of the segment of the centre beside the strand, and of the strand, from one segment of it to the next:
+// too much for the registers of a GPU.
+enum { AXIS = 0, FRAME = 3, END = 6, PLACE = 9, ARC = 12, COSINE = 13, SINE = 14 };
+static_assert(SINE < SPARES, "numbers of a strand beside its centre");
+const auto kept = [&](int first) { return vector{spare[first], spare[first + 1], spare[first + 2]}; };
+const auto store = [&](int first, const vector& value) {
+  spare[first] = value.x;
+  spare[first + 1] = value.y;
+  spare[first + 2] = value.z;
+};
+// The direction of the segment that ends at point `centre_at` + 1; that of the one before where it has no length.
+const auto read_segment = [&](const vector& axis_before) {
+  const vector before = kept(END);
+  const lanes arc_before = spare[ARC];
   lanes row[4];
-  read_rows(centre_rows, at * 4, row);
-  point = {row[0], row[1], row[2]};
-  arc = row[3];
-};
-// The centre's frame in the strand's: cosine and sine of the angle between them.
-const auto centre_angle = [&](const vector& forwards, const vector& u, const vector& v, lanes& cosine, lanes& sine) {
-  const vector carried = turned(centre_frame, centre_axis, forwards);
-  cosine = dot(carried, u);
-  sine = dot(carried, v);
-};
-// Its direction from the end of the segment before; that one's where it has no length.
-const auto read_segment = [&]() {
-  const vector before = centre_end;
-  const lanes arc_before = centre_arc;
-  read_centre(centre_at + 1, centre_end, centre_arc);
-  const lanes range = centre_arc - arc_before;
+  read_rows(centre_rows, centre_at * 4 + 4, row);
+  const vector end = {row[0], row[1], row[2]};
+  store(END, end);
+  spare[ARC] = row[3];
+  const lanes range = row[3] - arc_before;
   const auto has_range = range > 1.0e-12f;
-  return chosen(has_range, (centre_end - before) * (1.0f / (has_range ? range : lanes(1.0f))), centre_axis);
+  return chosen(has_range, (end - before) * (1.0f / (has_range ? range : lanes(1.0f))), axis_before);
 };
-const auto turn_by = [&](lanes part, lanes cosine, lanes sine) {
-  const lanes x = turn_cosine + (cosine - turn_cosine) * part, y = turn_sine + (sine - turn_sine) * part;
+// A part of the turn to the centre's frame, carried over to the strand's.
+const auto turn_by = [&](lanes part, const vector& carried, const vector& u, const vector& v, lanes& x, lanes& y) {
+  x += (dot(carried, u) - x) * part;
+  y += (dot(carried, v) - y) * part;
   const lanes size = sqrt_of(x * x + y * y);
   const auto is_long = size > 1.0e-3f;
   const lanes scale = 1.0f / (is_long ? size : lanes(1.0f));
-  turn_cosine = is_long ? x * scale : turn_cosine;
-  turn_sine = is_long ? y * scale : turn_sine;
+  spare[COSINE] = is_long ? x * scale : lanes(1.0f);
+  spare[SINE] = is_long ? y * scale : lanes(0.0f);
 };
 if (is_beside) {
   for (int lane = 0; lane < LANES; ++lane) {
     centre_rows[lane] = reinterpret_cast<const float*>(centre_points.data) + size_t(centre[lane]) * point_count * 4;
   }
-  read_centre(centre_at, centre_end, centre_arc);
-  const vector from_centre = root - centre_end;
-  centre_axis = centre_normal;
-  centre_axis = read_segment();
-  centre_frame = turned(at_centre, centre_normal, centre_axis);
-  const lanes facing = in_lock * smoothstep(dot(t[1], centre_axis));
-  lead = facing * dot(from_centre, centre_axis);
-  lanes cosine, sine;
-  centre_angle(t[1], u_first, cross(t[1], u_first), cosine, sine);
-  turn_by(facing, cosine, sine);
+  lanes row[4];
+  read_rows(centre_rows, centre_at * 4, row);
+  const vector centre_root = {row[0], row[1], row[2]};
+  store(END, centre_root);
+  spare[ARC] = row[3];
+  const vector axis = read_segment(centre_normal), frame = turned(at_centre, centre_normal, axis);
+  store(AXIS, axis);
+  store(FRAME, frame);
+  store(PLACE, root);
+  const lanes facing = in_lock * smoothstep(dot(t[1], axis));
+  lead = facing * dot(root - centre_root, axis);
+  lanes cosine = 1.0f, sine = 0.0f;
+  turn_by(facing, turned(frame, axis, t[1]), u_first, cross(t[1], u_first), cosine, sine);
 }
 const auto keep_beside = [&](
     lanes progress, lanes forward, const vector& forwards, const vector& u, const vector& v
 ) {
-  beside_place = beside_place + forwards * forward;
   const lanes ahead = progress + lead;
+  vector axis = kept(AXIS), frame = kept(FRAME);
   for (;;) {
-    const auto is_past = centre_arc <= ahead && centre_at < point_count - 2;
+    const auto is_past = lanes(spare[ARC]) <= ahead && centre_at < point_count - 2;
     if (!any_of(is_past)) break;
     centre_at = is_past ? centre_at + 1 : centre_at;
-    const vector axis = chosen(is_past, read_segment(), centre_axis);
-    centre_frame = chosen(is_past, turned(centre_frame, centre_axis, axis), centre_frame);
-    centre_axis = axis;
+    const vector next_axis = chosen(is_past, read_segment(axis), axis);
+    frame = chosen(is_past, turned(frame, axis, next_axis), frame);
+    axis = next_axis;
   }
-  const lanes facing = in_lock * smoothstep(dot(forwards, centre_axis));
+  store(AXIS, axis);
+  store(FRAME, frame);
+  const vector here = kept(PLACE) + forwards * forward;
+  store(PLACE, here);
+  const lanes facing = in_lock * smoothstep(dot(forwards, axis));
   const lanes part = facing * lower_of(forward * per_settling, lanes(0.45f));
-  const lanes off = dot(beside_place - centre_end, centre_axis) + centre_arc - ahead;
+  const lanes off = dot(here - kept(END), axis) + spare[ARC] - ahead;
   lead += clamped(part * off, -0.5f * forward, 0.5f * forward);
-  lanes cosine, sine;
-  centre_angle(forwards, u, v, cosine, sine);
-  turn_by(part, cosine, sine);
+  lanes cosine = spare[COSINE], sine = spare[SINE];
+  turn_by(part, turned(frame, axis, forwards), u, v, cosine, sine);
 };
 const auto in_centre_frame = [&](lanes& u, lanes& v) {
-  const lanes turned_u = u * turn_cosine - v * turn_sine;
-  v = u * turn_sine + v * turn_cosine;
+  const lanes cosine = spare[COSINE], sine = spare[SINE], turned_u = u * cosine - v * sine;
+  v = u * sine + v * cosine;
   u = turned_u;
 };
