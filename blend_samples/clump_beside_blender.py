@@ -29,7 +29,7 @@ ASSETS = "/assets/nodes/procedural_hair_node_assets.blend"
 STRAND_COUNT, POINT_COUNT = 20_000, 121
 REPETITIONS = 4
 CAPTION = 24  # pixels
-SIZE, RADIUS, PITCH, SHAPE = 0.02, 0.0075, 0.036, 0.1
+SIZE, RADIUS, PITCH, SHAPE = 0.02, 0.0075, 0.036, 0.02
 
 
 def main():

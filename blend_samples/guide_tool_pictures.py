@@ -72,12 +72,13 @@ def main():
 
 def compress(path):
     """Write a PNG again as small as it gets."""
-    settings = bpy.context.scene.render.image_settings
+    settings, view = bpy.context.scene.render.image_settings, bpy.context.scene.view_settings
     settings.file_format, settings.color_mode, settings.compression = "PNG", "RGB", 100
-    bpy.context.scene.view_settings.view_transform = "Standard"
-    bpy.context.scene.view_settings.look = "None"
+    before = view.view_transform, view.look
+    view.view_transform, view.look = "Standard", "None"
     image = bpy.data.images.load(str(path))
     image.save_render(str(path))
+    view.view_transform, view.look = before
 
 
 def comb(guides):

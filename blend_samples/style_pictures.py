@@ -104,7 +104,7 @@ def _grown(width, depth, height, side, comb):
     bpy.ops.wm.read_factory_settings(use_empty=True)
     bpy.ops.mesh.primitive_plane_add(size=1.0, location=(0.0, 0.0, height))
     patch = bpy.context.object
-    # A surface faces the way its hair grows: strands that leave it backward have no common frame to curl in.
+    # A surface faces the way its hair grows: wet hair keeps clear of it on that side.
     patch.data.transform(((width, 0, 0, 0), (0, side * depth, 0, 0), (0, 0, side, 0), (0, 0, 0, 1)))
     patch.hide_render = True
     bpy.ops.vellus.add_hair(

@@ -26,7 +26,7 @@ GALLERY = ("STRAIGHT", "WAVY", "CURLY", "COILY", "FRIZZY", "WET", "PIXIE", "BUZZ
 WETNESS = (0.0, 0.25, 0.5, 0.75, 1.0)
 STRAND_COUNT = 30_000
 SIZE = 360, 420  # pixels of a picture
-SAMPLE_COUNT = 9  # of a pixel
+SAMPLE_COUNT = 16  # of a pixel
 KEPT_BITS = 0xFC  # of a color: the pictures are pages of the documentation
 COLUMNS = 4
 LENS = 92.0  # [mm]: the head and its hair fill a picture
@@ -86,7 +86,7 @@ def _drawn_style(hair, name):
 def _drawn_wet(hair, wetness):
     hair.vellus.hair.point_count, hair.vellus.hair.tip_taper = 81, 0.2
     frizz = api.Frizz(amplitude=0.002, wavelength=0.03, seed=1)
-    api.set_styles(hair, [frizz, api.Wet(amount=wetness, lock=0.022, cling=0.45, seed=2)])
+    api.set_styles(hair, [frizz, api.Wet(amount=wetness, lock=0.022, cling=0.45, relax=0.95, seed=2)])
     bpy.context.view_layer.update()
     return drawn()
 

@@ -25,6 +25,7 @@ from hair_addon.core.styling import program as programs
 STYLES = {
     "clump": (clump.Settings(levels=1),),
     "curl": (curl.Settings(),),
+    "clump, curl": (clump.Settings(levels=1), curl.Settings()),
     "frizz": (frizz.Settings(),),
     "braid": (braid.Settings(),),  # whose profile begins steeply, at one of the points: rounding is seen there first
     "all three": (clump.Settings(levels=1), curl.Settings(), frizz.Settings()),
@@ -63,8 +64,8 @@ class Hair:
             wp.empty((0, count), dtype=float, device=device),
             there(np.stack([self.locks, self.locks]), int),
             there(np.dstack([self.centres, arcs]).astype(np.float32), wp.vec4),
-            there(np.tile(np.float32([0.0, 0.0, 1.0]), (centre_count, 1)), wp.vec3),
-            there(np.arange(centre_count, dtype=np.int32), int),
+            there(np.tile(np.float32([0.0, 0.0, 1.0]), (2 * centre_count, 1)), wp.vec3),
+            there(np.tile(np.arange(centre_count, dtype=np.int32), 2), int),
         )
         return there(self.points, wp.vec3), data
 
@@ -90,10 +91,10 @@ def hair(strand_count, point_count):
     return Hair(grown(roots, own), normals, identities, locks, grown(centres, bends))
 
 
-def program_of(styles):
-    """The `Program` of styles whose levels all have the same centres."""
-    level_count = len(programs.tree_levels(styles)) + 1
-    return programs.compiled(programs.strand_steps(styles, {}), [], [0] * level_count)
+def program_of(styles, centre_count):
+    """The `Program` of styles whose levels all have the same centres; guides are as many again, without points."""
+    first_centres = [0] * len(programs.tree_levels(styles)) + [centre_count]
+    return programs.compiled(programs.strand_steps(styles, {}), [], first_centres)
 
 
 def best_time(work, device, repetitions=20):
@@ -126,7 +127,7 @@ def main():
     print(f"  {'copying them':12} {1e3 * copying:8.3f} ms")
     axes = np.eye(3)
     for name, styles in STYLES.items():
-        program = program_of(styles)
+        program = program_of(styles, len(everything.centres))
         time = best_time(lambda program=program: steps.apply_steps(points, program, data, axes), device)
         wp.copy(points, plain)
         steps.apply_steps(points, program, data, axes)

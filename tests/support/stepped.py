@@ -30,7 +30,8 @@ def stepped(
 
     weights: (S,) of styles with a mask; members: (S,) locks of which all strands are in the first unless given;
     centres: (K, P, 3) centre strands of every level of every style that gathers, the mean of a lock's strands
-    unless given; launch: other arguments of `steps.apply_steps`.
+    unless given; without such a style locks are those of guides, whose points are not known; launch: other arguments
+    of `steps.apply_steps`.
     """
     count, point_count = points.shape[:2]
     identities = np.arange(count) if identities is None else identities
@@ -40,11 +41,15 @@ def stepped(
         centres = np.array([points[members == lock].mean(axis=0) for lock in range(lock_count)])
     arcs = np.pad(np.cumsum(segment_lengths(centres), axis=1), ((0, 0), (1, 0)))
     level_count = len(programs.tree_levels(styles)) + 1
+    first_centres = [0] * (level_count - 1) + [len(centres)]
     keys = programs.mask_keys(styles)
     masks = np.tile(np.ones(count) if weights is None else weights, (len(keys), 1))
 
     def there(array, kind, shape):
         return wp.array(np.broadcast_to(array, shape).astype(kind[1]), dtype=kind[0], device=device)
+
+    def twice(array):
+        return np.concatenate([array, array])
 
     number, whole, vector = (float, np.float32), (int, np.int32), (wp.vec3, np.float32)
     data = steps.StrandData(
@@ -53,10 +58,10 @@ def stepped(
         there(masks, number, (len(keys), count)),
         there(members, whole, (level_count, count)),
         there(np.dstack([centres, arcs]), (wp.vec4, np.float32), (*centres.shape[:2], 4)),
-        there(centre_normals, vector, (len(centres), 3)),
-        there(1000 + np.arange(len(centres)), whole, (len(centres),)),
+        there(twice(np.broadcast_to(centre_normals, (len(centres), 3))), vector, (2 * len(centres), 3)),
+        there(twice(1000 + np.arange(len(centres))), whole, (2 * len(centres),)),
     )
-    made = programs.compiled(programs.strand_steps(styles, cutters or {}), keys, [0] * level_count)
+    made = programs.compiled(programs.strand_steps(styles, cutters or {}), keys, first_centres)
     styled = there(points, vector, points.shape)
     steps.apply_steps(styled, made, data, np.eye(3) if axes is None else axes, **launch)
     assert styled.shape[1] == point_count

@@ -7,16 +7,17 @@
 // where a is the strand's own progress Σ e_j, so it goes around the head where the strand did before, and every
 // segment is as long as it was. With `keep_length` κ below 1 the progress is (1 - κ) d_i + κ e_i, and the strand
 // becomes longer.
-// offset(i, s, x, out u, out v) gives ρ_i [m] at the arc length s [m], x of the strand's length.
+// offset(i, s, x, out u, out v) gives ρ_i [m] at the arc length s [m], x of the strand's length; u_first: the first
+// segment's frame; passed(progress at the end of a segment, e, t, u, v) is called after each.
 
-const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
+const auto move_across = [&](auto offset, lanes before_u, lanes before_v, const vector& u_first, auto passed) {
   const float keep_length = number[7];
   // The segments around each lane's progress, which are kept while it stays between their middles: there their frames
   // hold. `end` is the arc length at the end of the second.
   const int ahead = point_count > 2 ? 2 : 1;
   ints at = 1;
   lanes below = 0.5f * length[1], above = below, end = length[1];
-  vector t_below = t[1], u_below = first_frame(), t_above = t_below, u_above = u_below;
+  vector t_below = t[1], u_below = u_first, t_above = t_below, u_above = u_below;
   if (ahead > 1) {
     above = end + 0.5f * length[ahead];
     end += length[ahead];
@@ -92,6 +93,7 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v) {
     // Unit but for rounding, which a step of Newton's method takes away.
     next[i] = chosen(has_length, nearly * (1.5f - 0.5f * dot(nearly, nearly)), t[i]);
     if (keep_length != 1.0f) next_length[i] = has_length ? size : d;
+    passed(progress, forward, forwards, sideways, upward);
   }
   swap(t, next);
   if (keep_length != 1.0f) {

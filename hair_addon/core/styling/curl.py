@@ -1,11 +1,16 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Curl: strands wind around their own old path, as helices or flat waves.
 
-With the arc of a turn ℓ = sqrt((2πR)² + h²) and κ = keep_length:
+With the arc of a turn ℓ = sqrt((2πR)² + h²), κ = keep_length and y the strand's progress along its path:
 
     R_i = A_si · radius · smoothstep(2 s_i / ℓ),    h_i = pitch · (1 + stretch (1 - x_i))
     φ_i = φ_(i-1) + 2π d_i ((1 - κ) / h_i + κ / sqrt((2πR)² (1 + (1 - flatness)²) / 2 + h_i²))
+                  + (2π Σ (y_j - y_(j-1)) / h_j - φ_(i-1)) h_i² / ((2πR)² (1 + (1 - flatness)²) / 2 + h_i²)
     φ_0 = 2π (h_clump + (1 - coherence) (h_s - ½)),    ρ_i = R_i (cos φ_i, ± (1 - flatness) sin φ_i)
+
+The second line leads the phase back to a turn for each pitch of y. Below a Clump, y is counted along the centre of the
+strand's lock, and ρ is in the centre's frames: strands that are rooted at different places along the lock wind as one
+(beside.h). Without one, y is the strand's own.
 
 A straight strand of length L reaches L pitch / ℓ. It is the curve of curvature R / (R² + (h/2π)²) and torsion
 (h/2π) / (R² + (h/2π)²), the helix that natural curvature gives a fibre [Bertails06]. A twentieth of the locks winds

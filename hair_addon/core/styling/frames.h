@@ -24,9 +24,12 @@ const auto reference = [&]() {
   const lanes above = higher_of(1.0f + n.z, lanes(1.0e-6f));
   return from_axes({1.0f - n.x * n.x / above, -n.x * n.y / above, -n.x});
 };
-const auto first_frame = [&]() { return turned(turned(reference(), centre_normal, normal), normal, t[1]); };
+// The first segment's frame, of that reference.
+const auto first_frame = [&](const vector& at_centre) {
+  return turned(turned(at_centre, centre_normal, normal), normal, t[1]);
+};
 const auto put_frames = [&](vector* u) {
-  vector across = first_frame();
+  vector across = first_frame(reference());
   u[1] = across;
   for (int i = 2; i < point_count; ++i) {
     across = turned(across, t[i - 1], t[i]);

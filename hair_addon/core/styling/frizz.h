@@ -59,4 +59,10 @@ const auto noise = [&](lanes s, lanes x, lanes& to_u, lanes& to_v) {
 };
 lanes root_u, root_v;
 noise(lanes(0.0f), lanes(0.0f), root_u, root_v);
-move_across([&](int, lanes s, lanes x, lanes& to_u, lanes& to_v) { noise(s, x, to_u, to_v); }, root_u, root_v);
+move_across(
+    [&](int, lanes s, lanes x, lanes& to_u, lanes& to_v) { noise(s, x, to_u, to_v); },
+    root_u,
+    root_v,
+    first_frame(reference()),
+    [](lanes, lanes, const vector&, const vector&, const vector&) {}
+);

@@ -7,7 +7,12 @@
 
 #if defined(__CUDA_ARCH__)
   const auto read_rows = [](const float* const* rows, int first, lanes* out) {
-    for (int k = 0; k < 4; ++k) out[k] = rows[0][first + k];
+    // Rows of points with their arc lengths are aligned.
+    const float4 row = *reinterpret_cast<const float4*>(rows[0] + first);
+    out[0] = row.x;
+    out[1] = row.y;
+    out[2] = row.z;
+    out[3] = row.w;
   };
   const auto write_rows = [](const lanes* values, float* const* rows, int first) {
     for (int k = 0; k < 4; ++k) rows[0][first + k] = values[k];

@@ -3,7 +3,8 @@
 // Points of strands, read and written one after the other, without an array of all. Stands after lane_rows.h.
 //
 // read_points(rows, take) calls take(i, point) for i = 0 … point_count - 1; write_points(rows, is_written, point_at)
-// asks for point_at(i) in the same order, and writes the rows of the lanes that are to be written.
+// asks for point_at(i) in the same order, and writes the rows of the lanes that are to be written. Between the two,
+// spare[k], k below SPARES, keeps numbers of each lane without registers.
 
 #if defined(__CUDA_ARCH__)
   // Rows of a warp's threads follow each other in memory. Its threads move some points of all rows together, by way of
@@ -15,6 +16,8 @@
   const int threads_left = points.shape[0] - (block - thread);
   const int thread_count = threads_left < THREADS ? threads_left : THREADS;
   const unsigned all_threads = 0xffffffffu >> (THREADS - thread_count);
+  constexpr int SPARES = NUMBERS_AT_ONCE;
+  float* const spare = staged + thread * STRIDE;
   // move(place in memory, from the thread's own row on; place in `staged`; which row), for points from `start` on.
   const auto move_together = [&](int start, auto move) {
     const int count = 3 * (point_count - start);
@@ -56,6 +59,8 @@
     }
   };
 #else
+  constexpr int SPARES = 3 * POINTS_AT_ONCE;
+  lanes spare[SPARES];
   // Four points, 12 numbers of each lane, at a time; the points that are left over number by number.
   const auto read_points = [&](float* const* rows, auto take) {
     vector four_points[4];

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 wp.set_module_options({"enable_backward": False})
 
 HAIR = "hair"  # what the strands are known by to the clump trees
+_AGAINST = -0.5  # mean cosine between guides and normals below which hair grows on the surface's other side
 
 # Points (N, P) [m] of strands of a binding, all or (N,) indices of some, for guides as they are followed now.
 StrandsOf = Callable[[HairBinding, np.ndarray | None], "wp.array2d[wp.vec3]"]
@@ -203,9 +204,11 @@ def bind(
     made = programs.strand_steps(styles, inputs.cutters)
     program = programs.compiled(made, keys, first_centres)
     guide_identities = geometry.root_frames.identities(guides.roots)[0]
+    side = _side(guides, binding.guide_normals.numpy())
+    centre_normals = [side * bound.normals.numpy() for bound in bindings]
     shared = {
         "centre_points": wp.zeros((sum(counts), point_count), dtype=wp.vec4, device=device),
-        "centre_normals": _joined([*(bound.normals for bound in bindings), binding.guide_normals], wp.vec3, device),
+        "centre_normals": _joined([*centre_normals, side * binding.guide_normals.numpy()], wp.vec3, device),
         "centre_identities": _joined([*(bound.identities[0] for bound in bindings), guide_identities], int, device),
     }
 
@@ -219,7 +222,7 @@ def bind(
         rows[-1] = bound.guide_weights.indices.numpy()[:, 0]
         weights = np.array([inputs.masks[key].of_strands(bound) for key in keys], np.float32)
         return StrandData(
-            bound.normals,
+            bound.normals if side == 1 else _joined([side * bound.normals.numpy()], wp.vec3, device),
             wp.array(bound.identities[0], dtype=int, device=device),
             wp.array(weights.reshape(len(keys), len(bound.roots)), dtype=float, device=device),
             wp.array(rows, dtype=int, device=device),
@@ -244,6 +247,17 @@ def bind(
         levels,
         centres,
     )
+
+
+def _side(guides, normals):
+    """-1 where hair grows against the surface's normals, as where faces are turned inside out; 1 elsewhere.
+
+    Frames follow from the normal by the least rotation to a strand, which is not defined straight against it.
+    """
+    points = guides.numpy()
+    segments = points[:, 1] - points[:, 0]
+    lengths = np.maximum(np.linalg.norm(segments, axis=1), 1e-12)
+    return -1 if ((segments * normals).sum(axis=1) / lengths).mean() < _AGAINST else 1
 
 
 def _steps_before(program, made, level):

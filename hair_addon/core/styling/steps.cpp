@@ -133,6 +133,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   int centre[LANES];
   vector centre_normal = normal;
   ints lock = identity;
+  lanes in_lock = 0.0f;
   if (level >= 0) {
     for (int lane = 0; lane < LANES; ++lane) {
       const int member = members.data[size_t(level) * members.shape[1] + strand[lane]];
@@ -141,6 +142,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
         if (kind == CLUMP || kind == WEAVE) set_lane(base, lane, 0.0f);
         continue;
       }
+      set_lane(in_lock, lane, 1.0f);
       set_lane(lock, lane, centre_identities.data[centre[lane]]);
       set_lane(centre_normal.x, lane, centre_normals.data[centre[lane]][0]);
       set_lane(centre_normal.y, lane, centre_normals.data[centre[lane]][1]);
@@ -188,6 +190,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
 #include "clump.h"
     } break;
     case CURL: {
+#include "beside.h"
 #include "curl.h"
     } break;
     case FRIZZ: {

@@ -7,9 +7,9 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from hair_addon.core.styling import curl, frizz
+from hair_addon.core.styling import clump, curl, frizz
 from tests.support.slid import steepest_moves
-from tests.support.stepped import stepped, straight_strands
+from tests.support.stepped import UP, stepped, straight_strands
 
 ALL = {"root": 1.0, "tip": 1.0, "start": 0.0}
 
@@ -128,3 +128,72 @@ def test_strands_that_turn_back_change_by_degrees(style):
     amounts = np.linspace(0.0, 1.0, 33)
     moves = list(islice(steepest_moves(lambda amount: stepped(strands, replace(style, amount=amount)), amounts), 12))
     assert moves[-1] < 0.01 * moves[0]
+
+
+def bent_lock(rng, count=60, length=0.24, point_count=121, normal=1.0):
+    """Strands that bend over from roots in a disc of 10 mm, and the one in the middle: (S, P, 3), (1, P, 3), normals.
+
+    normal: -1 where normals point into the surface.
+    """
+    radius, angle = 0.01 * np.sqrt(rng.random(count)), rng.uniform(0.0, 2.0 * np.pi, count)
+    roots = np.pad(np.stack([radius * np.cos(angle), radius * np.sin(angle)], axis=1), ((1, 0), (0, 1)))
+    bend = 1.6 + 8.0 * roots[:, :1]
+    around = 6.0 * roots[:, 1:2]
+    along = np.linspace(0.0, 1.0, point_count - 1)
+    tilt = np.minimum(0.2 + 3.0 * along, 1.0) * bend
+    segments = np.stack([np.sin(tilt) * np.cos(around), np.sin(tilt) * np.sin(around), np.cos(tilt)], axis=-1)
+    path = np.pad(np.cumsum(segments * length / (point_count - 1), axis=1), ((0, 0), (1, 0), (0, 0)))
+    strands = (roots[:, None] + path).astype(np.float32)
+    normals = np.stack([4.0 * roots[1:, 0], 4.0 * roots[1:, 1], np.ones(count)], axis=1)
+    return strands[1:], strands[:1], normal * normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+
+def distances_to(points, line):
+    """(N,) [m] from points (N, 3) to a curve through points (P, 3)."""
+    fine = np.linspace(0.0, len(line) - 1.0, 8 * len(line))
+    dense = np.stack([np.interp(fine, np.arange(len(line)), line[:, k]) for k in range(3)], axis=1)
+    return np.linalg.norm(points[:, None] - dense, axis=-1).min(axis=1)
+
+
+def root_mean_square(values):
+    return np.sqrt((values**2).mean())
+
+
+@pytest.mark.parametrize("normal", [1.0, -1.0])
+def test_a_clumped_lock_is_one_ringlet(normal, rng):
+    """Strands that begin at different places along the lock are as near to each other as without curls."""
+    strands, centre, normals = bent_lock(rng, normal=normal)
+    where = {"centres": centre, "normals": normals, "centre_normals": normal * UP}
+    gathered = clump.Settings(levels=1, thickness=0.03, shape=0.1, stray=0.0)
+    ringlet = helix(radius=0.007, pitch=0.036)
+    lock, wound = (stepped(strands, *styles, **where) for styles in ((gathered,), (gathered, ringlet)))
+    assert np.abs(wound - lock)[:, 60:].max() > 0.01
+    spreads = [
+        np.mean(
+            [root_mean_square(distances_to(points[1:, i], points[0].astype(np.float64))) for i in range(50, 115, 5)]
+        )
+        for points in (lock, wound)
+    ]
+    assert spreads[1] < 1.4 * spreads[0]
+
+
+def test_strands_of_a_lock_that_are_cut_wind_as_the_others(rng):
+    """A turn is at its place along the lock, not along the strand: also for strands that are shorter."""
+    strands, centre, normals = bent_lock(rng)
+    where = {"centres": centre, "normals": normals}
+    gathered, ringlet = clump.Settings(levels=1, thickness=0.0, amount=1.0, root=1.0, stray=0.0), helix(pitch=0.036)
+    short = strands.copy()
+    short[:30] = short[:30, :1] + 0.8 * (short[:30] - short[:30, :1])
+    made = stepped(short, gathered, ringlet, **where).astype(np.float64)
+    assert root_mean_square(distances_to(made[:30, 80], made[45])) < 1.8e-3
+
+
+def test_strands_that_leave_their_lock_go_on_by_themselves(rng):
+    """Those that grow opposite to their centre wind as often as strands alone do."""
+    strands, centre, _ = bent_lock(rng, count=8)
+    away = strands * (-1.0, 1.0, 1.0)
+    tilted = clump.Settings(levels=1, amount=1e-6, stray=0.0)
+    made = stepped(away.astype(np.float32), tilted, helix(), centres=centre)
+    alone = stepped(away.astype(np.float32), helix())
+    reaches = [np.linalg.norm(points[:, -1] - points[:, 0], axis=1) for points in (made, alone)]
+    np.testing.assert_allclose(*reaches, rtol=0.05)

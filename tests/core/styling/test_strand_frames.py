@@ -6,6 +6,7 @@ import pytest
 
 from hair_addon.core.styling import bend, curl
 from tests.support.stepped import UP, curved_strands, rotation, stepped, straight_strands
+from tests.support.styled import straight
 
 SMALL = 1e-3  # [rad], of the bends by which frames are read
 
@@ -129,3 +130,26 @@ def test_a_straight_strand_along_its_normal_has_the_reference(rng):
     strands[:] = normals[:, None] * np.linspace(0.0, 0.2, 41)[None, :, None]
     found = read_frames(strands, normals=normals, members=np.arange(30), centre_normals=normals, centres=strands)
     np.testing.assert_allclose(found, np.repeat(reference(normals)[:, None], 40, axis=1), atol=0.01)
+
+
+def spread(vectors):
+    """Part of unit vectors (S, 3) that their mean lacks: 0 where all are alike."""
+    return 1.0 - np.linalg.norm(vectors.mean(axis=0))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_hair_against_the_normals_is_as_coherent_as_hair_along_them(sign, rng):
+    """As on a surface that is inside out: strands of one guide are displaced alike."""
+    hair = straight(600)
+    tilts = rng.normal(0.0, 0.15, (len(hair.guides), 1, 2))
+    along = np.linspace(0.0, 1.0, hair.guides.point_count)[None, :, None] * 0.2
+    shape = np.concatenate(
+        [along * tilts, np.broadcast_to(sign * along, (*tilts.shape[:1], along.shape[1], 1))], axis=2
+    )
+    hair.guides = hair.guides.moved((hair.guides.numpy()[:, :1] + shape).astype(np.float32))
+    settings = curl.Settings(radius=2e-3, pitch=0.1, coherence=1.0, flatness=1.0, root=1.0, tip=1.0, start=0.0)
+    away = hair.styled(settings) - hair.plain
+    first = hair.binding.guide_weights.indices.numpy()[:, 0]
+    assert first.max() > 10
+    for guide in np.unique(first):
+        assert spread(unit(away[first == guide, 12].astype(np.float64))) < 0.05
