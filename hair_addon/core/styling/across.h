@@ -87,7 +87,8 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v, const 
     }
     const vector forwards = unit_or(t_between, lanes(1.0e-6f), t_below);
     const vector sideways = unit_or(u_between - forwards * dot(u_between, forwards), lanes(1.0e-6f), u_below);
-    const vector made = forwards * forward + sideways * w_u + cross(forwards, sideways) * w_v;
+    const vector upward = cross(forwards, sideways);
+    const vector made = forwards * forward + sideways * w_u + upward * w_v;
     const auto has_length = d > 1.0e-12f;
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));
     // Unit but for rounding, which a step of Newton's method takes away.
