@@ -71,7 +71,7 @@ def test_a_point_that_is_not_asked_has_no_plane_to_miss(device, rng):
             np.testing.assert_array_equal(
                 final, asking.find(there, before, STEP, is_final=True, is_skipping=False).numpy()
             )
-    assert spared > 0.2 and found > 0.1
+    assert spared > 0.1 and found > 0.1
 
 
 @pytest.mark.parametrize("kind", ["sheet", "slab"])
