@@ -74,6 +74,8 @@ class Colliders:
         # moves by `motion` [m] otherwise, at most.
         self.rigid_motion = self.rigid_motion_so_far = STILL
         self.motion = 0.0
+        # (matrix (3, 3), translation [m]) of points that move with the colliders, and what they deform by otherwise.
+        self.carry, self.deformation = STILL, 0.0
         self._known: dict[str, _Known] = {}
         self._before: Any = None
         self._after: Any = None
@@ -111,6 +113,7 @@ class Colliders:
         if self._is_still:
             return
         self.rigid_motion, self.motion = self._way.between(self._part, part)
+        self.carry, self.deformation = self._way.carried(self._part, part)
         (turn, shift), (turned, moved) = self.rigid_motion, self.rigid_motion_so_far
         self.rigid_motion_so_far = turn @ turned, turn @ moved + shift
         self._part = part
@@ -164,7 +167,8 @@ class Colliders:
 
     def _put(self, before, after):
         """Write the vertices at the beginning and at the end of the frame, and pose the mesh at its beginning."""
-        self._part, self.motion, self.largest_motion, self.rigid_motion = 0.0, 0.0, 0.0, STILL
+        self._part, self.motion, self.deformation, self.largest_motion = 0.0, 0.0, 0.0, 0.0
+        self.rigid_motion = self.carry = STILL
         self._is_still = True
         if self.mesh is None:
             return

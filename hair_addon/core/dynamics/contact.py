@@ -80,6 +80,7 @@ class Contacts:
     ) -> Any:
         """Return `planes` for the predicted positions of a substep, which began at `last_positions`.
 
+        Called in every substep, then once more with `is_final`: what is near is followed from one to the next.
         duration [s] of the substep. is_final: afterwards, for points that are still inside: segments are not asked, and
         nothing rises. is_skipping: off asks the surface for every point, which finds the same.
         """
@@ -138,8 +139,9 @@ class Contacts:
         surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
         surface.rims, surface.settings = colliders.rims, colliders.settings
         surface.largest_distance, surface.motion = colliders.largest_distance, colliders.motion
-        (turn, shift), (turned, moved) = colliders.rigid_motion, colliders.rigid_motion_so_far
-        surface.turn, surface.shift = wp.mat33(turn), wp.vec3(shift)
+        turned, moved = colliders.rigid_motion_so_far
+        (carry, carry_shift), surface.deformation = colliders.carry, colliders.deformation
+        surface.carry, surface.carry_shift = wp.mat33(carry), wp.vec3(carry_shift)
         surface.to_rest, surface.moved = wp.mat33(turned.T), wp.vec3(moved)
         return surface
 

@@ -9,7 +9,9 @@
 //   int is_middle                            1: the middle of segment `sample`; 0: the vertex after it
 //   array_t<float> positions, last_positions 3 rows a vertex [m], now and when the substep began
 //   array_t<float> middle_planes             PLANE rows a segment
-//   mat33 turn, vec3 shift, float motion     the surface's motion in this substep, and what it moves otherwise [m]
+//   float motion                             what the surface moves at most, but for its turn as a whole [m]
+//   mat33 carry, vec3 carry_shift            where what moves with it comes to in this substep
+//   float deformation                        and what it deforms by, at most [m]
 //   mat33 to_rest, vec3 moved                from places now to places at rest
 //   float largest_distance                   that any collider keeps [m]
 //   float rise                               of samples that the groom has inside [m]
@@ -23,7 +25,7 @@
 //
 // Returns whether any of them looks, or has such a segment beside.
 //
-// Constants: WIDTH, PLANE, MARGIN [m], MOST_MOTION [m], SLACK [m].
+// Constants: WIDTH, PLANE, MARGIN, NEAR, MOST_MOTION, SLACK, BACK [m].
 
 {
 #include "lanes.h"
@@ -89,12 +91,14 @@ if (rise > 0.0f) {
 }
 const lanes most = lower_of(lanes(largest_distance), at_rest);
 
-// As the surface sees it, which moves and turns as a whole, but for `motion`.
-const vector carried = turned(turn, last);
-const vector way = minus(point, vector{carried.x + shift[0], carried.y + shift[1], carried.z + shift[2]});
+// As the surface sees it. Through a collider that does not deform a ray finds what has passed: the nearest surface is
+// looked for no farther than it may pull.
+const vector carried = turned(carry, last);
+const vector way =
+    minus(point, vector{carried.x + carry_shift[0], carried.y + carry_shift[1], carried.z + carry_shift[2]});
 const lanes length = length_of(way);
-const lanes moving = lower_of(length, lanes(MOST_MOTION)) + motion;
-lanes needed = abs_of(most) + moving + MARGIN;
+const lanes moving = lower_of(length, lanes(MOST_MOTION)) + deformation;
+lanes needed = abs_of(most) + MARGIN + (deformation > BACK ? moving : lower_of(moving, lanes(NEAR)));
 
 const lanes before = get(row_of(clear, sample));
 const lanes left = is_final ? before : before - motion;

@@ -9,7 +9,7 @@ in `row_of`.
 import warp as wp
 
 from ..kernels import native_code
-from .nearest_surface import Surface, crossed, nearest
+from .nearest_surface import BACK, Hit, Surface, crossed, nearest
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -17,6 +17,9 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 PLANE = wp.constant(8)  # rows of an array that a plane takes
 WIDTH = 16  # samples that a thread of the processor takes at once
 NOWHERE = wp.constant(1e9)  # [m] from any collider
+
+MARGIN = wp.constant(1e-3)  # [m] beyond what a point keeps, for what the solver does to it
+MOST_MOTION = wp.constant(0.5)  # [m] of a point in a substep that is looked for: no farther, as it costs
 
 _AHEAD = wp.constant(0.01)  # [m] at most, looked for beyond what is needed, to spare later queries
 
@@ -83,7 +86,17 @@ def _gap(planes: wp.array3d[float], group: int, row: int, lane: int, point: wp.v
 
 
 @wp.func_native(
-    native_code.body(__file__, "contact_needs.cpp", WIDTH=WIDTH, PLANE=PLANE, MARGIN=1e-3, MOST_MOTION=0.5, SLACK=1e-5)
+    native_code.body(
+        __file__,
+        "contact_needs.cpp",
+        WIDTH=WIDTH,
+        PLANE=PLANE,
+        MARGIN=MARGIN,
+        NEAR=0.004,
+        MOST_MOTION=MOST_MOTION,
+        SLACK=1e-5,
+        BACK=BACK,
+    )
 )
 def _put_needs(
     group: int,
@@ -93,9 +106,10 @@ def _put_needs(
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
     middle_planes: wp.array3d[float],
-    turn: wp.mat33,
-    shift: wp.vec3,
     motion: float,
+    carry: wp.mat33,
+    carry_shift: wp.vec3,
+    deformation: float,
     to_rest: wp.mat33,
     moved: wp.vec3,
     largest_distance: float,
@@ -132,15 +146,28 @@ def _look(
     last = _sample(last_positions, group, sample, lane, is_middle)
     at_rest = rest[group, sample, lane]
     out_planes[group, _index(row, PLANE, 3), lane] = 0.0
-    hit = nearest(surface, point, last, needed + wp.min(0.5 * needed, _AHEAD), sides[group, sample, lane])
+    largest = wp.min(surface.largest_distance, at_rest)
+    entry = Hit()
+    entry.collider = -1
+    radius = needed + wp.min(0.5 * needed, _AHEAD)
+    if surface.deformation <= BACK and at_rest >= 0.0:
+        start = surface.carry * last + surface.carry_shift
+        entry = crossed(surface, point, start, largest)
+        if entry.collider >= 0:
+            needed = wp.max(needed, wp.abs(largest) + wp.min(wp.length(point - start), MOST_MOTION) + MARGIN)
+            radius = wp.max(radius, needed)
+    hit = nearest(surface, point, last, radius, sides[group, sample, lane])
+    if surface.deformation > BACK and at_rest >= 0.0 and hit.collider >= 0:
+        entry = crossed(surface, point, last + hit.displacement, largest)
     sides[group, sample, lane] = 0
     _put_vector(asked, group, sample, lane, surface.to_rest * (point - surface.moved))
     clear[group, sample, lane] = hit.gap
-    if hit.collider < 0 or hit.gap > needed:
+    is_near = hit.collider >= 0 and hit.gap <= needed
+    if entry.collider >= 0 and not (is_near and hit.distance <= 0.0 and wp.dot(hit.normal, entry.normal) > 0.0):
+        hit = entry  # the nearest is not the front of what it came through
+    elif not is_near:
         return
-    clear[group, sample, lane] = hit.distance
-    if at_rest >= 0.0:
-        hit = crossed(surface, hit, point, last, wp.min(surface.largest_distance, at_rest))
+    clear[group, sample, lane] = wp.min(clear[group, sample, lane], hit.distance)
     sides[group, sample, lane] = hit.side
     settings = surface.settings[hit.collider]
     offset = wp.dot(hit.normal, hit.place) + wp.min(settings[1], at_rest)
@@ -259,9 +286,10 @@ def find_planes(
             positions,
             last_positions,
             middle_planes,
-            surface.turn,
-            surface.shift,
             surface.motion,
+            surface.carry,
+            surface.carry_shift,
+            surface.deformation,
             surface.to_rest,
             surface.moved,
             surface.largest_distance,

@@ -3,7 +3,7 @@
 
 import warp as wp
 
-_BACK = wp.constant(1e-4)  # [m] before a point's last position, where its ray starts
+BACK = wp.constant(1e-4)  # [m] before a point's last position, where its ray starts
 _AT_EDGE = wp.constant(1e-5)  # a barycentric coordinate that counts as zero
 _TINY = wp.constant(1e-6)  # [m]: nearer points take the normal of the face
 
@@ -20,10 +20,12 @@ class Surface:
     rims: wp.array[int]
     settings: wp.array[wp.vec3]
     largest_distance: float
-    # How it moves and turns as a whole in this substep, and how far a vertex moves otherwise.
-    turn: wp.mat33
-    shift: wp.vec3
+    # How far a vertex moves in this substep, at most, but for their turn as a whole.
     motion: float
+    # Where points that move with it come to in this substep, and how far it deforms otherwise.
+    carry: wp.mat33
+    carry_shift: wp.vec3
+    deformation: float
     # How it has since the beginning: place at rest = to_rest (x - moved).
     to_rest: wp.mat33
     moved: wp.vec3
@@ -108,15 +110,17 @@ def nearest(surface: Surface, point: wp.vec3, last: wp.vec3, radius: float, kept
 
 
 @wp.func
-def crossed(surface: Surface, hit: Hit, point: wp.vec3, last: wp.vec3, limit: float):
-    """The surface that a point faster than `limit` a substep has passed through, if the nearest is not its front."""
-    start = last + hit.displacement  # the surface stands still, seen from here
+def crossed(surface: Surface, point: wp.vec3, start: wp.vec3, limit: float):
+    """The surface that a point has passed through since `start`, where the surface has moved to meanwhile, if that is
+    farther than `limit`."""
+    hit = Hit()
+    hit.collider = -1
     way = point - start
     length = wp.length(way)
     if length <= limit or length <= _TINY:
         return hit
     direction = way / length
-    query = wp.mesh_query_ray(surface.mesh, start - _BACK * direction, direction, length + _BACK)
+    query = wp.mesh_query_ray(surface.mesh, start - BACK * direction, direction, length + BACK)
     if not query.result:
         return hit
     collider = surface.face_colliders[query.face]
@@ -126,17 +130,13 @@ def crossed(surface: Surface, hit: Hit, point: wp.vec3, last: wp.vec3, limit: fl
     if facing > 0.0 and not is_sheet:
         return hit  # out of the inside
     side = float(_side_of(-facing))
-    normal *= side
-    if hit.distance <= 0.0 and wp.dot(hit.normal, normal) > 0.0:
-        return hit
     barycentric = wp.vec3(query.u, query.v, 1.0 - query.u - query.v)
     hit.collider = collider
     hit.place = wp.mesh_eval_position(surface.mesh, query.face, query.u, query.v)
     hit.displacement = _displacement(surface, query.face, barycentric)
-    hit.normal = normal
-    hit.distance = wp.dot(point - hit.place, normal)
+    hit.normal = normal * side
+    hit.distance = wp.dot(point - hit.place, hit.normal)
     hit.gap = wp.abs(hit.distance)
-    hit.side = 0
     if is_sheet:
         hit.side = int(side) * (collider + 1)
     return hit

@@ -30,11 +30,23 @@ class RigidMotion:
         whole turns by φ(p) then, with tan φ = p sin θ / (1 - p + p cos θ).
         """
         turn = self._turn(self._turned(last) - self._turned(first))
-        shift = self._centre + last * self._way - turn @ (self._centre + first * self._way)
-        whole, one = self._turn(self._angle), np.eye(3)
-        narrowed = (1.0 - last) * one + last * whole - turn @ ((1.0 - first) * one + first * whole)
-        rest = np.linalg.norm(narrowed, 2) * self._radius + np.linalg.norm(last * one - first * turn, 2) * self._rest
-        return (turn, shift), float(rest)
+        narrowed = self._offsets(last) - turn @ self._offsets(first)
+        rest = np.linalg.norm(narrowed, 2) * self._radius
+        return (turn, self._shift(turn, first, last)), float(rest) + self._rest_of(turn, first, last)
+
+    def carried(self, first: float, last: float) -> tuple[tuple[np.ndarray, np.ndarray], float]:
+        """As `between`, but by a matrix that also narrows as the lines do: the rest is what bends or grows, at most."""
+        carry = self._offsets(last) @ np.linalg.inv(self._offsets(first))
+        return (carry, self._shift(carry, first, last)), self._rest_of(carry, first, last)
+
+    def _offsets(self, part):
+        return (1.0 - part) * np.eye(3) + part * self._turn(self._angle)
+
+    def _shift(self, matrix, first, last):
+        return self._centre + last * self._way - matrix @ (self._centre + first * self._way)
+
+    def _rest_of(self, matrix, first, last):
+        return float(np.linalg.norm(last * np.eye(3) - first * matrix, 2)) * self._rest
 
     def _turned(self, part):
         return math.atan2(part * math.sin(self._angle), 1.0 - part + part * math.cos(self._angle))
@@ -53,11 +65,11 @@ def _rotation(start, end):
 
 
 def _axis_and_angle(turn):
-    """Unit axis and angle of a rotation; none for one by nearly 180°, whose middle is on its axis."""
+    """Unit axis and angle of a rotation; none for one by nearly 180°."""
     twice = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]])
     sine = 0.5 * np.linalg.norm(twice)
     angle = math.atan2(sine, 0.5 * (np.trace(turn) - 1.0))
-    if sine < 1e-9 or angle > 3.0:
+    if sine < 1e-9 or angle > 2.5:  # wider turns are narrowed to a line on the way
         return np.array([0.0, 0.0, 1.0]), 0.0
     return 0.5 * twice / sine, angle
 

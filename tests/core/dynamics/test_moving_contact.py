@@ -71,11 +71,11 @@ def test_a_point_that_is_not_asked_has_no_plane_to_miss(device, rng):
             np.testing.assert_array_equal(
                 final, asking.find(there, before, STEP, is_final=True, is_skipping=False).numpy()
             )
-    assert spared > 0.2 and found > 0.1
+    assert spared > 0.1 and found > 0.1
 
 
 @pytest.mark.parametrize("kind", ["sheet", "slab"])
-@pytest.mark.parametrize("who_moves", ["points", "collider", "both"])
+@pytest.mark.parametrize("who_moves", ["points", "collider", "both", "bending collider"])
 def test_fast_points_do_not_pass_through(device, rng, kind, who_moves):
     """Neither do those that stand still while the collider moves by: they stay in front, at the distance."""
     mesh = sheet(rng) if kind == "sheet" else slab(rng)
@@ -94,16 +94,40 @@ def test_fast_points_do_not_pass_through(device, rng, kind, who_moves):
         below[:] = False
         last[:, 2] = np.abs(last[:, 2])
     points = last.copy()
-    if who_moves != "collider":
+    if who_moves in {"points", "both"}:
         points += rng.uniform(-0.03, 0.03, (count, 3)) * [1.0, 1.0, 0.0]
         points[:, 2] = np.where(below, 1, -1) * rng.uniform(0.005, 0.04, count)
-    colliders.read([Collider("a", TriMesh((mesh.vertices + by).astype(np.float32), mesh.triangles), **collider)])
+    bent = np.zeros_like(mesh.vertices)
+    if who_moves == "bending collider":
+        bent[:, 2] = 0.02 * np.sin(40.0 * mesh.vertices[:, 0])
+    moved = TriMesh((mesh.vertices + by + bent).astype(np.float32), mesh.triangles)
+    colliders.read([Collider("a", moved, **collider)])
     colliders.pose(1.0)
     planes = asked(points, last)
     assert is_plane(planes).all()
     np.testing.assert_array_equal(planes[:, 2] < 0.0, below)
     assert (gaps_of(planes, points) < -1e-3).all()
-    np.testing.assert_allclose(planes[:, 4:7], np.tile(by, (count, 1)), atol=1e-6)
+    if who_moves == "bending collider":
+        assert np.abs(planes[:, 4:7] - by).max() <= 0.0201
+    else:
+        np.testing.assert_allclose(planes[:, 4:7], np.tile(by, (count, 1)), atol=1e-6)
+
+
+def test_a_collider_that_swells_over_still_points_takes_them_along(device):
+    """A sheet rises in the middle by far more than what points keep, and sinks around it: as a whole it stays."""
+    grid = flat_grid(6, 0.2)
+    points = grid.vertices + np.float32([0.0, 0.0, 0.004])
+    rise = 0.05 * (np.exp(-(((points[:, :2] - 0.1) / 0.05) ** 2).sum(axis=1)) - 0.2)
+    swollen = TriMesh((grid.vertices + rise[:, None] * [0.0, 0.0, 1.0]).astype(np.float32), grid.triangles)
+    colliders = Colliders(device)
+    for mesh in (grid, swollen):
+        colliders.read([Collider("a", mesh, is_double_sided=True)])
+    asked = Asked(colliders, len(points), points)
+    colliders.pose(1.0)
+    planes = asked(points)
+    passed = rise > 0.006
+    assert passed.sum() > 4 and is_plane(planes)[passed].all()
+    assert (planes[passed, 2] > 0.0).all() and (gaps_of(planes, points)[passed] < -1e-3).all()
 
 
 def test_a_double_sided_collider_keeps_the_side_of_a_point(device, rng):

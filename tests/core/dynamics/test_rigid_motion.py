@@ -48,5 +48,8 @@ def test_the_rest_is_no_more_than_what_is_said(rng, kind):
         start, end = (before + part * (after.astype(np.float64) - before) for part in (first, last))
         others = np.linalg.norm(end - start @ found.T - by, axis=1).max()
         assert others <= rest + 1e-5
+        (carry, shift), deformation = way.carried(first, last)
+        assert np.linalg.norm(end - start @ carry.T - shift, axis=1).max() <= deformation + 1e-5
         if kind in {"turn", "line"}:
+            assert deformation < 1e-5
             assert rest < 0.5 * np.linalg.norm(end - start, axis=1).max()
