@@ -112,6 +112,13 @@ def bind(
     return StyledHair(read, styling, make_trees)
 
 
+def unstyled(
+    styles: StyledHair, binding: HairBinding, guides: Strands, settings: HairSettings, surface: Surface
+) -> StyledHair:
+    """The `StyledHair` of the same strands without styles, and with as many points."""
+    return bind(ReadStyles(), binding, guides, settings, surface, lambda: styles.trees)
+
+
 def _are_same(inputs, others):
     if (inputs.masks.keys(), inputs.cutters.keys(), inputs.targets.keys()) != (
         others.masks.keys(),

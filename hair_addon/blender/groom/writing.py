@@ -62,6 +62,7 @@ def write_hair(target: Curves) -> None:
     bound, state = bindings.of(target), target.vellus
     if bound is None:
         return
+    bound.catch_up()
     if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key

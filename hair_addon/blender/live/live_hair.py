@@ -45,8 +45,31 @@ def follow_guides(hair, depsgraph):
     if moved is None:
         make_again(hair, depsgraph)
     elif len(moved):
-        hair_cache.move(hair.session_uid, moved, bound.growing)
+        hair_cache.move(hair.session_uid, moved, bound.shown.growing)
         _write_soon(hair)
+
+
+def show_styles(depsgraph):
+    """Show hair with its styles, or without while its guides are combed and artists want it so."""
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR":
+            continue
+        is_styled, bound = not _is_combed_straight(state), bindings.of(hair)
+        if bound is None and not is_styled and state.is_live and not state.status:
+            make_again(hair, depsgraph)  # as the first stroke would, and refused once
+            bound = bindings.of(hair)
+        if bound is not None and is_styled != (bound.straight is None):
+            bound.show_styles(is_styled)
+            invalidation.strands_made(hair)
+
+
+def _is_combed_straight(state):
+    """Whether the guides of hair with styles are in Sculpt Mode, and it is to be shown without these."""
+    guides = state.guide_curves
+    if guides is None or guides.vellus.shows_styles_while_combing or not len(state.styles) or not has_window():
+        return False
+    return any(o.mode == "SCULPT_CURVES" and o.data == guides for o in bpy.data.objects)
 
 
 def make_again(hair, depsgraph):

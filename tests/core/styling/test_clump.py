@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import clump, program
-from hair_addon.core.styling.stack import HAIR
 from tests.support.stepped import curved_strands, largest_move, stepped, straight_strands
 from tests.support.styled import head
 

@@ -5,7 +5,7 @@ import bpy
 
 from ...groom.diagnostics import warnings_of
 from ...groom.foreign_curves import is_foreign
-from ...groom.selection import active_of_kind, parts_of, surface_of
+from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
 from ...settings.translations import interface_text
 from ..setting_rows import row
 from .tab import HairTab, split, write
@@ -38,6 +38,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
                 box.operator(warning.operator)
         if parts:
             _draw_tools(layout)
+            _draw_combing(layout, context)
 
 
 def _draw_foreign(layout, context):
@@ -59,6 +60,13 @@ def _draw_tools(layout):
     line.operator("vellus.select_guides", text="Select Guides", icon="RESTRICT_SELECT_OFF")
     line.operator("vellus.select_hair", text="Select Hair", icon="RESTRICT_SELECT_OFF")
     column.operator("vellus.delete_hair", icon="TRASH")
+
+
+def _draw_combing(layout, context):
+    """What hair with styles shows while its guides are combed."""
+    hair, guides = hair_of(context.object), guides_of(context.object)
+    if hair is not None and guides is not None and len(hair.vellus.styles):
+        row(layout, guides.vellus, "shows_styles_while_combing")
 
 
 class VELLUS_PT_surface_uvs(HairTab, bpy.types.Panel):
