@@ -9,10 +9,12 @@ from collections.abc import Iterator
 import bpy
 from bpy.types import Curves, PropertyGroup
 
+from ...core.styling import clump_trees, program
 from ...core.styling.base import ProfiledSettings
 from ...core.styling.kinds import KINDS
 from ..settings import style_items
 from ..settings.translations import interface_text
+from . import bindings
 
 # Settings that are all zero, or empty, where a style of a kind does nothing.
 _WITHOUT = {
@@ -27,7 +29,7 @@ _OBJECTS = {"TRIM": "cutter", "LEAN": "target"}
 
 def notes_of(hair: Curves, item: PropertyGroup) -> list[str]:
     """Translated sentences about a style of a hair Curves datablock; item: the style's properties."""
-    return [*_without_effect(item), *_missing_data(hair, item), *_order(hair, item)]
+    return [*_without_effect(item), *_missing_data(hair, item), *_too_small(hair, item), *_order(hair, item)]
 
 
 def _without_effect(item: PropertyGroup) -> Iterator[str]:
@@ -68,6 +70,19 @@ def _has_mask(hair, name):
     if surface is not None and (surface.modifiers or name in surface.vertex_groups or name in surface.data.attributes):
         return True
     return surface is None or (guides is not None and name in guides.attributes)
+
+
+def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
+    """Known of hair whose strands were styled since the file was opened."""
+    bound = bindings.of(hair)
+    tree = program.tree_settings(style_items.settings_of(item))
+    if tree is None or bound is None or bound.styles.styling is None:
+        return
+    factor = clump_trees.size_factor(bound.styles.styling.trees.area, tree)
+    if factor > 1.0:
+        units = bpy.context.scene.unit_settings.system
+        size = bpy.utils.units.to_string(units, "LENGTH", factor * tree.sizes[0], precision=3)
+        yield interface_text("The locks are too small for this surface: a size of {size} is used.", size=size)
 
 
 def _order(hair: Curves, item: PropertyGroup) -> Iterator[str]:
