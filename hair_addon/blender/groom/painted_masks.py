@@ -57,11 +57,11 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
 
 def stop(surface: Object, context: Context) -> None:
     """Leave the paint mode of a surface, and select the hair whose mask was painted again."""
-    painted = surface.vertex_groups.active.name if surface.vertex_groups.active is not None else ""
+    painted = selection.painted_hair(surface)
     bpy.ops.object.mode_set(mode="OBJECT")
-    present = selection.curves_on(surface, "HAIR")
-    masked = [hair for hair in present if painted and painted in _masks_of(hair)]
-    shown = (selection.object_of(hair, context.view_layer) for hair in (*masked, *reversed(present)))
+    present = reversed(selection.curves_on(surface, "HAIR"))
+    wanted = present if painted is None else (painted, *present)
+    shown = (selection.object_of(hair, context.view_layer) for hair in wanted)
     hair_object = next((o for o in shown if o is not None and o.visible_get(view_layer=context.view_layer)), None)
     if hair_object is not None:
         selection.make_active(hair_object, context.view_layer)
@@ -138,10 +138,6 @@ def _is_guide_mask(hair, mask):
     if not mask or (surface is not None and (mask in surface.vertex_groups or mask in surface.data.attributes)):
         return False
     return read(hair.vellus.guide_curves, mask, "FLOAT", "CURVE") is not None
-
-
-def _masks_of(hair):
-    return [style_items.group_of(item).mask for item in hair.vellus.styles]
 
 
 def _viewport(context):

@@ -11,6 +11,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.params import declared
 from ...core.styling.kinds import DESCRIPTIONS, KINDS, LABELS, MOST_STYLES, kind_of
+from ..host.notices import text_of
 from . import setting_properties, style_keys
 from .marks import mark_both, mark_geometry
 from .translations import CONTEXT
@@ -88,11 +89,17 @@ def wetness_of(state):
     return max((item.wet.amount for item in state.styles if item.kind == "WET" and item.wet.is_on), default=0.0)
 
 
+def masks_of(item):
+    """(name of the group or attribute, name of the image) that mask a style; empty for none."""
+    group = group_of(item)
+    return text_of(group, "mask"), text_of(group, "mask_image")
+
+
 def objects_named(state):
     """Names of the objects that a hair's styles read."""
-    cutters = {item.trim.cutter for item in state.styles if item.kind == "TRIM"}
-    targets = {item.lean.target for item in state.styles if item.kind == "LEAN" and item.lean.direction == "OBJECT"}
-    return (cutters | targets) - {""}
+    leaning = [item.lean for item in state.styles if item.kind == "LEAN" and item.lean.direction == "OBJECT"]
+    cutters = {text_of(item.trim, "cutter") for item in state.styles if item.kind == "TRIM"}
+    return (cutters | {text_of(lean, "target") for lean in leaning}) - {""}
 
 
 def unique_name(name, others):
