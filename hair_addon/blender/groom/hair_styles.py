@@ -84,9 +84,10 @@ def fit_of(surface_object: Object, guide_settings: GuideSettings, hair_settings:
 
 
 def points_wanted(hair: Curves, length: float | None = None) -> int:
-    """Points per strand that the curls of a hair want, within the setting's range; 0 without curls. Raises `HairError`.
+    """Points per strand that the curls of a hair want, within the setting's range; 0 without curls.
 
-    length [m]: of strands, None for what the guides are set to; of hand-made guides it must be given.
+    length [m]: of strands, None for what the guides are set to; of hand-made guides it must be given. Raises
+    `HairError`.
     """
     guides = hair.vellus.guide_curves
     if guides is None or (length is None and curves.is_hand_made(guides)):

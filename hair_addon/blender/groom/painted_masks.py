@@ -8,6 +8,7 @@ from bpy.types import Context, Curves, Object, PropertyGroup
 from ...core.errors import HairError, cause_of
 from ..data import curves, guide_curves
 from ..data.attributes import read, write
+from ..host.notices import name_of
 from ..settings import style_items
 from . import bindings, selection, writing
 
@@ -52,7 +53,7 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
     try:
         bpy.ops.object.mode_set(mode=mode)
     except RuntimeError as error:  # hidden by a library or a driver
-        raise HairError('"{name}" cannot be painted: {cause}.', name=surface.name, cause=cause_of(error)) from error
+        raise HairError('"{name}" cannot be painted: {cause}.', name=name_of(surface), cause=cause_of(error)) from error
 
 
 def stop(surface: Object, context: Context) -> None:
@@ -97,7 +98,7 @@ def _require_paintable(surface, context):
     for datablock in (surface, surface.data):
         curves.require_editable(datablock)
     if surface not in [*context.view_layer.objects]:
-        raise HairError('"{name}" is not in this view layer: include one of its collections.', name=surface.name)
+        raise HairError('"{name}" is not in this view layer: include one of its collections.', name=name_of(surface))
 
 
 def _require_group(hair, mask):
@@ -120,7 +121,7 @@ def _canvas(surface, name):
     curves.require_editable(image)
     if not surface.data.uv_layers:
         sentence = '"{name}" has no UV map for the density image: create one, or clear the image.'
-        raise HairError(sentence, name=surface.name)
+        raise HairError(sentence, name=name_of(surface))
     return image
 
 

@@ -19,6 +19,7 @@ from ...core.styling.base import StyleSettings
 from ..data import curves, curves_objects, drawn_lines, masks, partings, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
+from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
 from . import bindings, staleness, styled_hair, writing
 from .bindings import BoundHair
@@ -368,7 +369,7 @@ def inputs_of(target: Curves) -> tuple[Curves, HairSettings]:
     """(guide Curves, `HairSettings`) of a hair Curves datablock. Raises `HairError`."""
     state = target.vellus
     if state.guide_curves is None:
-        raise HairError(f'"{target.name}" has no guides: pick them in the Strands panel.')
+        raise HairError(f'"{name_of(target)}" has no guides: pick them in the Strands panel.')
     return state.guide_curves, setting_properties.to_settings(state.hair, groom.HairSettings)
 
 

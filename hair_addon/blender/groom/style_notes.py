@@ -12,6 +12,7 @@ from bpy.types import Curves, PropertyGroup
 from ...core.styling import clump_trees, program
 from ...core.styling.base import ProfiledSettings
 from ...core.styling.kinds import KINDS
+from ..host.notices import text_of
 from ..settings import style_items
 from ..settings.translations import interface_text
 from . import bindings
@@ -47,21 +48,22 @@ def _without_effect(item: PropertyGroup) -> Iterator[str]:
 def _is_neutral(item, group):
     if item.kind == "TRIM" and group.factor != 1.0:
         return False
-    return item.kind in _WITHOUT and not any(getattr(group, name) for name in _WITHOUT[item.kind])
+    return item.kind in _WITHOUT and not any(text_of(group, name) for name in _WITHOUT[item.kind])
 
 
 def _missing_data(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     group = style_items.group_of(item)
-    name = getattr(group, _OBJECTS[item.kind]) if item.kind in _OBJECTS else ""
+    name = text_of(group, _OBJECTS[item.kind]) if item.kind in _OBJECTS else ""
+    mask, image = style_items.masks_of(item)
     is_used = item.kind != "LEAN" or group.direction == "OBJECT"
     if is_used and name and name not in bpy.data.objects:
         yield interface_text('No object "{name}": pick another.', name=name)
     if is_used and item.kind == "LEAN" and not name:
         yield interface_text("Pick an object to lean along.")
-    if group.mask and not _has_mask(hair, group.mask):
-        yield interface_text('No vertex group or attribute "{name}".', name=group.mask)
-    if group.mask_image and group.mask_image not in bpy.data.images:
-        yield interface_text('No image "{name}": pick another.', name=group.mask_image)
+    if mask and not _has_mask(hair, mask):
+        yield interface_text('No vertex group or attribute "{name}".', name=mask)
+    if image and image not in bpy.data.images:
+        yield interface_text('No image "{name}": pick another.', name=image)
 
 
 def _has_mask(hair, name):
@@ -75,8 +77,10 @@ def _has_mask(hair, name):
 def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     """Known of hair whose strands were styled since the file was opened."""
     bound = bindings.of(hair)
+    if bound is None or bound.styles.styling is None:
+        return
     tree = program.tree_settings(style_items.settings_of(item))
-    if tree is None or bound is None or bound.styles.styling is None:
+    if tree is None:
         return
     factor = clump_trees.size_factor(bound.styles.styling.trees.area, tree)
     if factor > 1.0:

@@ -12,6 +12,7 @@ import bpy
 from ...core.errors import HairError
 from ..data import curves, drawn_lines, masks
 from ..groom import bindings, edited_surfaces, painted_masks, pipeline, staleness, writing
+from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
 from . import invalidation, reported
@@ -56,7 +57,7 @@ def show_styles(depsgraph):
         if state.kind != "HAIR":
             continue
         is_styled, bound = not _is_combed_straight(state), bindings.of(hair)
-        if bound is None and not is_styled and state.is_live and not state.status:
+        if bound is None and not is_styled and state.is_live and not text_of(state, "status"):
             make_again(hair, depsgraph)  # as the first stroke would, and refused once
             bound = bindings.of(hair)
         if bound is not None and is_styled != (bound.straight is None):
@@ -217,10 +218,10 @@ def follow_mask(guides, depsgraph):
     """Mark hair as stale whose guides' mask has changed; the guides may be unchanged."""
     for hair in curves.followers(guides):
         state = hair.vellus
-        if not state.is_live or masks.own(state.hair) or hair.surface is None:
+        if not state.is_live or hair.surface is None:
             continue
         try:
-            if staleness.has_other_mask(hair, depsgraph):
+            if not masks.own(state.hair) and staleness.has_other_mask(hair, depsgraph):
                 _mark(hair)
         except HairError as error:
             state.status = str(error)
@@ -243,7 +244,8 @@ def follow_flow(changed, depsgraph):
     """Mark guides as stale whose flow lines are among some datablocks and have changed."""
     for guides in bpy.data.hair_curves:
         state = guides.vellus
-        if state.kind != "GUIDES" or not state.is_live or not drawn_lines.is_among(state.guides.flow_lines, changed):
+        lines = text_of(state.guides, "flow_lines")
+        if state.kind != "GUIDES" or not state.is_live or not drawn_lines.is_among(lines, changed):
             continue
         try:
             if staleness.has_other_flow(guides, depsgraph):
@@ -253,11 +255,11 @@ def follow_flow(changed, depsgraph):
 
 
 def _parts_by(state, changed):
-    if drawn_lines.is_among(state.hair.part_lines, changed):
+    if drawn_lines.is_among(text_of(state.hair, "part_lines"), changed):
         return True
     # Read with each step of a stroke: so only if guides have regions of their own.
     guides = state.guide_curves
-    return guides is not None and guides in changed and state.hair.region_attribute in guides.attributes
+    return guides is not None and guides in changed and text_of(state.hair, "region_attribute") in guides.attributes
 
 
 def follow_masks(surfaces, depsgraph):
@@ -294,16 +296,16 @@ def images_of(target):
     """The names of the images that guides or hair are masked by; hair's guides have their own."""
     state = target.vellus
     if state.kind == "GUIDES":
-        return {state.guides.density_image} - {""}
-    groups = (style_items.group_of(item) for item in state.styles)
-    return {state.hair.density_image, *(group.mask_image for group in groups)} - {""}
+        return {text_of(state.guides, "density_image")} - {""}
+    of_styles = {style_items.masks_of(item)[1] for item in state.styles}
+    return {text_of(state.hair, "density_image"), *of_styles} - {""}
 
 
 def follow_images(target, depsgraph):
     """Mark guides or hair as stale whose images may have been painted. Roots wait until Texture Paint is left."""
     state = target.vellus
     state.is_stale = True
-    if state.kind != "HAIR" or not state.hair.density_image or target.surface.mode == "TEXTURE_PAINT":
+    if state.kind != "HAIR" or not text_of(state.hair, "density_image") or target.surface.mode == "TEXTURE_PAINT":
         return
     try:
         if staleness.has_other_mask(target, depsgraph):
@@ -313,8 +315,7 @@ def follow_images(target, depsgraph):
 
 
 def _has_masks(state):
-    groups = (style_items.group_of(item) for item in state.styles)
-    return any(group.mask or group.mask_image for group in groups)
+    return any(any(style_items.masks_of(item)) for item in state.styles)
 
 
 def follow_styles(changed):

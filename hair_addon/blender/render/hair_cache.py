@@ -24,6 +24,7 @@ from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
 from ..host import paths
 from ..host.caches import Cache
+from ..host.notices import name_of
 from ..settings import preferences, properties
 
 # Tables of this many settings are kept: one groom and the last few positions of a slider.
@@ -243,7 +244,7 @@ def read_strands(datablock):
     """
     counts = curves.point_counts(datablock)
     if not len(counts):
-        raise HairError(f'"{datablock.name}" has no strands to draw.')
+        raise HairError(f'"{name_of(datablock)}" has no strands to draw.')
     points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
     wetness = curves.read_wetness(datablock)
     most = int(counts.max())

@@ -12,7 +12,7 @@ from ...settings import saved_looks
 from ...settings.translations import CONTEXT
 from .. import look_previews
 from ..setting_rows import others, row, rows
-from .tab import HairTab, split, write
+from .tab import HairTab, split, write, write_status
 
 _LOOK_COLUMNS = 4
 _LOOK_SCALE = 4.0  # of a picture, in heights of a row
@@ -71,8 +71,7 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
     def draw(self, context):
         layout = split(self.layout)
         state = hair_of(context.object).vellus
-        if state.shading_status:
-            write(layout, context, state.shading_status, "ERROR")
+        write_status(layout, context, state, "shading_status")
         row(layout, state, "is_drawn")
         for note in modifier_notes(_hair_object(context)):
             write(layout, context, note, "INFO")

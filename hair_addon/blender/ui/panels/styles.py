@@ -3,6 +3,7 @@
 
 import bpy
 
+from ....core.errors import HairError
 from ....core.files import style_presets
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
@@ -116,7 +117,10 @@ class VELLUS_PT_styles(HairTab, bpy.types.Panel):
 
 def _draw_points(layout, context, hair):
     """Offer the points that curls want where strands have fewer."""
-    wanted, present = points_wanted(hair), hair.vellus.hair.point_count
+    try:
+        wanted, present = points_wanted(hair), hair.vellus.hair.point_count
+    except HairError:  # which is the status of the hair
+        return
     if wanted > present:
         said = interface_text("Smooth curls need {wanted} points per strand.", wanted=wanted)
         write(layout, context, said, "INFO")
