@@ -224,8 +224,9 @@ def interpolate_hair(
     if masks is not None:
         raise HairError("masks are for plain arrays: name a vertex group of the surface in the style.")
     styles, _names = require_styles(styles)
-    hair = run_now(blender.groom.pipeline.interpolating_hair(_guides(guides), settings, _depsgraph()), progress)
-    blender.groom.hair_styles.assign(hair, styles)  # strands take them with Blender's next update
+    growing = blender.groom.pipeline.interpolating_hair(_guides(guides), settings, _depsgraph(), styles=styles)
+    hair = run_now(growing, progress)
+    blender.groom.writing.keep_styles(hair, styles)
     return hair
 
 

@@ -17,7 +17,7 @@ from .core.geometry.strands import Strands
 from .core.grooming import following, groom, hair_styles
 from .core.grooming.groom import HairSettings
 from .core.long_work import Progress
-from .core.params import Param, plain_value
+from .core.params import Param, declared, plain_value
 from .core.styling.base import StyleSettings
 from .core.styling.bend import Settings as Bend
 from .core.styling.braid import Settings as Braid
@@ -57,13 +57,14 @@ _SWITCH = Param("")
 
 
 def add_style(
-    hair: Curves, style: str | StyleSettings, *, name: str = "", fit: bool = False, **changes: Any
+    hair: Curves, style: str | StyleSettings, *, name: str = "", fit: bool = True, **changes: Any
 ) -> StyleSettings:
     """Add a style after the other styles of hair Curves; returns its settings.
 
     style: a name of the menu such as "CURL" or "WAVE", or settings such as `Curl(…)`; name: in the list, by default the
-    menu's; fit: whether lengths are for a human head, and multiplied by the size of the surface; changes: fields of the
-    style's settings. Without a `seed` the style gets one that no other style of the hair has.
+    menu's; changes: fields of the style's settings; fit: whether the menu's lengths, which are for a human head, are
+    fitted to the surface: what `Curl(…)` and changes give is taken as it is. Without a `seed` a style of the menu gets
+    one that no other style of the hair has.
 
     >>> hair = bpy.data.objects["Hair"]
     >>> api.add_style(hair, "CURL", radius=0.004).radius
@@ -73,15 +74,14 @@ def add_style(
     """
     if isinstance(style, str):
         offer = OFFERS[choice(style, "style", OFFERS)]
-        settings, name = offer.settings, name or offer.label
+        settings, name, kept = offer.settings, name or offer.label, tuple(changes)
     else:
         kind_of(style)
-        settings = style
+        settings, kept = style, [details[0] for details in declared(type(style))]
     settings = changed(type(settings), settings, changes)
     fit, name = plain_value("fit", fit, False, _SWITCH), plain_value("name", name, "", _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    has_seed = "seed" in changes or not isinstance(style, str)
-    return blender.groom.hair_styles.add(target, settings, name, is_fitted=fit, has_seed=has_seed)
+    return blender.groom.hair_styles.add(target, settings, name, is_fitted=fit, kept=kept)
 
 
 def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:

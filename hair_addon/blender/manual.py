@@ -29,6 +29,7 @@ _CLASSES = {
 
 _PROPERTIES = {"model": "shading", "is_drawn": "shading", "viewport_percentage": "shading", "show_guides": "systems"}
 _PROPERTIES |= {"table_folder": "lookup_tables", "simulates": "dynamics", "cache_folder": "dynamics"}
+_PROPERTIES |= {"shows_styles_while_combing": "surface"}
 
 # Page → the operators that it explains, a heading each.
 _OPERATORS = {

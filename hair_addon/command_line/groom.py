@@ -75,8 +75,8 @@ def _styled(given, settings, surface):
     def fit():
         return blender.groom.hair_styles.fit_of(surface, settings.guides, settings.hair)
 
-    if given.no_style_fit and not given.style_preset:
-        raise HairError("--no-style-fit needs --style-preset.")
+    if given.no_style_fit and not (given.style_preset or given.styles):
+        raise HairError("--no-style-fit needs --style or --style-preset.")
     styled = style_options.styled(given, settings, None if given.no_style_fit else fit)
     return options.changed_groom(styled, given)
 

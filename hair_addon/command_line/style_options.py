@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from ..core.errors import HairError
 from ..core.files import style_presets
+from ..core.styling.fitting import fitted
 from ..core.styling.kinds import KINDS, MOST_STYLES, OFFERS
 from . import setting_pairs
 
@@ -13,6 +14,7 @@ from . import setting_pairs
 def add_styles(parser, has_surface):
     """Add the options; has_surface: whether the command knows what to fit a preset to."""
     offers, presets = ", ".join(map(str.lower, OFFERS)), ", ".join(style_presets.PRESETS)
+    said = "; lengths that are not given are fitted to the surface" if has_surface else ""
     parser.add_argument(
         "--style",
         dest="styles",
@@ -20,18 +22,18 @@ def add_styles(parser, has_surface):
         type=style,
         action="append",
         default=[],
-        help=f"a style with settings, as in curl:radius=0.004,pitch=0.01; again for more, in order: {offers}",
+        help=f"a style with settings, as in curl:radius=0.004,pitch=0.01; again for more, in order: {offers}{said}",
     )
-    fitted = ", fitted to the surface" if has_surface else ", with lengths for a head"
+    lengths = ", fitted to the surface" if has_surface else ", with lengths for a head"
     parser.add_argument(
-        "--style-preset", choices=style_presets.PRESETS, metavar="NAME", help=f"a style preset{fitted}: {presets}"
+        "--style-preset", choices=style_presets.PRESETS, metavar="NAME", help=f"a style preset{lengths}: {presets}"
     )
     if has_surface:
-        parser.add_argument("--no-style-fit", action="store_true", help="keep the preset's lengths, for a head")
+        parser.add_argument("--no-style-fit", action="store_true", help="keep lengths that are for a head")
 
 
 def style(text):
-    """Parse KIND:name=value,name=value as (label, `StyleSettings`, whether it has a seed)."""
+    """Parse KIND:name=value,name=value as (label, `StyleSettings`, names of the settings that are given)."""
     kind, _, rest = text.partition(":")
     identifier = kind.strip().upper().replace("-", "_")
     if identifier not in OFFERS:
@@ -40,7 +42,7 @@ def style(text):
     offer = OFFERS[identifier]
     changes = setting_pairs.parsed(rest, KINDS[offer.kind], kind)
     try:
-        return offer.label, replace(offer.settings, **changes), "seed" in changes
+        return offer.label, replace(offer.settings, **changes), tuple(changes)
     except HairError as error:
         raise argparse.ArgumentTypeError(str(error)) from error
 
@@ -50,17 +52,20 @@ def styled(options, settings, fit=None):
 
     fit: function of no arguments that returns (factor of lengths, mean distance of strands [m]), None for a head's.
     """
+    size = fit() if fit is not None and (options.style_preset or options.styles) else None
     if options.style_preset:
         preset = style_presets.read(options.style_preset)
-        if fit is not None:
-            preset = style_presets.fit(preset, *fit())
+        if size is not None:
+            preset = style_presets.fit(preset, *size)
         settings = preset.changed(settings)
     if len(settings.styles) + len(options.styles) > MOST_STYLES:
         raise HairError(f"Hair has at most {MOST_STYLES} styles: give fewer --style options.")
     styles, names = list(settings.styles), list(settings.style_names or [""] * len(settings.styles))
-    for label, found, has_seed in options.styles:
+    for label, found, given in options.styles:
+        if size is not None:
+            found = fitted(found, *size, kept=given)
         taken = {other.seed for other in styles}
-        seed = found.seed if has_seed else next(n for n in range(len(taken) + 1) if n not in taken)
+        seed = found.seed if "seed" in given else next(n for n in range(len(taken) + 1) if n not in taken)
         styles.append(replace(found, seed=seed))
         names.append(label)
     return replace(settings, styles=tuple(styles), style_names=tuple(names))

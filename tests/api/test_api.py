@@ -14,6 +14,7 @@ import pytest
 import warp
 
 from hair_addon import api, api_dynamics, api_guide_tools, api_styles, api_tables
+from hair_addon.core.placement import cvt
 from tests.support.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
@@ -196,8 +197,9 @@ def test_styles_are_what_a_script_says(hair):
     assert added.flatness == 1.0 and api.styles_of(hair) == (added,)
     again = api.add_style(hair, api.Curl(pitch=0.05, seed=9), name="Ends")
     assert again == api.Curl(pitch=0.05, seed=9) and hair.data.vellus.styles[1].name == "Ends"
-    third = api.add_style(hair, "FRIZZ", seed=9, fit=True)
+    third = api.add_style(hair, "FRIZZ", seed=9, wavelength=0.03)
     assert third.seed == 9 and third.amplitude > api.Frizz().amplitude  # a sphere of two meters
+    assert third.wavelength == api.Frizz().wavelength and third.spread > api.Frizz().spread
     api.set_styles(hair, api.styles_of(hair)[::-1])
     assert api.styles_of(hair) == (third, again, added)
     assert [item.name for item in hair.data.vellus.styles] == ["Frizz", "Ends", "Wave"]
@@ -205,6 +207,23 @@ def test_styles_are_what_a_script_says(hair):
     api.set_styles(hair, [])
     api.apply_settings(hair, settings)
     assert api.settings_of(hair) == settings and settings.styles == (third, again, added)
+
+
+@pytest.mark.parametrize("style", [api.Frizz(), "FRIZZ"], ids=["settings", "a name"])
+def test_a_style_that_is_not_to_be_fitted_keeps_its_lengths(hair, style):
+    assert api.add_style(hair, style, fit=isinstance(style, api.Frizz)) == api.Frizz()
+
+
+@pytest.mark.parametrize("style", ["CLUMP", "BRAID", "WET"])
+def test_styles_of_the_menu_have_few_locks_on_any_surface(hair, style, monkeypatch):
+    """Locks for a head would be a hundred thousand on a sphere of two meters."""
+    placed, place = [], cvt.place
+    monkeypatch.setattr(
+        cvt, "place", lambda mesh, count, *rest, **named: placed.append(count) or place(mesh, count, *rest, **named)
+    )
+    api.add_style(hair, style)
+    update()
+    assert 0 < sum(placed) < 3000 and hair.data.vellus.status == ""
 
 
 def test_new_hair_has_the_styles_of_its_settings(sphere):

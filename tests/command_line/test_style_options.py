@@ -28,9 +28,9 @@ def words(identifier, settings, names):
 @pytest.mark.parametrize("identifier", OFFERS)
 def test_any_style_can_be_said(identifier):
     offer = OFFERS[identifier]
-    assert style_options.style(identifier.lower()) == (offer.label, offer.settings, False)
+    assert style_options.style(identifier.lower()) == (offer.label, offer.settings, ())
     names = [name for name, *_ in declared(type(offer.settings))]
-    assert style_options.style(words(identifier, offer.settings, names)) == (offer.label, offer.settings, True)
+    assert style_options.style(words(identifier, offer.settings, names)) == (offer.label, offer.settings, tuple(names))
 
 
 @pytest.mark.parametrize(
@@ -77,7 +77,7 @@ def test_a_preset_that_is_not_given_cannot_be_fitted(tmp_path):
 
 def test_styles_are_applied_in_the_order_of_the_words(scene, mesh, tmp_path):  # noqa: F811
     out = tmp_path / "out.blend"
-    groom = ("groom", mesh, *SMALL, "--out", out)
+    groom = ("groom", mesh, *SMALL, "--out", out, "--no-style-fit")
     styles = ("--style", "clump:size=0.5,levels=3", "--style", "Wave:radius=0.04,seed=7", "--style=trim:method=scale")
     assert run_here(*groom, *styles, "--style", "lean:is_on=no").status == 0
     settings = grown(out)[0]
@@ -102,6 +102,22 @@ def test_style_presets_fit_the_surface(scene, mesh, tmp_path):  # noqa: F811
     factor = settings.guides.length / 0.12  # the length of new hair on a head
     assert settings.styles[0].amplitude / plain.styles[0].amplitude == pytest.approx(factor, rel=0.01)
     assert settings.styles[1] == wet.Settings(lock=0.01, seed=1) and settings.hair.tip_taper == 0.9
+
+
+def test_lengths_that_are_not_given_fit_the_surface(scene, mesh, tmp_path):  # noqa: F811
+    out = tmp_path / "out.blend"
+    assert run_here("groom", mesh, *SMALL, "--out", out, "--style", "curl:radius=0.01,seed=3").status == 0
+    settings = grown(out)[0]
+    (found,) = settings.styles
+    factor = settings.guides.length / 0.12
+    assert abs(factor - 1.0) > 0.1
+    assert found.pitch == pytest.approx(curl.Settings().pitch * factor, rel=0.01)
+    assert (found.radius, found.seed) == (0.01, 3)
+
+
+def test_without_styles_there_is_nothing_to_fit(tmp_path):
+    ended = run("groom", HEAD, "--out", tmp_path / "a.npz", "--no-style-fit")
+    assert ended.status == 1 and ended.errors.strip().endswith("--no-style-fit needs --style or --style-preset.")
 
 
 def test_settings_have_the_styles_of_the_words():

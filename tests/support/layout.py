@@ -107,7 +107,9 @@ def draw(panel):
     context = Context()
     if hasattr(panel, "poll") and not panel.poll(context):
         return None
-    drawing = SimpleNamespace(layout=Layout(), settings=getattr(panel, "settings", ()))
+    ours = (base for base in panel.__mro__ if base.__module__.startswith("hair_addon"))
+    own = {name: getattr(panel, name) for base in ours for name in vars(base) if not name.startswith("_")}
+    drawing = SimpleNamespace(**own | {"layout": Layout()})
     if hasattr(panel, "draw_header"):
         panel.draw_header(drawing, context)
     if hasattr(panel, "draw_header_preset"):

@@ -13,6 +13,8 @@ import numpy as np
 import hair_addon
 from hair_addon import api
 from hair_addon.blender.io import inspection
+from hair_addon.blender.ui import panels
+from tests.support import layout
 
 SMALL = {"width": 16, "height": 12}
 
@@ -42,8 +44,116 @@ def make(path):
         made.location, made.rotation_euler = (0.0, -6.0, 0.0), (1.57, 0.0, 0.0)
         bpy.context.scene.collection.objects.link(made)
     bpy.context.scene.camera = bpy.data.objects["Camera"]
+    damage(path)
+
+
+def damage(path):
+    """Save the open file, and write bytes that no text has into its names."""
     bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=False)
     path.write_bytes(path.read_bytes().replace(b"QQQQ", b"\xff\xfe\xff\xfe"))
+
+
+def make_styled(path):
+    """Save a file with two hairs: what the styles of both name is unreadable, and what settings of the first name."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3)
+    sphere = bpy.context.object
+    sphere.name = "QQQQsphere"
+    sphere.vertex_groups.new(name="QQQQtop").add(range(100), 1.0, "REPLACE")
+    for name, data in (("QQQQcutter", None), ("QQQQlines", drawn_line())):
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, data))
+    image = bpy.data.images.new("QQQQimage", 8, 8)
+    image.pack()
+    image.use_fake_user = True
+    guides = api.distribute_guides(sphere, guide_count=20)
+    hair, other = (api.interpolate_hair(guides, strand_count=100) for guides in (guides, api.distribute_guides(sphere)))
+    for curves in (hair, guides):
+        curves.attributes.new("QQQQregion", "INT", "CURVE")
+    sphere.data.attributes.new("QQQQregion", "INT", "FACE")
+    style(hair)
+    style(other)
+    bpy.context.view_layer.update()
+    assert hair.vellus.status == guides.vellus.status == "", (hair.vellus.status, guides.vellus.status)
+    keyed = "styles[2].curl.radius", "hair.keep_length"
+    for curves, paths in ((hair, keyed), (other, keyed), (guides, ("guides.gravity",))):
+        for setting, frame in ((f"vellus.{path}", frame) for path in paths for frame in (1, 3)):
+            owner, _, name = setting.rpartition(".")
+            setattr(curves.path_resolve(owner), name, 0.1 * frame)
+            curves.keyframe_insert(setting, frame=frame)
+    settings = hair.vellus.hair
+    settings.part_lines, settings.region_attribute, settings.region_group = "QQQQlines", "QQQQregion", "QQQQtop"
+    settings.density_image = guides.vellus.guides.density_image = "QQQQimage"
+    guides.vellus.guides.flow_lines = "QQQQlines"
+    guides.name, hair.name, other.name = "QQQQguides", "QQQQhair", "QQQQother"
+    bpy.context.view_layer.update()
+    damage(path)
+
+
+def style(hair):
+    """Give hair styles that name an object, a vertex group and an image."""
+    styles = [
+        api.Trim(factor=0.8, cutter="QQQQcutter", mask="QQQQtop"),
+        api.Lean(direction="OBJECT", target="QQQQcutter", mask_image="QQQQimage"),
+        api.Curl(mask="QQQQtop"),
+    ]
+    api.set_styles(hair, styles)
+    for item in hair.vellus.styles:
+        item.name = f"QQQQ{item.kind}"
+
+
+def drawn_line():
+    """A line beside the sphere's pole."""
+    curve = bpy.data.curves.new("QQQQline", "CURVE")
+    curve.dimensions = "3D"
+    curve.splines.new("POLY").points.add(1)
+    curve.splines[0].points[0].co, curve.splines[0].points[1].co = (0.0, 0.1, 1.0, 1.0), (0.5, 0.1, 0.85, 1.0)
+    return curve
+
+
+def use_styled(path):
+    """Whatever Blender reports, handlers and panels go on."""
+    bpy.ops.wm.open_mainfile(filepath=str(path))
+    sphere, view_layer = bpy.data.hair_curves[0].surface, bpy.context.view_layer
+    cutter, lines = (next(o for o in bpy.data.objects if o.type == kind) for kind in ("EMPTY", "CURVE"))
+    for _ in range(2):
+        for other in (cutter, lines):
+            other.location.x += 0.1
+            view_layer.update()
+        lines.data.splines[0].points[0].co.x += 0.05
+        for guides in (c for c in bpy.data.hair_curves if c.vellus.kind == "GUIDES"):
+            comb(guides)
+        sphere.data.vertices[0].co.z += 0.05
+        sphere.data.update()
+        view_layer.update()
+        for mode in ("WEIGHT_PAINT", "VERTEX_PAINT", "TEXTURE_PAINT", "OBJECT"):
+            view_layer.objects.active = sphere
+            bpy.ops.object.mode_set(mode=mode)
+            sphere.data.update()
+            bpy.data.images[0].update_tag()
+            view_layer.update()
+            see(sphere)
+        for frame in (2, 3, 1):
+            bpy.context.scene.frame_set(frame)
+        for shown in (sphere, *(o for o in bpy.data.objects if o.type == "CURVES")):
+            see(shown)
+    for hair in (c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"):
+        assert "not valid UTF-8" in hair.vellus.status, hair.vellus.status
+    bpy.ops.wm.save_as_mainfile(filepath=str(path.with_name("saved_styled.blend")))
+
+
+def comb(guides):
+    """Move the tip of a guide."""
+    guides.points[len(guides.points) - 1].position.z += 0.01
+    guides.update_tag()
+    bpy.context.view_layer.update()
+
+
+def see(active):
+    """Draw every panel for an active object."""
+    bpy.context.view_layer.objects.active = active
+    for panel in panels.CLASSES:
+        if issubclass(panel, bpy.types.Panel):
+            layout.draw(panel)
 
 
 def use(folder):
@@ -76,4 +186,6 @@ if __name__ == "__main__":
     hair_addon.register()
     make(Path(sys.argv[1]) / "damaged.blend")
     use(Path(sys.argv[1]))
+    make_styled(Path(sys.argv[1]) / "styled.blend")
+    use_styled(Path(sys.argv[1]) / "styled.blend")
     print("all was used")

@@ -15,6 +15,7 @@ from ...core.geometry import mesh as mesh_math
 from ...core.geometry import strands
 from ...core.geometry.mesh import SurfacePoints
 from ...core.grooming import groom
+from ..host.notices import name_of
 from . import attributes, follow_nodes, simulated_guides
 
 _GUIDE_MAP = ("guide_index", "guide_weight")
@@ -77,7 +78,7 @@ def write_guide_map(curves, guide_map):
     """
     slot_count = 0 if guide_map is None else guide_map[0].shape[1]
     for attribute in list(curves.attributes):
-        kind, _, slot = attribute.name.rpartition("_")
+        kind, _, slot = name_of(attribute).rpartition("_")
         if kind in _GUIDE_MAP and slot.isdecimal() and int(slot) >= slot_count:
             curves.attributes.remove(attribute)
     for slot in range(slot_count):
@@ -330,11 +331,11 @@ def read_guides(curves, surface, device, known=None):
     """
     counts = point_counts(curves)
     if not len(counts):
-        raise HairError(f'"{curves.name}" has no guides: generate guides first.')
+        raise HairError(f'"{name_of(curves)}" has no guides: generate guides first.')
     local = read_points(curves)
     if not np.isfinite(local).all():
         sentence = '"{name}" has non-finite coordinates: undo, or delete those guides.'
-        raise HairError(sentence, name=curves.name)
+        raise HairError(sentence, name=name_of(curves))
     points = surface.from_local(local)
     offsets = np.concatenate([[0], np.cumsum(counts)])
     firsts = points[offsets[:-1]]
@@ -390,4 +391,4 @@ def followers(guide_curves):
 def require_editable(datablock):
     """Raise `HairError` for linked data: Blender would accept the change and lose it on reload."""
     if datablock.library is not None:
-        raise HairError(f'"{datablock.name}" is linked from another file: make a library override of it first.')
+        raise HairError(f'"{name_of(datablock)}" is linked from another file: make a library override of it first.')

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ...core.interpolation.regions import Regions
+from ..host.notices import name_of, text_of
 from . import drawn_lines, scene
 
 _WHOLE = {"INT", "INT8", "BOOLEAN"}
@@ -33,7 +34,7 @@ class Partings:
 
 def is_wanted(settings):
     """Whether `HairSettings` (or their properties) name anything that parts hair."""
-    return bool(settings.region_group or settings.region_attribute or settings.part_lines)
+    return any(text_of(settings, name) for name in ("region_group", "region_attribute", "part_lines"))
 
 
 def read(surface_object, surface, guide_curves, settings, depsgraph):
@@ -55,7 +56,7 @@ def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):
     try:
         attribute = mesh.attributes.get(name)
         if attribute is not None:
-            numbers = _whole_numbers(attribute, surface_object.name, ("POINT", "FACE"))
+            numbers = _whole_numbers(attribute, name_of(surface_object), ("POINT", "FACE"))
             if attribute.domain == "POINT":
                 corners = numbers[surface.mesh.triangles]
             else:
@@ -67,10 +68,10 @@ def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):
         evaluated.to_mesh_clear()
     attribute = None if guide_curves is None else guide_curves.attributes.get(name)
     if attribute is not None:
-        guides = _whole_numbers(attribute, guide_curves.name, ("CURVE",))
+        guides = _whole_numbers(attribute, name_of(guide_curves), ("CURVE",))
     if corners is None and guides is None:
         sentence = 'Neither "{name}" nor its guides have an attribute "{attribute}": pick another, or clear the field.'
-        raise HairError(sentence, name=surface_object.name, attribute=name)
+        raise HairError(sentence, name=name_of(surface_object), attribute=name)
     return Regions(corners, guides)
 
 
@@ -80,7 +81,7 @@ def _whole_numbers(attribute, owner, domains):
         sentence = 'The attribute "{attribute}" of "{name}" cannot separate hair: use integers on faces or vertices.'
         if "CURVE" in domains:
             sentence = 'The attribute "{attribute}" of "{name}" cannot separate hair: use integers on curves.'
-        raise HairError(sentence, attribute=attribute.name, name=owner)
+        raise HairError(sentence, attribute=name_of(attribute), name=owner)
     numbers = np.empty(len(attribute.data), bool if attribute.data_type == "BOOLEAN" else np.int32)
     attribute.data.foreach_get("value", numbers)
     return numbers.astype(np.int32)

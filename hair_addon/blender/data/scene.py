@@ -152,12 +152,12 @@ def read_surface(surface_object, depsgraph):
     """The evaluated mesh of an object as a `Surface`. Raises `HairError`."""
     if surface_object.type != "MESH":  # a script may have set it as the surface of Curves
         raise HairError(
-            '"{name}" is not a mesh that hair can grow on: attach the hair to a mesh.', name=surface_object.name
+            '"{name}" is not a mesh that hair can grow on: attach the hair to a mesh.', name=name_of(surface_object)
         )
     to_world_axes = np.array(surface_object.matrix_world.to_3x3(), np.float64)
     determinant = np.linalg.det(to_world_axes)
     if not np.isfinite(to_world_axes).all() or abs(determinant) < 1e-30:
-        raise HairError(f'"{surface_object.name}" has a scale of zero: change its scale.')
+        raise HairError(f'"{name_of(surface_object)}" has a scale of zero: change its scale.')
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
@@ -248,7 +248,7 @@ def read_vertex_group(surface_object, depsgraph, name):
     group = surface_object.vertex_groups.get(name)
     if group is None:
         raise HairError(
-            f'"{surface_object.name}" has no vertex group "{name}": pick another group, or clear the field.'
+            f'"{name_of(surface_object)}" has no vertex group "{name}": pick another group, or clear the field.'
         )
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
@@ -278,7 +278,7 @@ def read_texture(surface, name, may_be_black=False):
         return None
     if surface.corner_uvs is None:
         sentence = '"{name}" has no UV map for the density image: create one, or clear the image.'
-        raise HairError(sentence, name=surface.name)
+        raise HairError(sentence, name=name_of(surface))
     return Texture(values, surface.corner_uvs)
 
 
@@ -327,7 +327,7 @@ def read_camera(scene, depsgraph, width, height, camera=None):
     view_to_world.translation = location
     if not can_be_drawn(camera, camera.matrix_world, view_to_clip):
         sentence = 'The camera "{name}" has a non-finite transform or lens: correct its values.'
-        raise HairError(sentence, name=camera.name)
+        raise HairError(sentence, name=name_of(camera))
     return np.array(view_to_world.inverted(), np.float64), np.array(view_to_clip, np.float64)
 
 

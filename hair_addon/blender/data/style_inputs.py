@@ -12,6 +12,7 @@ from ...core.styling.base import StyleSettings, has_effect
 from ...core.styling.masks import Mask
 from ...core.styling.program import Cutter, mask_keys
 from ...core.styling.style_inputs import Inputs
+from ..host.notices import name_of
 from . import attributes, scene
 
 # Luminance of linear colours, Rec. 709.
@@ -64,7 +65,7 @@ def _mask(surface_object, surface, guide_curves, key, depsgraph):
     guides = None if corners is not None or guide_curves is None else _read_guide_attribute(guide_curves, name)
     if corners is None and guides is None:
         sentence = 'Neither "{name}" nor its guides have a vertex group or attribute "{mask}": pick another mask.'
-        raise HairError(sentence, name=surface_object.name, mask=name)
+        raise HairError(sentence, name=name_of(surface_object), mask=name)
     return Mask(corners, texture, guides, is_inverted)
 
 
@@ -77,7 +78,7 @@ def _read_surface_attribute(surface_object, surface, name, depsgraph):
         if attribute is None:
             return None
         _require_same(len(mesh.vertices) == len(surface.rest), surface_object)
-        values = _numbers(attribute, surface_object.name)
+        values = _numbers(attribute, name_of(surface_object))
         if attribute.domain == "POINT":
             return values[surface.mesh.triangles]
         mesh.calc_loop_triangles()
@@ -96,14 +97,14 @@ def _require_same(is_same, surface_object):
     """Raise `HairError` unless a mesh has as many vertices and faces as its `Surface`, which was read before."""
     if not is_same:
         sentence = 'The mesh of "{name}" has changed: the hair updates when you leave its paint mode.'
-        raise HairError(sentence, name=surface_object.name)
+        raise HairError(sentence, name=name_of(surface_object))
 
 
 def _numbers(attribute, owner):
     """(N,) float32 of an attribute: numbers, or the luminance of colours. Raises `HairError`."""
     if attribute.data_type not in _NUMBERS or attribute.domain not in ("POINT", "CORNER", "FACE"):
         sentence = 'The attribute "{attribute}" of "{name}" cannot mask hair: use numbers or colors.'
-        raise HairError(sentence, attribute=attribute.name, name=owner)
+        raise HairError(sentence, attribute=name_of(attribute), name=owner)
     field, width = _NUMBERS[attribute.data_type]
     values = np.empty(len(attribute.data) * width, bool if attribute.data_type == "BOOLEAN" else np.float32)
     attribute.data.foreach_get(field, values)
@@ -119,5 +120,5 @@ def _read_guide_attribute(guide_curves, name):
     values = attributes.read(guide_curves, name, "FLOAT", "CURVE")
     if values is None:
         sentence = 'The attribute "{attribute}" of "{name}" cannot mask hair: use numbers on curves.'
-        raise HairError(sentence, attribute=name, name=guide_curves.name)
+        raise HairError(sentence, attribute=name, name=name_of(guide_curves))
     return values

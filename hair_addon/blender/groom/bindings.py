@@ -6,7 +6,7 @@ be dropped at any time: the next change of a guide then searches again.
 """
 
 from concurrent.futures import Future
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -20,6 +20,7 @@ from ...core.grooming.groom import HairSettings
 from ...core.interpolation.hair_binding import HairBinding
 from ..data.scene import Surface
 from ..host.caches import Cache
+from . import styled_hair
 from .styled_hair import StyledHair
 
 if TYPE_CHECKING:
@@ -45,6 +46,8 @@ class BoundHair:
     is_map_written: bool = False  # whether the datablock holds this guide map
     written_radii: np.ndarray | None = None  # (P,) in the datablock, None if they may have changed
     is_report_due: bool = False  # whether Blender has not reported our write yet, which is to be ignored
+    straight: "BoundHair | None" = None  # the same without styles while viewports show that: alone it follows strokes
+    is_behind: bool = False  # whether strands have to grow again, as only those of `straight` have followed `guides`
 
     @property
     def points(self) -> np.ndarray:
@@ -77,14 +80,23 @@ class BoundHair:
         if combed is None:
             return None
         self.guides = guides
+        if self.straight is not None:
+            moved = self.straight.follow(guides)
+            if moved is not None and len(moved):
+                self.is_behind = True
+                self._points_have_moved()
+            return moved
         strand_count = len(_grown(self.shares))
         moved = np.arange(strand_count) if len(combed) == len(guides) else self._reached(combed)
         if len(moved):
             # Beyond a half, selecting the moved ones would take longer.
             self.grow(moved if len(moved) <= strand_count // 2 else None)
-            self.has_moved_only = self.is_written or self.has_moved_only
-            self.is_written = False
+            self._points_have_moved()
         return moved
+
+    def _points_have_moved(self):
+        self.has_moved_only = self.is_written or self.has_moved_only
+        self.is_written = False
 
     def _reached(self, combed):
         """Indices (M,) of the strands that move with some guides, and of those whose clumps do."""
@@ -97,6 +109,7 @@ class BoundHair:
         guides = self.guides if styling is None else styling.guides(self.guides)
         weights = following.weights_now(binding, guides, chosen)
         if chosen is None:
+            self.is_behind = False
             out = None if self.growing is None else self.points
             out = out if out is not None and out.shape[1] == guides.point_count else None
             self.growing = following.growing_points(binding, guides, weights, axes, out, styling)
@@ -110,6 +123,28 @@ class BoundHair:
         self.styles = styles
         self.grow()
         self.is_written = self.has_moved_only = False
+
+    @property
+    def shown(self) -> "BoundHair":
+        """Whose points viewports show: those without styles where there are such."""
+        return self if self.straight is None else self.straight
+
+    def show_styles(self, is_styled: bool) -> None:
+        """Let viewports show strands with styles, or without."""
+        if is_styled:
+            self.catch_up()
+            self.straight = None
+        elif self.straight is None:
+            self.straight = replace(self, styles=self._unstyled(), growing=None, shares=None)
+            self.straight.grow()
+
+    def catch_up(self) -> None:
+        """Bring strands up to guides that only those without styles have followed."""
+        if self.is_behind:
+            self.grow()
+
+    def _unstyled(self):
+        return styled_hair.unstyled(self.styles, self.binding, self.guides, self.settings, self.surface)
 
     def _take_shares(self, shares, moved=slice(None)):
         """Bring the guide map up to guides that were combed: the weights of strands, or of (M,) indices of them."""

@@ -12,6 +12,7 @@ from bpy.types import Curves, Object
 
 from ..data import follow_nodes
 from ..data.curves import followers
+from ..host.notices import name_of, text_of
 from ..settings.translations import interface_text
 
 
@@ -33,18 +34,19 @@ def warnings_of(surface: Object | None, parts: Iterable[Curves]) -> list[Warning
 
 def parting_warnings(hair: Curves) -> list[Warning]:
     """Return [Warning] about missing part lines and region groups of a hair Curves datablock."""
-    group, found = hair.vellus.hair, []
-    if group.part_lines and group.part_lines not in bpy.data.objects:
-        found.append(Warning(interface_text('No object "{name}": pick another part line.', name=group.part_lines)))
-    if hair.surface is not None and group.region_group and group.region_group not in hair.surface.vertex_groups:
+    lines, group = (text_of(hair.vellus.hair, name) for name in ("part_lines", "region_group"))
+    found = []
+    if lines and lines not in bpy.data.objects:
+        found.append(Warning(interface_text('No object "{name}": pick another part line.', name=lines)))
+    if hair.surface is not None and group and group not in hair.surface.vertex_groups:
         text = 'No vertex group "{name}": pick another for regions.'
-        found.append(Warning(interface_text(text, name=group.region_group)))
+        found.append(Warning(interface_text(text, name=group)))
     return found
 
 
 def flow_warnings(guides: Curves) -> list[Warning]:
     """Return [Warning] about missing flow lines of a guide Curves datablock."""
-    name = guides.vellus.guides.flow_lines
+    name = text_of(guides.vellus.guides, "flow_lines")
     if not name or name in bpy.data.objects:
         return []
     return [Warning(interface_text('No object "{name}": pick other flow lines.', name=name))]
@@ -66,7 +68,7 @@ def modifier_notes(hair_object: Object | None) -> list[str]:
 def _of_library(surface, parts):
     linked = next((block for block in (surface, *parts) if block is not None and block.library is not None), None)
     if linked is not None:
-        yield Warning(interface_text('"{name}" is linked: make a library override.', name=linked.name))
+        yield Warning(interface_text('"{name}" is linked: make a library override.', name=name_of(linked)))
 
 
 def _of_surface(surface, parts):
@@ -87,19 +89,12 @@ def _of_uv_map(surface, parts):
     if not maps:
         yield Warning(interface_text("No UV map: hair nodes need one."), "vellus.make_uv_map")
         return
-    lost = next((name for name in map(_uv_map_of, parts) if name not in maps), None)
+    lost = next((name for name in (text_of(part, "surface_uv_map") for part in parts) if name not in maps), None)
     if lost is not None:
         text = 'UV map "{name}" is missing.' if lost else "The hair has no UV coordinates."
         yield Warning(interface_text(text, name=lost), "vellus.use_uv_map")
     elif any(part.vellus.uv_status for part in parts):
         yield Warning(interface_text("UVs overlap: hair nodes misplace strands."), "vellus.make_uv_map")
-
-
-def _uv_map_of(part):
-    try:
-        return part.surface_uv_map
-    except UnicodeDecodeError:  # of a damaged file
-        return ""
 
 
 def _of_guides(parts):

@@ -10,6 +10,7 @@ from bpy.types import Curves, Depsgraph, Object, ViewLayer
 from ...core.errors import HairError
 from ...core.geometry import mesh, uv_check
 from ..data import curves, curves_objects, scene
+from ..host.notices import name_of
 from ..materials import materials
 from . import edited_surfaces
 from .selection import curves_on
@@ -69,11 +70,11 @@ def make_uv_map(surface_object: Object, view_layer: ViewLayer) -> None:
     if not surface_object.data.polygons:
         raise HairError("The surface has no faces to grow hair on.")
     if not surface_object.visible_get(view_layer=view_layer):
-        raise HairError('"{name}" is hidden: show it first.', name=surface_object.name)
+        raise HairError('"{name}" is hidden: show it first.', name=name_of(surface_object))
     if np.ptp(scene.vertex_positions(surface_object.data), axis=0).max() > _LARGEST_UNWRAPPED:
-        raise HairError('"{name}" is too large to unwrap: scale its mesh down.', name=surface_object.name)
+        raise HairError('"{name}" is too large to unwrap: scale its mesh down.', name=name_of(surface_object))
     if surface_object.data.uv_layers.new(name=_UV_MAP) is None:
-        raise HairError('"{name}" has no room for another UV map: remove one.', name=surface_object.name)
+        raise HairError('"{name}" has no room for another UV map: remove one.', name=name_of(surface_object))
     surface_object.data.uv_layers.active_index = len(surface_object.data.uv_layers) - 1
     active = view_layer.objects.active
     view_layer.objects.active = surface_object
@@ -100,7 +101,7 @@ def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
     surface = scene.read_surface(surface_object, depsgraph)
     mesh.check_mesh(surface.mesh)
     if surface.corner_uvs is None:
-        raise HairError('"{name}" has no UV map: make one.', name=surface_object.name)
+        raise HairError('"{name}" has no UV map: make one.', name=name_of(surface_object))
     share = uv_check.misleading_fraction(surface.mesh, surface.corner_uvs)
     for part in curves_on(surface_object, "GUIDES") + curves_on(surface_object, "HAIR"):
         part.vellus.uv_status = "UVs overlap" if share > _TOLERATED else ""
@@ -112,10 +113,12 @@ def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
     curves.require_editable(surface_object)
     curves.require_editable(surface_object.data)
     if surface_object.data.users > 1:
-        raise HairError('"{name}" shares its mesh with another object: make it single-user.', name=surface_object.name)
+        raise HairError(
+            '"{name}" shares its mesh with another object: make it single-user.', name=name_of(surface_object)
+        )
     scale = tuple(surface_object.scale)
     if not all(scale):
-        raise HairError('"{name}" has a scale of zero: change its scale.', name=surface_object.name)
+        raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
     axes_before = np.array(surface_object.matrix_world.to_3x3(), np.float64)
     with bpy.context.temp_override(
         active_object=surface_object,

@@ -10,6 +10,7 @@ from bpy.types import Curves, Object
 
 from ...core.errors import HairError
 from ..data import attributes, curves
+from ..host.notices import name_of
 
 _NAME = "Vellus Curves to Polylines"  # of nodes and their modifier that are there while curves are read
 
@@ -42,11 +43,13 @@ def require_editable(curves_object: Object) -> None:
     for datablock in (curves_object, curves_object.data):
         curves.require_editable(datablock)
     if sum(user.data == curves_object.data for user in bpy.data.objects) > 1:
-        raise HairError('"{name}" shares its curves with another object: make it single-user.', name=curves_object.name)
+        raise HairError(
+            '"{name}" shares its curves with another object: make it single-user.', name=name_of(curves_object)
+        )
     animation = curves_object.animation_data
     if animation is not None and (animation.action or animation.drivers or animation.nla_tracks):
         raise HairError(
-            '"{name}" is animated: clear its animation, as guides move with their surface.', name=curves_object.name
+            '"{name}" is animated: clear its animation, as guides move with their surface.', name=name_of(curves_object)
         )
 
 
@@ -99,7 +102,7 @@ def _evaluated(curves_object):
     geometry = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).evaluated_geometry()
     if geometry.curves is None:
         sentence = '"{name}" has no curves after its modifiers: turn off the modifiers that convert them.'
-        raise HairError(sentence, name=curves_object.name)
+        raise HairError(sentence, name=name_of(curves_object))
     return geometry
 
 
@@ -108,7 +111,7 @@ def _as_polylines(curves_object, applies_modifiers):
     """Have Blender evaluate an object to polylines and Catmull-Rom splines; everything is as before afterwards."""
     layer, data = bpy.context.view_layer, curves_object.data
     if not curves_object.visible_get(view_layer=layer):
-        raise HairError('"{name}" is hidden: show it first.', name=curves_object.name)
+        raise HairError('"{name}" is hidden: show it first.', name=name_of(curves_object))
     switched_off = [] if applies_modifiers else [m for m in curves_object.modifiers if m.show_viewport]
     was = {name: getattr(data, name) for name in _THIN} if curves_object.type == "CURVE" else {}
     nodes = modifier = None
@@ -162,7 +165,7 @@ def _convert(curves_object):
         bpy.ops.object.convert(target="CURVES")
     layer.update()
     if curves_object.type != "CURVES":
-        raise HairError('"{name}" cannot be converted to a Curves object.', name=curves_object.name)
+        raise HairError('"{name}" cannot be converted to a Curves object.', name=name_of(curves_object))
 
 
 def _replace_data(curves_object, replacement):

@@ -13,7 +13,7 @@ from ...core.shading.appearance import TABLE_FIELDS, Appearance
 from ..data import curves, scene
 from ..materials import looks
 from ..settings import properties, setting_properties, style_items
-from . import hand_made_guides, pipeline
+from . import hand_made_guides, pipeline, writing
 
 
 def settings_of(hair: Curves) -> GroomSettings:
@@ -42,7 +42,9 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
         # Otherwise everything would be regenerated without need.
         if setting_properties.to_settings(group, type(wanted)) != wanted:
             setting_properties.assign(group, wanted)
-    _assign_rest(guides, hair, settings)
+    assign_dynamics(guides, settings.dynamics)
+    style_items.assign(hair.vellus, settings.styles, settings.style_names)
+    _assign_shading(hair, settings)
 
 
 def assign_look(hair: Curves, look: Appearance) -> None:
@@ -61,8 +63,11 @@ def assign_dynamics(guides: Curves, settings: DynamicsSettings) -> None:
 
 def adding_hair(surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph) -> Work[tuple[Curves, Curves]]:
     """Guides and hair of some `GroomSettings` on a mesh object, as work in steps; returns the Curves of both."""
-    guides, hair = yield from pipeline.adding_hair(surface_object, settings.guides, settings.hair, depsgraph)
-    _assign_rest(guides, hair, settings)
+    growing = pipeline.adding_hair(surface_object, settings.guides, settings.hair, depsgraph, settings.styles)
+    guides, hair = yield from growing
+    writing.keep_styles(hair, settings.styles, settings.style_names)
+    assign_dynamics(guides, settings.dynamics)
+    _assign_shading(hair, settings)
     return guides, hair
 
 
@@ -73,13 +78,15 @@ def using_as_guides(
     made = yield from hand_made_guides.using_as_guides(
         curves_object, surface_object, depsgraph, hair_settings=settings.hair
     )
-    _assign_rest(made.guides, made.hair, settings)
+    assign_dynamics(made.guides, settings.dynamics)
+    if made.hair is not None:
+        style_items.assign(made.hair.vellus, settings.styles, settings.style_names)
+        _assign_shading(made.hair, settings)
+        # Styled now that there are guides, whose attributes may be masks.
+        pipeline.evaluate(made.hair, scene.present_depsgraph())
     return made
 
 
-def _assign_rest(guides, hair, settings):
-    """What is computed after the strands: styles, shading, and the simulation."""
-    assign_dynamics(guides, settings.dynamics)
-    style_items.assign(hair.vellus, settings.styles, settings.style_names)
+def _assign_shading(hair, settings):
     setting_properties.assign(hair.vellus.marschner, settings.tables, skip=TABLE_FIELDS)
     assign_look(hair, settings.appearance)

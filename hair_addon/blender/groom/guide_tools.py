@@ -29,6 +29,7 @@ from ...core.grooming.guide_tool_settings import (
 )
 from ..data import attributes, curves, cutters, guide_curves, posed_strands, scene, simulated_world
 from ..data.scene import Surface
+from ..host.notices import name_of
 from ..settings import preferences, properties
 
 LEAST_STIFFNESS = 1e-3  # of dynamics' settings
@@ -105,11 +106,11 @@ def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
     mesh_math.check_mesh(surface.mesh)
     starts = curves.curve_offsets(datablock).astype(np.int64)
     if len(starts) < 2:
-        raise HairError('"{name}" has no guides: generate guides first.', name=datablock.name)
+        raise HairError('"{name}" has no guides: generate guides first.', name=name_of(datablock))
     local = curves.read_points(datablock)
     if not np.isfinite(local).all():
         sentence = '"{name}" has non-finite coordinates: undo, or delete those guides.'
-        raise HairError(sentence, name=datablock.name)
+        raise HairError(sentence, name=name_of(datablock))
     points = surface.from_local(local)
     roots = curves.read_roots(datablock, surface, points[starts[:-1]])
     return CombedGuides(datablock, surface, local, points, starts, np.ones(len(starts) - 1), roots)

@@ -2,7 +2,7 @@
 """Styles of a hair: add, replace, and fit to the size of its surface."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from bpy.types import Curves, Object
@@ -24,18 +24,19 @@ _HEAD_LENGTH = next(length for name, length, _details in declared(GuideSettings)
 
 
 def add(
-    hair: Curves, settings: StyleSettings, name: str = "", is_fitted: bool = False, has_seed: bool = False
+    hair: Curves, settings: StyleSettings, name: str = "", is_fitted: bool = False, kept: Collection[str] = ()
 ) -> StyleSettings:
     """Add a style to a hair Curves datablock, after its other styles; returns its settings.
 
-    is_fitted: whether lengths are for a human head, and fitted to the surface; has_seed: whether the seed is the one in
-    `settings`, else it is one that no other style of the hair has. Raises `HairError` before any change.
+    is_fitted: whether lengths are for a human head, and fitted to the surface; kept: names of settings that are not
+    fitted. A seed that is none of them becomes one that no other style of the hair has. Raises `HairError` before any
+    change.
     """
     curves.require_editable(hair)
     style_items.require_room(len(hair.vellus.styles) + 1)
     if is_fitted:
-        settings = fitting.fitted(settings, *surface_fit(hair))
-    if not has_seed:
+        settings = fitting.fitted(settings, *surface_fit(hair), kept)
+    if "seed" not in kept:
         settings = replace(settings, seed=style_items.new_seed(hair.vellus))
     style_items.add(hair.vellus, settings, name)
     return style_items.settings_of(style_items.active_of(hair.vellus))
@@ -83,9 +84,10 @@ def fit_of(surface_object: Object, guide_settings: GuideSettings, hair_settings:
 
 
 def points_wanted(hair: Curves, length: float | None = None) -> int:
-    """Points per strand that the curls of a hair want, within the setting's range; 0 without curls. Raises `HairError`.
+    """Points per strand that the curls of a hair want, within the setting's range; 0 without curls.
 
-    length [m]: of strands, None for what the guides are set to; of hand-made guides it must be given.
+    length [m]: of strands, None for what the guides are set to; of hand-made guides it must be given. Raises
+    `HairError`.
     """
     guides = hair.vellus.guide_curves
     if guides is None or (length is None and curves.is_hand_made(guides)):

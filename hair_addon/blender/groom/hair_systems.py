@@ -9,7 +9,7 @@ import bpy
 from bpy.types import Curves, Object, ViewLayer
 
 from ..settings import properties
-from .selection import active_of_kind, make_active, object_of, surface_of
+from .selection import active_of_kind, make_active, object_of, painted_hair, surface_of
 
 
 def systems_of(surface: Object, view_layer: ViewLayer) -> list[Curves]:
@@ -25,7 +25,8 @@ def systems_of(surface: Object, view_layer: ViewLayer) -> list[Curves]:
 
 
 def edited_system(view_layer: ViewLayer) -> Curves | None:
-    """The Curves of the system that is edited: of the active object, or the newest on the active mesh; None if none."""
+    """The Curves of the system that is edited: of the active object, or on the active mesh that `selection.hair_of`
+    gives; None if none."""
     active = view_layer.objects.active
     systems = systems_of(surface_of(active), view_layer)
     guides, hair = active_of_kind(active, "GUIDES"), active_of_kind(active, "HAIR")
@@ -34,6 +35,9 @@ def edited_system(view_layer: ViewLayer) -> Curves | None:
     if guides is not None:
         followers = [c for c in systems if c.vellus.guide_curves == guides]
         return followers[-1] if followers else (guides if guides in systems else None)
+    painted = None if active is None or active.type != "MESH" else painted_hair(active)
+    if painted in systems:
+        return painted
     with_hair = [c for c in systems if c.vellus.kind == "HAIR"]
     return (with_hair or systems or [None])[-1]
 

@@ -22,6 +22,7 @@ from ...core.grooming.rooted_curves import RootedCurves, reversal
 from ...core.long_work import Work, part_of, run_now
 from ..data import attributes, curves, curves_objects, follow_nodes, masks, posed_strands, scene
 from ..host.datablocks import Remembered
+from ..host.notices import name_of
 from ..settings import preferences
 from . import foreign_curves, pipeline, staleness
 from .foreign_curves import SeenCurves
@@ -124,7 +125,7 @@ def using_as_guides(
     surface = scene.read_surface(surface_object, depsgraph)
     seen = foreign_curves.read(curves_object, applies_modifiers)
     if len(seen.starts) < 2:
-        raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=curves_object.name)
+        raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
     to_surface = np.linalg.inv(np.array(surface_object.matrix_world)) @ np.array(curves_object.matrix_world)
     is_unmasked = hair_settings is not None and not masks.own(hair_settings)
     grow = None if hair_settings is None else pipeline.hair_between(surface_object, surface, hair_settings, depsgraph)
@@ -156,7 +157,7 @@ def _require_usable(curves_object, surface_object):
     ancestor = surface_object
     while ancestor is not None:
         if ancestor == curves_object:
-            raise HairError('"{name}" is parented to its own curves: clear its parent.', name=surface_object.name)
+            raise HairError('"{name}" is parented to its own curves: clear its parent.', name=name_of(surface_object))
         ancestor = ancestor.parent
 
 
@@ -208,7 +209,7 @@ def _bind_to_group(bound, surface_object, roots):
 def _write(curves_object, surface_object, surface, guides, seen, applies_modifiers):
     datablock = foreign_curves.take(curves_object, applies_modifiers)
     if len(datablock.points) != seen.starts[-1]:
-        raise HairError('"{name}" was changed while its guides were being computed.', name=curves_object.name)
+        raise HairError('"{name}" was changed while its guides were being computed.', name=name_of(curves_object))
     rooted = guides.rooted
     if len(rooted.kept) < len(datablock.curves):
         unused = np.setdiff1d(np.arange(len(datablock.curves)), rooted.kept)

@@ -8,6 +8,7 @@ from bpy.types import Context, Curves, Object, PropertyGroup
 from ...core.errors import HairError, cause_of
 from ..data import curves, guide_curves
 from ..data.attributes import read, write
+from ..host.notices import name_of
 from ..settings import style_items
 from . import bindings, selection, writing
 
@@ -52,16 +53,16 @@ def paint(hair: Curves, item: PropertyGroup, context: Context) -> None:
     try:
         bpy.ops.object.mode_set(mode=mode)
     except RuntimeError as error:  # hidden by a library or a driver
-        raise HairError('"{name}" cannot be painted: {cause}.', name=surface.name, cause=cause_of(error)) from error
+        raise HairError('"{name}" cannot be painted: {cause}.', name=name_of(surface), cause=cause_of(error)) from error
 
 
 def stop(surface: Object, context: Context) -> None:
     """Leave the paint mode of a surface, and select the hair whose mask was painted again."""
-    painted = surface.vertex_groups.active.name if surface.vertex_groups.active is not None else ""
+    painted = selection.painted_hair(surface)
     bpy.ops.object.mode_set(mode="OBJECT")
-    present = selection.curves_on(surface, "HAIR")
-    masked = [hair for hair in present if painted and painted in _masks_of(hair)]
-    shown = (selection.object_of(hair, context.view_layer) for hair in (*masked, *reversed(present)))
+    present = reversed(selection.curves_on(surface, "HAIR"))
+    wanted = present if painted is None else (painted, *present)
+    shown = (selection.object_of(hair, context.view_layer) for hair in wanted)
     hair_object = next((o for o in shown if o is not None and o.visible_get(view_layer=context.view_layer)), None)
     if hair_object is not None:
         selection.make_active(hair_object, context.view_layer)
@@ -97,7 +98,7 @@ def _require_paintable(surface, context):
     for datablock in (surface, surface.data):
         curves.require_editable(datablock)
     if surface not in [*context.view_layer.objects]:
-        raise HairError('"{name}" is not in this view layer: include one of its collections.', name=surface.name)
+        raise HairError('"{name}" is not in this view layer: include one of its collections.', name=name_of(surface))
 
 
 def _require_group(hair, mask):
@@ -120,7 +121,7 @@ def _canvas(surface, name):
     curves.require_editable(image)
     if not surface.data.uv_layers:
         sentence = '"{name}" has no UV map for the density image: create one, or clear the image.'
-        raise HairError(sentence, name=surface.name)
+        raise HairError(sentence, name=name_of(surface))
     return image
 
 
@@ -138,10 +139,6 @@ def _is_guide_mask(hair, mask):
     if not mask or (surface is not None and (mask in surface.vertex_groups or mask in surface.data.attributes)):
         return False
     return read(hair.vellus.guide_curves, mask, "FLOAT", "CURVE") is not None
-
-
-def _masks_of(hair):
-    return [style_items.group_of(item).mask for item in hair.vellus.styles]
 
 
 def _viewport(context):

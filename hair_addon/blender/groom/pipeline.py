@@ -5,7 +5,7 @@ mesh object ─ distribute_guides ─▶ Guides Curves ─ interpolate_hair ─�
 and their inputs, so `evaluate` can regenerate them.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from bpy.types import Curves, Depsgraph, Object
 
@@ -15,10 +15,12 @@ from ...core.grooming import following, groom, groom_defaults, hair_styles
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
+from ...core.styling.base import StyleSettings
 from ..data import curves, curves_objects, drawn_lines, masks, partings, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
-from ..settings import preferences, setting_properties
+from ..host.notices import name_of
+from ..settings import preferences, setting_properties, style_items
 from . import bindings, staleness, styled_hair, writing
 from .bindings import BoundHair
 from .styled_hair import ReadStyles
@@ -81,11 +83,15 @@ def interpolate_hair(
 
 
 def interpolating_hair(
-    guide_curves: Curves, settings: HairSettings, depsgraph: Depsgraph, target: Curves | None = None
+    guide_curves: Curves,
+    settings: HairSettings,
+    depsgraph: Depsgraph,
+    target: Curves | None = None,
+    styles: Sequence[StyleSettings] = (),
 ) -> Work[Curves]:
-    """`interpolate_hair` as work in steps."""
+    """`interpolate_hair` as work in steps; styles: of new hair, whose Curves then keep them (`writing.keep_styles`)."""
     place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
-    bound = yield from _binding_hair(guide_curves, settings, depsgraph, target)
+    bound = yield from _binding_hair(guide_curves, settings, depsgraph, target, styles)
     return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
 
 
@@ -96,7 +102,7 @@ def bind_hair(
     return run_now(_binding_hair(guide_curves, settings, depsgraph, target))
 
 
-def _binding_hair(guide_curves, settings, depsgraph, target):
+def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
     surface = _read_surface(guide_curves.surface, depsgraph, target)
     guides = curves.read_guides(guide_curves, surface, preferences.device())
     mask = masks.of_strands(settings, guide_curves.vellus.guides)
@@ -104,7 +110,8 @@ def _binding_hair(guide_curves, settings, depsgraph, target):
     settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture, len(guides.roots))
     key = staleness.root_key(settings, density, None if texture is None else texture.values)
     parting = partings.read(guide_curves.surface, surface, guide_curves, settings, depsgraph)
-    read = styled_hair.read_styles(target, guide_curves.surface, surface, guide_curves, depsgraph)
+    styles = new_styles if target is None else style_items.styles_of(target.vellus)
+    read = styled_hair.read_styles(styles, guide_curves.surface, surface, guide_curves, depsgraph)
     known = _known_binding(target, settings, key, parting.key, guides, surface)
     roots = _kept_roots(target, surface, key, settings.strand_count) if known is None else None
     device, guide_uid = preferences.device(), guide_curves.session_uid
@@ -162,17 +169,22 @@ def _completed(surface_object, surface, guide_settings, hair_settings, depsgraph
 
 
 def adding_hair(
-    surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings, depsgraph: Depsgraph
+    surface_object: Object,
+    guide_settings: GuideSettings,
+    hair_settings: HairSettings,
+    depsgraph: Depsgraph,
+    styles: Sequence[StyleSettings] = (),
 ) -> Work[tuple[Curves, Curves]]:
     """Guides on a mesh object and hair between them, as work in steps; returns the Curves of both.
 
-    No object is made before all of it is computed.
+    styles: as in `interpolating_hair`. No object is made before all of it is computed.
     """
     surface = _read_surface(surface_object, depsgraph)
     completed, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
     (guide_settings, hair_settings), ((density, texture), of_hair) = completed, read
     parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
     flow = drawn_lines.read(surface_object, surface, guide_settings.flow_lines, depsgraph)
+    styling = styled_hair.read_styles(styles, surface_object, surface, None, depsgraph)
     device, place = preferences.device(), Remembered(surface_object)
     hair_key = staleness.root_key(hair_settings, of_hair[0], of_hair[1] and of_hair[1].values)
 
@@ -194,8 +206,8 @@ def adding_hair(
         progress = part_of(progress, 0.5, 1.0)
         ground = _ground(surface, of_hair, parting, device)
         binding = _bind(surface, guides, hair_settings, ground, None, progress)
-        styles = _unstyled(binding, guides, hair_settings, surface, ground)
-        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface, styles)
+        styled = _styled(styling, binding, guides, hair_settings, surface, ground)
+        bound = BoundHair(binding, hair_settings, hair_key, parting.key, guides, None, surface, styled)
         return grown, _growing(bound, progress)
 
     grown, bound = yield compute
@@ -222,7 +234,7 @@ def hair_between(
         key = staleness.root_key(completed, density, None if texture is None else texture.values)
         ground = _ground(surface, (density, texture), parting, device)
         binding = _bind(surface, guides, completed, ground, None, progress)
-        styles = _unstyled(binding, guides, completed, surface, ground)
+        styles = _styled(ReadStyles(), binding, guides, completed, surface, ground)
         return _growing(BoundHair(binding, completed, key, parting.key, guides, None, surface, styles), progress)
 
     return compute
@@ -269,10 +281,10 @@ def _trees_on(surface, guides, settings, ground):
     return lambda: hair_styles.clump_trees(surface.mesh, guides.roots, settings, **ground)
 
 
-def _unstyled(binding, guides, settings, surface, ground):
-    """The `StyledHair` of hair that is new: it has no styles yet."""
+def _styled(read, binding, guides, settings, surface, ground):
+    """The `StyledHair` of hair that is new."""
     make_trees = _trees_on(surface, guides, settings, ground)
-    return styled_hair.bind(ReadStyles(), binding, guides, settings, surface, make_trees)
+    return styled_hair.bind(read, binding, guides, settings, surface, make_trees)
 
 
 def _growing(bound, progress):
@@ -309,10 +321,11 @@ def restyle(target: Curves, depsgraph: Depsgraph) -> bool:
     combed = following.combed(guides, bound.guides)
     if combed is None or len(combed):
         return False
-    read = styled_hair.read_styles(target, target.surface, bound.surface, guide_curves, depsgraph)
+    styles = style_items.styles_of(target.vellus)
+    read = styled_hair.read_styles(styles, target.surface, bound.surface, guide_curves, depsgraph)
     if not read.is_same(bound.styles.read):
-        styles = bound.styles
-        bound.restyle(styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: styles.trees))
+        trees = bound.styles
+        bound.restyle(styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: trees.trees))
     return True
 
 
@@ -357,7 +370,7 @@ def inputs_of(target: Curves) -> tuple[Curves, HairSettings]:
     """(guide Curves, `HairSettings`) of a hair Curves datablock. Raises `HairError`."""
     state = target.vellus
     if state.guide_curves is None:
-        raise HairError(f'"{target.name}" has no guides: pick them in the Strands panel.')
+        raise HairError(f'"{name_of(target)}" has no guides: pick them in the Strands panel.')
     return state.guide_curves, setting_properties.to_settings(state.hair, groom.HairSettings)
 
 

@@ -1,10 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The targets of operators, from the active object: its surface, the guides on it, the hair that follows them."""
 
+from itertools import repeat
+
 import bpy
 from bpy.types import Context, Curves, Object, SpaceView3D, ViewLayer
 
 from ..data.curves import followers
+from ..host.notices import text_of
+from ..settings import style_items
 
 
 def active_of_kind(active: Object | None, kind: str) -> Curves | None:
@@ -45,13 +49,67 @@ def guides_named(name: str) -> Curves | None:
 
 
 def hair_of(active: Object | None) -> Curves | None:
-    """The active hair, the newest that follows the active guides, or the newest on the active mesh; None if none."""
+    """The active hair, the newest that follows the active guides, or the newest on the active mesh; None if none.
+
+    On a mesh in a paint mode, the hair whose mask is painted.
+    """
     if active is None:
         return None
     if active.type == "MESH":
-        return _newest(curves_on(active, "HAIR"))
+        return painted_hair(active) or _newest(curves_on(active, "HAIR"))
     guides = active_of_kind(active, "GUIDES")
     return active_of_kind(active, "HAIR") if guides is None else _newest(followers(guides))
+
+
+def painted_hair(active: Object) -> Curves | None:
+    """The hair on a mesh object in a paint mode that what is painted masks; None if there is none.
+
+    First that whose active style is masked, then that with another such style, then that which it limits.
+    """
+    painted = _painted(active)
+    if not any(painted):
+        return None
+    for masks_of in (_active_masks, _style_masks, _density_masks):
+        masked = [hair for hair in curves_on(active, "HAIR") if any(map(_are_alike, masks_of(hair), repeat(painted)))]
+        if masked:
+            return _newest(masked)
+    return None
+
+
+def _painted(active):
+    """(name of the group or attribute, name of the image) that a paint mode paints; empty for none."""
+    if active.mode == "TEXTURE_PAINT":
+        settings = bpy.context.scene.tool_settings.image_paint
+        return "", _name_of(settings.canvas if settings.mode == "IMAGE" else None)
+    painted = {
+        "WEIGHT_PAINT": active.vertex_groups.active,
+        "VERTEX_PAINT": active.data.color_attributes.active_color,
+    }
+    return _name_of(painted.get(active.mode)), ""
+
+
+def _name_of(owner):
+    return "" if owner is None else text_of(owner, "name")
+
+
+def _are_alike(mask, painted):
+    """Whether the name of a mask's group or image is that of what is painted."""
+    return any(one and one == other for one, other in zip(mask, painted, strict=True))
+
+
+def _active_masks(hair):
+    item = style_items.active_of(hair.vellus)
+    return [] if item is None else [style_items.masks_of(item)]
+
+
+def _style_masks(hair):
+    return [style_items.masks_of(item) for item in hair.vellus.styles]
+
+
+def _density_masks(hair):
+    guides = hair.vellus.guide_curves
+    limited = [hair.vellus.hair] + ([] if guides is None else [guides.vellus.guides])
+    return [(text_of(settings, "density_group"), text_of(settings, "density_image")) for settings in limited]
 
 
 def curves_on(surface: Object, kind: str) -> list[Curves]:

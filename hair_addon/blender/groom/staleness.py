@@ -10,6 +10,7 @@ from ...core import geometry
 from ...core.grooming import groom
 from ...core.params import Settings
 from ..data import curves, drawn_lines, masks, partings, scene
+from ..host.notices import text_of
 from ..settings import setting_properties
 
 
@@ -37,17 +38,17 @@ def guides_digest(guide_curves: Curves | None) -> str:
 
 def has_other_parting(target: Curves, depsgraph: Depsgraph) -> bool:
     """Whether the regions or part lines of hair have changed. Raises `HairError`."""
-    group = target.vellus.hair
-    if not partings.is_wanted(group) or target.surface is None:
+    if not partings.is_wanted(target.vellus.hair) or target.surface is None:
         return False
+    settings = setting_properties.to_settings(target.vellus.hair, groom.HairSettings)
     surface = scene.read_surface(target.surface, depsgraph)
-    parting = partings.read(target.surface, surface, target.vellus.guide_curves, group, depsgraph)
+    parting = partings.read(target.surface, surface, target.vellus.guide_curves, settings, depsgraph)
     return parting.key != target.vellus.parting_key
 
 
 def has_other_flow(guides: Curves, depsgraph: Depsgraph) -> bool:
     """Whether the flow lines of guides have changed since they were grown. Raises `HairError`."""
-    name = guides.vellus.guides.flow_lines
+    name = text_of(guides.vellus.guides, "flow_lines")
     if not name or guides.surface is None:
         return False
     surface = scene.read_surface(guides.surface, depsgraph)

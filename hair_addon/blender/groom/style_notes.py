@@ -9,10 +9,13 @@ from collections.abc import Iterator
 import bpy
 from bpy.types import Curves, PropertyGroup
 
+from ...core.styling import clump_trees, program
 from ...core.styling.base import ProfiledSettings
 from ...core.styling.kinds import KINDS
+from ..host.notices import text_of
 from ..settings import style_items
 from ..settings.translations import interface_text
+from . import bindings
 
 # Settings that are all zero, or empty, where a style of a kind does nothing.
 _WITHOUT = {
@@ -27,7 +30,7 @@ _OBJECTS = {"TRIM": "cutter", "LEAN": "target"}
 
 def notes_of(hair: Curves, item: PropertyGroup) -> list[str]:
     """Translated sentences about a style of a hair Curves datablock; item: the style's properties."""
-    return [*_without_effect(item), *_missing_data(hair, item), *_order(hair, item)]
+    return [*_without_effect(item), *_missing_data(hair, item), *_too_small(hair, item), *_order(hair, item)]
 
 
 def _without_effect(item: PropertyGroup) -> Iterator[str]:
@@ -45,21 +48,22 @@ def _without_effect(item: PropertyGroup) -> Iterator[str]:
 def _is_neutral(item, group):
     if item.kind == "TRIM" and group.factor != 1.0:
         return False
-    return item.kind in _WITHOUT and not any(getattr(group, name) for name in _WITHOUT[item.kind])
+    return item.kind in _WITHOUT and not any(text_of(group, name) for name in _WITHOUT[item.kind])
 
 
 def _missing_data(hair: Curves, item: PropertyGroup) -> Iterator[str]:
     group = style_items.group_of(item)
-    name = getattr(group, _OBJECTS[item.kind]) if item.kind in _OBJECTS else ""
+    name = text_of(group, _OBJECTS[item.kind]) if item.kind in _OBJECTS else ""
+    mask, image = style_items.masks_of(item)
     is_used = item.kind != "LEAN" or group.direction == "OBJECT"
     if is_used and name and name not in bpy.data.objects:
         yield interface_text('No object "{name}": pick another.', name=name)
     if is_used and item.kind == "LEAN" and not name:
         yield interface_text("Pick an object to lean along.")
-    if group.mask and not _has_mask(hair, group.mask):
-        yield interface_text('No vertex group or attribute "{name}".', name=group.mask)
-    if group.mask_image and group.mask_image not in bpy.data.images:
-        yield interface_text('No image "{name}": pick another.', name=group.mask_image)
+    if mask and not _has_mask(hair, mask):
+        yield interface_text('No vertex group or attribute "{name}".', name=mask)
+    if image and image not in bpy.data.images:
+        yield interface_text('No image "{name}": pick another.', name=image)
 
 
 def _has_mask(hair, name):
@@ -68,6 +72,21 @@ def _has_mask(hair, name):
     if surface is not None and (surface.modifiers or name in surface.vertex_groups or name in surface.data.attributes):
         return True
     return surface is None or (guides is not None and name in guides.attributes)
+
+
+def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
+    """Known of hair whose strands were styled since the file was opened."""
+    bound = bindings.of(hair)
+    if bound is None or bound.styles.styling is None:
+        return
+    tree = program.tree_settings(style_items.settings_of(item))
+    if tree is None:
+        return
+    factor = clump_trees.size_factor(bound.styles.styling.trees.area, tree)
+    if factor > 1.0:
+        units = bpy.context.scene.unit_settings.system
+        size = bpy.utils.units.to_string(units, "LENGTH", factor * tree.sizes[0], precision=3)
+        yield interface_text("The locks are too small for this surface: a size of {size} is used.", size=size)
 
 
 def _order(hair: Curves, item: PropertyGroup) -> Iterator[str]:

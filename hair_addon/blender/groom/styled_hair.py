@@ -19,7 +19,7 @@ from ...core.styling.clump_trees import ClumpTrees
 from ...core.styling.style_inputs import Inputs
 from ..data import style_inputs
 from ..data.scene import Surface
-from ..settings import style_items
+from ..settings import setting_properties
 
 if TYPE_CHECKING:
     from ...core.styling.stack import Styling
@@ -74,18 +74,16 @@ class StyledHair:
 
 
 def read_styles(
-    target: Curves | None,
+    styles: Sequence[StyleSettings],
     surface_object: Object,
     surface: Surface,
     guide_curves: Curves | None,
     depsgraph: Depsgraph,
-    styles: Sequence[StyleSettings] | None = None,
 ) -> ReadStyles:
-    """The `ReadStyles` of a hair Curves datablock, none for None; styles: instead of its own. Raises `HairError`."""
-    if styles is None:
-        styles = () if target is None else style_items.styles_of(target.vellus)
+    """The `ReadStyles` of hair on a surface; guide_curves: None for guides that are new. Raises `HairError`."""
     if not styles:
         return ReadStyles()
+    styles = [setting_properties.as_stored(settings) for settings in styles]  # as Curves will give them back
     return ReadStyles(tuple(styles), style_inputs.read(surface_object, surface, guide_curves, styles, depsgraph))
 
 
@@ -110,6 +108,13 @@ def bind(
         grooming.hair_styles.rotation_of(surface.to_world_axes),
     )
     return StyledHair(read, styling, make_trees)
+
+
+def unstyled(
+    styles: StyledHair, binding: HairBinding, guides: Strands, settings: HairSettings, surface: Surface
+) -> StyledHair:
+    """The `StyledHair` of the same strands without styles, and with as many points."""
+    return bind(ReadStyles(), binding, guides, settings, surface, lambda: styles.trees)
 
 
 def _are_same(inputs, others):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guides and hair written into Curves, with their settings and what tells later whether they are out of date."""
 
+from collections.abc import Sequence
 from concurrent.futures import Future
 
 import numpy as np
@@ -8,10 +9,11 @@ from bpy.types import Curves, Object
 
 from ...core.geometry.strands import Strands
 from ...core.grooming.groom import GuideSettings
+from ...core.styling.base import StyleSettings
 from ..data import curves, curves_objects
 from ..data.scene import Surface
 from ..materials import looks
-from ..settings import setting_properties
+from ..settings import setting_properties, style_items
 from . import bindings, staleness
 from .bindings import BoundHair
 
@@ -60,8 +62,9 @@ def write_strands(target: Curves | None, surface_object: Object, guide_curves: C
 def write_hair(target: Curves) -> None:
     """Bring a hair Curves datablock up to what it is bound to, if it is: the one place where hair is written."""
     bound, state = bindings.of(target), target.vellus
-    if bound is None:
+    if bound is None or bound.is_written:
         return
+    bound.catch_up()
     if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
@@ -88,6 +91,13 @@ def write_hair(target: Curves) -> None:
     state.followed = staleness.guides_digest(state.guide_curves)
     bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
     _store_roots(state.guide_curves, bound)
+
+
+def keep_styles(target: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> None:
+    """Store the styles that new hair was grown with; names: of each, empty ones for any."""
+    style_items.assign(target.vellus, styles, names)
+    target.vellus.is_stale = False
+    looks.evaluate_shading(target)
 
 
 def _store_roots(guide_curves, bound):

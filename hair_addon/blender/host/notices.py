@@ -28,6 +28,14 @@ def name_of(owner):
         return "(unreadable name)"
 
 
+def text_of(owner, name):
+    """A text property of data; empty if it is not valid UTF-8, as in a damaged file."""
+    try:
+        return getattr(owner, name)
+    except UnicodeDecodeError:
+        return ""
+
+
 def can_be_drawn(datablock, *values):
     """Whether numbers of a datablock are finite and not absurdly large; if not, say that it is left out."""
     # Written so that NaN fails too: every comparison with it is false.

@@ -8,6 +8,7 @@ from ...core.errors import HairError
 from ...core.geometry import strands
 from ..data import curves, posed_strands
 from ..groom import selection
+from ..host.notices import name_of
 from ..live import live_hair
 
 _AT_ONCE = 16_384  # strands, in double precision: all of them would take four times their memory
@@ -28,7 +29,7 @@ def world_points(datablock):
     bpy.context.view_layer.update()  # new objects may not be evaluated yet
     shown = selection.object_of(datablock, bpy.context.view_layer)
     if shown is None:
-        raise HairError('"{name}" has no object in this view layer.', name=datablock.name)
+        raise HairError('"{name}" has no object in this view layer.', name=name_of(datablock))
     pose = posed_strands.read_pose(datablock.surface, bpy.context.evaluated_depsgraph_get())
     local = pose.carry(_at_rest(datablock), datablock.vellus.topology, curves.read_root_places(datablock, np.inf))
     to_world = np.array(shown.matrix_world, np.float64) * metres_per_unit(bpy.context.scene)
@@ -42,7 +43,7 @@ def world_points(datablock):
 def _at_rest(datablock):
     counts = curves.point_counts(datablock)
     if not len(counts):
-        raise HairError('"{name}" has no strands.', name=datablock.name)
+        raise HairError('"{name}" has no strands.', name=name_of(datablock))
     points, most = curves.read_points(datablock), int(counts.max())
     if (counts == most).all():
         return points.reshape(-1, most, 3)

@@ -141,6 +141,7 @@ def _evaluate(depsgraph, combed):
             live_hair.follow_guides(hair, depsgraph)
         if state.is_shading_stale:
             looks.evaluate_shading(hair)
+    live_hair.show_styles(depsgraph)
 
 
 def _is_surface_at_rest(curves):

@@ -12,6 +12,7 @@ import bpy
 from ...core.errors import HairError
 from ..data import curves, drawn_lines, masks, simulated_guides
 from ..groom import bindings, edited_surfaces, painted_masks, pipeline, staleness, writing
+from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
 from . import invalidation, reported
@@ -45,7 +46,7 @@ def follow_guides(hair, depsgraph):
     if moved is None:
         make_again(hair, depsgraph)
     elif len(moved):
-        hair_cache.move(hair.session_uid, moved, bound.growing)
+        hair_cache.move(hair.session_uid, moved, bound.shown.growing)
         _write_soon(hair)
 
 
@@ -56,6 +57,29 @@ def show_guides(guides, points, depsgraph):
     for hair in curves.followers(guides):
         if hair.vellus.is_live:
             follow_guides(hair, depsgraph)
+
+
+def show_styles(depsgraph):
+    """Show hair with its styles, or without while its guides are combed and artists want it so."""
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR":
+            continue
+        is_styled, bound = not _is_combed_straight(state), bindings.of(hair)
+        if bound is None and not is_styled and state.is_live and not text_of(state, "status"):
+            make_again(hair, depsgraph)  # as the first stroke would, and refused once
+            bound = bindings.of(hair)
+        if bound is not None and is_styled != (bound.straight is None):
+            bound.show_styles(is_styled)
+            invalidation.strands_made(hair)
+
+
+def _is_combed_straight(state):
+    """Whether the guides of hair with styles are in Sculpt Mode, and it is to be shown without these."""
+    guides = state.guide_curves
+    if guides is None or guides.vellus.shows_styles_while_combing or not len(state.styles) or not has_window():
+        return False
+    return any(o.mode == "SCULPT_CURVES" and o.data == guides for o in bpy.data.objects)
 
 
 def make_again(hair, depsgraph):
@@ -220,10 +244,10 @@ def follow_mask(guides, depsgraph):
     """Mark hair as stale whose guides' mask has changed; the guides may be unchanged."""
     for hair in curves.followers(guides):
         state = hair.vellus
-        if not state.is_live or masks.own(state.hair) or hair.surface is None:
+        if not state.is_live or hair.surface is None:
             continue
         try:
-            if staleness.has_other_mask(hair, depsgraph):
+            if not masks.own(state.hair) and staleness.has_other_mask(hair, depsgraph):
                 _mark(hair)
         except HairError as error:
             state.status = str(error)
@@ -246,7 +270,8 @@ def follow_flow(changed, depsgraph):
     """Mark guides as stale whose flow lines are among some datablocks and have changed."""
     for guides in bpy.data.hair_curves:
         state = guides.vellus
-        if state.kind != "GUIDES" or not state.is_live or not drawn_lines.is_among(state.guides.flow_lines, changed):
+        lines = text_of(state.guides, "flow_lines")
+        if state.kind != "GUIDES" or not state.is_live or not drawn_lines.is_among(lines, changed):
             continue
         try:
             if staleness.has_other_flow(guides, depsgraph):
@@ -256,11 +281,11 @@ def follow_flow(changed, depsgraph):
 
 
 def _parts_by(state, changed):
-    if drawn_lines.is_among(state.hair.part_lines, changed):
+    if drawn_lines.is_among(text_of(state.hair, "part_lines"), changed):
         return True
     # Read with each step of a stroke: so only if guides have regions of their own.
     guides = state.guide_curves
-    return guides is not None and guides in changed and state.hair.region_attribute in guides.attributes
+    return guides is not None and guides in changed and text_of(state.hair, "region_attribute") in guides.attributes
 
 
 def follow_masks(surfaces, depsgraph):
@@ -297,16 +322,16 @@ def images_of(target):
     """The names of the images that guides or hair are masked by; hair's guides have their own."""
     state = target.vellus
     if state.kind == "GUIDES":
-        return {state.guides.density_image} - {""}
-    groups = (style_items.group_of(item) for item in state.styles)
-    return {state.hair.density_image, *(group.mask_image for group in groups)} - {""}
+        return {text_of(state.guides, "density_image")} - {""}
+    of_styles = {style_items.masks_of(item)[1] for item in state.styles}
+    return {text_of(state.hair, "density_image"), *of_styles} - {""}
 
 
 def follow_images(target, depsgraph):
     """Mark guides or hair as stale whose images may have been painted. Roots wait until Texture Paint is left."""
     state = target.vellus
     state.is_stale = True
-    if state.kind != "HAIR" or not state.hair.density_image or target.surface.mode == "TEXTURE_PAINT":
+    if state.kind != "HAIR" or not text_of(state.hair, "density_image") or target.surface.mode == "TEXTURE_PAINT":
         return
     try:
         if staleness.has_other_mask(target, depsgraph):
@@ -316,8 +341,7 @@ def follow_images(target, depsgraph):
 
 
 def _has_masks(state):
-    groups = (style_items.group_of(item) for item in state.styles)
-    return any(group.mask or group.mask_image for group in groups)
+    return any(any(style_items.masks_of(item)) for item in state.styles)
 
 
 def follow_styles(changed):

@@ -175,7 +175,7 @@ def _read_hair(places, viewport, refused):
         if not can_be_drawn(place.hair_object, place.to_world):
             continue
         try:
-            strands, shading = hair_cache.hair_on_gpu(datablock)
+            strands, shading = hair_cache.hair_on_gpu(datablock, is_viewport=viewport is not None)
         except HairError as error:
             if refused is None:
                 raise

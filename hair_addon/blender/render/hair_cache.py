@@ -24,6 +24,7 @@ from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
 from ..host import paths
 from ..host.caches import Cache
+from ..host.notices import name_of
 from ..settings import preferences, properties
 
 # Tables of this many settings are kept: one groom and the last few positions of a slider.
@@ -59,10 +60,26 @@ pose_cache = Cache()  # session_uid of an object that strands grow on → Pose
 shading_cache = Cache(_SHADING_CAPACITY)  # settings → Shading
 
 
-def hair_on_gpu(datablock):
-    """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`."""
-    strands_there = strands_on_gpu(datablock)
+def hair_on_gpu(datablock, is_viewport=True):
+    """(`StrandsOnGPU`, `Shading`) of a hair Curves datablock. Raises `HairError`.
+
+    is_viewport: whether hair may be shown without its styles while it is combed.
+    """
+    bound = bindings.of(datablock)
+    if is_viewport or bound is None or bound.straight is None:
+        strands_there = strands_on_gpu(datablock)
+    else:
+        strands_there = _upload_styled(datablock, bound)
     return strands_there, strands_there and shading_of(datablock, strands_there)
+
+
+def _upload_styled(datablock, bound):
+    """`StrandsOnGPU` of bound hair with its styles, kept nowhere."""
+    bound.catch_up()
+    styled = _read(datablock, bound, bound)
+    return strand_textures.upload_strands(
+        _carried(styled, _pose_of(datablock.surface)), styled.radii, styled.randoms, styled.wetness
+    )
 
 
 def strands_on_gpu(datablock):
@@ -74,7 +91,7 @@ def strands_on_gpu(datablock):
     if kept is _REFUSED:
         return None
     if kept is None or (kept.growing is not None and kept.growing.result() is not kept.points):
-        kept = strand_cache.keep(datablock.session_uid, _read(datablock, bindings.of(datablock)))
+        kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
     pose = _pose_of(datablock.surface)
     moved, kept.moved = kept.moved, []
     if kept.on_gpu is None or kept.pose is not pose:
@@ -149,7 +166,7 @@ def invalidate_unless_same(datablock):
             return
         if bound.is_report_due:
             kept = _strands_of(uid)
-            if kept is None or kept.points is not bound.points:
+            if kept is None or kept.points is not bound.shown.points:
                 strand_cache.invalidate(uid)
             return
         if not _are_points(datablock, bound.points):
@@ -163,7 +180,7 @@ def invalidate_unless_same(datablock):
 
 def _is_same(datablock, kept, bound):
     """Whether kept strands are those of a datablock, and its surface would carry them as it did."""
-    is_known = kept.points is bound.points if bound is not None else _are_points(datablock, kept.points)
+    is_known = kept.points is bound.shown.points if bound is not None else _are_points(datablock, kept.points)
     return (
         is_known
         and np.array_equal(kept.radii.ravel(), curves.read_radii(datablock))
@@ -196,8 +213,16 @@ def _are_points(datablock, points):
     return np.array_equal(points.reshape(-1, 3), curves.read_points(datablock))
 
 
-def _read(datablock, bound):
-    """`_KeptStrands` of a datablock as it is now, or of what it is bound by."""
+def _read_shown(datablock):
+    bound = bindings.of(datablock)
+    return _read(datablock, bound, bound and bound.shown)
+
+
+def _read(datablock, bound, shown):
+    """`_KeptStrands` of a datablock as it is now, or of what it is bound by.
+
+    shown: the `BoundHair` whose points are read, which may be without the styles of `bound`.
+    """
     if bound is None:
         places = None if datablock.surface is None else curves.read_root_places(datablock, np.inf)
         return _KeptStrands(*_shown_strands(datablock), places, _rooted_on(datablock, datablock.vellus.topology))
@@ -207,8 +232,8 @@ def _read(datablock, bound):
         (_identities, randoms), wetness = bound.binding.identities, bound.styles.wetness
     # Roots too are those of the binding: the datablock may store those of earlier strands.
     places, rooted_on = bound.surface.places(bound.binding.roots), _rooted_on(datablock, bound.surface.topology)
-    radii = np.tile(bound.radii, (len(bound.points), 1))
-    return _KeptStrands(bound.points, radii, randoms, wetness, places, rooted_on, bound.growing)
+    radii = np.tile(bound.radii, (len(shown.points), 1))
+    return _KeptStrands(shown.points, radii, randoms, wetness, places, rooted_on, shown.growing)
 
 
 def _shown_strands(datablock):
@@ -229,7 +254,7 @@ def read_strands(datablock):
     """
     counts = curves.point_counts(datablock)
     if not len(counts):
-        raise HairError(f'"{datablock.name}" has no strands to draw.')
+        raise HairError(f'"{name_of(datablock)}" has no strands to draw.')
     points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
     wetness = curves.read_wetness(datablock)
     most = int(counts.max())

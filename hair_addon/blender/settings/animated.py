@@ -12,6 +12,7 @@ from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables
 from ..host import scene_time
 from ..host.caches import Cache
+from ..host.notices import text_of
 from . import setting_properties, style_items
 
 _GROUPS = {
@@ -75,4 +76,4 @@ def _groups(state):
 
 def _key(item):
     """Of a style, wherever it is in the list."""
-    return item.kind, item.name
+    return item.kind, text_of(item, "name")

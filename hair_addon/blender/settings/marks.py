@@ -16,6 +16,11 @@ def mark_shading(group, _context):
     group.id_data.update_tag()
 
 
+def mark_shown(group, _context):
+    """Let viewports show them otherwise: nothing is computed again."""
+    group.id_data.update_tag()
+
+
 def mark_both(group, context):
     """Do both: for settings that change the shape and the look of hair."""
     mark_geometry(group, context)

@@ -15,7 +15,7 @@ from ...core.shading import appearance
 from ...core.shading.appearance import Appearance
 from ...core.shading.tables import lookup_tables
 from . import setting_properties, style_items
-from .marks import mark_colliding, mark_dynamics, mark_geometry, mark_shading
+from .marks import mark_colliding, mark_dynamics, mark_geometry, mark_shading, mark_shown
 from .translations import CONTEXT
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
@@ -178,6 +178,14 @@ class VellusCurves(bpy.types.PropertyGroup):
         translation_context=CONTEXT,
         default=False,
         update=mark_shading,
+    )
+    shows_styles_while_combing: bpy.props.BoolProperty(
+        name="Comb Styled",
+        description="Show hair with its styles while its guides are combed. When off, viewports show it straight and "
+        "strokes take less time; files and renders have styled hair",
+        translation_context=CONTEXT,
+        default=True,
+        update=mark_shown,
     )
     is_live: bpy.props.BoolProperty(
         name="Auto Update",

@@ -9,6 +9,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ...core.params import declared, from_surface, label_of
+from ..host.notices import text_of
 from .translations import CONTEXT
 
 _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
@@ -188,7 +189,7 @@ def assign(owner, settings, skip=()):
 
 def values_of(owner, names):
     """{name: value} of an operator's or group's properties, for comparison."""
-    values = {name: getattr(owner, name) for name in names}
+    values = {name: text_of(owner, name) for name in names}  # as any of them may be text
     return {n: value[:] if isinstance(value, bpy.types.bpy_prop_array) else value for n, value in values.items()}
 
 

@@ -11,6 +11,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.params import declared
 from ...core.styling.kinds import DESCRIPTIONS, KINDS, LABELS, MOST_STYLES, kind_of
+from ..host.notices import text_of
 from . import setting_properties, style_keys
 from .marks import mark_both, mark_geometry
 from .translations import CONTEXT
@@ -32,7 +33,7 @@ _GROUPS = {kind: _group_class(kind) for kind in KINDS}
 def _renamed(item, name, present, _is_set):
     """A name that no other style has; keys by name follow."""
     state = item.id_data.vellus
-    others = [other.name for other in state.styles if other.name != present]
+    others = [other for other in names_of(state) if other != present]
     name = unique_name(name.strip() or LABELS[item.kind], others)
     if present and name != present:
         names = names_of(state)
@@ -75,7 +76,7 @@ def styles_of(state):
 
 def names_of(state):
     """The names of a hair's styles in order."""
-    return tuple(item.name for item in state.styles)
+    return tuple(text_of(item, "name") for item in state.styles)
 
 
 def active_of(state):
@@ -88,11 +89,17 @@ def wetness_of(state):
     return max((item.wet.amount for item in state.styles if item.kind == "WET" and item.wet.is_on), default=0.0)
 
 
+def masks_of(item):
+    """(name of the group or attribute, name of the image) that mask a style; empty for none."""
+    group = group_of(item)
+    return text_of(group, "mask"), text_of(group, "mask_image")
+
+
 def objects_named(state):
     """Names of the objects that a hair's styles read."""
-    cutters = {item.trim.cutter for item in state.styles if item.kind == "TRIM"}
-    targets = {item.lean.target for item in state.styles if item.kind == "LEAN" and item.lean.direction == "OBJECT"}
-    return (cutters | targets) - {""}
+    leaning = [item.lean for item in state.styles if item.kind == "LEAN" and item.lean.direction == "OBJECT"]
+    cutters = {text_of(item.trim, "cutter") for item in state.styles if item.kind == "TRIM"}
+    return (cutters | {text_of(lean, "target") for lean in leaning}) - {""}
 
 
 def unique_name(name, others):
@@ -132,7 +139,7 @@ def add(state, settings, name="", place=None):
 def duplicate(state, place):
     """Add a copy of a style after it, without keys and with a seed of its own. Raises `HairError`."""
     item = state.styles[place]
-    add(state, replace(settings_of(item), seed=new_seed(state)), item.name, place + 1)
+    add(state, replace(settings_of(item), seed=new_seed(state)), text_of(item, "name"), place + 1)
 
 
 def move(state, place, to):
@@ -160,7 +167,7 @@ def assign(state, styles, names=None):
     """
     require_room(len(styles))
     styles = [setting_properties.as_stored(settings) for settings in styles]
-    before = [(item.name, item.kind) for item in state.styles]
+    before = [(text_of(item, "name"), item.kind) for item in state.styles]
     wanted = _named(state, styles, names)
     if wanted != before:
         order = [before.index(pair) if pair in before else None for pair in wanted]

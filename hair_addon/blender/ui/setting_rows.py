@@ -8,6 +8,7 @@ from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import declared
 from ...core.styling.base import ProfiledSettings, StyleSettings
 from ...core.styling.kinds import KINDS
+from ..host.notices import text_of
 from ..settings import setting_properties, style_items
 from ..settings.translations import interface_text
 
@@ -95,7 +96,7 @@ def growth_rows(layout, owner):
     rows(layout, owner, GuideSettings, _GROWTH)
     search_row(layout, owner, "flow_lines", bpy.data, "objects")
     angle = layout.column()
-    angle.active = bool(owner.flow_lines)
+    angle.active = bool(text_of(owner, "flow_lines"))
     row(angle, owner, "lift")
 
 

@@ -13,7 +13,14 @@ import numpy as np
 from ..params import Settings, param, param_of
 from .fibre import kajiya_kay, marschner, strand_variation
 from .fibre.fresnel import dielectric_reflectance
-from .fibre.pigment import color_falloff, color_from_sigma_a, sigma_a_from_color, sigma_a_from_melanin
+from .fibre.pigment import (
+    FITTED_IOR,
+    color_falloff,
+    color_from_sigma_a,
+    color_of_scattering,
+    sigma_a_from_color,
+    sigma_a_from_melanin,
+)
 from .tables import lookup_tables
 
 _WHITE = (1.0, 1.0, 1.0)
@@ -27,6 +34,9 @@ STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint
 # A film of water fills the gaps between the cuticle's scales, which gives a smooth surface (narrow highlights, no tilt,
 # a coat), and lowers the index of refraction that sends back as much light. Pigment stays as it is.
 _WET = {"roughness": 0.16, "coat": 0.4, "cuticle_angle": math.radians(0.5), "ior": 1.38}
+
+# Fibres whose index is that of air reflect nothing.
+_LEAST_SCATTERING = 1e-6
 
 # What the colour follows from, by parametrization.
 COLOR_FIELDS = {"MELANIN": ("melanin", "redness", "tint"), "COLOR": ("color",), "ABSORPTION": ("absorption",)}
@@ -131,9 +141,14 @@ def sigma_a(appearance: Appearance) -> tuple[float, ...]:
 
 
 def mean_color(appearance: Appearance) -> np.ndarray:
-    """The colour of a full head of this hair, RGB (3,), the mean over all strands from root to tip."""
+    """The colour of a full head of this hair, RGB (3,), the mean over all strands from root to tip.
+
+    Fibres send back R and TRT, both as the reflectance of their surface says: under water that is less.
+    """
     sigma_a_everywhere = strand_variation.sample_sigma_a(strand_settings(appearance))
-    return color_from_sigma_a(sigma_a_everywhere, appearance.radial_roughness).reshape(-1, 3).mean(axis=0)
+    color = color_from_sigma_a(sigma_a_everywhere, appearance.radial_roughness).reshape(-1, 3).mean(axis=0)
+    scattering = _mean_reflectance(shaded(appearance).ior) / _mean_reflectance(FITTED_IOR)
+    return color_of_scattering(color, max(scattering, _LEAST_SCATTERING))
 
 
 def strand_settings(appearance: Appearance) -> strand_variation.Settings:

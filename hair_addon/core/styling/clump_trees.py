@@ -6,6 +6,7 @@ whichever other strands there are. A strand belongs to the nearest site of the f
 one of the next coarser level, so locks are made of whole smaller locks. One in a region without sites belongs to none.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,13 +21,18 @@ from ..kernels.checks import require_indices
 from .program import TreeSettings
 from .random_numbers import CROSSOVER, random_numbers
 
-MOST_SITES = 50_000  # of a level: more take minutes to place
+MOST_SITES = 20_000  # of the finest level: they take a second to place, and 50,000 on two levels seven
 _HEXAGON = 0.866  # area of a site's cell by the square of the distance between sites
 
 
 def site_count(area: float, size: float) -> int:
     """Number of sites at a distance [m] from each other on an area [m²]."""
-    return int(np.clip(round(area / (_HEXAGON * size**2)), 1, MOST_SITES))
+    return max(round(area / (_HEXAGON * size**2)), 1)
+
+
+def size_factor(area: float, tree: TreeSettings) -> float:
+    """What the sizes of a tree are multiplied by on an area [m²], so that no level has more than `MOST_SITES`."""
+    return max(math.sqrt(area / (_HEXAGON * MOST_SITES)) / min(tree.sizes), 1.0)
 
 
 @dataclass
@@ -47,8 +53,9 @@ class ClumpTrees:
     def levels(self, tree: TreeSettings) -> list[HairBinding]:
         """The centres of each level, the coarsest first, bound to guides."""
         if tree not in self._levels:
+            factor = size_factor(self.area, tree)
             self._levels[tree] = [
-                self.binder.bind(self.place(site_count(self.area, size), tree.seed + level))
+                self.binder.bind(self.place(site_count(self.area, factor * size), tree.seed + level))
                 for level, size in enumerate(tree.sizes)
             ]
         return self._levels[tree]

@@ -1,25 +1,32 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings that are made for a human scalp, fitted to another surface: all lengths are multiplied by one factor."""
 
+from collections.abc import Collection
 from dataclasses import fields, replace
 from typing import Any
 
 from ..params import Param
-from . import base, clump
+from . import base, braid, clump, wet
 from .base import StyleSettings
 
 _FEWEST_SPACINGS = 4.0  # smaller locks have too few strands
+_LOCKS: dict[type[StyleSettings], str] = {clump.Settings: "size", braid.Settings: "size", wet.Settings: "lock"}
 
 
-def fitted[S: StyleSettings](settings: S, factor: float, strand_spacing: float = 0.0) -> S:
-    """A style with its lengths multiplied by a factor; locks have a size of 4 strand spacings [m] at least."""
+def fitted[S: StyleSettings](settings: S, factor: float, strand_spacing: float = 0.0, kept: Collection[str] = ()) -> S:
+    """A style with its lengths multiplied by a factor; locks have a size of 4 strand spacings [m] at least.
+
+    kept: names of settings that stay as they are.
+    """
+    given = {name: getattr(settings, name) for name in kept}
     if factor != 1.0:
         scaled = base.scaled(settings, factor)
         lengths = [field.name for field in fields(scaled) if field.metadata["param"].unit == "LENGTH"]
         settings = replace(scaled, **{name: _rounded(getattr(scaled, name)) for name in lengths})
-    if isinstance(settings, clump.Settings) and settings.size < _FEWEST_SPACINGS * strand_spacing:
-        settings = replace(settings, size=_rounded(_FEWEST_SPACINGS * strand_spacing))
-    return settings
+    lock = _LOCKS.get(type(settings))
+    if lock is not None and getattr(settings, lock) < _FEWEST_SPACINGS * strand_spacing:
+        settings = replace(settings, **{lock: _rounded(_FEWEST_SPACINGS * strand_spacing)})
+    return replace(settings, **given) if given else settings
 
 
 def fitted_value(value: Any, details: Param, factor: float) -> Any:

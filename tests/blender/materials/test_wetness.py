@@ -48,6 +48,22 @@ def test_the_wetter_of_look_and_style_is_seen(hair, wetness, amounts, wanted, mo
     assert api.settings_of(hair).appearance == Appearance(wetness=wanted)
 
 
+def test_the_flat_color_darkens_with_the_style(hair):
+    """What EEVEE and Blender's own viewport show of hair."""
+    state, colors = hair.data.vellus, []
+    style_items.assign(state, [wet.Settings(amount=0.0, lock=0.5)])
+    for amount in (0.0, 0.5, 1.0):
+        state.styles[0].wet.amount = amount
+        bpy.context.view_layer.update()
+        material = hair.data.materials[0]
+        node = next(node for node in material.node_tree.nodes if node.bl_idname == materials.HAIR_NODE)
+        color = next(socket for socket in node.inputs if socket.identifier == "Color").default_value
+        np.testing.assert_array_equal(color, material.diffuse_color)
+        colors.append(color[:3])
+    np.testing.assert_allclose(colors[0], appearance.mean_color(Appearance()), rtol=1e-6)
+    assert (np.diff(colors, axis=0) < 0.0).all() and (np.array(colors[-1]) < 0.9 * np.array(colors[0])).all()
+
+
 def test_a_style_that_is_off_is_dry(hair):
     state = hair.data.vellus
     style_items.assign(state, [wet.Settings(lock=0.5)])

@@ -3,6 +3,7 @@
 
 import math
 import os
+from dataclasses import replace
 from types import SimpleNamespace
 
 import bpy
@@ -282,8 +283,11 @@ def test_a_saved_look_has_a_swatch_of_its_color(hair, tmp_path, monkeypatch):
     look_previews.swatch("Mine")
     saved_looks.write("Mine", blue)
     look_previews.swatch("Mine")
+    saved_looks.write("Soaked", replace(blue, wetness=1.0))
+    look_previews.swatch("Soaked")
     (tmp_path / "Broken.json").write_text("{")
     look_previews.swatch("Broken")
     colors = [np.array(preview.icon_pixels_float[:3]) for preview in look_previews._previews.values()]
-    assert [int(np.argmax(color)) for color in colors] == [0, 2]
+    assert [int(np.argmax(color)) for color in colors] == [0, 2, 2]
+    assert (colors[2] < 0.97 * colors[1]).all()  # wet hair is darker
     look_previews.unregister()

@@ -7,13 +7,13 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from hair_addon.blender.groom import groom_settings, hair_styles, style_notes
+from hair_addon.blender.groom import bindings, groom_settings, hair_styles, style_notes
 from hair_addon.blender.settings import saved_styles, setting_properties, style_items
 from hair_addon.blender.ui import look_previews, panels
 from hair_addon.core.files import style_presets
 from hair_addon.core.grooming import groom_defaults
 from hair_addon.core.params import declared
-from hair_addon.core.styling import clump, curl, frizz, lean, trim, wet
+from hair_addon.core.styling import clump, clump_trees, curl, frizz, lean, trim, wet
 from hair_addon.core.styling.base import ProfiledSettings, scaled
 from hair_addon.core.styling.kinds import KINDS, OFFERS, kind_of
 from tests.support.always import operate
@@ -61,7 +61,7 @@ def test_the_menu_adds_its_styles(hair, offer, is_fitted):
     for name, _default, details in declared(type(wanted)):
         if details.unit == "LENGTH":
             expected = getattr(wanted, name)
-            if is_fitted and kind_of(wanted) == "CLUMP":  # locks of 500 strands on a sphere are larger
+            if is_fitted and name in ("size", "lock"):  # locks of 500 strands on a sphere are larger
                 expected = max(expected, 4.0 * math.sqrt(4.0 * math.pi / 500))
             assert getattr(styles()[0], name) == pytest.approx(expected, rel=0.02), name
     assert state().is_stale != is_fitted  # it waits, or the update has been
@@ -305,6 +305,20 @@ def test_the_order_of_styles_is_explained(hair):
     assert "Wet belongs last" in first[0] and second == [] and "Lean acts on guides" in third[0]
     state().styles[1].curl.is_on = state().styles[2].lean.is_on = False
     assert style_notes.notes_of(hair.data, state().styles[0]) == []
+
+
+@pytest.mark.parametrize("settings", [clump.Settings(size=0.3, levels=2), wet.Settings(lock=0.3)], ids=kind_of)
+def test_locks_that_are_too_small_are_explained(hair, settings, monkeypatch):
+    style_items.assign(state(), [settings])
+    bpy.context.view_layer.update()
+    said = style_notes.notes_of(hair.data, state().styles[0])
+    assert said == []
+    monkeypatch.setattr(clump_trees, "MOST_SITES", 20)
+    (said,) = style_notes.notes_of(hair.data, state().styles[0])
+    finest = math.sqrt(bindings.of(hair.data).styles.trees.area / (0.866 * 20))
+    size = finest / (settings.ratio if kind_of(settings) == "CLUMP" else 0.32)
+    assert said == f"The locks are too small for this surface: a size of {size:.2f} m is used."
+    assert said in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
 
 
 def test_presets_are_offered_with_pictures_where_there_are_some(hair, tmp_path, monkeypatch):

@@ -203,6 +203,22 @@ def test_hair_darkens_with_each_step_of_wetness(name):
     assert (np.diff(reflected) < 0.0).all()
 
 
+@pytest.mark.parametrize("name", (*NATURAL, "WHITE"))
+def test_the_flat_colour_of_wet_hair_is_darker_as_its_fibres_say(name):
+    """By a deep layer of fibres that absorb and send back what the tables of the Marschner model say."""
+    looks = [replace(presets.PRESETS[name][1], wetness=wetness) for wetness in STEPS]
+    colors = np.array([appearance.mean_color(look) for look in looks])
+    assert (np.diff(colors, axis=0) < 0.0).all()
+    np.testing.assert_array_equal(colors[-1], appearance.mean_color(appearance.wetted(looks[0], 1.0)))
+    layers = []
+    for look in (looks[0], looks[-1]):
+        table = lookup_tables.bake(appearance.table_settings(look, lookup_tables.Settings(size=32)))
+        total = albedo.mean_albedo(table)
+        k_by_s = (1.0 - total) / (total - albedo.mean_forward(table))
+        layers.append(1.0 + k_by_s - np.sqrt(k_by_s**2 + 2.0 * k_by_s))
+    np.testing.assert_allclose(colors[-1] / colors[0], layers[1] / layers[0], rtol=0.1)
+
+
 @pytest.mark.parametrize("name", NATURAL)
 def test_highlights_narrow_with_each_step_of_wetness(name):
     looks = [appearance.wetted(presets.PRESETS[name][1], wetness) for wetness in STEPS]

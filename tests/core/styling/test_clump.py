@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hair_addon.core.styling import clump, program
+from hair_addon.core.styling import clump, clump_trees, program
 from tests.support.stepped import curved_strands, largest_move, stepped, straight_strands
 from tests.support.styled import head
 
@@ -158,6 +158,22 @@ def test_sites_are_as_many_as_the_size_says(hair):
         assert len(sites) == pytest.approx(hair.trees.area / (0.866 * size**2), abs=1.0)
         apart = np.linalg.norm(sites[:, None] - sites, axis=-1) + np.eye(len(sites))
         assert np.median(apart.min(axis=1)) == pytest.approx(size, rel=0.25)
+
+
+def test_locks_too_small_for_a_surface_are_larger_ones(hair, monkeypatch):
+    """All levels grow by one factor, so that the finest has no more sites than there may be."""
+    monkeypatch.setattr(clump_trees, "MOST_SITES", 200)
+    area, counts = hair.trees.area, []
+    for size in (0.08, 0.01, 1e-3, 1e-30):
+        settings = clump.Settings(size=size, levels=2, ratio=0.5)
+        tree = program.tree_settings(settings)
+        factor = clump_trees.size_factor(area, tree)
+        coarse, fine = (len(level.roots) for level in hair.trees.levels(tree))
+        assert coarse == pytest.approx(area / (0.866 * (factor * size) ** 2), abs=1.0)
+        assert fine == pytest.approx(4 * coarse, abs=4) and fine <= 200
+        assert (factor == 1.0) == (area / (0.866 * (0.5 * size) ** 2) <= 200)
+        counts.append(fine)
+    assert counts[0] < 200 and counts[1:] == [200] * 3
 
 
 def test_more_strength_gathers_more(hair):

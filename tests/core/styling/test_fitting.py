@@ -1,10 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Styles fitted to a surface: lengths follow its size, and nothing else does."""
 
+from dataclasses import replace
+
 import pytest
 
 from hair_addon.core.params import declared
-from hair_addon.core.styling import clump, fitting
+from hair_addon.core.styling import braid, clump, fitting, wet
 from hair_addon.core.styling.kinds import OFFERS
 
 FACTORS = (0.1, 0.37, 1.0, 3.3, 25.0)
@@ -29,7 +31,23 @@ def test_a_human_head_changes_nothing(offer):
     assert fitting.fitted(settings, 1.0) == settings
 
 
+@pytest.mark.parametrize("offer", OFFERS)
+def test_what_is_given_stays(offer):
+    settings = OFFERS[offer].settings
+    names = [name for name, *_ in declared(type(settings))]
+    assert fitting.fitted(settings, 25.0, 2.0, kept=names) == settings
+    for kept in names:
+        one = fitting.fitted(settings, 25.0, 2.0, kept=[kept])
+        assert replace(one, **{kept: getattr(fitting.fitted(settings, 25.0, 2.0), kept)}) == fitting.fitted(
+            settings, 25.0, 2.0
+        )
+        assert getattr(one, kept) == getattr(settings, kept)
+
+
 @pytest.mark.parametrize("spacing", [0.0, 0.001, 0.01, 2.0])
-def test_locks_are_four_spacings_at_least(spacing):
-    size = fitting.fitted(clump.Settings(size=0.012), 1.0, spacing).size
-    assert size == pytest.approx(max(0.012, 4.0 * spacing))
+@pytest.mark.parametrize(
+    ("settings", "name"), [(clump.Settings(), "size"), (braid.Settings(), "size"), (wet.Settings(), "lock")]
+)
+def test_locks_are_four_spacings_at_least(settings, name, spacing):
+    size = getattr(fitting.fitted(settings, 1.0, spacing), name)
+    assert size == pytest.approx(max(getattr(settings, name), 4.0 * spacing))

@@ -11,7 +11,7 @@ from ...groom.foreign_curves import is_foreign
 from ...groom.selection import guides_again, guides_of, surface_of
 from ...settings.translations import interface_text
 from .. import menus, setting_rows
-from .tab import HairTab, draw_work, split, write
+from .tab import HairTab, draw_work, split, write, write_status
 
 
 class VELLUS_PT_guides(HairTab, bpy.types.Panel):
@@ -32,8 +32,7 @@ class VELLUS_PT_guides(HairTab, bpy.types.Panel):
             _draw_work(layout, context, surface, GuideSettings())
             layout.operator("vellus.distribute_guides", text="New Guide Set", icon="OUTLINER_OB_CURVES")
             return
-        if guides.vellus.status:
-            write(layout, context, interface_text(guides.vellus.status), "ERROR")
+        write_status(layout, context, guides.vellus)
         if is_hand_made(guides):
             _draw_hand_made(layout, context, guides)
             return

@@ -9,7 +9,7 @@ from ...groom.diagnostics import parting_warnings
 from ...groom.selection import active_of_kind, guides_of, hair_of
 from ...settings.translations import interface_text
 from .. import setting_rows
-from .tab import HairTab, draw_work, megabytes, split, write
+from .tab import HairTab, draw_work, megabytes, split, write, write_status
 
 
 class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
@@ -29,8 +29,7 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             layout.operator("vellus.interpolate_hair", text="Strands from These Guides", icon="CURVES")
             return
         state = hair.vellus
-        if state.status:
-            write(layout, context, interface_text(state.status), "ERROR")
+        write_status(layout, context, state)
         setting_rows.row(layout, state, "guide_curves")
         setting_rows.strand_rows(layout, state.hair, hair.surface)
         setting_rows.row(layout, state, "is_live")

@@ -9,13 +9,10 @@ from ....core.shading.presets import PRESETS
 from ...groom.diagnostics import modifier_notes
 from ...groom.selection import active_of_kind, hair_of, object_of
 from ...settings import saved_looks
-from ...settings.translations import CONTEXT
 from .. import look_previews
 from ..setting_rows import others, row, rows
-from .tab import HairTab, split, write
-
-_LOOK_COLUMNS = 4
-_LOOK_SCALE = 4.0  # of a picture, in heights of a row
+from .preset_menu import PresetMenu
+from .tab import HairTab, split, write, write_status
 
 _COLORS = tuple(name for names in appearance.COLOR_FIELDS.values() for name in names)
 
@@ -26,35 +23,22 @@ class _OfHair(HairTab):
         return hair_of(context.object) is not None
 
 
-class VELLUS_PT_looks(bpy.types.Panel):
+class VELLUS_PT_looks(PresetMenu, bpy.types.Panel):
     """Built-in looks and saved looks"""
 
     bl_label = "Looks"
     bl_idname = "VELLUS_PT_looks"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "HEADER"
-    bl_options = {"INSTANCED"}
-    bl_ui_units_x = 21
-    bl_translation_context = CONTEXT
+    apply_preset, apply_saved = "vellus.apply_preset", "vellus.apply_saved_look"
+    save, remove_saved = "vellus.save_look", "vellus.remove_look"
+    save_label = "Save Look"
 
-    def draw(self, _context):
-        layout = self.layout
-        layout.emboss = "PULLDOWN_MENU"
-        layout.operator_context = "EXEC_DEFAULT"
-        grid = layout.grid_flow(columns=_LOOK_COLUMNS, row_major=True, even_columns=True, even_rows=True, align=True)
-        for identifier, (label, _look) in PRESETS.items():
-            column = grid.column(align=True)
-            column.template_icon(icon_value=look_previews.picture(identifier), scale=_LOOK_SCALE)
-            column.operator("vellus.apply_preset", text=label).preset = identifier
-        layout.separator()
-        column = layout.column(align=True)
-        for name in saved_looks.names():
-            line = column.row(align=True)
-            text, icon = bpy.path.display_name(name), look_previews.swatch(name)
-            line.operator("vellus.apply_saved_look", text=text, translate=False, icon_value=icon).name = name
-            line.operator("vellus.remove_look", text="", icon="REMOVE").name = name
-        layout.operator_context = "INVOKE_DEFAULT"
-        layout.operator("vellus.save_look", text="Save Look", icon="ADD")
+    @staticmethod
+    def presets():
+        return ((name, label, look_previews.picture(name)) for name, (label, _look) in PRESETS.items())
+
+    @staticmethod
+    def saved():
+        return ((name, look_previews.swatch(name)) for name in saved_looks.names())
 
 
 class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
@@ -71,8 +55,7 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
     def draw(self, context):
         layout = split(self.layout)
         state = hair_of(context.object).vellus
-        if state.shading_status:
-            write(layout, context, state.shading_status, "ERROR")
+        write_status(layout, context, state, "shading_status")
         row(layout, state, "is_drawn")
         for note in modifier_notes(_hair_object(context)):
             write(layout, context, note, "INFO")

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ....core.errors import HairError
 from ....core.files import style_presets
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
@@ -11,13 +12,12 @@ from ...groom.hair_styles import points_wanted
 from ...groom.selection import hair_of
 from ...groom.style_notes import notes_of
 from ...settings import saved_styles, style_items
-from ...settings.translations import CONTEXT, interface_text
+from ...settings.translations import interface_text
 from .. import look_previews, setting_rows
+from .preset_menu import PresetMenu
 from .tab import HairTab, split, write
 
 _ROWS = 5  # of a list that holds less; as high as its buttons
-_PRESET_COLUMNS = 4
-_PICTURE_SCALE = 4.0  # in heights of a row
 
 
 def _active_of(context):
@@ -38,36 +38,22 @@ class VELLUS_UL_styles(bpy.types.UIList):
         row.prop(style_items.group_of(item), "is_on", text="")
 
 
-class VELLUS_PT_style_presets(bpy.types.Panel):
+class VELLUS_PT_style_presets(PresetMenu, bpy.types.Panel):
     """Built-in and saved style presets"""
 
     bl_label = "Style Presets"
     bl_idname = "VELLUS_PT_style_presets"
-    bl_space_type = "VIEW_3D"
-    bl_region_type = "HEADER"
-    bl_options = {"INSTANCED"}
-    bl_ui_units_x = 21
-    bl_translation_context = CONTEXT
+    apply_preset, apply_saved = "vellus.apply_style_preset", "vellus.apply_saved_style"
+    save, remove_saved = "vellus.save_style_preset", "vellus.remove_style_preset"
+    save_label = "Save Style Preset"
 
-    def draw(self, _context):
-        layout = self.layout
-        layout.emboss = "PULLDOWN_MENU"
-        layout.operator_context = "EXEC_DEFAULT"
-        grid = layout.grid_flow(columns=_PRESET_COLUMNS, row_major=True, even_columns=True, even_rows=True, align=True)
-        for identifier, label in style_presets.PRESETS.items():
-            column = grid.column(align=True)
-            picture = look_previews.style_picture(identifier)
-            if picture is not None:
-                column.template_icon(icon_value=picture, scale=_PICTURE_SCALE)
-            column.operator("vellus.apply_style_preset", text=label).preset = identifier
-        layout.separator()
-        column = layout.column(align=True)
-        for name in saved_styles.names():
-            line = column.row(align=True)
-            line.operator("vellus.apply_saved_style", text=bpy.path.display_name(name), translate=False).name = name
-            line.operator("vellus.remove_style_preset", text="", icon="REMOVE").name = name
-        layout.operator_context = "INVOKE_DEFAULT"
-        layout.operator("vellus.save_style_preset", text="Save Style Preset", icon="ADD")
+    @staticmethod
+    def presets():
+        return ((name, label, look_previews.style_picture(name)) for name, label in style_presets.PRESETS.items())
+
+    @staticmethod
+    def saved():
+        return ((name, 0) for name in saved_styles.names())
 
 
 class VELLUS_PT_styles(HairTab, bpy.types.Panel):
@@ -116,7 +102,10 @@ class VELLUS_PT_styles(HairTab, bpy.types.Panel):
 
 def _draw_points(layout, context, hair):
     """Offer the points that curls want where strands have fewer."""
-    wanted, present = points_wanted(hair), hair.vellus.hair.point_count
+    try:
+        wanted, present = points_wanted(hair), hair.vellus.hair.point_count
+    except HairError:  # which is the status of the hair
+        return
     if wanted > present:
         said = interface_text("Smooth curls need {wanted} points per strand.", wanted=wanted)
         write(layout, context, said, "INFO")

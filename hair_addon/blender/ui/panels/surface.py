@@ -5,7 +5,8 @@ import bpy
 
 from ...groom.diagnostics import warnings_of
 from ...groom.foreign_curves import is_foreign
-from ...groom.selection import active_of_kind, parts_of, surface_of
+from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
+from ...host.notices import name_of, text_of
 from ...settings.translations import interface_text
 from ..setting_rows import row
 from .tab import HairTab, split, write
@@ -27,7 +28,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
         if active is not None:
             row(layout, active, "surface")
         elif surface is not None:
-            layout.label(text=surface.name, icon="MESH_DATA", translate=False)
+            layout.label(text=name_of(surface), icon="MESH_DATA", translate=False)
         else:
             write(layout, context, interface_text("Select a mesh to grow hair on."), "INFO")
             return
@@ -38,6 +39,7 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
                 box.operator(warning.operator)
         if parts:
             _draw_tools(layout)
+            _draw_combing(layout, context)
 
 
 def _draw_foreign(layout, context):
@@ -61,6 +63,13 @@ def _draw_tools(layout):
     column.operator("vellus.delete_hair", icon="TRASH")
 
 
+def _draw_combing(layout, context):
+    """What hair with styles shows while its guides are combed."""
+    hair, guides = hair_of(context.object), guides_of(context.object)
+    if hair is not None and guides is not None and len(hair.vellus.styles):
+        row(layout, guides.vellus, "shows_styles_while_combing")
+
+
 class VELLUS_PT_surface_uvs(HairTab, bpy.types.Panel):
     """UV map that hair nodes use to find roots on the surface"""
 
@@ -75,7 +84,7 @@ class VELLUS_PT_surface_uvs(HairTab, bpy.types.Panel):
 
     def draw(self, context):
         layout = self.layout
-        used = sorted({part.surface_uv_map for part in parts_of(context.object) if part.surface_uv_map})
+        used = sorted({text_of(part, "surface_uv_map") for part in parts_of(context.object)} - {""})
         if used:
             layout.label(text=", ".join(used), icon="GROUP_UVS", translate=False)
         column = layout.column(align=True)

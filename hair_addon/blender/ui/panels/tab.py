@@ -3,6 +3,7 @@
 
 import textwrap
 
+from ...host.notices import text_of
 from ...settings.translations import CONTEXT, interface_text
 
 _CHARACTER_WIDTH = 6.8  # pixels of Blender's interface font on average, at a scale of one
@@ -36,6 +37,13 @@ def write(layout, context, text, icon="NONE"):
     column.scale_y = 0.8 if len(lines) > 1 else 1.0
     for place, line in enumerate(lines):
         column.label(text=line, icon=icon if place == 0 else "BLANK1", translate=False)
+
+
+def write_status(layout, context, state, name="status"):
+    """What is wrong with guides or hair, if anything is; state: `VellusCurves`; name: of the property that says it."""
+    status = text_of(state, name)
+    if status:
+        write(layout, context, interface_text(status), "ERROR")
 
 
 def megabytes(count):

@@ -13,6 +13,8 @@ from .angles import Values
 _EUMELANIN = np.array([0.506, 0.841, 1.653])
 _PHEOMELANIN = np.array([0.343, 0.733, 1.924])
 
+FITTED_IOR = 1.55  # of the fibres that [Chiang16] fitted colours to
+
 # Transmittance of full melanin, as its absorption is finite.
 LEAST_LIGHT = 1e-4
 
@@ -37,6 +39,17 @@ def sigma_a_from_color(color: ArrayLike, azimuthal_roughness: Values = 0.3) -> n
 def color_from_sigma_a(sigma_a: ArrayLike, azimuthal_roughness: Values = 0.3) -> np.ndarray:
     """The colour, linear RGB (..., 3), that light takes on among many fibres of sigma_a (..., 3) [Chiang16]."""
     return color_from_falloff(sigma_a, color_falloff(azimuthal_roughness))
+
+
+def color_of_scattering(color: ArrayLike, scattering: Values) -> np.ndarray:
+    """The colour (..., 3) of hair whose fibres send back more light, or less; color (..., 3): where scattering is 1.
+
+    Kubelka and Munk's deep layer: where a part K of the light is absorbed and a part S sent back, the reflectance R
+    follows from K / S = (1 - R)² / (2 R). Here K stays, and S is multiplied by `scattering`, positive.
+    """
+    color = np.asarray(color, float)
+    k, s = np.square(1.0 - color), 2.0 * color * scattering  # K and S by a common factor
+    return s / (s + k + np.sqrt(k * (k + 2.0 * s)))
 
 
 def color_from_falloff(sigma_a: ArrayLike, falloff: Values) -> np.ndarray:

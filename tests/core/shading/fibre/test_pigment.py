@@ -53,3 +53,21 @@ def test_smooth_fibres_follow_the_published_fit():
     """At azimuthal roughness 0 the fit is its first coefficient [Chiang16]: a groom of sigma_a = 1 is e^-5.969."""
     assert pigment.color_from_sigma_a(1.0, 0.0) == pytest.approx(np.exp(-5.969))
     assert pigment.color_from_sigma_a(1.0, 1.0) == pytest.approx(np.exp(-3.375))
+
+
+colors = st.lists(st.floats(0.0, 1.0), min_size=3, max_size=3)
+
+
+@given(colors, st.floats(1e-6, 10.0), st.floats(1e-6, 10.0))
+def test_less_that_is_sent_back_darkens_as_in_a_deep_layer(color, first, second):
+    """K / S of the colours differs by the scattering, and two changes are one."""
+    color = np.array(color)
+    np.testing.assert_allclose(pigment.color_of_scattering(color, 1.0), color, rtol=1e-12, atol=1e-300)
+    found = pigment.color_of_scattering(color, first)
+    assert ((found >= 0.0) & (found <= 1.0 + 1e-12)).all()
+    np.testing.assert_allclose(
+        first * np.square(1.0 - found) * color, np.square(1.0 - color) * found, rtol=1e-6, atol=1e-12
+    )
+    twice = pigment.color_of_scattering(found, second)
+    np.testing.assert_allclose(twice, pigment.color_of_scattering(color, first * second), rtol=1e-5, atol=1e-7)
+    assert ((found - color) * (first - 1.0) >= -1e-12).all()

@@ -1,0 +1,51 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Popover of presets: the built-in ones with their pictures, one's own, and a button that saves another."""
+
+import bpy
+
+from ...settings.translations import CONTEXT
+
+_COLUMNS = 4
+_PICTURE_SCALE = 4.0  # in heights of a row
+
+
+class PresetMenu:
+    """Mixed into panels that implement `presets` and `saved`, and name their operators."""
+
+    bl_space_type = "VIEW_3D"
+    bl_region_type = "HEADER"
+    bl_options = {"INSTANCED"}
+    bl_ui_units_x = 21
+    bl_translation_context = CONTEXT
+
+    apply_preset = apply_saved = remove_saved = save = save_label = ""
+
+    @staticmethod
+    def presets():
+        """(identifier, label, icon of its picture or None) of each built-in preset."""
+        raise NotImplementedError
+
+    @staticmethod
+    def saved():
+        """(name, icon or 0) of each of one's own."""
+        raise NotImplementedError
+
+    def draw(self, _context):
+        """All of them."""
+        layout = self.layout
+        layout.emboss = "PULLDOWN_MENU"
+        layout.operator_context = "EXEC_DEFAULT"
+        grid = layout.grid_flow(columns=_COLUMNS, row_major=True, even_columns=True, even_rows=True, align=True)
+        for identifier, label, picture in self.presets():
+            column = grid.column(align=True)
+            if picture is not None:
+                column.template_icon(icon_value=picture, scale=_PICTURE_SCALE)
+            column.operator(self.apply_preset, text=label).preset = identifier
+        layout.separator()
+        column = layout.column(align=True)
+        for name, icon in self.saved():
+            line, text = column.row(align=True), bpy.path.display_name(name)
+            line.operator(self.apply_saved, text=text, translate=False, icon_value=icon).name = name
+            line.operator(self.remove_saved, text="", icon="REMOVE").name = name
+        layout.operator_context = "INVOKE_DEFAULT"
+        layout.operator(self.save, text=self.save_label, icon="ADD")

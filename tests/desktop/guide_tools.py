@@ -1,0 +1,219 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Each guide tool in Sculpt Mode in a window: run from its menu, redone with another value, undone, redone and undone.
+
+Run by a desktop Blender: guide_tools.py -- ZIP OUT. Writes guide_tools.json with what the tests want to know, and a
+picture of the menu. Afterwards the hair is combed without its styles.
+"""
+
+import json
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+from tests.desktop.window import drag, in_viewport, places, take_picture, viewport, wait, wait_for, window  # noqa: E402
+
+MODULE = "bl_ext.user_default.vellus"
+ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
+OUT = Path(OUT)
+
+# In the order of the menu: what the redo panel changes.
+TOOLS = {
+    "guide_length": {"factor": 0.5},
+    "trim_guides": {"cutter": "Lower"},
+    "smooth_guides": {"iterations": 200},
+    "lift_guides": {"amount": 0.9},
+    "attract_guides": {"amount": 0.9},
+    "change_guide_count": {"factor": 3.0},
+    "mirror_guides": {"selected_only": False},
+    "copy_guide_shape": {"amount": 0.5},
+}
+
+facts = {"tools": {}}
+
+
+def of_kind(kind):
+    return next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind)
+
+
+def guides():
+    """(G, 41, 3) positions."""
+    curves = of_kind("GUIDES").data
+    values = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", values.ravel())
+    return values.reshape(len(curves.curves), -1, 3)
+
+
+def bound():
+    return sys.modules[f"{MODULE}.hair_addon.blender"].groom.bindings.of(of_kind("HAIR").data)
+
+
+def strands():
+    """(S, P, 3) positions as viewports show them, which may not be written yet."""
+    if bound() is not None:
+        return bound().shown.points.copy()
+    curves = of_kind("HAIR").data
+    values = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", values.ravel())
+    return values.reshape(len(curves.curves), -1, 3)
+
+
+def key(name, **held):
+    """A key over the middle of the viewport, pressed and let go."""
+    _area, region = viewport()
+    at = {"x": region.x + region.width // 2, "y": region.y + region.height // 2}
+    window().event_simulate(type="MOUSEMOVE", value="NOTHING", **at)
+    yield
+    window().event_simulate(type=name, value="PRESS", **at, **held)
+    yield
+    window().event_simulate(type=name, value="RELEASE", **at, **held)
+    yield
+
+
+def are_in(rows, others):
+    """Whether each row of (N, 41, 3) is one of others, to the last bit."""
+    known = {row.tobytes() for row in others}
+    return all(row.tobytes() in known for row in rows)
+
+
+def groom():
+    """Hair on a sphere, its guides waved, one eighth of them selected in Sculpt Mode; two empties to cut with."""
+    bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+    for thing in list(bpy.data.objects):
+        bpy.data.objects.remove(thing)
+    with in_viewport():
+        bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=1.0)
+        bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=80, length=0.5, strand_count=500, radius=0.005)
+    area, _region = viewport()
+    area.spaces.active.region_3d.view_distance = 6.0
+    for name, height in (("Lower", 0.8), ("Upper", 1.1)):
+        bpy.context.scene.collection.objects.link(bpy.data.objects.new(name, None))
+        bpy.data.objects[name].location.z = height
+    yield from wait(0.5)
+    with in_viewport():
+        bpy.ops.vellus.comb_guides()
+    along = np.linspace(0.0, 1.0, 41)[:, None]
+    combed = guides()
+    waves = 0.1 * np.sin(9.0 * along + np.arange(len(combed))[:, None, None]) * np.roll(combed[:, :1], 1, axis=2)
+    curves = of_kind("GUIDES").data
+    curves.attributes["position"].data.foreach_set("vector", (combed + along * waves).astype(np.float32).ravel())
+    selection = curves.attributes.new(".selection", "BOOLEAN", "CURVE")
+    selection.data.foreach_set("value", (combed[:, 0] > 0.0).all(axis=1))
+    curves.update_tag()
+    bpy.data.objects["Upper"].select_set(True)  # what cuts, in a call from the menu
+    yield from wait(1.0)
+    with in_viewport():
+        bpy.ops.ed.undo_push(message="Waved")
+
+
+def use(name):
+    """One tool: facts about guides and hair after each step."""
+    before, hair_before = guides(), strands()
+    is_chosen = (before[:, 0] > 0.0).all(axis=1)
+    with in_viewport():
+        bpy.ops.wm.call_menu(name="VELLUS_MT_guide_tools")
+    yield
+    yield from key("HOME")
+    for _entry in range(list(TOOLS).index(name)):
+        yield from key("DOWN_ARROW")
+    if name == "smooth_guides":
+        take_picture(OUT / "menu.png")
+    count = len(bpy.context.window_manager.operators)
+    yield from key("RET")
+    yield from wait_for(lambda: len(bpy.context.window_manager.operators) > count, 5.0)
+    yield
+    done = facts["tools"][name] = {"ran": bpy.context.window_manager.operators[-1].bl_idname}
+    done["mode"], first = bpy.context.mode, guides()
+    for setting, value in TOOLS[name].items():
+        setattr(bpy.context.window_manager.operators[-1].properties, setting, value)
+    with in_viewport():
+        bpy.ops.ed.undo_redo("EXEC_DEFAULT", True)  # what the redo panel does after a change
+    yield from wait(0.2)
+    after, hair_after = guides(), strands()
+    kept = {
+        "change_guide_count": before,
+        "mirror_guides": before[before[:, 0, 0] > 0.0],
+        "copy_guide_shape": before[is_chosen],
+    }.get(name, before[~is_chosen])
+    done["is redone"] = after.shape != first.shape or not np.array_equal(after, first)
+    done["is changed"] = after.shape != before.shape or not np.array_equal(after, before)
+    done["are others kept"] = are_in(kept, after) and are_in(kept, first)
+    done["hair moved"] = float(np.abs(hair_after - hair_before).max())
+    yield from key("Z", ctrl=True)
+    yield from wait(0.2)
+    done["is undone"] = bool(np.array_equal(guides(), before))
+    done["hair after undo"] = float(np.abs(strands() - hair_before).max())
+    yield from key("Z", ctrl=True, shift=True)
+    yield from wait(0.2)
+    done["is done again"] = bool(np.array_equal(guides(), after))
+    done["hair after redo"] = float(np.abs(strands() - hair_after).max())
+    yield from key("Z", ctrl=True)
+    yield from wait(0.2)
+    print(f"guide_tools: {name}", flush=True)
+
+
+def comb_straight():
+    """Hair with a style is shown without it in Sculpt Mode, and while a brush combs; with it afterwards."""
+    with in_viewport():
+        bpy.ops.object.mode_set(mode="OBJECT")
+        bpy.context.view_layer.objects.active = of_kind("HAIR")
+        bpy.ops.vellus.add_style("EXEC_DEFAULT", True, style="CURL")
+    yield from wait(1.0)
+    styled = strands()
+    of_kind("GUIDES").data.vellus.shows_styles_while_combing = False
+    with in_viewport():
+        bpy.ops.vellus.comb_guides()
+    yield from wait(1.0)
+    straight = strands()
+    size = bpy.context.tool_settings.curves_sculpt.unified_paint_settings
+    size.size = 150
+    middle = places(guides()[:, 0]).mean(axis=0)
+    followed = []
+    for number, _pause in enumerate(drag(middle - np.array([150, 0]), middle + np.array([150, 0]))):
+        yield
+        if number == 10:  # the button is still held
+            followed.append(float(np.abs(strands() - straight).max()))
+            facts["is straight in the stroke"] = bound() is not None and bound().straight is not None
+    yield from wait(1.0)
+    facts["straightened"], facts["combed"] = float(np.abs(straight - styled).max()), followed
+    take_picture(OUT / "straight.png")
+    with in_viewport():
+        bpy.ops.object.mode_set(mode="OBJECT")
+    yield from wait(1.0)
+    facts["is styled again"] = bound() is None or bound().straight is None
+    facts["styled again"] = float(np.abs(strands() - styled).max())
+    take_picture(OUT / "styled.png")
+    facts["status"] = of_kind("HAIR").data.vellus.status
+
+
+def walk():
+    """All of it; between its steps Blender handles its events and redraws."""
+    yield from groom()
+    for name in TOOLS:
+        yield from use(name)
+    yield from comb_straight()
+    facts["is done"] = True
+
+
+def advance(steps):
+    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
+    try:
+        next(steps)
+        return 0.02
+    except StopIteration:
+        pass
+    except Exception:
+        traceback.print_exc()
+    (OUT / "guide_tools.json").write_text(json.dumps(facts, indent=1))
+    bpy.ops.wm.quit_blender()
+    return None
+
+
+if __name__ == "__main__":
+    bpy.context.preferences.view.show_splash = False
+    walking = walk()
+    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The guide tools in a window: each from its menu, redone, undone; and hair that is combed without its styles."""
+
+import json
+import re
+import shutil
+
+import pytest
+
+from tests.desktop.conftest import ROOT
+from tools import build_extension, compile_kernels, desktop_blender
+
+pytestmark = pytest.mark.desktop
+
+SCRIPT = ROOT / "tests" / "desktop" / "guide_tools.py"
+TOOLS = (
+    *("guide_length", "trim_guides", "smooth_guides", "lift_guides", "attract_guides"),
+    *("change_guide_count", "mirror_guides", "copy_guide_shape"),
+)
+
+
+class Walk:
+    """What came of it: `facts`, and the `log`."""
+
+    def __init__(self, folder, status):
+        self.status = status
+        self.log = (folder / "guide_tools.log").read_text(errors="replace")
+        facts = folder / "guide_tools.json"
+        self.facts = json.loads(facts.read_text()) if facts.exists() else {}
+
+
+@pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
+def walk(request, desktop, tmp_path_factory):
+    """The `Walk` with one backend; its pictures are in out/desktop."""
+    folder = ROOT / "out" / "desktop" / f"guide_tools_{request.param}"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    status = desktop.run(
+        SCRIPT,
+        [build_extension.build(compile_kernels.this_platform()), folder],
+        backend=request.param,
+        profile=tmp_path_factory.mktemp("profile"),
+        log=folder / "guide_tools.log",
+        limit=300,
+        size=(760, 540),
+    )
+    return Walk(folder, status)
+
+
+def test_it_comes_to_its_end(walk):
+    assert walk.status == 0 and walk.facts.get("is done") and walk.facts["status"] == "", walk.log[-4000:]
+
+
+def test_the_console_tells_of_no_error(walk):
+    told = r"Vellus:|Traceback|\w*(Error|Exception)\b(?! \(0x)|<\w+>: \(EXR_ERR"
+    assert [line for line in walk.log.splitlines() if re.match(told, line)] == []
+
+
+@pytest.mark.parametrize("name", TOOLS)
+def test_a_tool_of_the_menu_is_redone_and_undone(walk, name):
+    done = walk.facts["tools"][name]
+    assert (done["ran"], done["mode"]) == (f"VELLUS_OT_{name}", "SCULPT_CURVES")
+    assert done["is changed"] and done["is redone"] and done["are others kept"]
+    assert done["is undone"] and done["is done again"]
+
+
+@pytest.mark.parametrize("name", TOOLS)
+def test_hair_follows_the_tool_and_its_undo(walk, name):
+    done = walk.facts["tools"][name]
+    assert done["hair moved"] > 0.01
+    assert max(done["hair after undo"], done["hair after redo"]) < 1e-5
+
+
+def test_hair_is_straight_while_it_is_combed(walk):
+    assert walk.facts["is straight in the stroke"] and walk.facts["is styled again"]
+    assert min(walk.facts["straightened"], *walk.facts["combed"], walk.facts["styled again"]) > 1e-3
