@@ -6,6 +6,7 @@ the tests want to know. Each of the `PARTS` runs in a Blender of its own and goe
 a hundred redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or without add-on.
 """
 
+import itertools
 import json
 import math
 import sys
@@ -162,7 +163,7 @@ def played():
         "frames": numbers,
         "last": last,
         "start": moved(combed, seen.get(1)),
-        "steps": [moved(seen[a], seen[b]) for a, b in zip(numbers, numbers[1:], strict=False)],
+        "steps": [moved(seen[a], seen[b]) for a, b in itertools.pairwise(numbers)],
         "picture": differ(before, light()),
         "state": state(),
     }

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Hair that is simulated in a window: it plays, jumps, is undone, baked and stopped, and its guides and the add-on go."""
+"""Hair that is simulated in a window: played, undone, baked, stopped, and taken away."""
 
 import json
 import re
