@@ -8,6 +8,7 @@ from tests.test_house import MODULES, name_of, syntax
 # What is no cache, each with who ends it.
 STATE = {
     "blender/groom/brushes.py: _fitted": "nobody: Blender's brushes outlive a file, and so does what was set in them",
+    "blender/groom/guide_baking.py: _baking": "the end of baking, on every way out",
     "blender/host/cli_command.py: _command": "unregister",
     "blender/host/running.py: _job": "end",
     "blender/host/running.py: _timer": "end",

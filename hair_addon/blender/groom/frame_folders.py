@@ -85,6 +85,13 @@ def forget(guides: Curves) -> None:
     folder_cache.invalidate(guides.session_uid)
 
 
+def have_changed(guides: Curves) -> None:
+    """Show guides with the next update as they are baked now: frames were written or removed."""
+    forget(guides)
+    guides.vellus.is_dynamics_stale = True
+    guides.update_tag()
+
+
 def has_frames(guides: Curves) -> bool:
     """Whether frames of some guides are known: panels ask with every redraw, so no file is read."""
     kept = folder_cache.get(guides.session_uid)

@@ -19,7 +19,6 @@ from ...core.files.frame_manifest import Manifest
 from ...core.long_work import Stage, Work
 from ...core.params import given
 from ..data import scene as scenes
-from ..data import simulated_guides
 from ..host import scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -140,11 +139,7 @@ def _end(scene, present, baked):
     _baking = False
     for remembered in baked:
         with contextlib.suppress(HairError):  # deleted meanwhile, by a script
-            guides = remembered.find()
-            simulated_guides.show(guides, None)
-            frame_folders.forget(guides)
-            guides.vellus.is_dynamics_stale = True
-            guides.update_tag()
+            frame_folders.have_changed(remembered.find())
 
 
 def _begin(guides, last, scene, starts_over, stack):

@@ -69,33 +69,40 @@ def follow_settings(blender_scene, depsgraph):
         if simulated_guides.is_shown(guides) and not frame_folders.is_simulated(guides):
             played_cache.invalidate(guides.session_uid)
             _show(guides, None, depsgraph)
-        if state.is_dynamics_stale:
+        if state.is_dynamics_stale and not guide_baking.is_baking():
             state.is_dynamics_stale = False
-            if frame_folders.is_simulated(guides) and not simulated_guides.is_shown(guides):
-                _show_known(guides, blender_scene, depsgraph)  # baked just now
-            _note_change(guides, blender_scene)
+            _note_change(guides, blender_scene, depsgraph)
 
 
 def follow_undo(blender_scene, depsgraph):
     """After an undo, a redo or a load, which show guides as they are combed: show them where they were simulated."""
-    for guides in frame_folders.simulating():
-        _show_known(guides, blender_scene, depsgraph)
+    for guides in frame_folders.simulating() if live_hair.has_window() else ():
+        try:
+            live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
+        except HairError as error:
+            guides.vellus.dynamics_status = str(error)
 
 
-def _show_known(guides, blender_scene, depsgraph):
-    """Show guides where they are known to be at the scene's time: nothing is simulated."""
-    try:
-        points = _points_at(guides, scene_time.time_of(blender_scene))
-        played = _played_now(guides)
-        if points is None and played is not None:
-            points = _last_known(played, scene_time.frame_of(blender_scene))
+def _follow_known(guides, blender_scene, depsgraph):
+    """Show guides where they are known to be, if they are shown elsewhere: frames were baked or removed."""
+    points, shown = _known(guides, blender_scene), simulated_guides.point_cache.get(guides.session_uid)
+    if (points is None) != (shown is None) or (points is not None and not np.array_equal(points, shown)):
         _show(guides, points, depsgraph)
-    except HairError as error:
-        guides.vellus.dynamics_status = str(error)
 
 
-def _note_change(guides, blender_scene):
+def _known(guides, blender_scene):
+    """Points of guides at the scene's time, or in the last frame before it that is known; None as combed."""
+    points = _points_at(guides, scene_time.time_of(blender_scene))
+    played = _played_now(guides)
+    if points is None and played is not None:
+        points = _last_known(played, scene_time.frame_of(blender_scene))
+    return points
+
+
+def _note_change(guides, blender_scene, depsgraph):
     try:
+        if frame_folders.is_simulated(guides):
+            _follow_known(guides, blender_scene, depsgraph)
         note_state(guides, blender_scene)
         guides.vellus.dynamics_status = ""
     except HairError as error:

@@ -52,6 +52,26 @@ def test_playing_is_what_baking_gives(swung):
     assert np.array_equal(drawn(hair), strands)
 
 
+def test_the_present_frame_is_shown_as_it_is_baked_and_as_combed_when_freed(swung):
+    guides, hair = swung
+    combed = drawn(hair)
+    bpy.context.scene.frame_set(8)
+    run_now(guide_baking.baking([guides.data], 9, bpy.context.scene))
+    bpy.context.view_layer.update()
+    baked, strands = shown(guides).copy(), drawn(hair)
+    assert simulated_hair.state_of(guides.data) == ("Frames {first} to {last} are baked", {"first": 1, "last": 9})
+    play(7, 8)
+    assert np.array_equal(shown(guides), baked)
+    np.testing.assert_allclose(drawn(hair), strands, atol=1e-6)
+    assert not np.array_equal(shown(guides), points(guides))
+    bpy.context.view_layer.objects.active = guides
+    assert bpy.ops.vellus.free_dynamics() == {"FINISHED"}
+    bpy.context.view_layer.update()
+    assert np.array_equal(shown(guides), points(guides))
+    np.testing.assert_allclose(drawn(hair), combed, atol=1e-6)
+    assert "Not simulated" in simulated_hair.state_of(guides.data)[0]
+
+
 def test_a_jump_simulates_nothing(swung, monkeypatch):
     guides, _hair = swung
     play(1, 6)

@@ -29,5 +29,5 @@ class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
     def change(self, context):
         guides = guides_of(context.object)
         count = frame_cache.remove(frame_folders.folder_of(guides))
-        frame_folders.forget(guides)
+        frame_folders.have_changed(guides)
         return "{count} files removed", {"count": count}

@@ -1,0 +1,185 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that are simulated in scenes of other units, scales and frames, on surfaces that bend, with styles."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import guide_poses, simulated_guides
+from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.core.files.frame_cache import FrameCache
+from hair_addon.core.long_work import run_now
+from tests.support.reading import evaluated_points, points, write_points
+from tests.support.swung import SWINGS, simulate, swing
+
+
+@pytest.fixture
+def window(monkeypatch):
+    """Guides are simulated while frames change, as in a window."""
+    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    yield
+    live_hair.cancel_writing()
+    invalidation.clear()
+
+
+@pytest.fixture
+def swung(hair, tmp_path, window):
+    """(guides, hair) whose sphere swings, and that simulate."""
+    guides = bpy.data.objects["Guides"]
+    swing(bpy.data.objects["Sphere"])
+    simulate(guides, tmp_path)
+    return guides, hair
+
+
+def played(guides, first=1, last=6):
+    """Where guides are simulated in the last of some frames, in local coordinates at rest."""
+    for frame in range(first, last + 1):
+        bpy.context.scene.frame_set(frame)
+    return simulated_guides.point_cache.get(guides.data.session_uid).copy()
+
+
+def drawn(hair):
+    live_hair.write_all()
+    return points(hair)
+
+
+def require_roots_on(surface, hair, within):
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    evaluated = surface.evaluated_get(depsgraph)
+    to_surface = np.array(surface.matrix_world.inverted() @ hair.matrix_world)
+    for root in evaluated_points(hair)[::10, 0]:
+        place = to_surface[:3, :3] @ root + to_surface[:3, 3]
+        found, nearest, *_ = evaluated.closest_point_on_mesh([float(component) for component in place])
+        assert found and np.linalg.norm(np.array(nearest) - place) < within
+
+
+def test_units_of_the_scene_do_not_matter(swung):
+    """A hundred times as large in units of a hundredth: the same in meters."""
+    guides, _hair = swung
+    expected = played(guides)
+    bpy.context.scene.frame_set(1)
+    bpy.data.objects["Sphere"].scale = (100.0, 100.0, 100.0)
+    bpy.context.scene.unit_settings.scale_length = 0.01
+    guides.data.vellus.dynamics.collision_distance *= 100.0
+    np.testing.assert_allclose(played(guides), expected, atol=1e-4)
+
+
+def test_a_mirrored_surface_moves_hair_as_its_mirror_image(swung):
+    guides, _hair = swung
+    expected = played(guides)
+    ball = bpy.data.objects["Sphere"]
+    ball.scale.x = -1.0
+    for frame, angle in SWINGS:
+        ball.rotation_euler.y = -angle
+        ball.keyframe_insert("rotation_euler", frame=frame)
+    mirrored = played(guides)
+    np.testing.assert_allclose(mirrored, expected, atol=1e-4)
+
+
+def test_an_unevenly_scaled_surface_keeps_hair_at_its_roots(swung):
+    guides, hair = swung
+    bpy.data.objects["Sphere"].scale = (1.0, 2.0, 0.5)
+    found = played(guides)
+    assert np.isfinite(found).all()
+    np.testing.assert_array_equal(found[:, 0], points(guides)[:, 0])
+    drawn(hair)
+    require_roots_on(bpy.data.objects["Sphere"], hair, 1e-4)
+
+
+def test_hair_follows_simulated_guides_as_combed_ones(swung):
+    """With styles too: guides that are combed to where they were simulated have the same hair."""
+    guides, hair = swung
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.vellus.add_style(style="CURL")
+    bpy.ops.vellus.add_style(style="TRIM")
+    bpy.context.view_layer.update()
+    straight = drawn(hair)
+    there = played(guides)
+    styled = drawn(hair)
+    assert np.abs(styled - straight).max() > 1e-2
+    guides.data.vellus.simulates = False
+    write_points(guides, there)
+    np.testing.assert_allclose(drawn(hair), styled, atol=1e-5)
+
+
+def test_a_style_is_changed_while_simulated_frames_are_shown(swung):
+    guides, hair = swung
+    there = played(guides)
+    bpy.context.view_layer.objects.active = hair
+    bpy.ops.vellus.add_style(style="TRIM")
+    hair.data.vellus.styles["Trim"].trim.factor = 0.5
+    bpy.context.view_layer.update()
+    styled = drawn(hair)
+    guides.data.vellus.simulates = False
+    write_points(guides, there)
+    np.testing.assert_allclose(drawn(hair), styled, atol=1e-5)
+
+
+def test_systems_on_one_surface_do_not_meet(swung, tmp_path):
+    """Each moves as it does alone."""
+    guides, hair = swung
+    alone, strands = played(guides), None
+    strands = drawn(hair)
+    ball = bpy.data.objects["Sphere"]
+    bpy.context.scene.frame_set(1)
+    bpy.context.view_layer.objects.active = ball
+    bpy.ops.object.select_all(action="DESELECT")
+    ball.select_set(True)
+    bpy.ops.vellus.add_hair(guide_count=20, length=0.3, strand_count=50)
+    other = next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "GUIDES" and o != guides)
+    simulate(other, tmp_path, gravity=-1.0)
+    np.testing.assert_array_equal(played(guides), alone)
+    np.testing.assert_array_equal(drawn(hair), strands)
+    there = simulated_guides.point_cache.get(other.data.session_uid)
+    assert len(there) == 20 and not np.array_equal(there, points(other))
+
+
+def test_a_subdivided_surface_keeps_its_roots(swung):
+    guides, hair = swung
+    ball = bpy.data.objects["Sphere"]
+    ball.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    bpy.context.view_layer.update()
+    played(guides)
+    assert guides.data.vellus.dynamics_status == ""
+    drawn(hair)
+    require_roots_on(ball, hair, 1e-3)
+
+
+def test_roots_stay_on_a_surface_that_an_armature_bends(arm, tmp_path, window):
+    bpy.context.view_layer.objects.active = arm
+    bpy.ops.object.select_all(action="DESELECT")
+    arm.select_set(True)
+    bpy.ops.vellus.add_hair(guide_count=40, length=0.4, strand_count=200)
+    guides, hair = bpy.data.objects["Guides"], bpy.data.objects["Hair"]
+    simulate(guides, tmp_path)
+    there = played(guides, 1, 9)
+    pose = guide_poses.read(guides.data, bpy.context.evaluated_depsgraph_get(), 1.0)
+    np.testing.assert_allclose(pose.to_world(there)[:, 0], pose.root_positions, atol=1e-5)
+    drawn(hair)
+    require_roots_on(arm, hair, 1e-4)
+
+
+def test_frames_may_be_negative(swung):
+    """A fall is the same fall, whatever its frames are called; baked ones too."""
+    guides, _hair = swung
+    bpy.data.objects["Sphere"].animation_data_clear()
+    guides.data.vellus.dynamics.sag_free = False
+    fallen = played(guides, 1, 6)
+    guides.data.vellus.dynamics.start_frame = -3
+    np.testing.assert_array_equal(played(guides, -3, 2), fallen)
+    run_now(guide_baking.baking([guides.data], 1, bpy.context.scene))
+    assert FrameCache(frame_folders.folder_of(guides.data)).frame_numbers() == list(range(-3, 3))
+    bpy.context.scene.frame_set(-1)
+    bpy.context.scene.frame_set(2)
+    np.testing.assert_array_equal(simulated_guides.point_cache.get(guides.data.session_uid), fallen)
+
+
+def test_skipped_frames_are_not_simulated(swung):
+    """As with a frame step, or where Blender drops frames: what is known stays shown."""
+    guides, _hair = swung
+    third = played(guides, 1, 3)
+    for frame in (5, 7, 9):
+        bpy.context.scene.frame_set(frame)
+        np.testing.assert_array_equal(simulated_guides.point_cache.get(guides.data.session_uid), third)
+    assert not np.array_equal(played(guides, 4, 4), third)
