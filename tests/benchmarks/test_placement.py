@@ -161,7 +161,9 @@ def versions():
 
 
 @pytest.mark.filterwarnings("default")  # peers have theirs
-@pytest.mark.parametrize("name", ["sphere", "Suzanne", "head"])
+@pytest.mark.parametrize(
+    "name", ["sphere", *(pytest.param(name, marks=pytest.mark.long) for name in ("Suzanne", "head"))]
+)
 def test_sites_are_more_even_than_those_of_peers(name):
     mesh = surface(name)
     ours(mesh, 200)  # compiles kernels

@@ -219,7 +219,10 @@ def run_mounted(mounting, words, folder):
 
 
 @needs_mounts
-@pytest.mark.parametrize("kind", [".blend", ".npz", ".usdc", ".abc", ".png", "tables"])
+@pytest.mark.parametrize(
+    "kind",
+    [".blend", ".npz", *(pytest.param(kind, marks=pytest.mark.long) for kind in (".usdc", ".abc", ".png", "tables"))],
+)
 def test_a_disk_that_is_really_full(words, tmp_path, kind):
     folder = tmp_path / "disk"
     folder.mkdir()

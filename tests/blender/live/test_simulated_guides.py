@@ -15,7 +15,9 @@ from tests.support.reading import points, write_points
 def followed(hair, request, monkeypatch):
     """(guides, hair), in a Blender without a window, or one that acts as if it had one."""
     monkeypatch.setattr(live_hair, "has_window", lambda: request.param)
-    yield bpy.data.objects["Guides"], hair
+    guides = bpy.data.objects["Guides"]
+    guides.data.vellus.simulates = True
+    yield guides, hair
     live_hair.cancel_writing()
     invalidation.data_replaced()
 
