@@ -160,10 +160,9 @@ def versions():
     return found | {"machine": platform.machine(), "processors": os.cpu_count(), "device": DEVICE}
 
 
+@pytest.mark.long
 @pytest.mark.filterwarnings("default")  # peers have theirs
-@pytest.mark.parametrize(
-    "name", ["sphere", *(pytest.param(name, marks=pytest.mark.long) for name in ("Suzanne", "head"))]
-)
+@pytest.mark.parametrize("name", ["sphere", "Suzanne", "head"])
 def test_sites_are_more_even_than_those_of_peers(name):
     mesh = surface(name)
     ours(mesh, 200)  # compiles kernels
