@@ -26,7 +26,7 @@ def devices():
     return ["cpu", *(str(device) for device in wp.get_cuda_devices())]
 
 
-@pytest.mark.parametrize("mode", ["classic", "energy"])
+@pytest.mark.parametrize("mode", ["classic", pytest.param("energy", marks=pytest.mark.long)])
 def test_bake(mode, monkeypatch):
     """Printed: times and their ratio to NumPy's. Asserted: how often kernels are launched, whatever the size."""
     settings = lookup_tables.Settings(mode=mode)

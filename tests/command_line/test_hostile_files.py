@@ -186,7 +186,12 @@ def refused(ended, folder):
     assert {path: path.read_bytes() for path in left} in ({}, {folder / "keep": b"kept"})
 
 
-@pytest.mark.parametrize("kind", OUTPUTS)
+SLOW = pytest.mark.long  # of formats that go the way of another one
+
+
+@pytest.mark.parametrize(
+    "kind", [pytest.param(kind, marks=SLOW if kind in {".usda", ".usdz"} else ()) for kind in OUTPUTS]
+)
 def test_a_full_disk_leaves_nothing_half_written(words, tmp_path, kind):
     """A limit on the size of files stands for it: both end a write in the middle."""
     limit = LIMITS.get(kind, 60_000)

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.support.commands import run
+from tests.support.commands import run, run_here
 from tests.support.swung import simulate, swing
 
 
@@ -23,9 +23,9 @@ def shot(lit, tmp_path):
 def test_frames_are_baked_and_rendered(shot, tmp_path):
     first = run("simulate", shot, "--json", "--last-frame", "3")
     assert [line["frame"] for line in first.results] == [2, 3, 4]  # one more for motion blur
-    assert [line["frame"] for line in run("simulate", shot, "--json").results] == [5, 6, 7]
+    assert [line["frame"] for line in run_here("simulate", shot, "--json").results] == [5, 6, 7]
     size = ("--width", "64", "--height", "64", "--samples", "4")
-    run("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-6", *size)
+    run_here("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-6", *size)
     pictures = [read(tmp_path / f"f_{frame:02}.png") for frame in (1, 4)]
     assert not np.array_equal(*pictures)
 
@@ -39,15 +39,15 @@ def read(path):
 
 
 def test_frames_that_are_not_baked_are_not_rendered(shot, tmp_path):
-    refused = run("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-3")
+    refused = run_here("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-3")
     assert refused.status == 1
     assert "Frame 2 of the guides" in refused.errors and "not baked" in refused.errors
     assert not list(tmp_path.glob("*.png"))
 
 
 def test_files_without_simulated_guides_are_refused(shot):
-    assert "no guides" in run("simulate", shot, "--guides", "Nobody").errors
+    assert "no guides" in run_here("simulate", shot, "--guides", "Nobody").errors
     bpy.data.objects["Guides"].data.vellus.simulates = False
     bpy.ops.wm.save_mainfile()
-    ended = run("simulate", shot)
+    ended = run_here("simulate", shot)
     assert ended.status == 1 and "no guides that simulate" in ended.errors

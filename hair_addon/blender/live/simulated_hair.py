@@ -165,7 +165,7 @@ def _advance(played, guides, blender_scene, depsgraph, settings):
     read = guide_simulation.read(guides, blender_scene, depsgraph, settings)
     points = played.simulated.advance(read)
     played.frame += 1
-    played.notes = read.errors
+    played.notes = (*read.errors, *played.simulated.simulation.notes)
     played.frames[played.frame] = points
     while len(played.frames) > 1 and points.nbytes * len(played.frames) > MOST_BYTES:
         del played.frames[next(iter(played.frames))]
@@ -177,6 +177,12 @@ def _show(guides, points, depsgraph):
     if points is not None and len(points) != len(guides.curves):
         return
     live_hair.show_guides(guides, points, depsgraph)
+
+
+def notes_of(guides):
+    """Errors of colliders and force fields that were left out of the last frame that was played."""
+    played = played_cache.get(guides.session_uid)
+    return () if played is None else played.notes
 
 
 def state_of(guides):

@@ -242,7 +242,7 @@ def spoil(folder, ending):
     cut.write_bytes(cut.read_bytes()[: cut.stat().st_size // 2])
 
 
-@pytest.mark.parametrize("more", [("--out", "f_###.png"), ("--out", "f_###.exr"), ("--out", "f_###.exr", "--passes")])
+@pytest.mark.parametrize("more", [("--out", "f_###.png"), ("--out", "f_###.exr", "--passes")])
 def test_unreadable_pictures_are_rendered_again(turning, tmp_path, monkeypatch, more):
     monkeypatch.chdir(tmp_path)
     line = ("render", turning, "--frames", "1-3", "--width", 32, "--samples", 1, "--json", *more)

@@ -9,6 +9,7 @@ from hair_addon.blender.data import simulated_guides
 from hair_addon.blender.groom import guide_baking
 from hair_addon.blender.live import handlers, invalidation, live_hair, simulated_hair
 from hair_addon.core.long_work import run_now
+from tests.support.layout import draw
 from tests.support.reading import points, write_points
 from tests.support.swung import simulate, swing
 
@@ -188,3 +189,26 @@ def test_without_a_window_nothing_is_simulated(swung, monkeypatch):
     monkeypatch.setattr(live_hair, "has_window", lambda: False)
     play(1, 6)
     assert np.array_equal(shown(guides), points(guides))
+
+
+def test_colliders_that_are_left_out_are_named_in_the_panel(swung):
+    guides, _hair = swung
+    collection = bpy.data.collections.new("Body")
+    bpy.context.scene.collection.children.link(collection)
+    collection.objects.link(bpy.data.objects.new("Empty Mesh", bpy.data.meshes.new("Empty Mesh")))
+    guides.data.vellus.dynamics.colliders = "Body"
+    play(1, 3)
+    bpy.context.view_layer.objects.active = guides
+    assert any("Empty Mesh" in text for text in draw(bpy.types.VELLUS_PT_dynamics).texts)
+    bpy.data.objects.remove(bpy.data.objects["Empty Mesh"])
+    play(4, 4)
+    assert not any("Empty Mesh" in text for text in draw(bpy.types.VELLUS_PT_dynamics).texts)
+
+
+def test_baked_frames_can_be_simulated_again_from_the_panel(swung):
+    guides, _hair = swung
+    bpy.context.view_layer.objects.active = guides
+    before = draw(bpy.types.VELLUS_PT_dynamics).drawn["vellus.bake_dynamics"]
+    run_now(guide_baking.baking([guides.data], 3, bpy.context.scene))
+    bpy.context.scene.frame_set(2)
+    assert draw(bpy.types.VELLUS_PT_dynamics).drawn["vellus.bake_dynamics"] == before + 1

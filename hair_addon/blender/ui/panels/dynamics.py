@@ -3,10 +3,10 @@
 
 import bpy
 
-from ...groom import dynamics_notes
+from ...groom import dynamics_notes, frame_folders
 from ...groom.selection import guides_of
 from ...live import simulated_hair
-from ...settings.translations import interface_text
+from ...settings.translations import error_text, interface_text
 from .. import setting_rows
 from .tab import HairTab, split, write
 
@@ -38,12 +38,16 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
         layout.active = guides.vellus.simulates
         sides = layout.row(align=True)
         sides.operator("vellus.play_dynamics", icon="PLAY")
-        sides.operator("vellus.bake_dynamics", text="Bake", icon="REC")
+        sides.operator("vellus.bake_dynamics", text="Bake", icon="REC").starts_over = False
+        if frame_folders.has_frames(guides):
+            sides.operator("vellus.bake_dynamics", text="", icon="FILE_REFRESH").starts_over = True
         sides.operator("vellus.free_dynamics", text="", icon="TRASH")
         layout.prop(guides.vellus, "cache_folder")
         if guides.vellus.simulates:
             sentence, values = simulated_hair.state_of(guides)
             write(layout, context, interface_text(sentence, **values))
+            for error in simulated_hair.notes_of(guides):
+                write(layout, context, error_text(error), "ERROR")
         if guides.vellus.dynamics_status:
             write(layout, context, guides.vellus.dynamics_status, "ERROR")
         note = dynamics_notes.size_note(guides, context.scene)
