@@ -28,6 +28,7 @@ TOOLS = {
     "smooth_guides": {"iterations": 200},
     "lift_guides": {"amount": 0.9},
     "attract_guides": {"amount": 0.9},
+    "drape_guides": {"stiffness": 0.05},
     "change_guide_count": {"factor": 3.0},
     "mirror_guides": {"selected_only": False},
     "copy_guide_shape": {"amount": 0.5},

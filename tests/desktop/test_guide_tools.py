@@ -14,7 +14,7 @@ pytestmark = pytest.mark.desktop
 
 SCRIPT = ROOT / "tests" / "desktop" / "guide_tools.py"
 TOOLS = (
-    *("guide_length", "trim_guides", "smooth_guides", "lift_guides", "attract_guides"),
+    *("guide_length", "trim_guides", "smooth_guides", "lift_guides", "attract_guides", "drape_guides"),
     *("change_guide_count", "mirror_guides", "copy_guide_shape"),
 )
 
@@ -29,7 +29,13 @@ class Walk:
         self.facts = json.loads(facts.read_text()) if facts.exists() else {}
 
 
-@pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
+# Tools draw nothing of their own: Vulkan, by software, takes as long again and is for the long run.
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(name, marks=pytest.mark.long if name == "vulkan" else ()) for name in desktop_blender.BACKENDS
+    ],
+)
 def walk(request, desktop, tmp_path_factory):
     """The `Walk` with one backend; its pictures are in out/desktop."""
     folder = ROOT / "out" / "desktop" / f"guide_tools_{request.param}"
