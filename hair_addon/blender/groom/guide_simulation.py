@@ -5,7 +5,7 @@
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from bpy.types import Curves, Depsgraph, Scene
@@ -42,6 +42,7 @@ class GuideSimulation:
     start: GuidePose
     roots: np.ndarray  # (G, 3) float32 at rest, local
     simulation: "dynamics.simulation.Simulation"
+    metres: float  # in a unit of the world
 
     def advance(self, frame: FrameInput) -> np.ndarray:
         """Simulate the next frame: (G, P, 3) float32 points at rest, in local coordinates."""
@@ -52,7 +53,7 @@ class GuideSimulation:
 
     def change(self, settings: DynamicsSettings) -> None:
         """Go on with other settings, from the next frame on."""
-        self.simulation.change(settings)
+        self.simulation.change(in_metres(settings, self.metres))
         self.settings = settings
 
     def go_on(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
@@ -72,15 +73,15 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
     settings = properties.dynamics_of(guides.vellus)
     frame = read(guides, scene, depsgraph, settings)
-    pose = frame.pose
+    pose, metres = frame.pose, simulated_world.metres_of(scene, settings)
     local = combed_points(guides)
     simulation = dynamics.simulation.Simulation(
-        pose.groom(local), settings, pose.root_pose(pose), frame.world, preferences.device()
+        pose.groom(local), in_metres(settings, metres), pose.root_pose(pose), frame.world, preferences.device()
     )
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
     digest = staleness.guides_digest(guides)
-    return GuideSimulation(digest, guides.vellus.topology, settings, pose, local[:, 0].copy(), simulation)
+    return GuideSimulation(digest, guides.vellus.topology, settings, pose, local[:, 0].copy(), simulation, metres)
 
 
 def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsSettings) -> FrameInput:
@@ -89,6 +90,13 @@ def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsS
     world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface)
     rate = scene.render.fps / scene.render.fps_base
     return FrameInput(pose, world, settings.time_scale / rate, tuple(errors))
+
+
+def in_metres(settings: DynamicsSettings, metres: float) -> DynamicsSettings:
+    """Settings whose lengths are in units of the world → the same in metres."""
+    return replace(
+        settings, cell_size=metres * settings.cell_size, collision_distance=metres * settings.collision_distance
+    )
 
 
 def combed_points(guides: Curves) -> np.ndarray:

@@ -31,6 +31,7 @@ from ..data import attributes, curves, cutters, guide_curves, posed_strands, sce
 from ..data.scene import Surface
 from ..host.notices import name_of
 from ..settings import preferences, properties
+from . import guide_simulation
 
 LEAST_STIFFNESS = 1e-3  # of dynamics' settings
 _FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still floats
@@ -218,7 +219,12 @@ def drape(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> i
     def shaped(points, chosen):
         there = metres * posed[guides.of_count(points.shape[1], chosen)].astype(np.float64)
         settled = dynamics.draping.draped(
-            there, mesh, dynamics_settings, gravity, settings.seconds, preferences.device()
+            there,
+            mesh,
+            guide_simulation.in_metres(dynamics_settings, metres),
+            gravity,
+            settings.seconds,
+            preferences.device(),
         )
         at_rest = guides.carried_back((settled / metres).astype(np.float32), chosen)
         return grooming.guide_segments.blended(points, at_rest, guides.weights[chosen])

@@ -105,11 +105,6 @@ class DynamicsSettings(Settings):
         True, "Keep the hair outside the surface it grows on", label="Collide with surface"
     )
     colliders: str = param("", "Collection of the meshes that the hair collides with")
-    keeps_hair_outside: bool = param(
-        False,
-        "Move the hair between guides out of colliders too, in renders and exports; not while playing",
-        label="Keep hair outside",
-    )
     collision_distance: float = param(
         1e-3,
         "Distance that the hair keeps from colliders",

@@ -57,11 +57,13 @@ def require_roots_on(surface, hair, within):
 def test_units_of_the_scene_do_not_matter(swung):
     """A hundred times as large in units of a hundredth: the same in meters."""
     guides, _hair = swung
+    guides.data.vellus.dynamics.cell_size = 0.2
     expected = played(guides)
     bpy.context.scene.frame_set(1)
     bpy.data.objects["Sphere"].scale = (100.0, 100.0, 100.0)
     bpy.context.scene.unit_settings.scale_length = 0.01
     guides.data.vellus.dynamics.collision_distance *= 100.0
+    guides.data.vellus.dynamics.cell_size *= 100.0
     np.testing.assert_allclose(played(guides), expected, atol=1e-4)
 
 

@@ -203,3 +203,16 @@ def test_friction_between_hairs_makes_them_move_together(rng):
     simulation = Simulation(groom, DynamicsSettings(hair_pressure=100.0), pose, World(), DEVICE)
     simulation.advance(pose, World(), FRAME)
     np.testing.assert_allclose(simulation.points(), groom, atol=1e-5)
+
+
+@pytest.mark.parametrize("pinned", [0.5, 1.0])
+def test_pinned_points_only_follow_the_surface(rng, pinned):
+    groom, pose = fur(rng)
+    settings = DynamicsSettings(pinned=pinned, bend_stiffness=1.0)
+    simulation = Simulation(groom, settings, pose, World(), DEVICE)
+    play(simulation, pose, range(1, 9), is_colliding=False)
+    rigid = shake(8).moved(groom)
+    away = np.linalg.norm(simulation.points() - rigid, axis=2).max(axis=0)
+    count = int(pinned * 38)  # the shape between points is that of the segments beside them
+    assert away[:count].max() < 1e-4
+    assert pinned == 1.0 or away[-1] > 0.01
