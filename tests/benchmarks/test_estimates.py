@@ -112,7 +112,9 @@ def assert_memory_is_as_said(side_count, guide_count, strand_count):
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="no measure of a process's most memory")
-@pytest.mark.parametrize("counts", [(400, 500, 1000), (30, 20_000, 1000), (30, 500, 500_000)])
+@pytest.mark.parametrize(
+    "counts", [pytest.param((400, 500, 1000), marks=pytest.mark.long), (30, 20_000, 1000), (30, 500, 500_000)]
+)
 def test_memory_equals_the_estimate(counts):
     assert_memory_is_as_said(*counts)
 

@@ -24,7 +24,13 @@ POSES = {
 }
 
 
-@pytest.fixture(params=POSES)
+# The others are those three in part.
+@pytest.fixture(
+    params=[
+        pytest.param(name, marks=() if name in {"plain", "stretched", "mirrored"} else pytest.mark.long)
+        for name in POSES
+    ]
+)
 def surface(request, sphere):
     """The sphere, standing in the world in one way or another."""
     for name, value in POSES[request.param].items():
