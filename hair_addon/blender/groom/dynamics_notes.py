@@ -9,6 +9,7 @@ from bpy.types import Curves, Scene
 
 from ...core.dynamics.stiffness_advice import bend_under_weight
 from ...core.errors import HairError
+from ..data import simulated_world
 from ..data.curves import is_hand_made
 from ..settings import properties
 from ..settings.translations import error_text, interface_text
@@ -47,7 +48,7 @@ def size_note(guides: Curves, blender_scene: Scene) -> str:
 
 def _length(guides, blender_scene):
     """Of guides as they are grown [m]."""
-    return guides.vellus.guides.length * blender_scene.unit_settings.scale_length * guides.vellus.dynamics.size
+    return guides.vellus.guides.length * simulated_world.metres_of(blender_scene, guides.vellus.dynamics)
 
 
 def _in_words(metres, blender_scene):

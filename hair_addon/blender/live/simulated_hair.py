@@ -55,7 +55,8 @@ def follow_frame(blender_scene, depsgraph):
                 points = _play(guides, blender_scene, depsgraph)
             _show(guides, points, shown_in)
             note_state(guides, blender_scene)
-            guides.vellus.dynamics_status = ""
+            if points is not None or played_cache.get(guides.session_uid) is not None:
+                guides.vellus.dynamics_status = ""
         except HairError as error:
             played_cache.invalidate(guides.session_uid)
             _show(guides, None, shown_in)

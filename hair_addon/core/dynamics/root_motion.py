@@ -40,11 +40,6 @@ class RootPose:
         """Points (S, N, 3) of each strand as in the groom, from its root there → float64 where the surface has them."""
         return self.positions[:, None] + rotations.rotated(self.turns[:, None], self.scale * points)
 
-    def carried_back(self, points: np.ndarray) -> np.ndarray:
-        """The inverse of `carried`: from where points are to the groom, from its root."""
-        away = np.asarray(points, np.float64) - self.positions[:, None]
-        return rotations.rotated(rotations.inverse(self.turns)[:, None], away) / self.scale
-
     def moved(self, motion: "RigidMotion") -> "RootPose":
         """The same after a motion of all."""
         return replace(

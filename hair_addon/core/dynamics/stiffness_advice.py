@@ -13,10 +13,8 @@ import math
 
 import numpy as np
 
+from .material import LEAST_STIFFNESS, WET_SOFTNESS, WET_WEIGHT
 from .settings import DynamicsSettings
-
-WET_WEIGHT, WET_SOFTNESS = 0.3, 0.5  # what wetness 1 adds to weight, and takes from stiffness
-LEAST_STIFFNESS = 1e-3  # of a tip, in that of the root
 
 _SEGMENT_COUNT = 32  # sinks within 0.2 % of the elastica up to Γ = 60
 _MOST_STEPS = 50

@@ -212,3 +212,11 @@ def test_baked_frames_can_be_simulated_again_from_the_panel(swung):
     run_now(guide_baking.baking([guides.data], 3, bpy.context.scene))
     bpy.context.scene.frame_set(2)
     assert draw(bpy.types.VELLUS_PT_dynamics).drawn["vellus.bake_dynamics"] == before + 1
+
+
+def test_why_guides_are_not_simulated_stays_said(swung):
+    guides, _hair = swung
+    guides.data.remove_curves()
+    bpy.context.view_layer.update()
+    play(1, 3)
+    assert "no guides" in guides.data.vellus.dynamics_status
