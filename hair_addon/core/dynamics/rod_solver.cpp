@@ -9,7 +9,7 @@
 //   int block                              a group of strands on a processor, a strand on a GPU
 //   int stages                             which parts of a substep: PREDICT, SOLVE, FINISH
 //   int first, end, count                  substeps first … end - 1 of the count in a frame
-//   int pinned                             points from the root that follow the surface beside point 0, ≤ M - 1
+//   int pinned                             points from the root that follow the surface beside point 0; M without SOLVE
 //   float h                                a substep [s]
 //   float carried                          (h / h of the substep before the first)²
 //   vec3 gravity                           [m/s²]

@@ -65,7 +65,7 @@ def step_of(
         material.drag_root,
         settings.hold,
         settings.hold_tip,
-        min(int(settings.pinned * material.lengths.shape[1]), material.lengths.shape[1] - 1),  # the tip stays free
+        int(settings.pinned * material.lengths.shape[1]),
         MOST_STRETCH / settings.stretch_stiffness**0.5,
     )
 
