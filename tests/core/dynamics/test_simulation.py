@@ -75,6 +75,13 @@ def test_without_inertia_hair_moves_with_its_surface(rng):
     np.testing.assert_allclose(points, shake(12).moved(groom), atol=1e-6)
 
 
+def test_hair_that_is_pinned_to_the_tip_moves_with_its_surface(rng):
+    """Also with something to collide with, of which no strand has a free point."""
+    groom, pose = fur(rng)
+    simulation = Simulation(groom, DynamicsSettings(pinned=1.0), pose, World(obstacles=(ball(),)), DEVICE)
+    np.testing.assert_allclose(play(simulation, pose, range(1, 5)), shake(4).moved(groom), atol=1e-6)
+
+
 def test_a_jump_takes_hair_along_as_it_is(rng):
     """Shape and speed are those before, seen from the surface, however far it went."""
     groom, pose = fur(rng)
