@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.commands import run, run_here
+from tests.support.reading import read_picture
 from tests.support.swung import simulate, swing
 
 
@@ -26,16 +27,8 @@ def test_frames_are_baked_and_rendered(shot, tmp_path):
     assert [line["frame"] for line in run_here("simulate", shot, "--json").results] == [5, 6, 7]
     size = ("--width", "64", "--height", "64", "--samples", "4")
     run_here("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-6", *size)
-    pictures = [read(tmp_path / f"f_{frame:02}.png") for frame in (1, 4)]
+    pictures = [read_picture(tmp_path / f"f_{frame:02}.png") for frame in (1, 4)]
     assert not np.array_equal(*pictures)
-
-
-def read(path):
-    image = bpy.data.images.load(str(path))
-    try:
-        return np.array(image.pixels[:])
-    finally:
-        bpy.data.images.remove(image)
 
 
 def test_frames_that_are_not_baked_are_not_rendered(shot, tmp_path):

@@ -76,9 +76,8 @@ def open_file(path):
 
 def close_files(path):
     """Remove the CacheFiles of a file, which is about to be replaced: modifiers play nothing until it is opened."""
-    for cache_file in [*bpy.data.cache_files]:
-        if cache_file.library is None and _absolute(cache_file.filepath) == path:
-            bpy.data.cache_files.remove(cache_file)
+    opened = [c for c in bpy.data.cache_files if c.library is None and _absolute(c.filepath) == path]
+    bpy.data.batch_remove(opened)
 
 
 def _absolute(filepath):

@@ -70,7 +70,7 @@ def delivering(guides, path, blender_scene):
         units = scene_time.frame_rate(blender_scene), strand_arrays.metres_per_unit(blender_scene)
         yield Stage("Delivering", 0.0)
         with whole_file(path) as partial:
-            with hair_file.HairFile(partial, *units) as file:
+            with hair_file.HairFile(partial, path, *units) as file:
                 for task in tasks:
                     task.path = file.add(name_of(task.hair.find()), task.counts)
                 for index, time in enumerate(times):

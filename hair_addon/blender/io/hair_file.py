@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A USD file of hair that moves, written sample by sample: it grows on the disk, not in memory."""
 
+import re
 from pathlib import Path
 
 import bpy
@@ -36,17 +37,29 @@ def _require_usd():
     bpy.utils.expose_bundled_modules()
 
 
+def _failed(path, error):
+    """A `HairError` with the cause that USD gives, among much else."""
+    cause = re.search(r"Error occurred writing file: ([^']*)", str(error))
+    return HairError(
+        "{path} cannot be written: {cause}.", path=path, cause=cause[1] if cause else "the disk may be full"
+    )
+
+
 class HairFile:
     """Strands of several hair objects at several times, in Blender's axes and a scene's units.
 
-    A context: the file is whole after it. Methods raise RuntimeError where the disk is full.
+    A context: the file is whole after it. Methods raise `HairError` where the disk is full; final_path: that it names.
     """
 
-    def __init__(self, path: Path, frame_rate: float, metres_per_unit: float) -> None:
+    def __init__(self, path: Path, final_path: Path, frame_rate: float, metres_per_unit: float) -> None:
         _require_usd()
-        from pxr import Usd, UsdGeom
+        from pxr import Tf, Usd, UsdGeom
 
-        self._stage = Usd.Stage.CreateNew(str(path))
+        self._path = final_path
+        try:
+            self._stage = Usd.Stage.CreateNew(str(path))
+        except Tf.ErrorException as error:
+            raise _failed(final_path, error) from error
         self._stage.GetRootLayer().customLayerData = {_CREATOR: _PROGRAM, "version": paths.addon_version()}
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.z)
         UsdGeom.SetStageMetersPerUnit(self._stage, metres_per_unit)
@@ -78,11 +91,15 @@ class HairFile:
 
     def save(self, time):
         """Write what was added to the disk; time: of the samples, in frames."""
+        from pxr import Tf
+
         self._times.append(time)
-        self._stage.SetStartTimeCode(min(self._times))
-        self._stage.SetEndTimeCode(max(self._times))
-        if not self._stage.GetRootLayer().Save():
-            raise RuntimeError("the disk may be full")
+        try:
+            self._stage.SetStartTimeCode(min(self._times))
+            self._stage.SetEndTimeCode(max(self._times))
+            self._stage.GetRootLayer().Save()
+        except Tf.ErrorException as error:
+            raise _failed(self._path, error) from error
 
 
 class _Hair:
