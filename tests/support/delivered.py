@@ -24,18 +24,16 @@ for time in map(float, times):
     curves.attributes["position"].data.foreach_get("vector", points.ravel())
     found[str(time)] = points
 np.savez(out, **found)
-if scene.render.engine == "CYCLES":
-    scene.frame_set(int(float(times[-1])))
-    scene.render.filepath = out + ".png"
-    bpy.ops.render.render(write_still=True)
+scene.render.filepath = out + ".png"
+bpy.ops.render.render(write_still=True)
 """
 
 
 def without_addon(path, folder, times):
-    """{time: (N, 3) float32} of the object Hair of a .blend, which is rendered at the last time if Cycles is set."""
+    """({time: (N, 3) float32} of the object Hair of a .blend, and a picture at the last time) in another process."""
     out = folder / "elsewhere.npz"
     words = [sys.executable, "-c", PROGRAM, str(path), str(out), *map(str, times)]
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     subprocess.run(words, check=True, cwd=folder, env=environment, capture_output=True, timeout=300)
     with np.load(out) as found:
-        return {float(name): found[name] for name in found}
+        return {float(name): found[name] for name in found}, out.with_name(out.name + ".png")
