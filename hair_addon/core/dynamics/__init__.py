@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         draping,
         hair_volume,
         material,
+        moving_mesh,
         nearest_surface,
         presets,
         rigid_motion,

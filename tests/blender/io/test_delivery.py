@@ -80,7 +80,7 @@ def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_pat
     made = deliver(shot)
     assert made.path == tmp_path / "shot_Guides.usdc" and made.byte_count == made.path.stat().st_size
     assert largest_difference(live(times), before) < 1e-6
-    assert largest_difference({time: before[4.0] for time in times}, before) > 0.01
+    assert largest_difference(dict.fromkeys(times, before[4.0]), before) > 0.01
     bpy.ops.wm.save_mainfile()
     found, picture = without_addon(tmp_path / "shot.blend", tmp_path, times)
     assert largest_difference(found, before) < 1e-6
