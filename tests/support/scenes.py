@@ -19,6 +19,7 @@ from tests.support.reading import vertex_positions
 @pytest.fixture(scope="session", autouse=True)
 def blender():
     """The add-on in Blender, with graphics: once in a process, whichever folders of tests it runs."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
     if not hasattr(bpy.types.Curves, "vellus"):
         hair_addon.register()
     gpu.init()
@@ -29,8 +30,8 @@ def blender():
 
 @pytest.fixture
 def scene():
-    """An empty scene, undo ready."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    """An empty scene, undo ready; of Blender's settings, which take longer to read, those of the process stay."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.preferences.edit.use_global_undo = True
     return bpy.context.scene
 
