@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon.blender.data import simulated_guides
 from hair_addon.blender.groom import guide_baking
-from hair_addon.blender.live import handlers, invalidation, live_hair, simulated_hair
+from hair_addon.blender.live import dynamics_state, handlers, invalidation, live_hair, simulated_hair
 from hair_addon.core.long_work import run_now
 from tests.support.layout import draw
 from tests.support.reading import points, write_points
@@ -60,7 +60,7 @@ def test_the_present_frame_is_shown_as_it_is_baked_and_as_combed_when_freed(swun
     run_now(guide_baking.baking([guides.data], 9, bpy.context.scene))
     bpy.context.view_layer.update()
     baked, strands = shown(guides).copy(), drawn(hair)
-    assert simulated_hair.state_of(guides.data) == ("Frames {first} to {last} are baked", {"first": 1, "last": 9})
+    assert dynamics_state.state_of(guides.data) == ("Frames {first} to {last} are baked", {"first": 1, "last": 9})
     play(7, 8)
     assert np.array_equal(shown(guides), baked)
     np.testing.assert_allclose(drawn(hair), strands, atol=1e-6)
@@ -70,7 +70,7 @@ def test_the_present_frame_is_shown_as_it_is_baked_and_as_combed_when_freed(swun
     bpy.context.view_layer.update()
     assert np.array_equal(shown(guides), points(guides))
     np.testing.assert_allclose(drawn(hair), combed, atol=1e-6)
-    assert "Not simulated" in simulated_hair.state_of(guides.data)[0]
+    assert "Not simulated" in dynamics_state.state_of(guides.data)[0]
 
 
 def test_a_jump_simulates_nothing(swung, monkeypatch):
@@ -106,7 +106,7 @@ def test_a_setting_takes_effect_with_the_next_frame(swung):
     bpy.context.view_layer.update()
     assert np.array_equal(shown(guides), sixth)
     play(7, 9)
-    assert simulated_hair.state_of(guides.data)[1]["frame"] == 6
+    assert dynamics_state.state_of(guides.data)[1]["frame"] == 6
     bpy.context.scene.frame_set(1)
     guides.data.vellus.dynamics.gravity = 1.0
     other = shown(guides).copy()

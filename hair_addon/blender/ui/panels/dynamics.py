@@ -5,7 +5,7 @@ import bpy
 
 from ...groom import dynamics_notes, frame_folders
 from ...groom.selection import guides_of
-from ...live import simulated_hair
+from ...live import dynamics_state, simulated_hair
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
 from .tab import HairTab, split, write
@@ -44,7 +44,7 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
         sides.operator("vellus.free_dynamics", text="", icon="TRASH")
         layout.prop(guides.vellus, "cache_folder")
         if guides.vellus.simulates:
-            sentence, values = simulated_hair.state_of(guides)
+            sentence, values = dynamics_state.state_of(guides)
             write(layout, context, interface_text(sentence, **values))
             for error in simulated_hair.notes_of(guides):
                 write(layout, context, error_text(error), "ERROR")
