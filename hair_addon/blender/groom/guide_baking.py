@@ -22,7 +22,7 @@ from ..host import scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import properties
-from . import bake_resuming, frame_folders, guide_simulation
+from . import bake_resuming, frame_folders, guide_simulation, quiet_hair
 from .bake_resuming import Task
 
 SOLVER_VERSION = 1  # of all that frames follow from beside settings: raised when they come out otherwise
@@ -90,6 +90,7 @@ def baking(
     _baking = True
     with contextlib.ExitStack() as stack:
         stack.callback(_end, scene, present, [Remembered(guides) for guides in guides_list])
+        stack.enter_context(quiet_hair.unevaluated(guides_list, scene))
         tasks = [_begin(guides, last, scene, starts_over, stack) for guides in guides_list]
         yield Stage("Baking", 0.0)
         yield from bake_resuming.going_on(tasks, scene)
