@@ -377,10 +377,12 @@ def inputs_of(target: Curves) -> tuple[Curves, HairSettings]:
 def _read_surface(surface_object, depsgraph, target=None):
     """The `Surface` of a mesh object that may be changed.
 
-    The surface that `target` is bound to, if that is the same: of which normals and areas are known.
+    The surface that `target` is bound to, if that is the same: of which normals and areas are known. That of hair
+    that follows a library only carries it.
     """
-    _check_surface(surface_object)
-    curves_objects.keep_rest(surface_object)
+    if target is None or not curves.follows_library(target):
+        _check_surface(surface_object)
+        curves_objects.keep_rest(surface_object)
     surface, bound = scene.read_surface(surface_object, depsgraph), target and bindings.of(target)
     if bound is not None and bound.surface.is_same(surface):
         surface = bound.surface

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
         settings,
         simulation,
         stiffness_advice,
+        stopped_colliders,
     )
 else:
     __getattr__ = submodules(__name__)
