@@ -217,6 +217,7 @@ class VellusCurves(bpy.types.PropertyGroup):
         default="//haircache",
     )
     cache_identity: bpy.props.StringProperty(description="Folder of the baked frames", options={"HIDDEN"})
+    delivered_key: bpy.props.StringProperty(description="Baked frames that were delivered", options={"HIDDEN"})
     is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_dynamics_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
