@@ -37,6 +37,7 @@ PURE = {
     "core/geometry/bspline.py: _device_matrix",
     "core/geometry/bspline.py: _flat_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
+    "core/params.py: _declared",
 }
 
 _DISPLAYS = (ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.Set, ast.SetComp)
