@@ -122,7 +122,8 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const auto random = [&](int purpose) { return random_number(identity, seed, ints(purpose)); };
 
   // A_si = base · profile(x_i).
-  lanes base = number[0] * (1.0f - number[1] * random(VARY));
+  lanes base = number[0];
+  if (number[1] != 0.0f) base *= 1.0f - number[1] * random(VARY);
   if (mask >= 0) {
     for (int lane = 0; lane < LANES; ++lane) {
       set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
