@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         contact,
         contact_queries,
         detail,
+        draped_growth,
         draping,
         hair_volume,
         material,
