@@ -13,6 +13,7 @@ from ..gpu import (
     level_of_detail,
     render_programs,
     strand_textures,
+    surface_shading,
     uniforms,
     world_texture,
 )
@@ -35,7 +36,7 @@ class DrawnScene:
     """Read once by `read`, drawn from any number of views until something moves."""
 
     hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on, part in viewports)
-    surfaces: list  # (SurfaceOnGPU, linear RGB, None of a holdout)
+    surfaces: list  # (SurfaceOnGPU, parts of a `DrawnMesh`, None of a holdout)
     lights: np.ndarray  # uniforms.LIGHTS
     world: light_door.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
@@ -126,7 +127,7 @@ def read_unlit(depsgraph, known, refused):
 
 
 def _upload(meshes):
-    return [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
+    return [(drawing.upload_surface(mesh.positions, mesh.normals, mesh.uvs), mesh.parts) for mesh in meshes]
 
 
 def _new_shadow_maps(lights):
@@ -223,7 +224,7 @@ def _brightness(lights, place):
 def draw_hiding(drawn, view):
     """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for surface, _color in drawn.surfaces:
+        for surface, _parts in drawn.surfaces:
             drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
 
 
@@ -265,8 +266,8 @@ def draw_arrival(drawn, view, buffer):
     """Return a texture of light visibility for the content of a `VisibilityBuffer`, to which hair was added last."""
     _see_through_hair(drawn, view)
     with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for surface, color in drawn.surfaces:
-            if color is None:
+        for surface, parts in drawn.surfaces:
+            if parts is None:
                 drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
                 continue
             program = render_programs.surface_arrival_program()
@@ -284,8 +285,8 @@ def draw_surfaces(drawn, view):
     """Draw all surfaces with depth test into the bound framebuffer."""
     _see_through_hair(drawn, view)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, color), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=True):
-            if color is None:
+        for (surface, parts), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=True):
+            if parts is None:
                 drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
                 continue
-            drawing.draw_surface(surface, color, view, drawn.lights, drawn.shadow_maps.samplers | seen)
+            surface_shading.draw(surface, parts, view, drawn.lights, drawn.shadow_maps.samplers | seen)
