@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The surface under the hair, a Principled BSDF: diffuse below a rough dielectric, or metal.
+// The surface under the hair, a Principled BSDF: diffuse below a rough dielectric, or metal. Of a clear one, what it
+// reflects, and as alpha the part that it does not let through.
 
 #include "include/shadow.glsl"
 #include "include/world.glsl"
@@ -65,6 +66,10 @@ void main()
       float facets = D_ggx(clamp(dot(N, H), 0.0, 1.0), widened) * V_smith(n_dot_l, n_dot_v, alpha);
       highlight += arriving * gain * fresnel * facets;
     }
+  }
+  if (surface.is_clear != 0) {
+    color = vec4(min(highlight, vec3(BRIGHTEST)), coat);
+    return;
   }
   vec3 below = (1.0 - surface.metallic) * max(1.0 - coat, 0.0) * albedo;
   color = vec4(min(below * irradiance / PI + highlight, vec3(BRIGHTEST)), 1.0);

@@ -23,6 +23,11 @@ class DrawnMesh:
     parts: tuple | None
     owner: tuple = ()
 
+    @property
+    def is_clear(self):
+        """Whether all of it transmits light: it hides nothing, and casts no shadow."""
+        return self.parts is not None and all(material.is_clear for _first, _count, material in self.parts)
+
 
 def read_drawn_meshes(depsgraph, viewport=None):
     """A `DrawnMesh` for every mesh that a 3-D viewport shows as a surface, or without one a render; instances too."""

@@ -39,13 +39,17 @@ class ImageMap:
 
 @dataclass(frozen=True)
 class SurfaceMaterial:
-    """Inputs of a Principled BSDF. color: linear RGB; reflectance: at normal incidence, of all but metal."""
+    """Inputs of a Principled BSDF. color: linear RGB; reflectance: at normal incidence, of all but metal.
+
+    is_clear: whether it transmits light, as glass or a cornea does: it is seen by what it reflects.
+    """
 
     color: tuple = (0.8, 0.8, 0.8)
     roughness: float = 1.0
     metallic: float = 0.0
     reflectance: float = 0.0
     normal_strength: float = 1.0
+    is_clear: bool = False
     color_image: ImageMap | None = None
     roughness_image: ImageMap | None = None
     normal_image: ImageMap | None = None
@@ -73,6 +77,7 @@ def read_material(material):
         float(_value(sockets["Metallic"])),
         _reflectance(float(_value(sockets["IOR"])), float(_value(sockets["Specular IOR Level"]))),
         float(_value(normal_map.inputs["Strength"])) if is_mapped else 1.0,
+        float(_value(sockets["Transmission Weight"])) > 0.5,
         _image_map(sockets["Base Color"], material),
         _image_map(sockets["Roughness"], material),
         _image_map(normal_map.inputs["Color"], material, normal_map.uv_map) if is_mapped else None,

@@ -62,7 +62,7 @@ def _albedo_texture():
 def _record(material, images):
     record = uniforms.SURFACE.record()
     record["color"][:3] = material.color
-    for name in ("roughness", "metallic", "reflectance", "normal_strength"):
+    for name in ("roughness", "metallic", "reflectance", "normal_strength", "is_clear"):
         record[name] = getattr(material, name)
     for index, name in enumerate(shaders.SURFACE_IMAGES):
         record[f"has_{name}"] = images[name] is not None

@@ -123,6 +123,7 @@ SURFACE = Block(
         "metallic": "float",
         "reflectance": "float",  # at normal incidence, of all but metal
         "normal_strength": "float",
+        "is_clear": "int",
         "has_color_image": "int",
         "has_roughness_image": "int",
         "has_normal_image": "int",

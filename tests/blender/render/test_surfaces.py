@@ -204,3 +204,17 @@ def test_a_frame_of_an_unchanged_scene_reads_no_material(stage, monkeypatch):
     for _frame in range(2):
         buffer = visibility_buffer.VisibilityBuffer(SIZE, SIZE)
         drawn_scene.draw_behind_hair(drawn, drawing.view_record(*camera, SIZE), buffer, is_transparent=True)
+
+
+def test_what_is_behind_a_clear_surface_is_seen_through_its_highlight(stage):
+    material_of(plane(4.0), Base_Color=(0.3, 0.3, 0.3, 1.0), Specular_IOR_Level=0.0)
+    sun(math.radians(90.0), 0.0, 0.0, strength=math.pi)
+    bare = picture()[..., :3]
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.9, location=(0.0, -1.0, 0.0))
+    bpy.context.object.data.shade_smooth()
+    material_of(bpy.context.object, Transmission_Weight=1.0, Roughness=0.1)
+    seen = picture()[..., :3]
+    middle = slice(SIZE // 2 - 1, SIZE // 2 + 1)
+    assert seen[middle, middle].min() > 2.0 * bare.max()  # the sun, in the sphere
+    beside = seen[SIZE // 2, SIZE // 4]
+    np.testing.assert_allclose(beside, bare[SIZE // 2, SIZE // 4] * 0.96, rtol=0.05)
