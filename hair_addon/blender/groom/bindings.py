@@ -24,7 +24,7 @@ from . import styled_hair
 from .styled_hair import StyledHair
 
 if TYPE_CHECKING:
-    from ...core.interpolation.guide_weights import Reach
+    from ...core.interpolation.reach import Reach
 
 
 @dataclass
@@ -69,7 +69,7 @@ class BoundHair:
     def reach(self) -> "Reach":
         """The strands that follow each guide."""
 
-        return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.guides))
+        return interpolation.reach.of_guides(self.binding.guide_weights, len(self.guides))
 
     def follow(self, guides: Strands) -> np.ndarray | None:
         """Bring strands up to guides as they are combed now; indices (M,) of those that moved.
@@ -107,16 +107,16 @@ class BoundHair:
         """Compute strands for `guides`, in other threads or, where they are (M,) indices of some, at once."""
         binding, styling, axes = self.binding, self.styles.styling, self.surface.to_local_axes
         guides = self.guides if styling is None else styling.guides(self.guides)
-        weights = following.weights_now(binding, guides, chosen)
         if chosen is None:
+            weights = following.weights_now(binding, guides)
             self.is_behind = False
             out = None if self.growing is None else self.points
             out = out if out is not None and out.shape[1] == guides.point_count else None
             self.growing = following.growing_points(binding, guides, weights, axes, out, styling)
             self._take_shares(weights.weights.numpy())
         else:
-            self.points[chosen] = following.follow_some(binding, guides, chosen, weights, axes, styling)
-            self._take_shares(weights.weights.numpy(), chosen)
+            self.points[chosen], shares = following.follow_some(binding, guides, chosen, axes, styling)
+            self._take_shares(shares, chosen)
 
     def restyle(self, styles: StyledHair) -> None:
         """Apply other styles to the same strands: nothing is searched."""

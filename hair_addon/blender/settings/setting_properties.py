@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -15,7 +16,7 @@ from .translations import CONTEXT
 _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
 
 
-def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None):
+def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, override=frozenset()):
     """{name: bpy property} for the fields of a `Settings` class but those of `skip`; `update` as in bpy.props.
 
     A radius has its diameter beside it, which is shown in its place. Operators have no `update`. Structural settings,
@@ -26,16 +27,17 @@ def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None):
     for name, default, details in declared(settings_class):
         if name not in skip:
             details = replace(details, high=highs.get(name, details.high))
-            made[name] = _property(name, default, details, update, details.is_structural or name in unkeyed)
+            is_unkeyed = details.is_structural or name in unkeyed
+            made[name] = _property(name, default, details, update, is_unkeyed, set(override))
             if details.diameter is not None:
                 shown, description = details.diameter
                 made[shown] = _diameter_property(name, shown, description, details, update)
     return made
 
 
-def _property(name, default, details, update, is_unkeyed):
+def _property(name, default, details, update, is_unkeyed, override):
     common = {"name": _title(label_of(name, details)), "description": details.description, "default": default}
-    common["translation_context"] = CONTEXT
+    common["translation_context"], common["override"] = CONTEXT, override
     if is_unkeyed:
         common["options"] = set()
     if update is not None:
@@ -114,15 +116,21 @@ def to_settings(owner, settings_class, skip=()):
 
     Raises `HairError` for what the range forbids.
     """
+    fields = [field for field in declared(settings_class) if field[0] not in skip]
     try:
-        values = {
-            name: plain(getattr(owner, name), default, details)
-            for name, default, details in declared(settings_class)
-            if name not in skip
-        }
+        values = [getattr(owner, name) for name, _default, _details in fields]
     except UnicodeDecodeError as error:
         raise HairError("A name in the hair settings is not valid UTF-8: pick the item again.") from error
-    return settings_class(**values)
+    held = (tuple(value) if isinstance(field[1], tuple) else value for value, field in zip(values, fields, strict=True))
+    return _settings_of(settings_class, tuple(skip), tuple(held))
+
+
+@lru_cache(maxsize=256)  # of settings that were read before: they are read with every step of a stroke
+def _settings_of(settings_class, skip, values):
+    fields = [field for field in declared(settings_class) if field[0] not in skip]
+    return settings_class(
+        **{name: plain(value, default, details) for (name, default, details), value in zip(fields, values, strict=True)}
+    )
 
 
 def plain(value, default, details):

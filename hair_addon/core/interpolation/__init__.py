@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         hair_binding,
         interpolation,
         part_lines,
+        reach,
         regions,
         root_binder,
     )

@@ -6,7 +6,7 @@ import bpy
 from ...data import delivered_hair
 from ...groom import dynamics_notes, frame_folders
 from ...groom.selection import guides_of, hair_of, object_of
-from ...live import simulated_hair
+from ...live import dynamics_state, simulated_hair, unlocked_renders
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
 from .tab import HairTab, split, write
@@ -46,12 +46,15 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
         layout.prop(guides.vellus, "cache_folder")
         _draw_delivery(layout, context)
         if guides.vellus.simulates:
-            sentence, values = simulated_hair.state_of(guides)
+            sentence, values = dynamics_state.state_of(guides)
             write(layout, context, interface_text(sentence, **values))
             for error in simulated_hair.notes_of(guides):
                 write(layout, context, error_text(error), "ERROR")
         if guides.vellus.dynamics_status:
             write(layout, context, guides.vellus.dynamics_status, "ERROR")
+        if frame_folders.has_frames(guides) and not context.scene.render.use_lock_interface:
+            write(layout, context, interface_text(unlocked_renders.SENTENCE), "INFO")
+            unlocked_renders.draw_setting(layout, context)
         note = dynamics_notes.size_note(guides, context.scene)
         if note:
             write(layout, context, note, "INFO")
