@@ -54,9 +54,9 @@ def _brow(skin, side):
         # Hair of the upper and of the lower border turns toward the middle.
         turns = angle - 0.35 * row
         lengths = _BROW_LENGTH * (0.75 + 0.45 * np.sin(np.pi * np.clip(along + 0.12, 0.0, 1.0)))
-        guides.append(
-            [_lying(skin, *line[i], side, turns[i], lengths[i] * (1.0 - 0.25 * abs(row))) for i in range(_BROW_STEPS)]
-        )
+        guides.append([
+            _lying(skin, *line[i], side, turns[i], lengths[i] * (1.0 - 0.25 * abs(row))) for i in range(_BROW_STEPS)
+        ])
     return np.array(roots), np.array(guides)
 
 

@@ -94,12 +94,10 @@ def _ball(center, axes):
     # The iris is a shallow cone behind the cornea; the pupil a hole in it.
     depth = np.where(is_pupil, 0.0016, 0.0008 - 0.0006 * _IRIS_RINGS)
     angles = np.linspace(np.arcsin(IRIS_RADIUS / RADIUS), np.pi, _SCLERA_RINGS + 1)[1:]
-    profile = np.concatenate(
-        [
-            np.stack([radii, limbus - depth], axis=1),
-            RADIUS * np.stack([np.sin(angles), np.cos(angles)], axis=1),
-        ]
-    )
+    profile = np.concatenate([
+        np.stack([radii, limbus - depth], axis=1),
+        RADIUS * np.stack([np.sin(angles), np.cos(angles)], axis=1),
+    ])
     places = np.concatenate([_IRIS_PART * _IRIS_RINGS, np.linspace(_IRIS_PART, 1.0, _SCLERA_RINGS + 1)[1:]])
     return _revolved(center, axes, profile, places, slots=(len(_IRIS_RINGS) - 1, 1, 0))
 

@@ -59,27 +59,12 @@ class BakedFrame:
     folder: Path
 
 
-<<<<<<< HEAD
-@dataclass
-class _Task:
-    """Guides that are being baked."""
-
-    name: str
-    guides: Remembered
-    simulated: GuideSimulation
-    writer: Writer
-    done: int  # the last frame that is there
-    broken: int = 0
-
-
 def memory_of(guides_list: Sequence[Curves]) -> int:
     """Memory that baking guides takes while it runs [bytes]."""
     counts = [(guides.vellus.dynamics.vertex_count, len(guides.curves)) for guides in guides_list]
     return sum(cost.simulation_bytes(*count) for count in counts)
 
 
-=======
->>>>>>> main
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
     """{part: digest} of what the frames of some guides follow from, but for the animation. Raises `HairError`."""
     settings = properties.dynamics_of(guides.vellus)
