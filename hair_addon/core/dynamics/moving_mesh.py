@@ -41,7 +41,8 @@ def simulated(
     )
 
     def world(vertices, number):
-        return World(gravity, surface.obstacles(vertices, scaled), time=number * seconds)
+        obstacles = (surface.obstacle(vertices, scaled),) if settings.collides_with_surface else ()
+        return World(gravity, obstacles, time=number * seconds)
 
     start, seconds = surface.pose(mesh.vertices), seconds * settings.time_scale
     at_first = world(mesh.vertices, 0)
@@ -94,10 +95,8 @@ class _Surface:
         left, _sizes, right = np.linalg.svd(np.swapaxes(posed[:, 1:] - posed[:, :1], 1, 2))
         return RootPose(self._size * positions, rotations.from_matrices(left @ right))
 
-    def obstacles(self, vertices, settings):
-        """What guides collide with: the mesh itself, or nothing."""
-        if not settings.collides_with_surface:
-            return ()
+    def obstacle(self, vertices, settings):
+        """The mesh itself, which guides collide with."""
         vertices = self._size * vertices.astype(np.float64)
         distance = settings.collision_distance
-        return (Obstacle("surface", vertices, self._mesh.triangles, settings.friction, distance),)
+        return Obstacle("surface", vertices, self._mesh.triangles, settings.friction, distance)
