@@ -6,7 +6,7 @@ After an event nothing is drawn or computed from what was cached before it. Func
 """
 
 from ..data import simulated_guides
-from ..gpu import lights, shaders, world_texture
+from ..gpu import lights, shaders, surface_shading, world_texture
 from ..groom import bindings, frame_folders
 from ..host import notices
 from ..render import hair_cache, region_pictures, viewport
@@ -40,6 +40,7 @@ OTHERS = (
     unlocked_renders.noted_cache,
     frame_folders.folder_cache,
     shaders.complaint_cache,
+    surface_shading.texture_cache,
     notices.said_cache,
 )
 
