@@ -14,7 +14,7 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import parallel
 from ..kernels.parallel import Rows
-from .colliders import FARTHEST, Colliders
+from .colliders import Colliders
 from .nearest_surface import Surface, nearest
 from .simulation import Obstacle
 
@@ -24,6 +24,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 _RETURN = wp.constant(0.15)  # of the way back, that a strand takes on the length of a segment
 _ROUNDS = wp.constant(3)  # of moving a point out, and back to its distance from the one before
 _PUSHES = wp.constant(4)  # afterwards, where one is not enough: in the notches of a mesh
+_AHEAD = wp.constant(1.0)  # segments that a surface is looked for beyond the next point, to spare later queries
 _NEAR = wp.constant(1e-6)  # [m] less than the distance that counts as that distance
 
 
@@ -63,9 +64,9 @@ def _surface_of(colliders):
 
 
 @wp.func
-def _lack(surface: Surface, place: wp.vec3):
-    """(direction out, how far a point lacks its distance, how far the nearest surface is)."""
-    hit = nearest(surface, place, place, FARTHEST, 0)
+def _lack(surface: Surface, place: wp.vec3, radius: float):
+    """(direction out, how far a point lacks its distance, how far the nearest surface is, up to a radius)."""
+    hit = nearest(surface, place, place, radius, 0)
     lack = float(0.0)
     if hit.collider >= 0 and wp.dot(hit.normal, hit.normal) > 0.5:
         lack = surface.settings[hit.collider][1] - hit.distance
@@ -96,9 +97,11 @@ def _keep_outside(
         if clear <= 0.0:
             lack = float(1.0)
             gap = float(0.0)
+            # The point before is outside, so a surface between the two is not farther than they are apart.
+            radius = _AHEAD * size + wp.length(place - last) + surface.largest_distance
             for step in range(_ROUNDS + _PUSHES):
                 if lack > _NEAR:
-                    out, lack, gap = _lack(surface, place)
+                    out, lack, gap = _lack(surface, place, radius)
                     if lack > _NEAR:
                         is_moved = 1
                         place += lack * out
