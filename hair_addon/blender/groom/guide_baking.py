@@ -60,7 +60,7 @@ class BakedFrame:
 
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
     """{part: digest} of what the frames of some guides follow from, but for the animation. Raises `HairError`."""
-    settings = properties.dynamics_of(guides.vellus)
+    settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     return frame_manifest.digests_of(
         {
             "solver": SOLVER_VERSION,
@@ -165,7 +165,7 @@ def _begin(guides, last, scene, starts_over, stack):
 def _read(task, scene, depsgraph):
     """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
     guides = task.guides.find()
-    settings = properties.dynamics_of(guides.vellus)
+    settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     if settings != task.simulated.settings:  # keyed
         task.simulated.change(settings)
     read = guide_simulation.read(guides, scene, depsgraph, settings)

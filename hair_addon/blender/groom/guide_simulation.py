@@ -88,7 +88,7 @@ class GuideSimulation:
 
 def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:
     """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
-    settings = properties.dynamics_of(guides.vellus)
+    settings = simulated(properties.dynamics_of(guides.vellus))
     frame = read(guides, scene, depsgraph, settings)
     pose, metres = frame.pose, simulated_world.metres_of(scene, settings)
     local = combed_points(guides)
@@ -110,6 +110,11 @@ def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsS
     rate = scene.render.fps / scene.render.fps_base
     seconds = settings.time_scale / rate
     return FrameInput(scene_time.frame_of(scene), pose, world, seconds, tuple(errors))
+
+
+def simulated(settings: DynamicsSettings) -> DynamicsSettings:
+    """Settings without those that guides do not follow from, but hair: to be compared with others."""
+    return replace(settings, keeps_hair_outside=False)
 
 
 def in_metres(settings: DynamicsSettings, metres: float) -> DynamicsSettings:

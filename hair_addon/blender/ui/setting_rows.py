@@ -40,7 +40,7 @@ _FIBRE = ("youngs_modulus", "shear_modulus", "fibre_radius", "density")
 _FORCES = ("gravity", "air_drag", "force_fields", "inertia")
 _SHAPE = ("hold", "hold_tip", "sag_free", "pinned")
 _COLLIDERS = ("collides_with_surface", "colliders")
-_CONTACT = ("collision_distance", "friction")
+_CONTACT = ("collision_distance", "friction", "keeps_hair_outside")
 _VOLUME = ("hair_friction", "hair_pressure", "cell_size")
 
 

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
         hair_volume,
         material,
         nearest_surface,
+        outside,
         presets,
         rigid_motion,
         rod_solver,
