@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         draping,
         hair_volume,
         material,
+        moving_mesh,
         nearest_surface,
         outside,
         presets,

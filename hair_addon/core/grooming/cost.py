@@ -29,6 +29,9 @@ _HAIR_FACE_SECONDS, _STRAND_SECONDS = 2.5e-6, 3e-6
 # Simulating: a frame, and a vertex in a substep, with contact.
 _FRAME_SECONDS, _VERTEX_SECONDS = 0.02, 4e-7
 
+# While they are simulated: a guide, and a vertex of it.
+_SIMULATED_GUIDE_BYTES, _SIMULATED_VERTEX_BYTES = 30_000, 600
+
 # Draping as guides grow: once, a triangle within their reach, and a guide.
 _DRAPE_SECONDS, _DRAPE_FACE_SECONDS, _DRAPE_GUIDE_SECONDS = 0.15, 4e-6, 5e-4
 
@@ -71,6 +74,11 @@ def drape_seconds(settings: GuideSettings, face_count: int) -> float:
 def hair_seconds(settings: HairSettings, face_count: int) -> float:
     """How long growing strands between guides takes [s]; settings: `HairSettings`; face_count as above."""
     return settings.strand_count * _STRAND_SECONDS + face_count * _HAIR_FACE_SECONDS
+
+
+def simulation_bytes(vertex_count: int, guide_count: int) -> int:
+    """Memory that simulating guides takes while it runs [bytes]; vertex_count: of a guide."""
+    return guide_count * (_SIMULATED_GUIDE_BYTES + vertex_count * _SIMULATED_VERTEX_BYTES)
 
 
 def table_seconds(size: int) -> float:
