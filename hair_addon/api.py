@@ -50,7 +50,7 @@ from .api_styles import (
     styles_of,
 )
 from .api_tables import bake_tables, table_settings
-from .core import geometry, grooming, imaging, lazy
+from .core import dynamics, geometry, grooming, imaging, lazy
 from .core.errors import HairError
 from .core.files import settings_file
 from .core.files.settings_file import GroomSettings, require_styles
@@ -139,7 +139,7 @@ def distribute_guides(
     settings, progress = changed(GuideSettings, settings, changes), heard(progress)
     if are_arrays(surface):
         require_no_names(settings)
-        return groom.distribute_guides(mesh_of(surface), settings, progress=progress)
+        return dynamics.draped_growth.grow(mesh_of(surface), settings, progress=progress)
 
     return run_now(
         blender.groom.pipeline.distributing_guides(_surface_object(surface), settings, _depsgraph()), progress

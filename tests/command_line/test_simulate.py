@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """simulate: frames baked from the command line, gone on with, and rendered; what is wrong is one sentence."""
 
+import subprocess
+
 import bpy
 import numpy as np
 import pytest
 
-from tests.support.commands import run, run_here
+from tests.support.commands import ROOT, command, run, run_here
+from tests.support.reading import read_picture
 from tests.support.swung import simulate, swing
 
 
@@ -26,16 +29,32 @@ def test_frames_are_baked_and_rendered(shot, tmp_path):
     assert [line["frame"] for line in run_here("simulate", shot, "--json").results] == [5, 6, 7]
     size = ("--width", "64", "--height", "64", "--samples", "4")
     run_here("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-6", *size)
-    pictures = [read(tmp_path / f"f_{frame:02}.png") for frame in (1, 4)]
+    pictures = [read_picture(tmp_path / f"f_{frame:02}.png") for frame in (1, 4)]
     assert not np.array_equal(*pictures)
 
 
-def read(path):
-    image = bpy.data.images.load(str(path))
-    try:
-        return np.array(image.pixels[:])
-    finally:
-        bpy.data.images.remove(image)
+@pytest.mark.long
+def test_halves_of_a_shot_that_two_processes_render_are_those_of_one(shot, tmp_path):
+    run_here("simulate", shot)
+    size = ("--width", "48", "--height", "32", "--samples", "1")
+    assert run_here("render", shot, "--out", tmp_path / "one_#.exr", "--frames", "1-6", *size).status == 0
+    halves = [["render", shot, "--out", tmp_path / "two_#.exr", "--frames", part, *size] for part in ("1-3", "4-6")]
+    processes = [subprocess.Popen(command(*words), cwd=ROOT) for words in halves]
+    assert [process.wait(300) for process in processes] == [0, 0]
+    pictures = [[read_picture(tmp_path / f"{name}_{frame}.exr") for frame in range(1, 7)] for name in ("one", "two")]
+    assert np.array_equal(*pictures)
+    assert not np.array_equal(pictures[0][2], pictures[0][3])
+
+
+@pytest.mark.long
+def test_one_of_two_processes_that_bake_at_once_is_told(shot, tmp_path):
+    both = [subprocess.Popen(command("simulate", shot), cwd=ROOT, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate(timeout=300)[1] for process in both]
+    statuses = sorted(process.returncode for process in both)
+    assert statuses in ([0, 0], [0, 1])  # the second may have come when the first was done
+    assert statuses == [0, 0] or any("is being baked by another process" in text for text in said)
+    frames = [*(tmp_path / "frames").rglob("+*.npz")]
+    assert len(frames) == 7 and run_here("simulate", shot, "--json").results == []
 
 
 def test_frames_that_are_not_baked_are_not_rendered(shot, tmp_path):

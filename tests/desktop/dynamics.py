@@ -75,7 +75,7 @@ def differ(before, after):
 
 
 def state():
-    sentence, values = addon().live.simulated_hair.state_of(of_kind("GUIDES").data)
+    sentence, values = addon().live.dynamics_state.state_of(of_kind("GUIDES").data)
     return sentence.format(**values)
 
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Attributes of Curves ↔ arrays."""
 
+import ctypes
+
 import numpy as np
 
 # Data types that can be read as arrays: (name of the value property, components, dtype).
@@ -35,6 +37,25 @@ def write(curves, name, data_type, domain, values):
     elif _holds(attribute, value_name, values):
         return
     attribute.data.foreach_set(value_name, values)
+
+
+def write_positions(curves, points):
+    """Write float32 points (..., 3) of all curves, those of linked and overridden Curves too, which no file keeps."""
+    data, points = curves.attributes["position"].data, np.ascontiguousarray(points, np.float32)
+    if not is_from_library(curves):
+        data.foreach_set("vector", points.ravel())
+        return
+    # Where Blender's interface lets nobody edit, `foreach_set` does nothing without a word. Single elements may be
+    # written, by the first of which Blender unshares the array from its evaluated copies.
+    if points.size != 3 * len(data):
+        raise ValueError("points are not as many as those of the curves")
+    if len(data):
+        ctypes.memmove(data[0].as_pointer(), points.ctypes.data, points.nbytes)
+
+
+def is_from_library(curves):
+    """Whether another file holds what Curves are: they are linked, or a library override."""
+    return curves.library is not None or curves.override_library is not None
 
 
 def _holds(attribute, value_name, values):

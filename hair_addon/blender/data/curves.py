@@ -31,7 +31,7 @@ _ROOT_TOLERANCE = 1e-4
 def _write_positions(curves, points):
     """Write points (..., 3) float32 of all curves, and their fingerprint for `is_combed`."""
 
-    curves.attributes["position"].data.foreach_set("vector", np.ascontiguousarray(points, np.float32).ravel())
+    attributes.write_positions(curves, points)
     curves.vellus.written = geometry.fingerprint.fingerprint(points)
 
 
@@ -386,6 +386,11 @@ def stored_roots(curves, surface, is_complete=False):
 def followers(guide_curves):
     """Return the hair Curves that follow some guides."""
     return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and c.vellus.guide_curves == guide_curves]
+
+
+def follows_library(hair):
+    """Whether hair Curves or their guides are linked, or library overrides."""
+    return any(attributes.is_from_library(c) for c in (hair, hair.vellus.guide_curves) if c is not None)
 
 
 def require_editable(datablock):

@@ -31,7 +31,7 @@ def read(blender_scene, depsgraph, settings, guide_pose, surface_object):
     if settings.collides_with_surface:
         vertices, triangles = guide_pose.vertices, guide_pose.triangles
         obstacles.append(_obstacle(surface_object, vertices, triangles, settings, metres))
-    for collider in _colliders(settings.colliders):
+    for collider in colliders(settings.colliders):
         if settings.collides_with_surface and collider == surface_object:
             continue
         try:
@@ -53,7 +53,7 @@ def _obstacle(mesh_object, vertices, triangles, settings, metres):
     return dynamics.simulation.Obstacle(name, vertices, triangles, friction, metres * distance, own.is_double_sided)
 
 
-def _colliders(collection_name):
+def colliders(collection_name):
     """The mesh objects of a collection, by name."""
     collection = bpy.data.collections.get(collection_name) if collection_name else None
     return [] if collection is None else [o for o in collection.all_objects if o.type == "MESH"]

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         edits,
         foreign_curves,
         groom_settings,
+        grown_guides,
         guide_additions,
         guide_tools,
         hair_styles,

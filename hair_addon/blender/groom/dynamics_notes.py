@@ -13,6 +13,7 @@ from ..data import simulated_world
 from ..data.curves import is_hand_made
 from ..settings import properties
 from ..settings.translations import error_text, interface_text
+from . import frame_folders
 
 LONGEST = 1.5  # [m]: longer hair is probably of a character that is not modeled to scale
 TYPICAL_LENGTH = 0.1  # [m], of hand-made guides: the setting does not apply to them
@@ -44,6 +45,13 @@ def size_note(guides: Curves, blender_scene: Scene) -> str:
         "Guides of {length} move slowly: decrease Size if the character is modeled larger than life.",
         length=_in_words(length, blender_scene),
     )
+
+
+def is_delivery_outdated(hair: Curves) -> bool:
+    """Whether guides were baked otherwise since their hair was delivered, as far as is known without reading files."""
+    kept = frame_folders.folder_cache.get(hair.vellus.guide_curves.session_uid)
+    manifest = None if kept is None else kept[1].manifest
+    return manifest is not None and hair.vellus.delivered_key != manifest.key
 
 
 def _length(guides, blender_scene):

@@ -10,6 +10,8 @@ from bpy.types import Curves
 from ...core.errors import HairError
 from ...core.files import frame_cache, frame_manifest
 from ...core.files.frame_cache import FrameCache
+from ..data import attributes, delivered_hair
+from ..data.curves import followers
 from ..host import paths
 from ..host.caches import Cache
 from ..host.notices import name_of
@@ -18,32 +20,61 @@ folder_cache = Cache()  # session_uid of guide Curves → (folder, FrameCache): 
 
 
 def folder_of(guides: Curves) -> Path:
-    """The folder of the frames of some guides, whether it exists or not. Raises `HairError` if it leads nowhere."""
-    identity = guides.vellus.cache_identity or _identity_of_name(guides)
-    return frame_cache.folder_of(paths.resolve(guides.vellus.cache_folder), identity)
+    """The folder of the frames of some guides, whether it exists or not. Raises `HairError` if it leads nowhere.
+
+    Of linked guides it is that of the file that links them: a shot has frames of its own.
+    """
+    return frame_cache.folder_of(paths.resolve(guides.vellus.cache_folder), _identity_of(guides))
+
+
+def _identity_of(guides):
+    if attributes.is_from_library(guides):
+        return _identity_of_name(guides)  # what is stored is the library's
+    return guides.vellus.cache_identity or _identity_of_name(guides)
 
 
 def _identity_of_name(guides):
     """The same in every session of a file that was not saved since guides were baked, as by the command line."""
-    return frame_manifest.digest(name_of(guides))[:16]
+    name = name_of(guides)
+    of = name if guides.library is None else [name, Path(guides.library.filepath).name]
+    return frame_manifest.digest(of)[:16]
 
 
 def frames_of(guides: Curves) -> FrameCache | None:
-    """The baked frames of some guides, of which there may be none; None where their folder leads nowhere."""
-    if guides.vellus.cache_folder.startswith("//") and not bpy.data.filepath:
-        return None
+    """The baked frames of some guides, of which there may be none; None where their folder leads nowhere.
+
+    Linked guides that are not baked in this file have those that are baked in their library.
+    """
+    known = folder_cache.get(guides.session_uid)
     try:
-        folder = folder_of(guides)
+        folder = folder_of(guides) if _leads_somewhere(guides) else None
+        if known is None or known[0] != folder:
+            known = folder_cache.keep(guides.session_uid, (folder, _read(guides, folder)))
     except HairError:
         return None
-    kept = folder_cache.get(guides.session_uid)
-    if kept is None or kept[0] != folder:
-        kept = folder_cache.keep(guides.session_uid, (folder, FrameCache(folder)))
-    return kept[1]
+    return known[1]
+
+
+def _leads_somewhere(guides):
+    return bool(bpy.data.filepath) or not guides.vellus.cache_folder.startswith("//")
+
+
+def _read(guides, folder):
+    """The `FrameCache` of a folder; of the library's, where the folder has no frames, or None stands for it."""
+    read = None if folder is None else FrameCache(folder)
+    if guides.library is None or (read is not None and read.manifest is not None):
+        return read
+    base = paths.resolve(guides.vellus.cache_folder, guides.library)
+    of_library = FrameCache(
+        frame_cache.folder_of(base, guides.vellus.cache_identity or frame_manifest.digest(name_of(guides))[:16])
+    )
+    return read if of_library.manifest is None else of_library
 
 
 def new_folder(guides: Curves) -> Path:
     """The folder to bake some guides to: theirs, or a new one where they have none or share it with other guides."""
+    if attributes.is_from_library(guides):
+        return folder_of(guides)
     state = guides.vellus
     others = {other.vellus.cache_identity for other in bpy.data.hair_curves if other != guides} - {""}
     identity = state.cache_identity or _identity_of_name(guides)
@@ -54,24 +85,36 @@ def new_folder(guides: Curves) -> Path:
 def require_baked(numbers: Iterable[int]) -> None:
     """Raise `HairError` unless all guides that simulate have baked frames of these numbers, from their start frame on.
 
-    Renders of sequences ask: they never simulate.
+    Renders of sequences ask: they never simulate. Hair that plays delivered frames needs no others.
     """
     for guides in simulating():
-        start = guides.vellus.dynamics.start_frame
-        baked = frames_of(guides)
-        there = set() if baked is None else set(baked.frame_numbers())
-        missing = [number for number in numbers if number > start and number not in there]
-        if missing:
-            raise HairError(
-                'Frame {frame} of the guides "{name}" is not baked: bake their dynamics first.',
-                frame=missing[0],
-                name=name_of(guides),
-            )
+        hair = followers(guides)
+        if not hair or not all(map(delivered_hair.is_delivered, hair)):
+            require_frames(guides, numbers)
+
+
+def require_frames(guides: Curves, numbers: Iterable[int]) -> None:
+    """Raise `HairError` unless guides simulate, and have baked frames of these numbers from their start frame on."""
+    if not is_simulated(guides):
+        raise HairError('The guides "{name}" do not simulate: switch Dynamics on.', name=name_of(guides))
+    start = guides.vellus.dynamics.start_frame
+    baked = frames_of(guides)
+    is_theirs = baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves)
+    there = set(baked.frame_numbers()) if baked is not None and is_theirs else set()
+    missing = [number for number in numbers if number > start and number not in there]
+    if missing:
+        raise HairError(
+            'Frame {frame} of the guides "{name}" is not baked: bake their dynamics first.',
+            frame=missing[0],
+            name=name_of(guides),
+        )
 
 
 def simulating() -> list[Curves]:
-    """Guide Curves that are simulated."""
-    return [guides for guides in bpy.data.hair_curves if is_simulated(guides)]
+    """Guide Curves that are simulated, but for those of a library that this file overrides."""
+    overrides = (guides.override_library for guides in bpy.data.hair_curves)
+    replaced = {override.reference for override in overrides if override is not None}
+    return [guides for guides in bpy.data.hair_curves if is_simulated(guides) and guides not in replaced]
 
 
 def is_simulated(guides: Curves) -> bool:

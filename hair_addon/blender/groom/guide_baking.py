@@ -9,12 +9,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
 from bpy.types import Curves, Scene
 
 from ...core.errors import HairError
 from ...core.files import array_file, frame_cache, frame_manifest
-from ...core.files.frame_cache import FrameCache, Writer
+from ...core.files.frame_cache import FrameCache
 from ...core.files.frame_manifest import Manifest
 from ...core.long_work import Stage, Work
 from ...core.params import given
@@ -23,8 +22,8 @@ from ..host import scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import properties
-from . import frame_folders, guide_simulation
-from .guide_simulation import FrameInput, GuideSimulation
+from . import bake_resuming, frame_folders, guide_simulation, quiet_hair
+from .bake_resuming import Task
 
 SOLVER_VERSION = 1  # of all that frames follow from beside settings: raised when they come out otherwise
 STATE_FRAMES = 24  # between states
@@ -59,18 +58,6 @@ class BakedFrame:
     folder: Path
 
 
-@dataclass
-class _Task:
-    """Guides that are being baked."""
-
-    name: str
-    guides: Remembered
-    simulated: GuideSimulation
-    writer: Writer
-    done: int  # the last frame that is there
-    broken: int = 0
-
-
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
     """{part: digest} of what the frames of some guides follow from, but for the animation. Raises `HairError`."""
     settings = properties.dynamics_of(guides.vellus)
@@ -103,8 +90,10 @@ def baking(
     _baking = True
     with contextlib.ExitStack() as stack:
         stack.callback(_end, scene, present, [Remembered(guides) for guides in guides_list])
+        stack.enter_context(quiet_hair.unevaluated(guides_list, scene))
         tasks = [_begin(guides, last, scene, starts_over, stack) for guides in guides_list]
         yield Stage("Baking", 0.0)
+        yield from bake_resuming.going_on(tasks, scene)
         first = min((task.done for task in tasks), default=last)
         counts = [0] * len(tasks)
         for frame in range(first + 1, last + _BEYOND + 1):
@@ -143,7 +132,7 @@ def _end(scene, present, baked):
 
 
 def _begin(guides, last, scene, starts_over, stack):
-    """A `_Task` that has come as far as frames and states are there already."""
+    """A `Task` in its first frame."""
     settings = properties.dynamics_of(guides.vellus)
     start = settings.start_frame
     if last < start:
@@ -163,43 +152,24 @@ def _begin(guides, last, scene, starts_over, stack):
     keys = (key_of(guides, scene),)
     manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout)
     writer = stack.enter_context(frame_cache.baking(folder, manifest))
-    task = _Task(name_of(guides), Remembered(guides), simulated, writer, start)
-    there = FrameCache(folder)
-    if not _is_there(there, start, manifest.key):
-        read = guide_simulation.read(guides, scene, scenes.present_depsgraph(), settings)
-        writer.write_frame(start, combed, _digest(read))
-        return task
-    _go_on(task, there, guides, scene, manifest)
-    return task
-
-
-def _go_on(task, there, guides, scene, manifest):
-    """Take the last state up to which all frames are there."""
-    frame = task.done
-    while _is_there(there, frame + 1, manifest.key):
-        frame += 1
-    for number in reversed([n for n in there.state_numbers() if manifest.first < n <= frame]):
-        state = there.read_state(number)
-        if state is None:
-            continue
-        scene_time.go_to(scene, number)
-        read = guide_simulation.read(guides, scene, scenes.present_depsgraph(), task.simulated.settings)
-        task.simulated.go_on(state, read)
-        task.done = number
-        return
-
-
-def _is_there(there, frame, key):
-    found = there.read_frame(frame)
-    return found is not None and found.key == key
+    guides_named, there = Remembered(guides), FrameCache(folder)
+    numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}
+    digest = bake_resuming.digest_of(guides, scene, settings)
+    found = there.read_frame(start)
+    if found is None or (found.key, found.digest) != (manifest.key, digest):
+        numbers = set()
+        writer.write_frame(start, combed, digest)
+    return Task(name_of(guides), guides_named, simulated, writer, start, there, numbers=numbers)
 
 
 def _read(task, scene, depsgraph):
+    """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
     guides = task.guides.find()
     settings = properties.dynamics_of(guides.vellus)
     if settings != task.simulated.settings:  # keyed
         task.simulated.change(settings)
-    return guide_simulation.read(guides, scene, depsgraph, settings)
+    read = guide_simulation.read(guides, scene, depsgraph, settings)
+    return read, bake_resuming.digest_of(guides, scene, settings)
 
 
 def _computing(tasks, inputs, frame, part, is_last):
@@ -207,18 +177,11 @@ def _computing(tasks, inputs, frame, part, is_last):
 
     def compute(progress):
         progress(f"Frame {frame}", part)
-        for task, read in zip(tasks, inputs, strict=True):
+        for task, (read, digest) in zip(tasks, inputs, strict=True):
             points = task.simulated.advance(read)
             task.broken += len(task.simulated.simulation.broken)
-            task.writer.write_frame(frame, points, _digest(read))
+            task.writer.write_frame(frame, points, digest)
             if is_last or (frame - task.simulated.settings.start_frame) % STATE_FRAMES == 0:
                 task.writer.write_state(frame, task.simulated.simulation.save())
 
     return compute
-
-
-def _digest(read: FrameInput) -> str:
-    """Digest of the animation in a frame: roots, and the bounds of colliders."""
-    bounds = [bound for one in read.world.obstacles for bound in (one.vertices.min(axis=0), one.vertices.max(axis=0))]
-    roots = read.pose.root_positions
-    return frame_manifest.digest(np.float32(np.concatenate([roots, *[bound[None] for bound in bounds]])))

@@ -5,7 +5,7 @@
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from bpy.types import Curves, Depsgraph, Scene
@@ -15,14 +15,16 @@ from ...core.dynamics.settings import DynamicsSettings
 from ...core.errors import HairError
 from ..data import attributes, curves, guide_poses, simulated_world
 from ..data.guide_poses import GuidePose
+from ..host import scene_time
 from ..settings import preferences, properties
 from . import staleness
 
 
 @dataclass(frozen=True)
 class FrameInput:
-    """What guides follow in one frame, as read. errors: of colliders that were left out."""
+    """What guides follow in one frame, as read. errors: of colliders that were left out, or stay where they were."""
 
+    frame: int
     pose: GuidePose
     world: "dynamics.simulation.World"
     seconds: float
@@ -33,7 +35,8 @@ class FrameInput:
 class GuideSimulation:
     """Guides that are simulated, and the frame they have come to.
 
-    digest, topology: of guides and surface; start: their pose in the first frame; combed: (G, 3) their roots.
+    digest, topology: of guides and surface; start: their pose in the first frame; obstacles: {name: as hair last
+    collided with it}.
     """
 
     digest: str
@@ -43,10 +46,23 @@ class GuideSimulation:
     roots: np.ndarray  # (G, 3) float32 at rest, local
     simulation: "dynamics.simulation.Simulation"
     metres: float  # in a unit of the world
+    obstacles: dict[str, "dynamics.simulation.Obstacle"] = field(default_factory=dict)
+    errors: tuple[HairError, ...] = ()  # of colliders, in the last frame
+
+    def see(self, frame: FrameInput) -> FrameInput:
+        """The next frame as guides are simulated in it: where a collider has another topology, it stays as it was.
+
+        Called for each frame in turn, it need not be simulated.
+        """
+        obstacles, notes = dynamics.stopped_colliders.stopped(frame.world.obstacles, self.obstacles, frame.frame)
+        self.obstacles = {obstacle.name: obstacle for obstacle in obstacles}
+        return replace(frame, world=replace(frame.world, obstacles=obstacles), errors=(*frame.errors, *notes))
 
     def advance(self, frame: FrameInput) -> np.ndarray:
         """Simulate the next frame: (G, P, 3) float32 points at rest, in local coordinates."""
+        frame = self.see(frame)
         self.simulation.advance(frame.pose.root_pose(self.start), frame.world, frame.seconds)
+        self.errors = (*frame.errors, *self.simulation.notes)
         points = frame.pose.to_rest(self.simulation.points())
         points[:, 0] = self.roots  # to the last bit, as what follows compares roots
         return points
@@ -57,7 +73,8 @@ class GuideSimulation:
         self.settings = settings
 
     def go_on(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
-        """Go on from a state that the simulation's `save` gave in the frame that was read. Raises `HairError`."""
+        """Go on from a state that the simulation's `save` gave in a frame, as `see` returned it. Raises `HairError`."""
+        self.obstacles = {obstacle.name: obstacle for obstacle in frame.world.obstacles}
         self.simulation.load(state, frame.pose.root_pose(self.start), frame.world)
 
     def is_of(self, guides: Curves, settings: DynamicsSettings) -> bool:
@@ -80,8 +97,10 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     )
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
-    digest = staleness.guides_digest(guides)
-    return GuideSimulation(digest, guides.vellus.topology, settings, pose, local[:, 0].copy(), simulation, metres)
+    digest, topology = staleness.guides_digest(guides), guides.vellus.topology
+    begun = GuideSimulation(digest, topology, settings, pose, local[:, 0].copy(), simulation, metres)
+    begun.see(frame)
+    return begun
 
 
 def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsSettings) -> FrameInput:
@@ -89,7 +108,8 @@ def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsS
     pose = guide_poses.read(guides, depsgraph, simulated_world.metres_of(scene, settings))
     world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface)
     rate = scene.render.fps / scene.render.fps_base
-    return FrameInput(pose, world, settings.time_scale / rate, tuple(errors))
+    seconds = settings.time_scale / rate
+    return FrameInput(scene_time.frame_of(scene), pose, world, seconds, tuple(errors))
 
 
 def in_metres(settings: DynamicsSettings, metres: float) -> DynamicsSettings:

@@ -7,15 +7,15 @@ from concurrent.futures import Future
 import numpy as np
 from bpy.types import Curves, Object
 
-from ...core.geometry.strands import Strands
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
-from ..data import curves, curves_objects
+from ..data import attributes, curves, curves_objects
 from ..data.scene import Surface
 from ..materials import looks
 from ..settings import setting_properties, style_items
 from . import bindings, staleness
 from .bindings import BoundHair
+from .grown_guides import GrownGuides
 
 # Of the guides' own Curves, by their length: so they are seen on a surface of any size.
 _GUIDE_RADIUS = 1.0 / 300.0
@@ -25,7 +25,7 @@ def write_guides(
     target: Curves | None,
     surface_object: Object,
     surface: Surface,
-    guides: Strands,
+    grown: GrownGuides,
     settings: GuideSettings,
     key: str,
     flow_key: str,
@@ -37,7 +37,9 @@ def write_guides(
     """
     target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
+    target.vellus.status = grown.status
     target.vellus.root_key, target.vellus.flow_key = key, flow_key
+    guides = grown.strands
     radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
     points = Future()
     points.set_result(surface.to_local(guides.numpy()))
@@ -84,7 +86,7 @@ def write_hair(target: Curves) -> None:
         curves.write_clumps(target, bound.styles.clumps)
         if curves.write_wetness(target, bound.styles.wetness):
             looks.evaluate_shading(target)
-    if not bound.is_map_written:
+    if not bound.is_map_written and not attributes.is_from_library(target):
         curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
     curves.write_points(target, bound.growing)
     state.is_stale = False  # as another choice of guides marks it
@@ -102,7 +104,7 @@ def keep_styles(target: Curves, styles: Sequence[StyleSettings], names: Sequence
 
 def _store_roots(guide_curves, bound):
     """Store the roots of guides that were drawn or slid by a brush, so that they follow their surface."""
-    if guide_curves is None or guide_curves.library is not None or guide_curves.session_uid != bound.guide_uid:
+    if guide_curves is None or attributes.is_from_library(guide_curves) or guide_curves.session_uid != bound.guide_uid:
         return
     roots, surface = bound.guides.roots, bound.surface
     stored = curves.read_root_places(guide_curves, len(surface.rest))

@@ -10,17 +10,20 @@ import bpy
 from ...core.errors import HairError
 
 
-def resolve(path):
-    """A path of Blender's, `//` and all, as an absolute `Path`. Raises `HairError` for one that leads nowhere."""
+def resolve(path, library=None):
+    """A path of Blender's, `//` and all, as an absolute `Path`. Raises `HairError` for one that leads nowhere.
+
+    library: the `bpy.types.Library` whose path it is; None for the open file.
+    """
     if not path.strip("/"):
         raise HairError("No file or folder was given: pick one.")
     if "\0" in path:
         raise HairError("The path contains an invalid character: type it again.")
-    if path.startswith("//") and not bpy.data.filepath:
+    if path.startswith("//") and library is None and not bpy.data.filepath:
         raise HairError(f"{path} is relative to the .blend file: save the file first.")
     if path.startswith("\\\\"):
         raise HairError(f"{path} is on another computer, to which Vellus does not write: pick a local folder.")
-    return Path(bpy.path.abspath(path)).resolve()
+    return Path(bpy.path.abspath(path, library=library)).resolve()
 
 
 def has_operator(name):

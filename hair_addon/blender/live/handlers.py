@@ -10,7 +10,7 @@ from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import animated
-from . import invalidation, live_hair, reported, simulated_hair
+from . import every_frame, invalidation, live_hair, reported, simulated_hair, unlocked_renders
 
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
 _is_opening = False
@@ -175,6 +175,8 @@ def after_frame_change(scene, depsgraph):
         simulated_hair.follow_frame(scene, depsgraph)
         if scene_time.is_rendered(depsgraph):
             live_hair.write_all()
+    else:
+        unlocked_renders.note(scene)
 
 
 @persistent
@@ -216,12 +218,27 @@ def after_undo(*_args):
     invalidation.data_replaced()
 
 
+@persistent
+def after_render(scene, *_args):
+    """Say what a render could not show."""
+    unlocked_renders.end(scene)
+
+
+@persistent
+def after_playing(*_args):
+    """Put back the playback that Play from Start has changed."""
+    every_frame.end()
+
+
 _HANDLERS = (
     (bpy.app.handlers.depsgraph_update_post, after_depsgraph_update),
     (bpy.app.handlers.frame_change_pre, before_frame_change),
     (bpy.app.handlers.frame_change_post, after_frame_change),
+    (bpy.app.handlers.animation_playback_post, after_playing),
     (bpy.app.handlers.save_pre, before_reading),
     (bpy.app.handlers.render_init, before_reading),
+    (bpy.app.handlers.render_complete, after_render),
+    (bpy.app.handlers.render_cancel, after_render),
     (bpy.app.handlers.undo_post, after_undo),
     (bpy.app.handlers.redo_post, after_undo),
     (bpy.app.handlers.load_post, after_load),
@@ -242,4 +259,7 @@ def unregister():
         handlers.remove(handler)
     if bpy.app.timers.is_registered(_take_over):
         bpy.app.timers.unregister(_take_over)
+    if bpy.app.timers.is_registered(unlocked_renders.offer):
+        bpy.app.timers.unregister(unlocked_renders.offer)
+    every_frame.end()
     live_hair.write_all()

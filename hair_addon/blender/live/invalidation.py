@@ -11,7 +11,7 @@ from ..groom import bindings, frame_folders
 from ..host import notices
 from ..render import hair_cache, region_pictures, viewport
 from ..settings import animated
-from . import reported, simulated_hair
+from . import dynamics_state, every_frame, reported, simulated_hair, unlocked_renders
 
 # Copies of Blender's data, and what was made of them. Undo and redo put other data in its place.
 COPIES = (
@@ -34,7 +34,10 @@ OTHERS = (
     region_pictures.picture_cache,
     viewport.display_table_cache,
     simulated_hair.played_cache,
-    simulated_hair.state_cache,
+    dynamics_state.state_cache,
+    dynamics_state.change_cache,
+    every_frame.before_cache,
+    unlocked_renders.noted_cache,
     frame_folders.folder_cache,
     shaders.complaint_cache,
     notices.said_cache,

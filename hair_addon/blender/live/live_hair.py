@@ -87,6 +87,9 @@ def _is_combed_straight(state):
 
 def make_again(hair, depsgraph):
     """Bind hair to its guides again and compute all strands, after changes of settings, surface or guides."""
+    if curves.follows_library(hair) and simulated_guides.is_shown(hair.vellus.guide_curves):
+        _follow_linked(hair, depsgraph)
+        return
     if not has_window():
         pipeline.evaluate(hair, depsgraph)
         if _follow_simulated(hair):
@@ -108,6 +111,21 @@ def make_again(hair, depsgraph):
         hair.vellus.is_stale = False
         hair.vellus.status = str(error)
         return
+    invalidation.strands_made(hair)
+    _write_soon(hair)
+
+
+def _follow_linked(hair, depsgraph):
+    """Let hair of a library, or between its guides, follow where dynamics has moved these: only points are written."""
+    try:
+        pipeline.require_uncombed(hair)
+        bound = pipeline.bind_hair(*pipeline.inputs_of(hair), depsgraph, hair)
+    except HairError as error:
+        hair.vellus.status = str(error)
+        return
+    bound.is_written = bound.has_moved_only = bound.is_map_written = True  # by its own file
+    bindings.keep(hair, bound)
+    _follow_simulated(hair)
     invalidation.strands_made(hair)
     _write_soon(hair)
 

@@ -18,7 +18,7 @@ from ..groom.guide_simulation import GuideSimulation
 from ..host import running, scene_time
 from ..host.caches import Cache
 from ..settings import properties
-from . import live_hair
+from . import dynamics_state, live_hair
 
 MOST_BYTES = 1 << 30  # of frames in memory
 
@@ -35,7 +35,6 @@ class _Played:
 
 
 played_cache = Cache()  # session_uid of guide Curves → _Played
-state_cache = Cache()  # session_uid of guide Curves → (sentence, values) for the panel
 
 
 def follow_frame(blender_scene, depsgraph):
@@ -50,11 +49,11 @@ def follow_frame(blender_scene, depsgraph):
     shown_in = depsgraph if scene_time.is_shown(depsgraph) else scene.present_depsgraph()
     for guides in frame_folders.simulating():
         try:
-            points = _points_at(guides, time)
+            points = _points_at(guides, time, (blender_scene, depsgraph))
             if points is None and is_played and time == int(time):
                 points = _play(guides, blender_scene, depsgraph)
             _show(guides, points, shown_in)
-            note_state(guides, blender_scene)
+            _note_state(guides, blender_scene)
             if points is not None or played_cache.get(guides.session_uid) is not None:
                 guides.vellus.dynamics_status = ""
         except HairError as error:
@@ -104,23 +103,41 @@ def _note_change(guides, blender_scene, depsgraph):
     try:
         if frame_folders.is_simulated(guides):
             _follow_known(guides, blender_scene, depsgraph)
-        note_state(guides, blender_scene)
+        _note_state(guides, blender_scene)
         guides.vellus.dynamics_status = ""
     except HairError as error:
         guides.vellus.dynamics_status = str(error)
 
 
-def _points_at(guides, time):
-    """Points of guides at a time in frames where they are baked, or were simulated in this session; else None."""
+def _points_at(guides, time, checked_in=None):
+    """Points of guides at a time in frames where they are baked, or were simulated in this session; else None.
+
+    checked_in: (scene, depsgraph) of a viewport whose animation is to be compared with that of the baked frame.
+    """
     baked = frame_folders.frames_of(guides)
     if baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves):
-        points = baked.points_at(time)
+        points = _baked_points(guides, baked, time, checked_in)
         for error in baked.take_complaints():
             print(f"Vellus: {error}", file=sys.stderr)
         if points is not None:
             return points
     played = _played_now(guides)
     return None if played is None else played.frames.get(time)
+
+
+def _baked_points(guides, baked, time, checked_in):
+    if time != int(time):
+        return baked.points_at(time)
+    frame = baked.read_frame(int(time))
+    if frame is None:
+        return None
+    if checked_in is not None and scene_time.is_shown(checked_in[1]):
+        dynamics_state.check_animation(guides, frame, *checked_in)
+    return frame.points
+
+
+def _note_state(guides, blender_scene):
+    dynamics_state.note(guides, blender_scene, played_cache.get(guides.session_uid))
 
 
 def _play(guides, blender_scene, depsgraph):
@@ -166,7 +183,7 @@ def _advance(played, guides, blender_scene, depsgraph, settings):
     read = guide_simulation.read(guides, blender_scene, depsgraph, settings)
     points = played.simulated.advance(read)
     played.frame += 1
-    played.notes = (*read.errors, *played.simulated.simulation.notes)
+    played.notes = played.simulated.errors
     played.frames[played.frame] = points
     while len(played.frames) > 1 and points.nbytes * len(played.frames) > MOST_BYTES:
         del played.frames[next(iter(played.frames))]
@@ -184,45 +201,3 @@ def notes_of(guides):
     """Errors of colliders and force fields that were left out of the last frame that was played."""
     played = played_cache.get(guides.session_uid)
     return () if played is None else played.notes
-
-
-def state_of(guides):
-    """(sentence, values) for the panel: what is baked or simulated of some guides, and what has changed since."""
-    return state_cache.get(guides.session_uid) or _unknown_state()
-
-
-def _unknown_state():
-    return "Not simulated yet: play from the start frame, or bake", {}
-
-
-def note_state(guides, blender_scene):
-    """Find out what `state_of` says, after a frame, a bake, or a change of settings."""
-    baked, played = frame_folders.frames_of(guides), played_cache.get(guides.session_uid)
-    if baked is not None and baked.manifest is not None:
-        state = _state_of_baked(baked.manifest, guides, blender_scene)
-    elif played is not None:
-        state = _state_of_played(played)
-    else:
-        state = _unknown_state()
-    state_cache.keep(guides.session_uid, state)
-
-
-def _state_of_played(played):
-    if played.outdated is not None:
-        return "Frames up to {frame} have other settings: play from the start", {"frame": played.outdated}
-    substeps = played.simulated.simulation.substeps
-    return "Simulated up to frame {frame}, in {count} substeps a frame", {"frame": played.frame, "count": substeps}
-
-
-def _state_of_baked(manifest, guides, blender_scene):
-    first, last = manifest.first, manifest.last
-    if manifest.guide_count != len(guides.curves):
-        return "The baked frames are of other guides: bake again", {}
-    if manifest.keys[-1] != guide_baking.key_of(guides, blender_scene):
-        return (
-            "Frames {first} to {last} are baked with other settings or guides: bake again",
-            {"first": first, "last": last},
-        )
-    if manifest.state != "complete":
-        return "Frames {first} to {last} are baked in part: Bake Dynamics goes on", {"first": first, "last": last}
-    return "Frames {first} to {last} are baked", {"first": first, "last": last}

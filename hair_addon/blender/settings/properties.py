@@ -20,6 +20,7 @@ from .translations import CONTEXT
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
 _NOT_KEYED = set()  # of properties that take no keys
+OVERRIDABLE = {"LIBRARY_OVERRIDABLE"}  # what a shot may set of a linked character, and is stored in the shot
 
 MODELS = (
     ("KAJIYA_KAY", "Kajiya-Kay", "Opaque cylinder with a diffuse part and one highlight"),
@@ -106,7 +107,9 @@ class VellusMarschnerSettings(bpy.types.PropertyGroup):
 class VellusDynamicsSettings(bpy.types.PropertyGroup):
     """Simulation of guides"""
 
-    __annotations__ = setting_properties.annotations(DynamicsSettings, mark_dynamics, unkeyed=_UNKEYED)
+    __annotations__ = setting_properties.annotations(
+        DynamicsSettings, mark_dynamics, unkeyed=_UNKEYED, override=OVERRIDABLE
+    )
 
 
 class VellusCollider(bpy.types.PropertyGroup):
@@ -132,6 +135,7 @@ class VellusCurves(bpy.types.PropertyGroup):
         translation_context=CONTEXT,
         type=bpy.types.Curves,
         poll=lambda _group, curves: curves.vellus.kind == "GUIDES",
+        override=OVERRIDABLE,
         update=mark_geometry,
     )
     guides: bpy.props.PointerProperty(type=VellusGuideSettings)
@@ -199,18 +203,21 @@ class VellusCurves(bpy.types.PropertyGroup):
         translation_context=CONTEXT,
         default=False,
         options=_NOT_KEYED,
+        override=OVERRIDABLE,
         update=mark_dynamics,
     )
-    dynamics: bpy.props.PointerProperty(type=VellusDynamicsSettings)
+    dynamics: bpy.props.PointerProperty(type=VellusDynamicsSettings, override=OVERRIDABLE)
     cache_folder: bpy.props.StringProperty(
         name="Cache Folder",
         description="Folder that baked frames are written to, each hair system in a folder of its own",
         translation_context=CONTEXT,
         subtype="DIR_PATH",
         options=_RELATIVE,
+        override=OVERRIDABLE,
         default="//haircache",
     )
     cache_identity: bpy.props.StringProperty(description="Folder of the baked frames", options={"HIDDEN"})
+    delivered_key: bpy.props.StringProperty(description="Baked frames that were delivered", options={"HIDDEN"})
     is_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_shading_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
     is_dynamics_stale: bpy.props.BoolProperty(default=False, options={"HIDDEN"})
@@ -254,7 +261,7 @@ CLASSES = (
 
 def register():
     """Attach the settings to every Curves datablock, object, scene and view layer."""
-    bpy.types.Curves.vellus = bpy.props.PointerProperty(type=VellusCurves)
+    bpy.types.Curves.vellus = bpy.props.PointerProperty(type=VellusCurves, override=OVERRIDABLE)
     bpy.types.Object.vellus = bpy.props.PointerProperty(type=VellusCollider)
     bpy.types.Scene.vellus = bpy.props.PointerProperty(type=VellusRenderSettings)
     bpy.types.ViewLayer.vellus = bpy.props.PointerProperty(type=VellusPassSettings)

@@ -16,7 +16,7 @@ from .translations import CONTEXT
 _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
 
 
-def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None):
+def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, override=frozenset()):
     """{name: bpy property} for the fields of a `Settings` class but those of `skip`; `update` as in bpy.props.
 
     A radius has its diameter beside it, which is shown in its place. Operators have no `update`. Structural settings,
@@ -27,16 +27,17 @@ def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None):
     for name, default, details in declared(settings_class):
         if name not in skip:
             details = replace(details, high=highs.get(name, details.high))
-            made[name] = _property(name, default, details, update, details.is_structural or name in unkeyed)
+            is_unkeyed = details.is_structural or name in unkeyed
+            made[name] = _property(name, default, details, update, is_unkeyed, set(override))
             if details.diameter is not None:
                 shown, description = details.diameter
                 made[shown] = _diameter_property(name, shown, description, details, update)
     return made
 
 
-def _property(name, default, details, update, is_unkeyed):
+def _property(name, default, details, update, is_unkeyed, override):
     common = {"name": _title(label_of(name, details)), "description": details.description, "default": default}
-    common["translation_context"] = CONTEXT
+    common["translation_context"], common["override"] = CONTEXT, override
     if is_unkeyed:
         common["options"] = set()
     if update is not None:

@@ -18,7 +18,7 @@ NAME_SHARE = 0.54
 # Too long for one line: the name is above the value.
 WIDE = ("neighbour_limit", "mode")
 
-_GROWTH = ("length_variation", "tilt", "gravity")
+_GROWTH = ("length_variation", "tilt", "gravity", "drape")
 _FLOW = ("flow_lines", "lift")
 _PLACEMENT = ("seed", "relax_iterations", "curvature", "symmetric")
 _MASKS = ("density_group", "density_image")

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         contact,
         contact_queries,
         detail,
+        draped_growth,
         draping,
         hair_volume,
         material,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
         settings,
         simulation,
         stiffness_advice,
+        stopped_colliders,
     )
 else:
     __getattr__ = submodules(__name__)

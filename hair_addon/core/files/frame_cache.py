@@ -168,6 +168,13 @@ class Writer:
         """Write the state after a frame: all that the next one follows from. Forced onto the disk."""
         self._write(_name(number, True), {**self._marked(number), **arrays}, self.manifest.state_file_layout, True)
 
+    def remove_states(self, after: int) -> None:
+        """Remove the states after a frame: what is simulated from there on may differ. Raises `HairError`."""
+        try:
+            _remove(self.folder, lambda name: (found := _NAME.fullmatch(name)) and found[1] and int(found[2]) > after)
+        except OSError as error:
+            raise HairError("{path} cannot be written: {cause}.", path=self.folder, cause=cause_of(error)) from error
+
     def change(self, **changes: object) -> None:
         """Change entries of the manifest, such as notes."""
         changed = replace(self.manifest, **changes)  # type: ignore[bad-argument-type]

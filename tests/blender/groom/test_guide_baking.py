@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon.blender.data import guide_poses, simulated_guides
 from hair_addon.blender.groom import frame_folders, guide_baking
-from hair_addon.blender.live import simulated_hair
+from hair_addon.blender.live import dynamics_state
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import Stopped, run_now
@@ -130,14 +130,14 @@ def test_what_has_changed_since_is_said(swung, change):
     guides, _hair = swung
     bake(guides)
     bpy.context.scene.frame_set(4)
-    assert simulated_hair.state_of(guides.data)[0] == "Frames {first} to {last} are baked"
+    assert dynamics_state.state_of(guides.data)[0] == "Frames {first} to {last} are baked"
     if change == "settings":
         guides.data.vellus.dynamics.damping = 0.1
         bpy.context.view_layer.update()
     else:
         guides.data.attributes["position"].data[5].vector.x += 0.1
         bpy.context.scene.frame_set(5)
-    assert "with other settings or guides" in simulated_hair.state_of(guides.data)[0]
+    assert "with other settings or guides" in dynamics_state.state_of(guides.data)[0]
 
 
 def test_a_copy_bakes_to_a_folder_of_its_own(swung):

@@ -7,7 +7,14 @@ import pytest
 
 from hair_addon.blender.data import simulated_guides
 from hair_addon.blender.groom import guide_baking
-from hair_addon.blender.live import handlers, invalidation, live_hair, simulated_hair
+from hair_addon.blender.live import (
+    dynamics_state,
+    handlers,
+    invalidation,
+    live_hair,
+    simulated_hair,
+    unlocked_renders,
+)
 from hair_addon.core.long_work import run_now
 from tests.support.layout import draw
 from tests.support.reading import points, write_points
@@ -60,7 +67,7 @@ def test_the_present_frame_is_shown_as_it_is_baked_and_as_combed_when_freed(swun
     run_now(guide_baking.baking([guides.data], 9, bpy.context.scene))
     bpy.context.view_layer.update()
     baked, strands = shown(guides).copy(), drawn(hair)
-    assert simulated_hair.state_of(guides.data) == ("Frames {first} to {last} are baked", {"first": 1, "last": 9})
+    assert dynamics_state.state_of(guides.data) == ("Frames {first} to {last} are baked", {"first": 1, "last": 9})
     play(7, 8)
     assert np.array_equal(shown(guides), baked)
     np.testing.assert_allclose(drawn(hair), strands, atol=1e-6)
@@ -70,7 +77,7 @@ def test_the_present_frame_is_shown_as_it_is_baked_and_as_combed_when_freed(swun
     bpy.context.view_layer.update()
     assert np.array_equal(shown(guides), points(guides))
     np.testing.assert_allclose(drawn(hair), combed, atol=1e-6)
-    assert "Not simulated" in simulated_hair.state_of(guides.data)[0]
+    assert "Not simulated" in dynamics_state.state_of(guides.data)[0]
 
 
 def test_a_jump_simulates_nothing(swung, monkeypatch):
@@ -106,7 +113,7 @@ def test_a_setting_takes_effect_with_the_next_frame(swung):
     bpy.context.view_layer.update()
     assert np.array_equal(shown(guides), sixth)
     play(7, 9)
-    assert simulated_hair.state_of(guides.data)[1]["frame"] == 6
+    assert dynamics_state.state_of(guides.data)[1]["frame"] == 6
     bpy.context.scene.frame_set(1)
     guides.data.vellus.dynamics.gravity = 1.0
     other = shown(guides).copy()
@@ -220,3 +227,24 @@ def test_why_guides_are_not_simulated_stays_said(swung):
     bpy.context.view_layer.update()
     play(1, 3)
     assert "no guides" in guides.data.vellus.dynamics_status
+
+
+def test_renders_that_hair_cannot_follow_are_said_with_the_setting(swung, capsys):
+    guides, _hair = swung
+    scene = bpy.context.scene
+    bpy.context.view_layer.objects.active = guides
+    panel = bpy.types.VELLUS_PT_dynamics
+    unlocked_renders.note(scene)
+    unlocked_renders.end(scene)
+    assert not draw(panel).drawn["use_lock_interface"] and not bpy.app.timers.is_registered(unlocked_renders.offer)
+    run_now(guide_baking.baking([guides.data], 3, scene))
+    scene.frame_set(2)
+    assert draw(panel).drawn["use_lock_interface"] and unlocked_renders.SENTENCE in " ".join(draw(panel).texts)
+    unlocked_renders.note(scene)
+    unlocked_renders.note(scene)
+    assert capsys.readouterr().err.count(unlocked_renders.SENTENCE) == 1
+    unlocked_renders.end(scene)
+    assert bpy.app.timers.is_registered(unlocked_renders.offer)
+    bpy.app.timers.unregister(unlocked_renders.offer)
+    scene.render.use_lock_interface = True
+    assert not draw(panel).drawn["use_lock_interface"]

@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon.blender.data import guide_poses, simulated_guides
 from hair_addon.blender.groom import frame_folders, guide_baking
-from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.live import dynamics_state, invalidation, live_hair
 from hair_addon.core.files.frame_cache import FrameCache
 from hair_addon.core.long_work import run_now
 from tests.support.reading import evaluated_points, points, write_points
@@ -187,4 +187,6 @@ def test_skipped_frames_are_not_simulated(swung):
     for frame in (5, 7, 9):
         bpy.context.scene.frame_set(frame)
         np.testing.assert_array_equal(simulated_guides.point_cache.get(guides.data.session_uid), third)
+        sentence, values = dynamics_state.state_of(guides.data)
+        assert "skipped" in sentence and values == {"frame": 3}
     assert not np.array_equal(played(guides, 4, 4), third)

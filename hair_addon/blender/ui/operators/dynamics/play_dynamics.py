@@ -5,6 +5,7 @@ import bpy
 
 from ....groom.selection import guides_of
 from ....host import scene_time
+from ....live import every_frame
 from ....settings import properties
 from ..base import HairOperator
 
@@ -28,4 +29,8 @@ class VELLUS_OT_play_dynamics(HairOperator, bpy.types.Operator):
         if context.screen.is_animation_playing:
             bpy.ops.screen.animation_cancel(restore_frame=False)
         scene_time.go_to(context.scene, start)
+        is_changed = every_frame.begin(context.scene)
         bpy.ops.screen.animation_play()
+        if is_changed:
+            return "Every frame is played until playing stops: the simulation needs each of them", {}
+        return None

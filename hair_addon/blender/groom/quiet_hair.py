@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair and guides that Blender need not evaluate while frames are baked, where nobody looks at them."""
+
+import contextlib
+from collections.abc import Generator, Sequence
+
+import bpy
+from bpy.types import Curves, Object, Scene
+
+from ..data import simulated_world
+from ..settings import properties
+
+
+@contextlib.contextmanager
+def unevaluated(guides_list: Sequence[Curves], scene: Scene) -> Generator[None]:
+    """Disable all hair and guides in viewports, and enable those again that were, on every way out.
+
+    Only without a window, and if the meshes that the guides need are visible: what is hidden may be evaluated only
+    because hair follows it.
+    """
+    if not bpy.app.background or not all(needed.visible_get() for needed in _needed(guides_list)):
+        yield
+        return
+    hidden = [o for o in scene.objects if o.type == "CURVES" and o.data.vellus.kind != "NONE" and not o.hide_viewport]
+    uids = {curves_object.session_uid for curves_object in hidden}
+    try:
+        for curves_object in hidden:
+            curves_object.hide_viewport = True
+        yield
+    finally:
+        for curves_object in bpy.data.objects:  # one that was deleted meanwhile is not among them
+            if curves_object.session_uid in uids:
+                curves_object.hide_viewport = False
+
+
+def _needed(guides_list: Sequence[Curves]) -> list[Object]:
+    """The meshes that guides grow on and collide with."""
+    needed = [guides.surface for guides in guides_list if guides.surface is not None]
+    for guides in guides_list:
+        needed += simulated_world.colliders(properties.dynamics_of(guides.vellus).colliders)
+    return needed

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Obstacles that get other vertices or faces while hair is simulated: for hair they stay where they were before."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import HairError
+from .simulation import Obstacle
+
+
+def stopped(
+    obstacles: Sequence[Obstacle], last: Mapping[str, Obstacle], frame: int
+) -> tuple[tuple[Obstacle, ...], list[HairError]]:
+    """(obstacles of a frame, those of another topology in the place where they were; a note for each of these).
+
+    last: {name: obstacle} of the frame before, as this function returned them: another topology is another than there.
+    One that was missing then, or whose vertices were not finite, begins anew.
+    """
+    taken, notes = [], []
+    for obstacle in obstacles:
+        before = last.get(obstacle.name)
+        if before is None or _is_same(before, obstacle) or not _is_sound(before):
+            taken.append(obstacle)
+            continue
+        taken.append(replace(obstacle, vertices=before.vertices, triangles=before.triangles))
+        sentence = "{name} has other vertices or faces in frame {frame}: for hair it stays where it was before."
+        notes.append(HairError(sentence, name=obstacle.name, frame=frame))
+    return tuple(taken), notes
+
+
+def _is_same(one, other):
+    """Whether two obstacles have the same vertices and faces, wherever they are."""
+    return len(one.vertices) == len(other.vertices) and np.array_equal(one.triangles, other.triangles)
+
+
+def _is_sound(obstacle):
+    return len(obstacle.triangles) > 0 and bool(np.isfinite(obstacle.vertices).all())

@@ -1,0 +1,112 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Simulated characters that a shot links: baked in the shot, and moved there as in their own file."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.core.long_work import run_now
+from tests.support.reading import evaluated_points, points
+from tests.support.swung import simulate, swing
+
+FRAME = 7
+
+
+@pytest.fixture
+def character(hair, tmp_path):
+    """(file of hair that swings, its points in a frame as they are in that file), not baked there."""
+    surface, guides = bpy.data.objects["Sphere"], bpy.data.objects["Guides"]
+    collection = bpy.data.collections.new("Character")
+    for part in (surface, guides, hair):
+        for before in part.users_collection:
+            before.objects.unlink(part)
+        collection.objects.link(part)
+    bpy.context.scene.collection.children.link(collection)
+    swing(surface)
+    simulate(guides, "//haircache")
+    path = tmp_path / "library" / "character.blend"
+    path.parent.mkdir()
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    bake()
+    bpy.context.scene.frame_set(FRAME)
+    there = points(hair)
+    return path, there
+
+
+def bake(last=FRAME):
+    run_now(guide_baking.baking(frame_folders.simulating(), last, bpy.context.scene))
+
+
+def shot_of(path, folder, way):
+    """A new file that links a character; returns its path."""
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    shot = folder / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(shot))
+    with bpy.data.libraries.load(str(path), link=True, relative=True) as (_there, here):
+        here.collections = ["Character"]
+    character, scene = bpy.data.collections["Character"], bpy.context.scene
+    if way == "instance":
+        instance = bpy.data.objects.new("Character", None)
+        instance.instance_type, instance.instance_collection = "COLLECTION", character
+        scene.collection.objects.link(instance)
+    else:
+        scene.collection.children.link(character)
+    if way == "override":
+        character.override_hierarchy_create(scene, bpy.context.view_layer)
+    if way == "local hair":
+        next(o for o in bpy.data.objects if o.name == "Hair").data.make_local()
+    bpy.context.view_layer.update()
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    return shot
+
+
+def shown_hair():
+    """The object of the hair that is in the shot."""
+    found = [o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]
+    return next((o for o in found if o.override_library is not None), found[0])
+
+
+@pytest.mark.parametrize("way", ["linked", "instance", "override", "local hair"])
+def test_a_shot_bakes_and_shows_a_linked_character(character, tmp_path, way):
+    path, there = character
+    in_library = path.read_bytes()
+    shot = shot_of(path, tmp_path, way)
+    hair, scene = shown_hair(), bpy.context.scene
+    combed = points(hair)
+    (guides,) = frame_folders.simulating()
+    bake()
+    assert frame_folders.folder_of(guides).parent == tmp_path / "haircache"
+    scene.frame_set(FRAME)
+    np.testing.assert_allclose(points(hair), there, atol=1e-6)
+    np.testing.assert_allclose(evaluated_points(hair), there, atol=1e-6)
+    scene.frame_set(1)
+    np.testing.assert_allclose(points(hair), combed, atol=1e-6)
+    scene.frame_set(FRAME)
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    bpy.context.scene.frame_set(FRAME)
+    np.testing.assert_allclose(points(shown_hair()), there, atol=1e-6)
+    assert path.read_bytes() == in_library
+
+
+def test_frames_that_are_baked_in_the_library_play_in_the_shot(character, tmp_path):
+    path, there = character
+    shot_of(path, tmp_path, "linked")
+    bpy.context.scene.frame_set(FRAME)
+    np.testing.assert_allclose(points(shown_hair()), there, atol=1e-6)
+
+
+def test_a_shot_has_settings_of_its_own(character, tmp_path):
+    path, there = character
+    shot = shot_of(path, tmp_path, "override")
+    (guides,) = frame_folders.simulating()
+    guides.vellus.dynamics.gravity = -2.0
+    bpy.ops.wm.save_mainfile()
+    bpy.ops.wm.open_mainfile(filepath=str(shot))
+    (guides,) = frame_folders.simulating()
+    assert guides.vellus.dynamics.gravity == -2.0
+    bake()
+    bpy.context.scene.frame_set(FRAME)
+    assert np.abs(points(shown_hair()) - there).max() > 1e-3
