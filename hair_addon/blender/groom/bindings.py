@@ -24,7 +24,7 @@ from . import styled_hair
 from .styled_hair import StyledHair
 
 if TYPE_CHECKING:
-    from ...core.interpolation.reach import Reach
+    from ...core.interpolation.guide_weights import Reach
 
 
 @dataclass
@@ -70,7 +70,7 @@ class BoundHair:
     def reach(self) -> "Reach":
         """The strands that follow each guide."""
 
-        return interpolation.reach.of_guides(self.binding.guide_weights, len(self.guides))
+        return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.guides))
 
     def follow(self, guides: Strands) -> np.ndarray | None:
         """Bring strands up to guides as they are combed now; indices (M,) of those that moved.
