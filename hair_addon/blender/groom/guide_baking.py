@@ -72,12 +72,16 @@ class _Task:
 
 
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
-    """{part: digest} of what the frames of some guides follow from, but for the animation. Raises `HairError`."""
-    settings = properties.dynamics_of(guides.vellus)
+    """{part: digest} of what the frames of some guides follow from, but for the animation, of settings too.
+
+    Raises `HairError`.
+    """
+    settings = given(properties.dynamics_of(guides.vellus))
+    keyed = properties.keyed_dynamics_of(guides.vellus)
     return frame_manifest.digests_of(
         {
             "solver": SOLVER_VERSION,
-            "settings": given(settings),
+            "settings": {name: value for name, value in settings.items() if name not in keyed},
             "guides": guide_simulation.combed_points(guides),
             "surface": guides.vellus.topology,
             "frame rate": scene.render.fps / scene.render.fps_base,

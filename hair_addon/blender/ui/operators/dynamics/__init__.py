@@ -5,10 +5,12 @@ from .apply_dynamics_preset import VELLUS_OT_apply_dynamics_preset
 from .bake_dynamics import VELLUS_OT_bake_dynamics
 from .free_dynamics import VELLUS_OT_free_dynamics
 from .play_dynamics import VELLUS_OT_play_dynamics
+from .stiffen_dynamics import VELLUS_OT_stiffen_dynamics
 
 CLASSES = (
     VELLUS_OT_play_dynamics,
     VELLUS_OT_bake_dynamics,
     VELLUS_OT_free_dynamics,
     VELLUS_OT_apply_dynamics_preset,
+    VELLUS_OT_stiffen_dynamics,
 )
