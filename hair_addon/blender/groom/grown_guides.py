@@ -42,7 +42,7 @@ def draped_if_new(
     if not is_free or groom_defaults.known(completed.gravity) < HANGING:
         return replace(completed, drape=False)
     face_count = int(dynamics.draped_growth.within_reach(surface.mesh, completed, density).sum())
-    return replace(completed, drape=cost.drape_seconds(completed, face_count) <= _QUICK)
+    return replace(completed, drape=cost.drape_seconds(completed.guide_count, face_count) <= _QUICK)
 
 
 def grow(
