@@ -66,12 +66,16 @@ def memory_of(guides_list: Sequence[Curves]) -> int:
 
 
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
-    """{part: digest} of what the frames of some guides follow from, but for the animation. Raises `HairError`."""
-    settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
+    """{part: digest} of what the frames of some guides follow from, but for the animation, of settings too.
+
+    Raises `HairError`.
+    """
+    settings = given(guide_simulation.simulated(properties.dynamics_of(guides.vellus)))
+    keyed = properties.keyed_dynamics_of(guides.vellus)
     return frame_manifest.digests_of(
         {
             "solver": SOLVER_VERSION,
-            "settings": given(settings),
+            "settings": {name: value for name, value in settings.items() if name not in keyed},
             "guides": guide_simulation.combed_points(guides),
             "surface": guides.vellus.topology,
             "frame rate": scene.render.fps / scene.render.fps_base,
