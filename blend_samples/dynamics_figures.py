@@ -12,6 +12,7 @@ from hair_addon.blender.data import guide_poses
 from hair_addon.blender.groom import frame_folders
 
 _ROOTS = 4  # points of a guide that may be nearer to the skin than hair keeps
+_EVERY = 5  # frames are looked at: Blender makes the hair in each
 _LOWEST = 0.61  # [m] in the head's axes: below, the neck is cut open and has no inside
 
 
@@ -40,11 +41,10 @@ def figures_of(guides, skull, last):
     scene = bpy.context.scene
     places = {}
     height = np.inf
-    for frame in range(1, last + 1):
+    for frame in sorted({2, last - 1, last, *range(1, last, _EVERY)}):
         scene.frame_set(frame)
         places[frame] = guide_points(guides, frame)
-        if frame % 3 == 1:
-            height = min(height, heights(places[frame][:, _ROOTS:].reshape(-1, 3), skull).min())
+        height = min(height, heights(places[frame][:, _ROOTS:].reshape(-1, 3), skull).min())
     lengths = {frame: np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1) for frame, points in places.items()}
     stretch = max(abs(now / lengths[1] - 1.0).max() for now in lengths.values())
     speed = np.linalg.norm(places[last] - places[last - 1], axis=2).max() * scene.render.fps

@@ -16,8 +16,8 @@ import numpy as np
 from hair_addon.core.files.whole_file import whole_file
 
 ROOT = Path(__file__).resolve().parent.parent
-LAST = 60  # frame
-SIZE = 400, 480  # pixels
+LAST = 54  # frame
+SIZE = 320, 384  # pixels
 SAMPLE_COUNT = 8  # of a pixel, also over the time of the shutter
 TURN, TURN_SECONDS = 70.0, 0.5  # degrees
 
@@ -51,9 +51,8 @@ def turned(time):
     return angle
 
 
-def _build(head_file, path):
-    """The head turns to both sides; its hair simulates, and is not baked."""
-    bpy.ops.wm.open_mainfile(filepath=str(head_file))
+def prepare():
+    """Let the head of the open file turn to both sides, and its hair simulate, to be baked beside the file."""
     skull, guides, _hair = dynamics_scene.objects()
     dynamics_scene.turn(skull, 2, turned, LAST + 1)
     guides.data.vellus.cache_folder = "//haircache"
@@ -61,6 +60,11 @@ def _build(head_file, path):
     scene.frame_start, scene.frame_end = dynamics_scene.FIRST, LAST
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     scene.render.use_motion_blur, scene.render.motion_blur_shutter = True, 0.5
+
+
+def _build(head_file, path):
+    bpy.ops.wm.open_mainfile(filepath=str(head_file))
+    prepare()
     with whole_file(path) as partial:
         bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 

@@ -18,7 +18,6 @@ from hair_addon import api
 KEPT_BITS = 0xFC  # of a color: three of the strips are pages of the documentation
 BALL_RADIUS = 0.02  # [m]
 BALL_SPEED = 0.25  # [m/s]
-BALL_START = np.array([0.0, 0.03, 0.66])  # [m]: in the neck
 BALL_SEEN = (-0.06, 0.06, 0.69)  # [m]
 BALL_COLOR = (0.55, 0.62, 0.70, 1.0)
 WIND = 2.0  # [m/s]
@@ -27,6 +26,8 @@ UPRIGHT_LENGTH = 0.11  # [m]
 SCREEN_RIGHT = np.array([-dynamics_scene.CAMERA[1], dynamics_scene.CAMERA[0], 0.0]) / math.hypot(
     *dynamics_scene.CAMERA[:2]
 )
+
+BALL_START = np.array([0.0, 0.03, 0.66]) - 0.06 * SCREEN_RIGHT  # [m]: in the neck
 
 
 @dataclass(frozen=True)
@@ -78,6 +79,7 @@ def blow():
     for frame in range(1, RESTED + 1):
         across.field.strength = WIND * gust(dynamics_scene.time_of(frame))
         across.field.keyframe_insert("strength", frame=frame)
+    dynamics_scene.see_from(dynamics_scene.CAMERA, dynamics_scene.SEEN + 0.045 * SCREEN_RIGHT, 68.0)
 
 
 def gust(time):
@@ -115,7 +117,7 @@ def nod():
 def wet():
     """Make the hair wet: heavier and softer, in locks, and darker."""
     _skull, guides, hair = dynamics_scene.objects()
-    api.set_dynamics(guides, "WET")
+    api.set_dynamics(guides, wetness=1.0)
     api.set_styles(hair, [*api.styles_of(hair), api.Wet(amount=1.0, lock=0.018, seed=5)])
     api.shade(hair, wetness=1.0)
 
@@ -147,7 +149,7 @@ RESTED = 24 * 5 + 1  # frame
 STRIPS = {
     "shaking": Strip((shake,), (1, 10, 12, 14, 16, RESTED)),
     "wind": Strip((blow,), (1, 13, 22, 34, 44, RESTED)),
-    "ball": Strip((push_ball,), (1, 11, 15, 19, 24, RESTED)),
+    "ball": Strip((push_ball,), (1, 16, 20, 24, 29, RESTED)),
     "wet": Strip((nod, wet_nod), (1, 9, 17, 25, RESTED), ("dry", "wet")),
     "upright": Strip((stand, sag), (1, 5, 9, RESTED), ("sag-free", "sagging")),
 }
