@@ -31,6 +31,7 @@ def main():
     parser.add_argument("names", nargs="*", help=f"of {', '.join(made)}; all by default")
     parser.add_argument("--out", type=Path, default=Path("out/dynamics"))
     parser.add_argument("--strands", type=int, default=dynamics_scene.STRAND_COUNT, help="number of strands")
+    parser.add_argument("--docs", type=Path, help="folder for smaller copies of the strips: docs/dynamics_STRIP.png")
     given = parser.parse_args()
     unknown = set(given.names) - set(made)
     if unknown:
@@ -50,6 +51,8 @@ def main():
         for name, strip in dynamics_strips.STRIPS.items():
             if name in names:
                 dynamics_strips.draw(name, strip, scene_file, out)
+                if given.docs is not None:
+                    dynamics_strips.write_page(out / f"{name}.png", given.docs.resolve() / f"dynamics_{name}.png")
     status = dynamics_film.make(scene_file, out) if "film" in names else 0
     print(f"made in {time.perf_counter() - started:.0f} s: {out}")
     return status

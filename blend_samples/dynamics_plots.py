@@ -32,7 +32,7 @@ def elastica():
     plots = []
     for count in VERTEX_COUNTS:
         ticks = ((0, 0.5, 1), (-1, -0.5, 0))
-        plot = Plot(f"{count} points", (-0.03, 1.05), (-1.02, 0.06), ticks, "x / L", legend=(0.03, 0.72))
+        plot = Plot(f"{count} points", (-0.03, 1.05), (-1.02, 0.06), ticks, "x / L", legend=(0.5, 0.74))
         for length, color in zip(LENGTHS, COLORS, strict=True):
             plot.line(heavy_elastica(BENDING, test_equilibria.WEIGHT, length, 200)[:, ::2] / length, REFERENCE)
             found = test_equilibria.settled(line(length, count)).points[0]
@@ -48,7 +48,7 @@ def elastica():
 def arcs():
     """Level circles that bend and twist under their weight, seen from above at a slant."""
     title = "Level circles, and under their weight: Kirchhoff's rods, 25 points"
-    plot = Plot(title, (-0.08, 0.08), (-0.10, 0.06), size=(640, 640), legend=(0.5, 0.86))
+    plot = Plot(title, (-0.06, 0.05), (-0.075, 0.035), size=(640, 640), legend=(0.5, 0.86))
     view = np.array([[0.86, -0.5, 0.0], [0.25, 0.43, 0.87]]).T
     for (radius, turns, moment, _gate), color in zip(test_equilibria.ARCS, COLORS, strict=False):
         length = 2.0 * np.pi * turns * radius

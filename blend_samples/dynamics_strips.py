@@ -10,12 +10,13 @@ import bpy
 import dynamics_figures  # beside this file
 import dynamics_scene
 import guide_tool_pictures
+import imbuf
 import numpy as np
 import ratio_plot
 
 from hair_addon import api
 
-KEPT_BITS = 0xFC  # of a color: three of the strips are pages of the documentation
+PAGE_WIDTH, PAGE_BITS = 1600, 0xF8  # pixels, and what is kept of a color, of a picture of the documentation
 BALL_RADIUS = 0.02  # [m]
 BALL_SPEED = 0.25  # [m/s]
 BALL_SEEN = (-0.06, 0.06, 0.69)  # [m]
@@ -55,9 +56,21 @@ def draw(name, strip, scene_file, out):
             label = f"{caption} {dynamics_scene.time_of(frame):.2f} s".strip()
             words.append((label, width * column + 10, height * row + 20))
     path = out / f"{name}.png"
-    ratio_plot.save(np.concatenate(rows) & KEPT_BITS, words, path)
+    ratio_plot.save(np.concatenate(rows), words, path)
     guide_tool_pictures.compress(path)
     print(path, flush=True)
+
+
+def write_page(path, page):
+    """Write a strip once more as a picture of the documentation: smaller, in fewer colors."""
+    picture = imbuf.load(str(path))
+    width, height = picture.size
+    picture.resize((PAGE_WIDTH, round(height * PAGE_WIDTH / width)), method="BILINEAR")
+    with picture.with_buffer() as buffer:
+        pixels = np.array(buffer)[::-1, :, :3] & PAGE_BITS
+    ratio_plot.save(pixels, [], page)
+    guide_tool_pictures.compress(page)
+    print(page, flush=True)
 
 
 def shake():
@@ -145,11 +158,11 @@ def sag():
     stand(is_sag_free=False)
 
 
-RESTED = 24 * 5 + 1  # frame
+SETTLED, RESTED = 24 * 3 + 1, 24 * 5 + 1  # frames
 STRIPS = {
     "shaking": Strip((shake,), (1, 10, 12, 14, 16, RESTED)),
     "wind": Strip((blow,), (1, 13, 22, 34, 44, RESTED)),
     "ball": Strip((push_ball,), (1, 16, 20, 24, 29, RESTED)),
-    "wet": Strip((nod, wet_nod), (1, 9, 17, 25, RESTED), ("dry", "wet")),
-    "upright": Strip((stand, sag), (1, 5, 9, RESTED), ("sag-free", "sagging")),
+    "wet": Strip((nod, wet_nod), (1, 9, 17, 25, SETTLED), ("dry", "wet")),
+    "upright": Strip((stand, sag), (1, 5, 9, SETTLED), ("sag-free", "sagging")),
 }
