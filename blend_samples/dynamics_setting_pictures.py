@@ -137,7 +137,7 @@ def sideways(time):
 
 CARRIED = Experiment(HANGING, (0.0, 0.125, 0.21, 0.29, 0.375), (-0.02, -0.175, 0.2), {}, root=sideways)
 COIL = Experiment(
-    curl(), (0.0, 4.0), (-0.08, -0.225, 0.24), {"sag_free": False, "bend_stiffness": 3.0, "vertex_count": 61}
+    curl(), (0.0, 4.0), (-0.11, -0.275, 0.29), {"sag_free": False, "bend_stiffness": 3.0, "vertex_count": 61}
 )
 HEAVY = Experiment(HANGING, (0.0, 4.0), (-0.09, -0.21, 0.22), {"sag_free": False, "weight": 10.0})
 # In thin air and small steps, which do not slow it down: what is left is the damping.

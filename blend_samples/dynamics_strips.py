@@ -16,7 +16,7 @@ import ratio_plot
 
 from hair_addon import api
 
-PAGE_WIDTH, PAGE_BITS = 1600, 0xF8  # pixels, and what is kept of a color, of a picture of the documentation
+PAGE_WIDTH, PAGE_BITS = 1540, 0xF8  # pixels, and what is kept of a color, of a picture of the documentation
 BALL_RADIUS = 0.02  # [m]
 BALL_SPEED = 0.25  # [m/s]
 BALL_SEEN = (-0.06, 0.06, 0.69)  # [m]
