@@ -8,7 +8,9 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import head  # beside this file
+import dynamics_film  # beside this file
+import dynamics_scene
+import head
 import parting
 
 import hair_addon
@@ -31,7 +33,13 @@ def build_parting():
     head.light()
 
 
-SAMPLES = {"head": build_head, "parting": build_parting}
+def build_dynamics():
+    """The head, which turns to both sides, with hair that simulates: play it, or bake it."""
+    dynamics_scene.build()
+    dynamics_film.prepare()
+
+
+SAMPLES = {"head": build_head, "parting": build_parting, "dynamics": build_dynamics}
 
 
 def main():
