@@ -10,6 +10,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import head  # beside this file
 import parting
+import portrait
 
 import hair_addon
 
@@ -18,7 +19,9 @@ FOLDER = Path(__file__).resolve().parent
 
 def build_head():
     """The head with 200 guides and 30,000 strands."""
-    head.grow(head.build())
+    skull = head.build()
+    head.grow(skull)
+    portrait.dress(skull)
     head.light()
 
 
@@ -28,6 +31,7 @@ def build_parting():
     _guides, hair = head.grow(skull, guide_count=300)
     hair.data.vellus.hair.part_lines = parting.draw_part_line(skull).name
     bpy.context.view_layer.update()
+    portrait.dress(skull)
     head.light()
 
 
