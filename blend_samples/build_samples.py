@@ -12,6 +12,7 @@ import dynamics_film  # beside this file
 import dynamics_scene
 import head
 import parting
+import portrait
 
 import hair_addon
 
@@ -20,7 +21,9 @@ FOLDER = Path(__file__).resolve().parent
 
 def build_head():
     """The head with 200 guides and 30,000 strands."""
-    head.grow(head.build())
+    skull = head.build()
+    head.grow(skull)
+    portrait.dress(skull)
     head.light()
 
 
@@ -30,6 +33,7 @@ def build_parting():
     _guides, hair = head.grow(skull, guide_count=300)
     hair.data.vellus.hair.part_lines = parting.draw_part_line(skull).name
     bpy.context.view_layer.update()
+    portrait.dress(skull)
     head.light()
 
 
