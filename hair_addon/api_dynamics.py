@@ -43,7 +43,7 @@ def dynamics_of(guides: Curves) -> DynamicsSettings:
     >>> api.dynamics_of(bpy.data.objects["Guides"]).bend_stiffness
     8.0
     """
-    return blender.settings.properties.dynamics_of(blender.data.arguments.curves_of(guides, "GUIDES").vellus)
+    return blender.settings.properties.own_dynamics_of(blender.data.arguments.curves_of(guides, "GUIDES").vellus)
 
 
 def set_dynamics(
@@ -65,7 +65,7 @@ def set_dynamics(
     """
     target = blender.data.arguments.curves_of(guides, "GUIDES")
     if settings is None or isinstance(settings, str):
-        present = blender.settings.properties.dynamics_of(target.vellus)
+        present = blender.settings.properties.own_dynamics_of(target.vellus)
         settings = present if settings is None else applied(present, choice(settings, "dynamics preset", PRESETS))
     wanted = changed(DynamicsSettings, settings, changes)
     if simulates is not None:

@@ -66,12 +66,16 @@ def memory_of(guides_list: Sequence[Curves]) -> int:
 
 
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
-    """{part: digest} of what the frames of some guides follow from, but for the animation. Raises `HairError`."""
-    settings = properties.dynamics_of(guides.vellus)
+    """{part: digest} of what the frames of some guides follow from, but for the animation, of settings too.
+
+    Raises `HairError`.
+    """
+    settings = given(guide_simulation.simulated(properties.dynamics_of(guides.vellus)))
+    keyed = properties.keyed_dynamics_of(guides.vellus)
     return frame_manifest.digests_of(
         {
             "solver": SOLVER_VERSION,
-            "settings": given(settings),
+            "settings": {name: value for name, value in settings.items() if name not in keyed},
             "guides": guide_simulation.combed_points(guides),
             "surface": guides.vellus.topology,
             "frame rate": scene.render.fps / scene.render.fps_base,
@@ -173,7 +177,7 @@ def _begin(guides, last, scene, starts_over, stack):
 def _read(task, scene, depsgraph):
     """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
     guides = task.guides.find()
-    settings = properties.dynamics_of(guides.vellus)
+    settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     if settings != task.simulated.settings:  # keyed
         task.simulated.change(settings)
     read = guide_simulation.read(guides, scene, depsgraph, settings)

@@ -48,7 +48,7 @@ def _guides(datablock):
         "hair": [name_of(hair) for hair in followers(datablock)],
         "settings": _settings(lambda: setting_properties.to_settings(datablock.vellus.guides, GuideSettings)),
         "simulates": datablock.vellus.simulates,
-        "dynamics": _settings(lambda: properties.dynamics_of(datablock.vellus)),
+        "dynamics": _settings(lambda: properties.own_dynamics_of(datablock.vellus)),
         "baked": _baked(datablock),
         "warnings": _warnings(datablock),
     }

@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, drawn_lines, masks, simulated_guides
-from ..groom import bindings, edited_surfaces, painted_masks, pipeline, staleness, writing
+from ..groom import bindings, edited_surfaces, hair_outside, painted_masks, pipeline, staleness, writing
 from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
@@ -29,8 +29,11 @@ def has_window():
     return not bpy.app.background
 
 
-def follow_guides(hair, depsgraph):
-    """Update a hair's strands after combing: no search, unless guides were added, removed or slid."""
+def follow_guides(hair, depsgraph, local=None):
+    """Update a hair's strands after combing: no search, unless guides were added, removed or slid.
+
+    local: (N, 3) points of the guides now, if they have been read already.
+    """
     bound = bindings.of(hair)
     if bound is None:
         is_simulated = simulated_guides.is_shown(hair.vellus.guide_curves)
@@ -39,7 +42,7 @@ def follow_guides(hair, depsgraph):
         make_again(hair, depsgraph)
         return
     try:
-        moved = bound.follow(_shown_guides(hair, bound))
+        moved = bound.follow(_shown_guides(hair, bound, local))
     except HairError as error:
         hair.vellus.status = str(error)
         return
@@ -47,7 +50,10 @@ def follow_guides(hair, depsgraph):
         make_again(hair, depsgraph)
     elif len(moved):
         hair_cache.move(hair.session_uid, moved, bound.shown.growing)
-        _write_soon(hair)
+        write_soon(hair)
+    elif hair_outside.is_wanted(hair):
+        bound.is_due()  # colliders may have moved
+        write_soon(hair)
 
 
 def show_guides(guides, points, depsgraph):
@@ -109,7 +115,7 @@ def make_again(hair, depsgraph):
         hair.vellus.status = str(error)
         return
     invalidation.strands_made(hair)
-    _write_soon(hair)
+    write_soon(hair)
 
 
 def _follow_linked(hair, depsgraph):
@@ -124,7 +130,7 @@ def _follow_linked(hair, depsgraph):
     bindings.keep(hair, bound)
     _follow_simulated(hair)
     invalidation.strands_made(hair)
-    _write_soon(hair)
+    write_soon(hair)
 
 
 def _follow_simulated(hair):
@@ -136,9 +142,9 @@ def _follow_simulated(hair):
     return True
 
 
-def _shown_guides(hair, bound):
+def _shown_guides(hair, bound, local=None):
     device = bound.binding.positions.device
-    return curves.read_shown_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides)
+    return curves.read_shown_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides, local)
 
 
 def _restyled(hair):
@@ -148,7 +154,7 @@ def _restyled(hair):
         state.is_stale = False
         return
     invalidation.strands_made(hair)
-    _write_soon(hair)
+    write_soon(hair)
 
 
 def is_ahead(hair):
@@ -185,6 +191,9 @@ def _write(hair):
     """Write hair that is newer than its datablock. An error becomes its status, so that other hair is written."""
     try:
         writing.write_hair(hair)
+        bound = bindings.of(hair)
+        if bound is not None and bound.free is not None:
+            invalidation.strands_made(hair)  # of which some were kept outside
     except HairError as error:
         bindings.invalidate(hair)
         hair.vellus.status = str(error)
@@ -197,7 +206,8 @@ def cancel_writing():
         bpy.app.timers.unregister(write_after_pause)
 
 
-def _write_soon(hair):
+def write_soon(hair):
+    """Write hair after a pause in which nothing changes, without a window at once."""
     if not has_window():
         _write(hair)
         return

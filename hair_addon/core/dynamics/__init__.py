@@ -20,6 +20,7 @@ if TYPE_CHECKING:
         material,
         moving_mesh,
         nearest_surface,
+        outside,
         presets,
         rigid_motion,
         rod_solver,

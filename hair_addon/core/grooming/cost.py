@@ -32,8 +32,9 @@ _FRAME_SECONDS, _VERTEX_SECONDS = 0.02, 4e-7
 # While they are simulated: a guide, and a vertex of it.
 _SIMULATED_GUIDE_BYTES, _SIMULATED_VERTEX_BYTES = 30_000, 600
 
-# Draping as guides grow: once, a triangle within their reach, and a guide.
-_DRAPE_SECONDS, _DRAPE_FACE_SECONDS, _DRAPE_GUIDE_SECONDS = 0.15, 4e-6, 5e-4
+# Draping: once, a triangle of the surface, and a guide in a substep.
+_DRAPE_SECONDS, _DRAPE_FACE_SECONDS, _DRAPE_GUIDE_SECONDS = 0.15, 4e-6, 1e-5
+GROWN_SUBSTEPS = 48  # of guides that are draped as they grow
 
 _TEXEL_SECONDS = 1.5e-6  # of all of the Marschner tables together
 
@@ -63,12 +64,12 @@ def guide_seconds(settings: GuideSettings, face_count: int) -> float:
     rounds = min(settings.relax_iterations, _MOST_ROUNDS)
     guide = _GUIDE_SECONDS + rounds * _GUIDE_ROUND_SECONDS + (_SPREAD_SECONDS if rounds else 0.0)
     placing = settings.guide_count * guide + face_count * (_FACE_SECONDS + rounds * _FACE_ROUND_SECONDS)
-    return placing + (drape_seconds(settings, face_count) if settings.drape else 0.0)
+    return placing + (drape_seconds(settings.guide_count, face_count) if settings.drape else 0.0)
 
 
-def drape_seconds(settings: GuideSettings, face_count: int) -> float:
-    """How long draping guides that have grown takes [s]; face_count: triangles within their reach."""
-    return _DRAPE_SECONDS + settings.guide_count * _DRAPE_GUIDE_SECONDS + face_count * _DRAPE_FACE_SECONDS
+def drape_seconds(guide_count: int, face_count: int, substeps: int = GROWN_SUBSTEPS) -> float:
+    """How long draping guides takes [s]; face_count: triangles that they may touch; substeps: in all."""
+    return _DRAPE_SECONDS + guide_count * substeps * _DRAPE_GUIDE_SECONDS + face_count * _DRAPE_FACE_SECONDS
 
 
 def hair_seconds(settings: HairSettings, face_count: int) -> float:

@@ -129,7 +129,7 @@ def follow_some(
     """(M, P, 3) float32, the points that `growing_points` gives some strands, and (M, k) float32, their weights.
 
     No others are computed but the centres of their clumps. guides and styling: as in `strands_now`; chosen: (M,)
-    indices of strands, such as `reach.Reach` finds for the guides that moved.
+    indices of strands, such as `guide_weights.Reach` finds for the guides that moved.
     """
     read = [] if styling is None else styling.centres_of(chosen)
     levels = [] if styling is None else styling.levels

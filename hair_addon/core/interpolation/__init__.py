@@ -14,7 +14,6 @@ if TYPE_CHECKING:
         hair_binding,
         interpolation,
         part_lines,
-        reach,
         regions,
         root_binder,
     )

@@ -76,6 +76,38 @@ class Limits:
     length: float = math.inf
 
 
+@dataclass(frozen=True)
+class Reach:
+    """The strands that follow each guide, as compressed rows: guide g's are strands[starts[g]:starts[g + 1]]."""
+
+    starts: np.ndarray  # (G+1,) int64
+    strands: np.ndarray  # int32
+
+    def of(self, guides: np.ndarray) -> np.ndarray:
+        """Indices, rising, of the strands that follow any of some guides."""
+        is_reached = np.zeros(int(self.strands.max(initial=-1)) + 1, bool)
+        if len(guides) == len(self.starts) - 1:
+            is_reached[self.strands] = True
+            return np.flatnonzero(is_reached)
+        for guide in guides:
+            is_reached[self.strands[self.starts[guide] : self.starts[guide + 1]]] = True
+        return np.flatnonzero(is_reached)
+
+
+def reach(guide_weights: GuideWeights, guide_count: int) -> Reach:
+    """The `Reach` of guides, from the `GuideWeights` of the strands that follow them."""
+    return reach_by(guide_weights.indices.numpy(), guide_count)
+
+
+def reach_by(indices: np.ndarray, guide_count: int) -> Reach:
+    """The `Reach` of guides, or whatever else strands go with: indices (S, k) int32 of those of each, -1 for none."""
+    # Sorted as one number each, guide and then strand: four times as fast as by an order of indices.
+    pairs = (indices.astype(np.int64) << 32) | np.arange(len(indices))[:, None]
+    pairs = np.sort(pairs[indices >= 0])
+    starts = np.searchsorted(pairs, np.arange(guide_count + 1) << 32)
+    return Reach(starts, pairs.astype(np.int32))
+
+
 def rows(array: wp.array, chosen: wp.array[int]) -> wp.array:
     """Some rows of a Warp array, in an array of their own; chosen: int32 Warp array on its device."""
     return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()

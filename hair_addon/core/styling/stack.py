@@ -29,7 +29,7 @@ from .steps import StrandData
 from .style_inputs import Inputs
 
 if TYPE_CHECKING:
-    from ..interpolation.reach import Reach
+    from ..interpolation.guide_weights import Reach
 
 # Nothing differentiates these kernels.
 wp.set_module_options({"enable_backward": False})
@@ -54,7 +54,7 @@ class _Level:
     @cached_property
     def reach(self) -> "Reach":
         """The centres that follow each guide."""
-        return interpolation.reach.of_guides(self.binding.guide_weights, len(self.binding.guide_positions))
+        return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.binding.guide_positions))
 
 
 @dataclass
@@ -141,7 +141,7 @@ class Styling:
         """For each level, the strands that belong to each centre."""
         rows = self.data.members.numpy()[: len(self.levels)]
         return [
-            interpolation.reach.of_groups(members[:, None], len(level.binding.roots))
+            interpolation.guide_weights.reach_by(members[:, None], len(level.binding.roots))
             for members, level in zip(rows, self.levels, strict=True)
         ]
 

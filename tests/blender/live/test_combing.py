@@ -14,7 +14,7 @@ from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import handlers, invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.grooming import following
-from hair_addon.core.interpolation.reach import of_guides
+from hair_addon.core.interpolation.guide_weights import reach
 from tests.support.counting import counts_of
 from tests.support.reading import attribute, points, write_points
 
@@ -115,7 +115,7 @@ def test_only_strands_of_moved_guides_are_uploaded(hair, window, monkeypatch):
 def test_reach_is_the_inverse_of_indices(hair):
     weights = bindings.of(hair.data).binding.guide_weights
     indices = weights.indices.numpy()
-    found = of_guides(weights, 60)
+    found = reach(weights, 60)
     for guide in range(60):
         strands = found.strands[found.starts[guide] : found.starts[guide + 1]]
         assert set(strands) == set(np.flatnonzero((indices == guide).any(axis=1)))

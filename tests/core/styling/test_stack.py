@@ -11,7 +11,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import hash_grid
 from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
-from hair_addon.core.interpolation import reach
+from hair_addon.core.interpolation import guide_weights
 from hair_addon.core.interpolation.regions import Regions
 from hair_addon.core.kernels import kernel_cache
 from hair_addon.core.styling import braid, clump, curl, frizz, lean, program, smooth, steps, wet
@@ -47,7 +47,7 @@ def combed_guides(hair, chosen, amount=0.01):
 def test_a_stroke_reaches_every_strand_that_moves(hair, name):
     """Found by comparing all strands; and no strand is found that follows no moved guide and no moved centre."""
     bound = hair.bound(*STACKS[name])
-    followers = reach.of_guides(hair.binding.guide_weights, len(hair.guides))
+    followers = guide_weights.reach(hair.binding.guide_weights, len(hair.guides))
     before = hair.styled(*STACKS[name])
     for chosen in ([3], [10, 41], []):
         after = hair.styled(*STACKS[name], guides=combed_guides(hair, chosen))
@@ -61,7 +61,7 @@ def test_a_stroke_reaches_every_strand_that_moves(hair, name):
 @pytest.mark.parametrize("name", STACKS)
 def test_strands_that_are_reached_are_as_in_a_full_update(hair, name):
     guides = combed_guides(hair, [5, 6])
-    followers = reach.of_guides(hair.binding.guide_weights, len(hair.guides)).of(np.array([5, 6]))
+    followers = guide_weights.reach(hair.binding.guide_weights, len(hair.guides)).of(np.array([5, 6]))
     reached = hair.bound(*STACKS[name]).reached(np.array([5, 6]), followers).astype(np.int32)
     full = hair.styled(*STACKS[name], guides=guides)
     np.testing.assert_array_equal(hair.styled(*STACKS[name], guides=guides, chosen=reached), full[reached])
