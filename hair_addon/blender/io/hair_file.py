@@ -16,10 +16,13 @@ _PROGRAM = "Vellus delivered hair"
 
 
 def require_ours(path):
-    """Raise `HairError` unless a file at `path` may be replaced: there is none, or it is of this kind."""
+    """Raise `HairError` unless a file could be written to `path`, where there is none, or one of this kind.
+
+    Also where this build of Blender lacks USD.
+    """
+    _require_usd()
     if not path.exists():
         return
-    _require_usd()
     from pxr import Sdf, Tf
 
     try:

@@ -9,6 +9,7 @@ import pytest
 
 from hair_addon.blender.data import follow_nodes
 from hair_addon.blender.groom import dynamics_notes, frame_folders, guide_baking
+from hair_addon.blender.host import paths
 from hair_addon.blender.io import delivery
 from hair_addon.blender.live import live_hair
 from hair_addon.core.errors import HairError
@@ -183,6 +184,14 @@ def test_what_cannot_be_delivered_is_refused(shot, tmp_path):
     refuse(shot, "do not simulate")
     shot.vellus.simulates = True
     assert not [*tmp_path.glob(".vellus*"), *tmp_path.glob("*.usdc")]
+
+
+def test_a_blender_without_usd_is_told_at_once(shot, monkeypatch):
+    monkeypatch.setattr(paths, "has_operator", lambda name: name != "wm.usd_export")
+    before = state()
+    with pytest.raises(HairError, match="lacks USD"):
+        next(delivery.delivering(shot, delivery.path_of(shot), bpy.context.scene))
+    assert state() == before
 
 
 def test_without_a_saved_file_there_is_no_place_for_it(hair):
