@@ -61,11 +61,15 @@ def build():
 def _add_scalp(head):
     positions = np.empty((len(head.data.vertices), 3), np.float32)
     head.data.vertices.foreach_get("co", positions.ravel())
-    above = positions[:, 2] - np.interp(positions[:, 1], _HAIRLINE[:, 0], _HAIRLINE[:, 1])
-    weights = np.clip(above / _HAIRLINE_WIDTH, 0.0, 1.0)
+    weights = np.clip(above_hairline(positions) / _HAIRLINE_WIDTH, 0.0, 1.0)
     group = head.vertex_groups.new(name="scalp")
     for vertex in np.flatnonzero(weights > 0.0):
         group.add([int(vertex)], float(weights[vertex]), "REPLACE")
+
+
+def above_hairline(positions):
+    """(N, 3) places on the head [m] → (N,) heights above the hairline as it is seen from the side."""
+    return positions[:, 2] - np.interp(positions[:, 1], _HAIRLINE[:, 0], _HAIRLINE[:, 1])
 
 
 def skin():

@@ -7,6 +7,7 @@ void main()
   corner_seen_x_y = texelFetch(visibility_x_y, texel, 0);
   corner_seen_z = texelFetch(visibility_z, texel, 0).xy;
   surface_normal = normal;
+  surface_uv = uv;
   drawn_position = position;
   gl_Position = view.world_to_clip * vec4(position, 1.0);
 }

@@ -2,6 +2,7 @@
 """The rules of the house (CONTRIBUTING.md): which file may use which, and which room a line belongs to."""
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -29,6 +30,7 @@ def each(paths):
     return pytest.mark.parametrize("path", paths, ids=lambda path: path.relative_to(ROOT).as_posix())
 
 
+@functools.cache
 def syntax(path):
     return ast.parse(path.read_text(encoding="utf-8"), path)
 
@@ -117,11 +119,14 @@ def test_the_addon_imports_itself_relatively(path):
 
 def attribute_lines(tree, *chains):
     """Lines of attribute chains such as `bpy.props` or, for any object, `.foreach_get`."""
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Attribute):
-            chain = ast.unparse(node)
-            if any(chain == wanted or (wanted[0] == "." and f".{chain}".endswith(wanted)) for wanted in chains):
-                yield node.lineno
+    for line, chain in _attribute_chains(tree):
+        if any(chain == wanted or (wanted[0] == "." and f".{chain}".endswith(wanted)) for wanted in chains):
+            yield line
+
+
+@functools.cache
+def _attribute_chains(tree):
+    return [(node.lineno, ast.unparse(node)) for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
 
 
 def import_lines(path, *names):
@@ -180,12 +185,11 @@ ROOMS = {
 }
 
 
-@pytest.mark.parametrize("rule", ROOMS)
 @each(MODULES)
-def test_code_is_in_its_package(path, rule):
-    lines_of, rooms = ROOMS[rule]
-    if not re.fullmatch(rooms, name_of(path)):
-        assert lines_of(path) == [], f"{rule} belongs in {rooms}"
+def test_code_is_in_its_package(path):
+    elsewhere = {rule: row for rule, row in ROOMS.items() if not re.fullmatch(row[1], name_of(path))}
+    found = {f"{rule} belongs in {rooms}": lines_of(path) for rule, (lines_of, rooms) in elsewhere.items()}
+    assert {rule: lines for rule, lines in found.items() if lines} == {}
 
 
 @each(MODULES)

@@ -31,11 +31,13 @@ PURE = {
     "blender/gpu/drawing.py: _parts",
     "blender/gpu/uniforms.py: settings_block",
     "blender/host/paths.py: addon_version",
+    "blender/settings/setting_properties.py: _settings_of",
     "core/dynamics/stiffness_advice.py: tip_sink",
     "core/geometry/bspline.py: basis_matrix",
     "core/geometry/bspline.py: _device_matrix",
     "core/geometry/bspline.py: _flat_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
+    "core/params.py: _declared",
 }
 
 _DISPLAYS = (ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.Set, ast.SetComp)

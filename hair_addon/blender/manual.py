@@ -43,7 +43,10 @@ _OPERATORS = {
         *("smooth_guides", "lift_guides", "attract_guides", "drape_guides"),
     ),
     "strands": ("interpolate_hair",),
-    "dynamics": ("play_dynamics", "bake_dynamics", "free_dynamics", "apply_dynamics_preset"),
+    "dynamics": (
+        *("play_dynamics", "bake_dynamics", "free_dynamics", "apply_dynamics_preset", "stiffen_dynamics"),
+        *("deliver_dynamics", "remove_delivery"),
+    ),
     "styles": (
         *("add_style", "remove_style", "move_style", "duplicate_style", "use_points"),
         *("paint_style_mask", "mask_from_selection"),

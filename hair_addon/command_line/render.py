@@ -59,6 +59,7 @@ def run(given, console):
     blender.io.frames.require_pattern(given.out, len(numbers))
     blender.io.frames.require_view_layer()
     blender.groom.frame_folders.require_baked(numbers)
+    blender.io.frames.bind_simulated()
     settings = _frame_settings(given, blender.io.frames.scene_size())
     if blender.io.frames.is_sequence(given.out):
         _make_sequence(given, console, numbers, settings)

@@ -41,13 +41,18 @@ def part_of(progress: Progress, first: float, last: float) -> Progress:
 
 
 def run_now[T](work: Work[T], progress: Progress = no_progress) -> T:
-    """Run such a generator to its end; returns its result. progress: callback for each computation."""
+    """Run such a generator to its end; returns its result. progress: callback for each computation.
+
+    After an error, of a computation or of progress, it is closed: what it had begun is undone by then.
+    """
     try:
         compute = next(work)
         while True:
             compute = work.send(compute(progress))
     except StopIteration as end:
         return end.value
+    finally:
+        work.close()
 
 
 class Job:

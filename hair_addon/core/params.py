@@ -9,6 +9,7 @@ import numbers
 import reprlib
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field, fields, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -60,6 +61,11 @@ def declared(settings_class: type["Settings"]) -> list[tuple[str, Any, Param]]:
 
     The default of a setting that follows from the surface is its typical value.
     """
+    return list(_declared(settings_class))
+
+
+@cache
+def _declared(settings_class):
     described = [(f.name, f.default, f.metadata["param"]) for f in fields(settings_class)]
     return [(name, details.typical if default is None else default, details) for name, default, details in described]
 

@@ -1,11 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """simulate: frames baked from the command line, gone on with, and rendered; what is wrong is one sentence."""
 
+import subprocess
+from pathlib import Path
+
 import bpy
 import numpy as np
 import pytest
 
-from tests.support.commands import run, run_here
+from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.host import memory
+from tests.support.commands import ROOT, command, run, run_here
+from tests.support.reading import evaluated_points, read_picture
 from tests.support.swung import simulate, swing
 
 
@@ -26,16 +32,32 @@ def test_frames_are_baked_and_rendered(shot, tmp_path):
     assert [line["frame"] for line in run_here("simulate", shot, "--json").results] == [5, 6, 7]
     size = ("--width", "64", "--height", "64", "--samples", "4")
     run_here("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-6", *size)
-    pictures = [read(tmp_path / f"f_{frame:02}.png") for frame in (1, 4)]
+    pictures = [read_picture(tmp_path / f"f_{frame:02}.png") for frame in (1, 4)]
     assert not np.array_equal(*pictures)
 
 
-def read(path):
-    image = bpy.data.images.load(str(path))
-    try:
-        return np.array(image.pixels[:])
-    finally:
-        bpy.data.images.remove(image)
+@pytest.mark.long
+def test_halves_of_a_shot_that_two_processes_render_are_those_of_one(shot, tmp_path):
+    run_here("simulate", shot)
+    size = ("--width", "48", "--height", "32", "--samples", "1")
+    assert run_here("render", shot, "--out", tmp_path / "one_#.exr", "--frames", "1-6", *size).status == 0
+    halves = [["render", shot, "--out", tmp_path / "two_#.exr", "--frames", part, *size] for part in ("1-3", "4-6")]
+    processes = [subprocess.Popen(command(*words), cwd=ROOT) for words in halves]
+    assert [process.wait(300) for process in processes] == [0, 0]
+    pictures = [[read_picture(tmp_path / f"{name}_{frame}.exr") for frame in range(1, 7)] for name in ("one", "two")]
+    assert np.array_equal(*pictures)
+    assert not np.array_equal(pictures[0][2], pictures[0][3])
+
+
+@pytest.mark.long
+def test_one_of_two_processes_that_bake_at_once_is_told(shot, tmp_path):
+    both = [subprocess.Popen(command("simulate", shot), cwd=ROOT, stderr=subprocess.PIPE, text=True) for _ in range(2)]
+    said = [process.communicate(timeout=300)[1] for process in both]
+    statuses = sorted(process.returncode for process in both)
+    assert statuses in ([0, 0], [0, 1])  # the second may have come when the first was done
+    assert statuses == [0, 0] or any("is being baked by another process" in text for text in said)
+    frames = [*(tmp_path / "frames").rglob("+*.npz")]
+    assert len(frames) == 7 and run_here("simulate", shot, "--json").results == []
 
 
 def test_frames_that_are_not_baked_are_not_rendered(shot, tmp_path):
@@ -51,3 +73,56 @@ def test_files_without_simulated_guides_are_refused(shot):
     bpy.ops.wm.save_mainfile()
     ended = run_here("simulate", shot)
     assert ended.status == 1 and "no guides that simulate" in ended.errors
+
+
+def test_what_is_baked_is_told(shot):
+    def told():
+        (guides,) = run_here("info", shot, "--json").results[0]["guides"]
+        return guides["baked"]
+
+    assert told() is None
+    run_here("simulate", shot, "--last-frame", "4")
+    baked = told()
+    assert (baked["first"], baked["last"], baked["state"]) == (1, 4, "complete")
+    assert baked["missing"] == baked["outdated"] == []
+    next(Path(baked["folder"]).glob("+00000003.npz")).unlink()
+    state = bpy.data.objects["Guides"].data.vellus
+    state.dynamics.damping = 0.1
+    bpy.context.scene.render.fps = 30
+    bpy.ops.wm.save_mainfile()
+    assert (told()["missing"], told()["outdated"]) == ([3], ["frame rate", "settings"])
+    assert "outdated: ['frame rate', 'settings']" in run_here("info", shot).out
+
+
+def test_a_delivered_file_needs_no_cache(shot, tmp_path):
+    out = tmp_path / "elsewhere" / "delivered.blend"
+    told = run_here("simulate", shot, "--deliver", out, "--json").results[-1]
+    assert told["delivered"] == str(out.with_name("delivered_Guides.usdc")) and (told["first"], told["last"]) == (1, 6)
+    assert [*sorted(path.name for path in out.parent.iterdir())] == ["delivered.blend", "delivered_Guides.usdc"]
+    hair = bpy.data.objects["Hair"]
+    bpy.context.scene.frame_set(5)
+    live = evaluated_points(hair)
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    (cache_file,) = bpy.data.cache_files
+    assert cache_file.filepath == "//delivered_Guides.usdc"
+    bpy.data.hair_curves["Guides"].vellus.cache_folder = "//nothing"
+    bpy.context.scene.frame_set(5)
+    np.testing.assert_allclose(evaluated_points(bpy.data.objects["Hair"]), live, atol=1e-6)
+    frame_folders.require_baked(range(1, 7))
+    for name in (shot, tmp_path / "delivered.usdc"):
+        assert run_here("simulate", shot, "--deliver", name).status == 1
+
+
+def test_too_little_memory_is_told(shot, monkeypatch):
+    needed = guide_baking.memory_of([bpy.data.hair_curves["Guides"]])
+    monkeypatch.setattr(memory, "free_bytes", lambda: needed * 2)
+    warned = run_here("simulate", shot, "--last-frame", "1")
+    assert warned.status == 0 and "takes 50 % of the free memory" in warned.errors
+    monkeypatch.setattr(memory, "free_bytes", lambda: needed * 1.4)
+    refused = run_here("simulate", shot, "--overwrite")
+    assert refused.status == 1 and "use fewer guides" in refused.errors
+    assert memory.share_of_free(needed) > memory.MOST and not guide_baking.is_baking()
+
+
+def test_free_memory_is_what_the_system_says():
+    assert memory.free_bytes() > 50e6

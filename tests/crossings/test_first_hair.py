@@ -129,15 +129,15 @@ def test_all_ways_grow_the_same_hair_where_no_size_is_given(sphere, tmp_path):
         bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
         return bpy.data.objects["Sphere"]
 
-    bpy.ops.vellus.add_hair(**FEW, density_group="top")
+    bpy.ops.vellus.add_hair(**FEW, density_group="top")  # on a dome: draped
     surface = keep("add hair")
     bpy.ops.vellus.distribute_guides(guide_count=40, density_group="top")
     bpy.ops.vellus.interpolate_hair(strand_count=300)
     surface = keep("one after the other")
-    guides = api.distribute_guides(surface, guide_count=40, density_group="top")
+    guides = api.distribute_guides(surface, guide_count=40, density_group="top", drape=True)
     api.interpolate_hair(guides, strand_count=300)
     surface = keep("script")
-    of_guides = api.GuideSettings(guide_count=40, density_group="top")
+    of_guides = api.GuideSettings(guide_count=40, density_group="top", drape=True)
     settings = api.GroomSettings(of_guides, api.HairSettings(strand_count=300))
     api.add_hair(surface, settings)
     surface = keep("script, in one step")
@@ -148,7 +148,7 @@ def test_all_ways_grow_the_same_hair_where_no_size_is_given(sphere, tmp_path):
     api.apply_settings(hair, settings)
     bpy.context.view_layer.update()
     keep("settings given later")
-    command = ("groom", blend, "--guides", 40, "--strands", 300, "--density-group", "top", "--out", out)
+    command = ("groom", blend, "--guides", 40, "--strands", 300, "--density-group", "top", "--drape", "--out", out)
     assert run_here(*command).status == 0
     bpy.ops.wm.open_mainfile(filepath=str(out))
     keep("command line")

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every setting in random order in a real window, on surfaces that are deformed, animated, emptied and linked.
 
-Run by a desktop Blender: any_setting.py -- SEED STEPS OUT [ZIP]. Installs the extension from ZIP unless it is there.
-Writes any_setting_SEED.json to OUT: the steps taken, and whether the end was reached. In background hair is written at
-once; in a window the picture is ahead of the Curves, and what is drawn then comes from both.
+Run by a desktop Blender: any_setting.py -- SEED END OUT [ZIP]. Installs the extension from ZIP unless it is there.
+Takes the steps before number END, and saves the scene to OUT with any_setting_SEED.json: the steps taken, the state of
+the random numbers and whether END was reached. Where these are there already, it goes on with them: so each part of a
+long walk has a Blender of its own, as a hundred redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or
+without add-on. In background hair is written at once; in a window the picture is ahead of the Curves, and what is drawn
+then comes from both.
 """
 
 import json
@@ -19,84 +22,54 @@ import numpy as np
 MODULE = "bl_ext.user_default.vellus"
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+from tests.desktop import any_scene  # noqa: E402
 from tests.desktop.window import in_viewport, viewport, wait  # noqa: E402
-
-SURFACES = ("Plain", "Subdivided", "Bent", "Keyed", "Scaled")
-LIBRARY = "library.blend"
 
 
 class Artist:
     """Takes random steps; each is printed before it is taken, so that the log ends with what ended Blender."""
 
-    def __init__(self, seed, step_count, folder):
+    def __init__(self, seed, folder):
         self.random = random.Random(seed)
-        self.step_count, self.folder, self.taken = step_count, folder, []
+        self.folder, self.report = folder, folder / f"any_setting_{seed}.json"
+        self.scene = str(folder / "any_setting.blend")
+        self.step_count, self.taken, self.redraw_count = 0, [], 0
         self.blender = sys.modules[f"{MODULE}.hair_addon.blender"]
         self.core = sys.modules[f"{MODULE}.hair_addon.core"]
+        self.blender.render.hair_picture.SAMPLE_COUNT = 1  # one pass a picture: it is not its quality that is looked at
+        bpy.types.SpaceView3D.draw_handler_add(self._count_redraw, (), "WINDOW", "POST_PIXEL")
+
+    def _count_redraw(self):
+        self.redraw_count += 1
 
     # ------------------------------------------------------------------------------------------------- the scene
 
-    def build(self):
-        """Surfaces of every kind with hair, and one that is linked with its hair from another file."""
-        self.blender.render.hair_picture.SAMPLE_COUNT = 1  # one pass a picture: it is not its quality that is looked at
-        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-        yield
-        with in_viewport():
-            self._build_library()
-            for number, name in enumerate(SURFACES):
-                self._add_surface(name, (2.5 * (number - 2), 0.0, 0.0))
-                bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=30, strand_count=300, length=0.4)
-            with bpy.data.libraries.load(str(self.folder / LIBRARY), link=True) as (found, wanted):
-                wanted.objects = list(found.objects)
-            for linked in wanted.objects:
-                bpy.context.scene.collection.objects.link(linked)
-            sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
-            bpy.context.scene.collection.objects.link(sun)
-            bpy.ops.ed.undo_push(message="Scene")
-        view = viewport()[0].spaces.active.region_3d
-        view.view_location, view.view_distance = (0.0, 0.0, 0.0), 16.0
+    def begin(self):
+        """The scene as the part before left it, or a new one."""
+        if not self.report.exists():
+            yield from any_scene.build(self.folder)
+            return
+        report = json.loads(self.report.read_text())
+        version, numbers, gauss = report["random"]
+        self.random.setstate((version, tuple(numbers), gauss))
+        self.step_count, self.taken = report["step_count"], report["steps"]
+        bpy.ops.wm.open_mainfile(filepath=self.scene)
         yield
 
-    def _build_library(self):
-        self._add_surface("Linked", (0.0, 3.0, 0.0))
-        bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=30, strand_count=300, length=0.4)
-        bpy.data.libraries.write(str(self.folder / LIBRARY), {bpy.data.objects["Linked"], *self._objects("CURVES")})
-        for thing in list(bpy.data.objects):
-            bpy.data.objects.remove(thing)
-        bpy.data.orphans_purge()
-
-    def _add_surface(self, name, place):
-        if name == "Plain":
-            bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, location=place)
-        else:
-            bpy.ops.mesh.primitive_monkey_add(location=place)
-        surface = bpy.context.object
-        surface.name = name
-        surface.vertex_groups.new(name="half").add(
-            [v.index for v in surface.data.vertices if v.co.z > 0.0], 1.0, "REPLACE"
-        )
-        if name == "Subdivided":
-            surface.modifiers.new("Subdivision", "SUBSURF").levels = 1
-        if name in {"Bent", "Linked"}:
-            surface.modifiers.new("Bend", "SIMPLE_DEFORM").angle = 0.8
-        if name == "Keyed":
-            surface.shape_key_add(name="Basis")
-            key = surface.shape_key_add(name="Long")
-            for point in key.points:
-                point.co.z *= 1.6
-            for frame, value in ((1, 0.0), (20, 1.0)):
-                key.value = value
-                key.keyframe_insert("value", frame=frame)
-        if name == "Scaled":
-            surface.scale = (-1.0, 0.7, 1.3)
+    def end(self, is_done):
+        """Write what the next part goes on with."""
+        if is_done:
+            self._save()
+        kept = {"step_count": self.step_count, "random": self.random.getstate(), "steps": self.taken}
+        self.report.write_text(json.dumps({"is_done": is_done} | kept, indent=1))
 
     # ------------------------------------------------------------------------------------------------- the steps
 
-    def take(self):
-        """All steps, with Blender's own events and redraws between them."""
+    def take(self, end):
+        """All steps before number `end`, with Blender's own events and redraws between them."""
         moves = [getattr(self, name) for name in sorted(dir(self)) if name.startswith("do_")]
         weights = [12.0 if move in (self.do_setting, self.do_two_settings) else 1.0 for move in moves]
-        for number in range(self.step_count):
+        while self.step_count < end:
             (move,) = self.random.choices(moves, weights)
             try:
                 with in_viewport():
@@ -107,12 +80,14 @@ class Artist:
             except RuntimeError as refusal:  # an operator that reported why not
                 self.say(f"refused: {refusal}")
                 assert "Traceback" not in str(refusal), refusal
+            self.step_count += 1
             yield
-            if number % 2:
+            if self.step_count % 2 == 0:
                 self.look()
             yield
         yield from wait(1.0)
         self.look()
+        print(f"any_setting: {self.redraw_count} redraws", flush=True)
 
     def say(self, text):
         """Tell the log, at once."""
@@ -322,10 +297,12 @@ class Artist:
 
     def do_save_and_load(self):
         self.say("save and load")
+        self._save()
+        bpy.ops.wm.open_mainfile(filepath=self.scene)
+
+    def _save(self):
         self._leave_mode()
-        path = str(self.folder / "any_setting.blend")
-        bpy.ops.wm.save_as_mainfile(filepath=path)
-        bpy.ops.wm.open_mainfile(filepath=path)
+        bpy.ops.wm.save_as_mainfile(filepath=self.scene)
 
     def do_duplicate(self):
         curves_object = self._curves()
@@ -359,14 +336,14 @@ class Artist:
         return thing.select_get()
 
 
-def walk(seed, step_count, folder):
-    """All of it, as a generator between whose parts Blender lives."""
-    artist = Artist(seed, step_count, folder)
-    report = folder / f"any_setting_{seed}.json"
-    report.write_text(json.dumps({"is_done": False}))
-    yield from artist.build()
-    yield from artist.take()
-    report.write_text(json.dumps({"is_done": True, "steps": artist.taken}, indent=1))
+def walk(seed, end, folder):
+    """The steps before number `end`, as a generator between whose parts Blender lives."""
+    artist = Artist(seed, folder)
+    yield from artist.begin()
+    artist.end(is_done=False)
+    yield from artist.take(end)
+    with in_viewport():
+        artist.end(is_done=True)
 
 
 def advance(steps):
@@ -383,10 +360,10 @@ def advance(steps):
 
 
 if __name__ == "__main__":
-    SEED, STEPS, OUT = sys.argv[sys.argv.index("--") + 1 :][:3]
+    SEED, END, OUT = sys.argv[sys.argv.index("--") + 1 :][:3]
     bpy.context.preferences.view.show_splash = False
     if MODULE not in bpy.context.preferences.addons:
         zip_path = sys.argv[sys.argv.index("--") + 4]
         bpy.ops.extensions.package_install_files(filepath=zip_path, repo="user_default", enable_on_install=True)
-    walking = walk(int(SEED), int(STEPS), Path(OUT))
+    walking = walk(int(SEED), int(END), Path(OUT))
     bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)

@@ -7,33 +7,42 @@ from pathlib import Path
 
 import pytest
 
-from tools import build_extension, compile_kernels
+from tools import build_extension, compile_kernels, desktop_blender
 
 pytestmark = pytest.mark.desktop
 
 SCRIPT = Path(__file__).with_name("any_setting.py")
 
+# Steps that one Blender takes, with two or three redraws each; the next goes on with the file that it saved.
+PART = 25
 
-def check(desktop, profile, seed, step_count, limit):
-    """Take the steps that follow from a seed, in `limit` seconds at most; what was printed is in out/desktop."""
-    folder = build_extension.ROOT / "out" / "desktop" / f"any_setting_{seed}_{step_count}"
+
+def check(desktop, profile, seed, step_count, limit, backend="opengl"):
+    """Take the steps that follow from a seed; what was printed is in out/desktop.
+
+    limit: of a part [s]. The steps are the same with either backend.
+    """
+    folder = build_extension.ROOT / "out" / "desktop" / f"any_setting_{seed}_{step_count}_{backend}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     extension = build_extension.build(compile_kernels.this_platform())
-    status = desktop.run(
-        SCRIPT,
-        [str(seed), str(step_count), folder, extension],
-        profile=profile,
-        log=folder / "any_setting.log",
-        limit=limit,
-        size=(640, 400),
-    )
-    log = (folder / "any_setting.log").read_text(errors="replace")
-    report = json.loads((folder / f"any_setting_{seed}.json").read_text())
-    assert status == 0 and report["is_done"], log[-4000:]
-    # What Blender calls by itself, as handlers and drawing, raises into the console alone.
-    assert "Traceback" not in log, log
-    assert "Not freed memory blocks" not in log, log[-4000:]
+    for end in [*range(PART, step_count, PART), step_count]:
+        path = folder / f"any_setting_{end}.log"
+        status = desktop.run(
+            SCRIPT,
+            [str(seed), str(end), folder, extension],
+            backend=backend,
+            profile=profile,
+            log=path,
+            limit=limit,
+            size=(640, 400),
+        )
+        log = path.read_text(errors="replace")
+        report = json.loads((folder / f"any_setting_{seed}.json").read_text())
+        assert status == 0 and report["is_done"] and report["step_count"] == end, log[-4000:]
+        # What Blender calls by itself, as handlers and drawing, raises into the console alone.
+        assert "Traceback" not in log, log
+        assert "Not freed memory blocks" not in log, log[-4000:]
 
 
 def test_a_few_random_settings(desktop, tmp_path):
@@ -41,6 +50,7 @@ def test_a_few_random_settings(desktop, tmp_path):
 
 
 @pytest.mark.long
+@pytest.mark.parametrize("backend", desktop_blender.BACKENDS)
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
-def test_many_random_settings(desktop, tmp_path, seed):
-    check(desktop, tmp_path, seed, step_count=300, limit=3600)
+def test_many_random_settings(desktop, tmp_path, seed, backend):
+    check(desktop, tmp_path, seed, step_count=300, limit=1200, backend=backend)

@@ -76,3 +76,12 @@ def guide_map(datablock):
         datablock.attributes[f"guide_index_{slot}"].data.foreach_get("value", indices[slot])
         datablock.attributes[f"guide_weight_{slot}"].data.foreach_get("value", weights[slot])
     return indices.T, weights.T
+
+
+def read_picture(path):
+    """(values,) of a picture file's pixels."""
+    image = bpy.data.images.load(str(path))
+    try:
+        return np.array(image.pixels[:])
+    finally:
+        bpy.data.images.remove(image)

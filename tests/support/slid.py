@@ -34,9 +34,8 @@ class Slid:
         program = programs.compiled(made, [], first_centres)
         of_levels = [replace(level, steps=program.before(row)) for row, level in enumerate(levels)]
         points = self._plain_strands(self._hair.binding)
-        replace(self._styling, program=program, levels=of_levels).apply(
-            points, lambda binding, _chosen: self._plain_strands(binding)
-        )
+        centres = [(self._plain_strands(level.binding), None) for level in levels]
+        replace(self._styling, program=program, levels=of_levels).apply(points, centres)
         return points.numpy()
 
     def _plain_strands(self, binding):

@@ -5,7 +5,6 @@ from copy import copy
 from dataclasses import replace
 
 import numpy as np
-import warp as wp
 
 from hair_addon.core.grooming import following, groom, hair_styles
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
@@ -50,9 +49,10 @@ class Groom:
         if styling is None:
             return following.follow_guides(self.binding, guides).numpy()
         followed = styling.guides(guides)
-        weights = following.weights_now(self.binding, followed, chosen)
-        rows = None if chosen is None else wp.array(chosen, dtype=int, device=self.device)
-        return following.strands_now(self.binding, followed, weights, styling, rows).numpy()
+        if chosen is not None:
+            return following.follow_some(self.binding, followed, chosen, styling=styling)[0]
+        weights = following.weights_now(self.binding, followed)
+        return following.strands_now(self.binding, followed, weights, styling).numpy()
 
 
 def head(strand_count=1500, guide_count=120, device=DEVICE, seed=1, **hair):

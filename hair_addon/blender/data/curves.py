@@ -323,16 +323,16 @@ def nearest_roots(surface, places):
     return geometry.closest_point.SurfaceQuery(surface.mesh).nearest(places)
 
 
-def read_guides(curves, surface, device, known=None):
+def read_guides(curves, surface, device, known=None, local=None):
     """Guides as they are combed now: `Strands` on a device, of one point count, however many each curve has.
 
     known: `Strands` of the same guides on the same surface as they were read before: those that are where they were
-    rooted then, all of them, keep their roots.
+    rooted then, all of them, keep their roots. local: what `read_points` gives now, if that is known.
     """
     counts = point_counts(curves)
     if not len(counts):
         raise HairError(f'"{name_of(curves)}" has no guides: generate guides first.')
-    local = read_points(curves)
+    local = read_points(curves) if local is None else local
     if not np.isfinite(local).all():
         sentence = '"{name}" has non-finite coordinates: undo, or delete those guides.'
         raise HairError(sentence, name=name_of(curves))
@@ -347,9 +347,9 @@ def read_guides(curves, surface, device, known=None):
     return known.moved(points) if has_known_roots else strands.from_numpy(points, roots, device)
 
 
-def read_shown_guides(curves, surface, device, known=None):
+def read_shown_guides(curves, surface, device, known=None, local=None):
     """Guides as hair follows them in this frame: where dynamics has moved them, else as `read_guides` reads them."""
-    guides = read_guides(curves, surface, device, known)
+    guides = read_guides(curves, surface, device, known, local)
     shown = simulated_guides.point_cache.get(curves.session_uid)
     return guides if shown is None or len(shown) != len(guides) else guides.moved(surface.from_local(shown))
 

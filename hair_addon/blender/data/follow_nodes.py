@@ -43,6 +43,12 @@ def set_surface(curves_object, surface_object, vertex_count, is_combed):
                     socket.value = inputs[name]
 
 
+def modifier_of(curves_object):
+    """The modifier that deforms an object's strands with their surface; None where an artist has removed it."""
+    found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
+    return next(found, None)
+
+
 def modifiers_of_artist(curves_object):
     """Names of an object's modifiers that renders show, but for the one that deforms strands with their surface."""
     shown = [modifier for modifier in curves_object.modifiers if modifier.show_render]

@@ -18,17 +18,18 @@ _STEPS = drawing.Steps(point_count=11, strand_count=10_000)
 _DIRECTIONS_AT_ONCE = 7
 
 
-def measure(hair, surfaces, opacities):
+def measure(hair, surfaces, opacities, clear=()):
     """Visibility textures {sampler: texture} of each strands and of each surface: two lists.
 
     hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU]; opacities: of each hair's strands, for which its
-    visibility holds; the surfaces' is for the first.
+    visibility holds; the surfaces' is for the first; clear: surfaces that hide nothing, which follow the others.
     """
+    receivers = [*surfaces, *clear]
     views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
-    views += [_view_of_surface(surface) for surface in surfaces]
-    for view, opacity in zip(views, opacities + [(opacities or [1.0])[0]] * len(surfaces), strict=True):
+    views += [_view_of_surface(surface) for surface in receivers]
+    for view, opacity in zip(views, opacities + [(opacities or [1.0])[0]] * len(receivers), strict=True):
         view["seen_opacity"] = opacity
-    places = [strands.texture for strands, _ in hair] + [surface.places for surface in surfaces]
+    places = [strands.texture for strands, _ in hair] + [surface.places for surface in receivers]
     targets = [_Target(view, texture) for view, texture in zip(views, places, strict=True)]
     maps = shadows.ShadowMaps(_SIZE, _DIRECTIONS_AT_ONCE)
     for first in range(0, len(ambient_cube.DIRECTIONS), _DIRECTIONS_AT_ONCE):

@@ -172,16 +172,6 @@ def dispatch_over(program, size):
     gpu.compute.dispatch(program, width, height, 1)
 
 
-def draw_surface(surface, color, view, lights, scene_samplers):
-    """Draw a matt `SurfaceOnGPU`; color: linear RGB."""
-    program = shaders.surface_program()
-    program.bind()
-    program.uniform_float("surface_color", color)
-    record = view.copy()
-    record["row_strands"] = surface.row_corners
-    _draw(surface.batch, program, record, uniforms.uniform_buffer(lights), scene_samplers)
-
-
 def draw_surface_depth(surface, view, lights, fragment="shadow_surface.frag"):
     """Draw a surface into a shadow map's first pass, or where it only hides: surface_hides.frag."""
     _draw(surface, shaders.surface_depth_program(fragment), view, uniforms.uniform_buffer(lights), {})
@@ -213,15 +203,17 @@ def bound(program, blocks, samplers):
     gpu.shader.unbind()
 
 
-def upload_surface(positions, normals):
-    """(3 F, 3) float32 corner positions and unit normals in world space → `SurfaceOnGPU`."""
+def upload_surface(positions, normals, uvs=None):
+    """(3 F, 3) float32 corner positions and unit normals in world space, (3 F, 2) UVs or none → `SurfaceOnGPU`."""
     layout = gpu.types.GPUVertFormat()
     layout.attr_add(id="position", comp_type="F32", len=3, fetch_mode="FLOAT")
     layout.attr_add(id="normal", comp_type="F32", len=3, fetch_mode="FLOAT")
+    layout.attr_add(id="uv", comp_type="F32", len=2, fetch_mode="FLOAT")
     vertices = gpu.types.GPUVertBuf(layout, len(positions))
+    uvs = np.zeros((len(positions), 2)) if uvs is None else uvs
     # Other types than contiguous float32 would be accepted silently and drawn incorrectly.
-    vertices.attr_fill("position", np.ascontiguousarray(positions, np.float32))
-    vertices.attr_fill("normal", np.ascontiguousarray(normals, np.float32))
+    for name, values in (("position", positions), ("normal", normals), ("uv", uvs)):
+        vertices.attr_fill(name, np.ascontiguousarray(values, np.float32))
     row_corners = min(len(positions), TEXTURE_WIDTH)
     places = places_texture(positions[:, None], np.zeros((len(positions), 1), np.float32), row_corners)
     return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners, len(positions))

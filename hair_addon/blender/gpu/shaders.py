@@ -190,14 +190,22 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, 
     return info
 
 
+SURFACE_IMAGES = ("color_image", "roughness_image", "normal_image")  # of a `SurfaceMaterial`
+
+
 @kept
 def surface_program():
-    """The program that draws a matt surface: attributes position, normal; uniform surface_color."""
+    """The program that draws a lit surface: attributes position, normal, uv; the block of its material, its images."""
     info, varying = surface_info()
-    declare_scene(info)
-    info.push_constant("VEC3", "surface_color")
+    declare_scene(info, uniforms.SURFACE.source)
+    info.vertex_in(2, "VEC2", "uv")
+    info.uniform_buf(2, "Surface", "surface")
+    names = (*SURFACE_IMAGES, "surface_albedo")
+    for slot, name in enumerate(names, start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
     varying.smooth("VEC4", "corner_seen_x_y")
     varying.smooth("VEC2", "corner_seen_z")
+    varying.smooth("VEC2", "surface_uv")
     info.vertex_out(varying)
     return compile_drawing(info, "lit_surface.vert", "surface.frag")
 

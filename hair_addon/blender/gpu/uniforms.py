@@ -113,6 +113,23 @@ LIGHTS = Block(
     },
 )
 
+SURFACE = Block(
+    "Surface",
+    {
+        "color": "vec4",  # linear RGB where it has no image
+        "image_rows": ("vec4", 6),  # from (u, v, 1) to coordinates of the images: two each of color, roughness, normal
+        "roughness_channels": "vec4",  # weights of the image's RGBA
+        "roughness": "float",
+        "metallic": "float",
+        "reflectance": "float",  # at normal incidence, of all but metal
+        "normal_strength": "float",
+        "is_clear": "int",
+        "has_color_image": "int",
+        "has_roughness_image": "int",
+        "has_normal_image": "int",
+    },
+)
+
 MOTION = Block(
     "Motion",
     {

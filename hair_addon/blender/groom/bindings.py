@@ -123,16 +123,16 @@ class BoundHair:
         self.let_go()
         binding, styling, axes = self.binding, self.styles.styling, self.surface.to_local_axes
         guides = self.guides if styling is None else styling.guides(self.guides)
-        weights = following.weights_now(binding, guides, chosen)
         if chosen is None:
+            weights = following.weights_now(binding, guides)
             self.is_behind = False
             out = None if self.growing is None else self.points
             out = out if out is not None and out.shape[1] == guides.point_count else None
             self.growing = following.growing_points(binding, guides, weights, axes, out, styling)
             self._take_shares(weights.weights.numpy())
         else:
-            self.points[chosen] = following.follow_some(binding, guides, chosen, weights, axes, styling)
-            self._take_shares(weights.weights.numpy(), chosen)
+            self.points[chosen], shares = following.follow_some(binding, guides, chosen, axes, styling)
+            self._take_shares(shares, chosen)
 
     def restyle(self, styles: StyledHair) -> None:
         """Apply other styles to the same strands: nothing is searched."""

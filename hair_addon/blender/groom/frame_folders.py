@@ -10,7 +10,8 @@ from bpy.types import Curves
 from ...core.errors import HairError
 from ...core.files import frame_cache, frame_manifest
 from ...core.files.frame_cache import FrameCache
-from ..data import attributes
+from ..data import attributes, delivered_hair
+from ..data.curves import followers
 from ..host import paths
 from ..host.caches import Cache
 from ..host.notices import name_of
@@ -84,19 +85,29 @@ def new_folder(guides: Curves) -> Path:
 def require_baked(numbers: Iterable[int]) -> None:
     """Raise `HairError` unless all guides that simulate have baked frames of these numbers, from their start frame on.
 
-    Renders of sequences ask: they never simulate.
+    Renders of sequences ask: they never simulate. Hair that plays delivered frames needs no others.
     """
     for guides in simulating():
-        start = guides.vellus.dynamics.start_frame
-        baked = frames_of(guides)
-        there = set() if baked is None else set(baked.frame_numbers())
-        missing = [number for number in numbers if number > start and number not in there]
-        if missing:
-            raise HairError(
-                'Frame {frame} of the guides "{name}" is not baked: bake their dynamics first.',
-                frame=missing[0],
-                name=name_of(guides),
-            )
+        hair = followers(guides)
+        if not hair or not all(map(delivered_hair.is_delivered, hair)):
+            require_frames(guides, numbers)
+
+
+def require_frames(guides: Curves, numbers: Iterable[int]) -> None:
+    """Raise `HairError` unless guides simulate, and have baked frames of these numbers from their start frame on."""
+    if not is_simulated(guides):
+        raise HairError('The guides "{name}" do not simulate: switch Dynamics on.', name=name_of(guides))
+    start = guides.vellus.dynamics.start_frame
+    baked = frames_of(guides)
+    is_theirs = baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves)
+    there = set(baked.frame_numbers()) if baked is not None and is_theirs else set()
+    missing = [number for number in numbers if number > start and number not in there]
+    if missing:
+        raise HairError(
+            'Frame {frame} of the guides "{name}" is not baked: bake their dynamics first.',
+            frame=missing[0],
+            name=name_of(guides),
+        )
 
 
 def simulating() -> list[Curves]:

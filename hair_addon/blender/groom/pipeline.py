@@ -21,7 +21,7 @@ from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
-from . import bindings, staleness, styled_hair, writing
+from . import bindings, grown_guides, staleness, styled_hair, writing
 from .bindings import BoundHair
 from .styled_hair import ReadStyles
 
@@ -47,29 +47,20 @@ def distributing_guides(
     depsgraph: Depsgraph,
     target: Curves | None = None,
     keeps_roots: bool = False,
+    may_drape: bool = False,
 ) -> Work[Curves]:
-    """`distribute_guides` as work in steps (core/long_work.py)."""
+    """`distribute_guides` as work in steps (core/long_work.py); may_drape: as in `adding_hair`."""
     surface = _read_surface(surface_object, depsgraph)
     density, texture = masks.own(settings).read(surface_object, surface, depsgraph)
-    settings = groom_defaults.complete(settings, surface.posed_mesh, density, texture)
+    completed = groom_defaults.complete(settings, surface.posed_mesh, density, texture)
+    settings = grown_guides.draped_if_new(settings, completed, surface, density) if may_drape else completed
     key = staleness.root_key(settings, density, None if texture is None else texture.values)
     roots = _kept_roots(target, surface, key, settings.guide_count) if keeps_roots else None
     flow = drawn_lines.read(surface_object, surface, settings.flow_lines, depsgraph)
-    device, place, target = preferences.device(), Remembered(surface_object), Remembered(target)
-    guides = yield lambda progress: groom.distribute_guides(
-        surface.mesh,
-        settings,
-        density=density,
-        texture=texture,
-        mirror_normal=surface.mirror_normal,
-        shape=surface.shape,
-        roots=roots,
-        flow=flow,
-        drawn_on=_drawn_on(surface),
-        device=device,
-        progress=progress,
-    )
-    return writing.write_guides(target.find(), place.find(), surface, guides, settings, key, drawn_lines.key(flow))
+    place, target = Remembered(surface_object), Remembered(target)
+    mask = density, texture
+    grown = yield lambda progress: grown_guides.grow(surface, settings, mask, flow, progress, roots)
+    return writing.write_guides(target.find(), place.find(), surface, grown, settings, key, drawn_lines.key(flow))
 
 
 def interpolate_hair(
@@ -174,14 +165,20 @@ def adding_hair(
     hair_settings: HairSettings,
     depsgraph: Depsgraph,
     styles: Sequence[StyleSettings] = (),
+    may_drape: bool = False,
 ) -> Work[tuple[Curves, Curves]]:
     """Guides on a mesh object and hair between them, as work in steps; returns the Curves of both.
 
-    styles: as in `interpolating_hair`. No object is made before all of it is computed.
+    styles: as in `interpolating_hair`; may_drape: drape guides as `grown_guides.draped_if_new`, whatever the settings
+    say.
+    No object is made before all of it is computed.
     """
     surface = _read_surface(surface_object, depsgraph)
     completed, read = _completed(surface_object, surface, guide_settings, hair_settings, depsgraph)
-    (guide_settings, hair_settings), ((density, texture), of_hair) = completed, read
+    open_settings, (guide_settings, hair_settings) = guide_settings, completed
+    (density, texture), of_hair = read
+    if may_drape:
+        guide_settings = grown_guides.draped_if_new(open_settings, guide_settings, surface, density)
     parting = partings.read(surface_object, surface, None, hair_settings, depsgraph)
     flow = drawn_lines.read(surface_object, surface, guide_settings.flow_lines, depsgraph)
     styling = styled_hair.read_styles(styles, surface_object, surface, None, depsgraph)
@@ -190,19 +187,8 @@ def adding_hair(
 
     def compute(progress):
         groom.load_kernels(device, progress)
-        grown = groom.distribute_guides(
-            surface.mesh,
-            guide_settings,
-            density=density,
-            texture=texture,
-            mirror_normal=surface.mirror_normal,
-            shape=surface.shape,
-            flow=flow,
-            drawn_on=_drawn_on(surface),
-            device=device,
-            progress=part_of(progress, 0.0, 0.5),
-        )
-        guides = _as_written(grown, surface, device)
+        grown = grown_guides.grow(surface, guide_settings, (density, texture), flow, part_of(progress, 0.0, 0.5))
+        guides = _as_written(grown.strands, surface, device)
         progress = part_of(progress, 0.5, 1.0)
         ground = _ground(surface, of_hair, parting, device)
         binding = _bind(surface, guides, hair_settings, ground, None, progress)

@@ -7,7 +7,6 @@ from concurrent.futures import Future
 import numpy as np
 from bpy.types import Curves, Object
 
-from ...core.geometry.strands import Strands
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import attributes, curves, curves_objects
@@ -16,6 +15,7 @@ from ..materials import looks
 from ..settings import setting_properties, style_items
 from . import bindings, hair_outside, staleness
 from .bindings import BoundHair
+from .grown_guides import GrownGuides
 
 # Of the guides' own Curves, by their length: so they are seen on a surface of any size.
 _GUIDE_RADIUS = 1.0 / 300.0
@@ -25,7 +25,7 @@ def write_guides(
     target: Curves | None,
     surface_object: Object,
     surface: Surface,
-    guides: Strands,
+    grown: GrownGuides,
     settings: GuideSettings,
     key: str,
     flow_key: str,
@@ -37,7 +37,9 @@ def write_guides(
     """
     target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
+    target.vellus.status = grown.status
     target.vellus.root_key, target.vellus.flow_key = key, flow_key
+    guides = grown.strands
     radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
     points = Future()
     points.set_result(surface.to_local(guides.numpy()))

@@ -4,6 +4,8 @@
 There is at most one: its operator blocks all input except Esc and navigation until it has ended.
 """
 
+import contextlib
+
 _job = None
 _timer = None
 
@@ -19,6 +21,17 @@ def begin(context, started):
     _job = started
     if _timer is None:
         _timer = context.window_manager.event_timer_add(0.05, window=context.window)
+
+
+@contextlib.contextmanager
+def set_aside():
+    """As if no operation ran: for a step of the running one that needs hair to follow a change of the scene."""
+    global _job
+    kept, _job = _job, None
+    try:
+        yield
+    finally:
+        _job = kept
 
 
 def end(context):

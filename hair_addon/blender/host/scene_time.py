@@ -40,6 +40,30 @@ def go_to(blender_scene, frame):
     blender_scene.frame_set(frame)
 
 
+def go_to_time(blender_scene, time):
+    """Change a scene to a time in frames, which need not be whole, and evaluate it."""
+    whole = math.floor(time)
+    blender_scene.frame_set(whole, subframe=time - whole)
+
+
+def frame_rate(blender_scene):
+    """Return the frames a second of a scene."""
+    return blender_scene.render.fps / blender_scene.render.fps_base
+
+
+def exposure_times(blender_scene, steps):
+    """Return the times [frames] from a frame at which Cycles samples the motion of objects; [0.0] without motion blur.
+
+    steps: of the objects, as Cycles has it: 2^steps + 1 times, from one end of the exposure to the other.
+    """
+    render = blender_scene.render
+    if not render.use_motion_blur or not render.motion_blur_shutter > 0.0:
+        return [0.0]
+    center = {"START": 0.5, "CENTER": 0.0, "END": -0.5}[render.motion_blur_position]
+    count = 2**steps
+    return [render.motion_blur_shutter * (center + index / count - 0.5) for index in range(count + 1)]
+
+
 def visit(blender_scene, offsets, set_frame):
     """Change a scene to several times in turn, and back afterwards: a generator of the indices of `offsets`.
 

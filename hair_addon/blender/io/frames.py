@@ -13,7 +13,10 @@ from ...core.imaging import picture_checks
 from ...core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME, PassSettings
 from ...core.long_work import no_progress
 from ...core.params import declared
+from ..data import curves, scene
+from ..groom import frame_folders
 from ..host import scene_time
+from ..live import live_hair
 from ..render import engine as render_engine
 from ..render import viewport
 
@@ -67,6 +70,19 @@ def require_view_layer():
     """Raise `HairError` if no view layer of the open scene is rendered: Blender would crash."""
     if not any(layer.use for layer in bpy.context.scene.view_layers):
         raise HairError("No view layer of the scene is rendered: turn on Use for Rendering in one of them.")
+
+
+def bind_simulated():
+    """Bind simulated hair in its start frame, so that the first frame that a process renders changes no bit of it.
+
+    Strands are bound in the axes of the world, where a surface that turns is another by a rounding in each frame.
+    """
+    blender_scene = scene_time.present_scene()
+    for guides in frame_folders.simulating():
+        scene_time.go_to(blender_scene, guides.vellus.dynamics.start_frame)
+        for hair in curves.followers(guides):
+            if hair.vellus.is_live and not curves.follows_library(hair):
+                live_hair.make_again(hair, scene.present_depsgraph())
 
 
 def _number_width(pattern):

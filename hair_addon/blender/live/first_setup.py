@@ -11,9 +11,10 @@ from pathlib import Path
 
 import bpy
 
+from ...core import dynamics
 from ...core.grooming import groom
 from ...core.kernels import kernel_setup
-from ...core.long_work import Job
+from ...core.long_work import Job, part_of
 from ..host import paths
 from ..settings import preferences
 
@@ -45,7 +46,7 @@ def _advance():
         if kernel_setup.is_under_way():  # for hair that the user waits for
             return _INTERVAL
         # One thread: other cores are left to the user's work.
-        _job = Job(lambda progress: groom.load_kernels("cpu", progress, most_threads=1))
+        _job = Job(_load)
         return _INTERVAL
     if not _job.is_done:
         return _INTERVAL
@@ -54,6 +55,12 @@ def _advance():
     with contextlib.suppress(OSError):  # then the next session finds them in Warp's cache
         _stamp().write_text(paths.addon_version(), encoding="utf-8")
     return None
+
+
+def _load(progress):
+    """Kernels of the first hair, which is draped on a scalp."""
+    groom.load_kernels("cpu", part_of(progress, 0.0, 0.7), most_threads=1)
+    dynamics.draped_growth.load_kernels("cpu", part_of(progress, 0.7, 1.0), most_threads=1)
 
 
 def _end():

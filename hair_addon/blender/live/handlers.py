@@ -52,12 +52,12 @@ def after_depsgraph_update(scene, depsgraph):
         invalidation.image_changed()
     painted = {update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Image)}
     _mark_painted(painted, depsgraph)
-    combed = []
+    combed = {}
     for datablock in changed:
         if isinstance(datablock, bpy.types.Curves):
             invalidation.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
-                combed.append(datablock)
+                combed[datablock] = reported.points_of(datablock)
     bindings.is_reported()
     animated.follow(depsgraph)
     simulated_hair.follow_settings(scene, depsgraph)
@@ -117,7 +117,10 @@ def _of_kind(kind):
 
 
 def _evaluate(depsgraph, combed):
-    """Evaluate guides first, then their hair. During a long operation, updates wait for its end."""
+    """Evaluate guides first, then their hair. During a long operation, updates wait for its end.
+
+    combed: {guide Curves that have moved: their (N, 3) points}.
+    """
     if running.job() is not None:
         for guides in combed:
             live_hair.mark_followers(guides)
@@ -129,7 +132,7 @@ def _evaluate(depsgraph, combed):
             pipeline.evaluate(guides, depsgraph)
             invalidation.strands_made(guides)
             live_hair.follow_mask(guides, depsgraph)
-            combed.append(guides)
+            combed[guides] = None  # to be read
     for hair in _of_kind("HAIR"):
         state = hair.vellus
         follows = state.guide_curves in combed
@@ -138,7 +141,7 @@ def _evaluate(depsgraph, combed):
         elif state.is_stale and not live_hair.is_ahead(hair):
             live_hair.make_again(hair, depsgraph)
         elif follows:
-            live_hair.follow_guides(hair, depsgraph)
+            live_hair.follow_guides(hair, depsgraph, combed[state.guide_curves])
         if state.is_shading_stale:
             looks.evaluate_shading(hair)
     live_hair.show_styles(depsgraph)

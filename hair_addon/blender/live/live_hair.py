@@ -29,8 +29,11 @@ def has_window():
     return not bpy.app.background
 
 
-def follow_guides(hair, depsgraph):
-    """Update a hair's strands after combing: no search, unless guides were added, removed or slid."""
+def follow_guides(hair, depsgraph, local=None):
+    """Update a hair's strands after combing: no search, unless guides were added, removed or slid.
+
+    local: (N, 3) points of the guides now, if they have been read already.
+    """
     bound = bindings.of(hair)
     if bound is None:
         is_simulated = simulated_guides.is_shown(hair.vellus.guide_curves)
@@ -39,7 +42,7 @@ def follow_guides(hair, depsgraph):
         make_again(hair, depsgraph)
         return
     try:
-        moved = bound.follow(_shown_guides(hair, bound))
+        moved = bound.follow(_shown_guides(hair, bound, local))
     except HairError as error:
         hair.vellus.status = str(error)
         return
@@ -139,9 +142,9 @@ def _follow_simulated(hair):
     return True
 
 
-def _shown_guides(hair, bound):
+def _shown_guides(hair, bound, local=None):
     device = bound.binding.positions.device
-    return curves.read_shown_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides)
+    return curves.read_shown_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides, local)
 
 
 def _restyled(hair):

@@ -27,6 +27,11 @@ def have_guides_moved(guide_curves):
     return before is None or not np.array_equal(before, points)
 
 
+def points_of(guide_curves):
+    """(N, 3) local points of guides, as `have_guides_moved` has read them."""
+    return guide_cache.get(guide_curves.session_uid)
+
+
 def remember_axes():
     """Store the world axes of all surfaces, after an update."""
     axes_cache.clear()

@@ -13,6 +13,7 @@ from ..gpu import (
     level_of_detail,
     render_programs,
     strand_textures,
+    surface_shading,
     uniforms,
     world_texture,
 )
@@ -35,17 +36,18 @@ class DrawnScene:
     """Read once by `read`, drawn from any number of views until something moves."""
 
     hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on, part in viewports)
-    surfaces: list  # (SurfaceOnGPU, linear RGB, None of a holdout)
+    surfaces: list  # (SurfaceOnGPU, parts of a `DrawnMesh`, None of a holdout)
     lights: np.ndarray  # uniforms.LIGHTS
     world: light_door.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
     hair_visibility: list  # {sampler: texture} of the world's light on each of the hair
-    surface_visibility: list
+    surface_visibility: list  # of `surfaces`, then of `clear`
     # session_uid of the object that a click on each hair selects; in a render `drawn_meshes.owner_of` it.
     owners: tuple = ()
     selected: tuple = ()  # whether that object is selected
     instances: tuple = ()  # of hair, as `hair_places.read_instances` found them
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
+    clear: tuple = ()  # as `surfaces`, of those that hide nothing
 
 
 _EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
@@ -75,21 +77,33 @@ def read(
         # Scenes without hair have no cost.
         return _EMPTY
     if before is None or before.shadow_maps is None:
-        surfaces = _upload(drawn_meshes.read_drawn_meshes(depsgraph, viewport))
+        surfaces, clear = _upload(
+            drawn_meshes.read_drawn_meshes(depsgraph, viewport), viewport is None or not is_hair_only
+        )
         world = light_door.read_world(blender_scene)
         lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, _placed(hair))
         shadow_maps = _new_shadow_maps(lights)
     else:
-        surfaces, lights, world, shadow_maps = before.surfaces, before.lights, before.world, before.shadow_maps
+        surfaces, clear = before.surfaces, before.clear
+        lights, world, shadow_maps = before.lights, before.world, before.shadow_maps
     placed, batches = _placed(hair), [surface.batch for surface, _ in surfaces]
     shadow_maps.draw(lights, placed, batches, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
     if is_draft and before is not None and _have_same_places(before.hair, hair):
         seen = before.hair_visibility, before.surface_visibility
     else:
-        seen = _visibility(hair, surfaces)
+        seen = _visibility(hair, surfaces, clear)
     owners, selected = tuple(place.owner for place in places), tuple(place.is_selected for place in places)
     return DrawnScene(
-        hair, surfaces, lights, world, shadow_maps, *seen, owners=owners, selected=selected, instances=instances
+        hair,
+        surfaces,
+        lights,
+        world,
+        shadow_maps,
+        *seen,
+        owners=owners,
+        selected=selected,
+        instances=instances,
+        clear=clear,
     )
 
 
@@ -105,7 +119,7 @@ def read_render(depsgraph, known, refused):
     lights = _lights(light_door.read_lights(depsgraph, for_render=True), world, _placed(unlit.hair))
     shadow_maps = _new_shadow_maps(lights)
     shadow_maps.draw(lights, _placed(unlit.hair), [surface.batch for surface, _ in unlit.surfaces], _SHADOW_STEPS)
-    hair_seen, surfaces_seen = _visibility(unlit.hair, unlit.surfaces)
+    hair_seen, surfaces_seen = _visibility(unlit.hair, unlit.surfaces, unlit.clear)
     return replace(
         unlit,
         lights=lights,
@@ -121,12 +135,18 @@ def read_unlit(depsgraph, known, refused):
     found = list(_read_rendered_hair(depsgraph, known, refused))
     meshes = drawn_meshes.read_drawn_meshes(depsgraph)
     hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)
-    surface_owners = tuple(mesh.owner for mesh in meshes)
-    return replace(_EMPTY, hair=hair, surfaces=_upload(meshes), owners=owners, surface_owners=surface_owners)
+    surface_owners = tuple(mesh.owner for mesh in meshes if not mesh.is_clear)
+    surfaces, clear = _upload(meshes, is_shaded=True)
+    return replace(_EMPTY, hair=hair, surfaces=surfaces, clear=clear, owners=owners, surface_owners=surface_owners)
 
 
-def _upload(meshes):
-    return [(drawing.upload_surface(mesh.positions, mesh.normals), mesh.color) for mesh in meshes]
+def _upload(meshes, is_shaded):
+    """(surfaces, those that are clear) of a `DrawnScene`; is_shaded: whether they are seen as we shade them."""
+    surfaces, clear = [], []
+    for mesh in meshes:
+        uploaded = drawing.upload_surface(mesh.positions, mesh.normals, mesh.uvs), mesh.parts
+        (clear if is_shaded and mesh.is_clear else surfaces).append(uploaded)
+    return surfaces, tuple(clear)
 
 
 def _new_shadow_maps(lights):
@@ -137,9 +157,10 @@ def _placed(hair):
     return [(strands, to_world) for strands, _, to_world, *_ in hair]
 
 
-def _visibility(hair, surfaces):
+def _visibility(hair, surfaces, clear):
     opacities = [shading.opacity for _, shading, *_ in hair]
-    return ambient_visibility.measure(_placed(hair), [surface for surface, _ in surfaces], opacities)
+    solid, seen_through = ([surface for surface, _parts in some] for some in (surfaces, clear))
+    return ambient_visibility.measure(_placed(hair), solid, opacities, seen_through)
 
 
 def _read_rendered_hair(depsgraph, known, refused):
@@ -223,7 +244,7 @@ def _brightness(lights, place):
 def draw_hiding(drawn, view):
     """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for surface, _color in drawn.surfaces:
+        for surface, _parts in drawn.surfaces:
             drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
 
 
@@ -265,8 +286,8 @@ def draw_arrival(drawn, view, buffer):
     """Return a texture of light visibility for the content of a `VisibilityBuffer`, to which hair was added last."""
     _see_through_hair(drawn, view)
     with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for surface, color in drawn.surfaces:
-            if color is None:
+        for surface, parts in drawn.surfaces:
+            if parts is None:
                 drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
                 continue
             program = render_programs.surface_arrival_program()
@@ -281,11 +302,15 @@ def _see_through_hair(drawn, view):
 
 
 def draw_surfaces(drawn, view):
-    """Draw all surfaces with depth test into the bound framebuffer."""
+    """Draw all surfaces with depth test into the bound framebuffer, and over them those that are clear."""
     _see_through_hair(drawn, view)
+    count = len(drawn.surfaces)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, color), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=True):
-            if color is None:
+        for (surface, parts), seen in zip(drawn.surfaces, drawn.surface_visibility[:count], strict=True):
+            if parts is None:
                 drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
                 continue
-            drawing.draw_surface(surface, color, view, drawn.lights, drawn.shadow_maps.samplers | seen)
+            surface_shading.draw(surface, parts, view, drawn.lights, drawn.shadow_maps.samplers | seen)
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA_PREMULT"):
+        for (surface, parts), seen in zip(drawn.clear, drawn.surface_visibility[count:], strict=True):
+            surface_shading.draw(surface, parts, view, drawn.lights, drawn.shadow_maps.samplers | seen)

@@ -59,7 +59,7 @@ class Motion:
 def draw(drawn, motion, view, buffer):
     """Return a texture of motion vectors [pixels] for the `VisibilityBuffer` that a `DrawnScene` was drawn into."""
     with buffer.surfaces_of_part(render_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, _color), owner in zip(drawn.surfaces, drawn.surface_owners, strict=True):
+        for (surface, _parts), owner in zip(drawn.surfaces, drawn.surface_owners, strict=True):
             record, samplers = motion.surface(owner)
             placed = view.copy()
             placed["row_strands"] = surface.row_corners
@@ -78,6 +78,6 @@ def places(drawn, world_to_view, view_to_clip):
     }
     surfaces = {
         owner: (surface.places, surface.corner_count)
-        for (surface, _color), owner in zip(drawn.surfaces, drawn.surface_owners, strict=True)
+        for (surface, _parts), owner in zip(drawn.surfaces, drawn.surface_owners, strict=True)
     }
     return Places(view_to_clip @ world_to_view, hair, surfaces)

@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import replace
+from functools import lru_cache
 
 import bpy
 import numpy as np
@@ -115,15 +116,21 @@ def to_settings(owner, settings_class, skip=()):
 
     Raises `HairError` for what the range forbids.
     """
+    fields = [field for field in declared(settings_class) if field[0] not in skip]
     try:
-        values = {
-            name: plain(getattr(owner, name), default, details)
-            for name, default, details in declared(settings_class)
-            if name not in skip
-        }
+        values = [getattr(owner, name) for name, _default, _details in fields]
     except UnicodeDecodeError as error:
         raise HairError("A name in the hair settings is not valid UTF-8: pick the item again.") from error
-    return settings_class(**values)
+    held = (tuple(value) if isinstance(field[1], tuple) else value for value, field in zip(values, fields, strict=True))
+    return _settings_of(settings_class, tuple(skip), tuple(held))
+
+
+@lru_cache(maxsize=256)  # of settings that were read before: they are read with every step of a stroke
+def _settings_of(settings_class, skip, values):
+    fields = [field for field in declared(settings_class) if field[0] not in skip]
+    return settings_class(
+        **{name: plain(value, default, details) for (name, default, details), value in zip(fields, values, strict=True)}
+    )
 
 
 def plain(value, default, details):

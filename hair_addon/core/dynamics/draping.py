@@ -7,13 +7,16 @@ from dataclasses import replace
 import numpy as np
 import warp as wp
 
+from ..errors import HairError
 from ..geometry.mesh import TriMesh
 from . import rotations
 from .root_motion import RootPose
 from .settings import DynamicsSettings
-from .simulation import Obstacle, Simulation, World
+from .simulation import MOST_SUBSTEPS, Obstacle, Simulation, World
 
-FRAME = 1.0 / 24.0  # [s]
+# Of an animation's frames, as reading the surface takes a while for each.
+_FRAMES = 4
+FRAME = _FRAMES / 24.0  # [s]
 REST = 5e-3  # [m/s] below which guides are at rest
 _DAMPING = 0.05  # [s]
 _DRAG = 4.0  # times that of air: equilibria stay, and are come to sooner
@@ -30,8 +33,8 @@ def draped(
 ) -> np.ndarray:
     """Guides (G, P, 3) [m] → (G, P, 3) float64 where they come to rest, or after some seconds if they do not before.
 
-    mesh: the surface that they grow on and lie upon; gravity: [m/s²]; tell: called with the part that is done. Raises
-    `HairError`.
+    mesh: the surface that they grow on and lie upon; gravity: [m/s²]; tell: called with the part that is done, and may
+    raise to stop. Raises `HairError`, also where the surface cannot be collided with.
     """
     pose = RootPose(np.asarray(points[:, 0], np.float64), np.tile(rotations.IDENTITY, (len(points), 1)))
     surface = Obstacle(
@@ -47,8 +50,12 @@ def draped(
         inertia=1.0,
         damping=max(settings.damping, _DAMPING),
         air_drag=max(settings.air_drag, 1.0) * _DRAG,
+        substeps=min(settings.substeps * _FRAMES, MOST_SUBSTEPS),
     )
+    tell(0.0)
     simulation = Simulation(points, falling, pose, world, device)
+    for note in simulation.notes:
+        raise HairError("Guides cannot be draped on this surface: {cause}.", cause=note.values["cause"])
     before, count = simulation.vertices(), max(round(seconds / FRAME), 1)
     for frame in range(count):
         tell(frame / count)

@@ -5,7 +5,6 @@ Warp is imported late, because the import is slow.
 """
 
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -33,36 +32,33 @@ def strands_now(
     guides: Strands,
     weights: "GuideWeights",
     styling: "Styling | None" = None,
-    chosen: "wp.array[int] | None" = None,
     out: "wp.array2d[wp.vec3] | None" = None,
 ) -> "wp.array2d[wp.vec3]":
-    """Return (M, P) vec3 [m] on the binding's device: strands for the guides as combed now. All updates call this.
+    """Return (S, P) vec3 [m] on the binding's device: strands for the guides as combed now.
 
-    It computes the weighted sum, and applies styles to it.
+    It computes the weighted sum, and applies styles to it. `follow_some` does the same for some of the strands.
 
     guides: as strands follow them, which are those of `Styling.guides` for styled strands; weights: from `weights_now`
-    for the same strands and guides; chosen: (M,) int32 Warp array, their rows in `binding`, None for all; out: array to
-    fill and return, None for a new one.
+    for the same guides; out: array to fill and return, None for a new one.
     """
-    points = _weighted_sum(binding, guides, weights, chosen, out)
+    points = _weighted_sum(binding, guides, weights, out)
     if styling is not None:
-        styling.apply(points, lambda other, some: _some_now(other, guides, some), chosen)
+        centres = [level.binding for level in styling.levels]
+        styling.apply(points, [(_weighted_sum(own, guides, weights_now(own, guides)), None) for own in centres])
     return points
 
 
-def _some_now(binding, guides, chosen):
-    """(M, P) vec3: strands without styles, all or (M,) indices of some."""
-    rows = None if chosen is None else _rows(binding, chosen)
-    return _weighted_sum(binding, guides, weights_now(binding, guides, chosen), rows)
-
-
-def _weighted_sum(binding, guides, weights, chosen=None, out=None):
-    roots, normals = binding.positions, binding.normals
-    if chosen is not None:
-        roots, normals = (interpolation.guide_weights.rows(array, chosen) for array in (roots, normals))
-    weights, guide_points, guide_normals = _followed(binding, guides, weights)
+def _weighted_sum(binding, guides, weights, out=None):
+    # A kernel given memory of another device reads garbage, or causes an error that affects its whole device.
+    guide_points = guides.points.to(binding.positions.device)
     return interpolation.interpolation.interpolate(
-        roots, normals, guide_points, guide_normals, weights, binding.keep_length, out
+        binding.positions,
+        binding.normals,
+        guide_points,
+        binding.guide_normals,
+        weights,
+        binding.keep_length,
+        out,
     )
 
 
@@ -71,7 +67,10 @@ def combed(guides: Strands, before: Strands) -> np.ndarray | None:
     has_same_roots = guides.roots is before.roots or guides.roots.is_same(before.roots)
     if guides.points.shape != before.points.shape or not has_same_roots:
         return None
-    return np.flatnonzero((guides.numpy() != before.numpy()).any(axis=(1, 2)))
+    is_other = guides.numpy() != before.numpy()
+    if np.count_nonzero(is_other) > len(is_other):
+        return np.flatnonzero(is_other.any(axis=(1, 2)))
+    return np.unique(np.flatnonzero(is_other) // is_other[0].size)  # for few: half the time
 
 
 def follow_guides(binding: HairBinding, guides: Strands, styling: "Styling | None" = None) -> Strands:
@@ -124,55 +123,94 @@ def follow_some(
     binding: HairBinding,
     guides: Strands,
     chosen: np.ndarray,
-    weights: "GuideWeights",
     axes: np.ndarray = _AS_BOUND,
     styling: "Styling | None" = None,
-) -> np.ndarray:
-    """(M, P, 3) float32: the points that `growing_points` gives some strands, and no others are computed.
+) -> tuple[np.ndarray, np.ndarray]:
+    """(M, P, 3) float32, the points that `growing_points` gives some strands, and (M, k) float32, their weights.
 
-    chosen: (M,) indices of strands, such as `guide_weights.Reach` finds for the guides that moved; weights: theirs, as
-    `weights_now` gives them.
+    No others are computed but the centres of their clumps. guides and styling: as in `strands_now`; chosen: (M,)
+    indices of strands, such as `guide_weights.Reach` finds for the guides that moved.
     """
-    points = strands_now(binding, guides, weights, styling, _rows(binding, chosen)).numpy()
-    return geometry.transform.transformed(points, axes, points)
+    read = [] if styling is None else styling.centres_of(chosen)
+    levels = [] if styling is None else styling.levels
+    centres = [(level.binding, rows) for level, rows in zip(levels, read, strict=True)]
+    sums, weights = _sums_of_some([(binding, chosen), *centres], guides)
+    if styling is not None:
+        styling.apply(sums[0], list(zip(sums[1:], read, strict=True)), chosen)
+    points = sums[0].numpy()
+    return geometry.transform.transformed(points, axes, points), weights[: len(chosen)]
 
 
-def weights_now(binding: HairBinding, guides: Strands, chosen: np.ndarray | None = None) -> "GuideWeights":
-    """The `GuideWeights` by which strands follow the guides as combed now; chosen: (M,) indices of some, None: all."""
+def weights_now(binding: HairBinding, guides: Strands) -> "GuideWeights":
+    """The `GuideWeights` by which strands follow the guides as combed now."""
+    _require_guides(binding, guides)
+    guide_points = guides.points.to(binding.positions.device)
+    return interpolation.guide_weights.limited(
+        binding.guide_weights, guide_points, binding.guide_normals, binding.limits
+    )
+
+
+def _require_guides(binding, guides):
     if len(guides) != len(binding.guide_normals):
         raise HairError(
             f"The hair is bound to {len(binding.guide_normals)} guides, but there are {len(guides)}: bind it again."
         )
-    weights = binding.guide_weights
-    if chosen is not None:
-        weights = weights.of(_rows(binding, chosen))
-    now = interpolation.guide_weights.limited(*_followed(binding, guides, weights), binding.limits)
-    return replace(weights, weights=now.weights)
 
 
-def _rows(binding, chosen):
-    """Indices of some strands, (M,), on the binding's device."""
+def _sums_of_some(parts, guides):
+    """Weighted sums for some strands of bindings to the same guides by the same settings, all in one pass.
+
+    parts: pairs of a binding and (M,) indices of its strands. Returns a list of (M, P) vec3, one of each part, and the
+    weights of the guides of all, float32.
+    """
     import warp as wp
 
-    require_indices("strands", chosen, len(binding.positions))
-    return wp.array(chosen, dtype=int, device=binding.positions.device)
+    binding, rows_here = parts[0][0], interpolation.guide_weights.rows_here
+    device = binding.positions.device
+    _require_guides(binding, guides)
+    for own, chosen in parts:
+        require_indices("strands", chosen, len(own.positions))
+        require_count("guides", own.guide_weights.guide_count, len(guides))
 
+    def joined(array_of, kind):
+        rows = [rows_here(array_of(own), chosen) for own, chosen in parts]
+        return wp.array(np.concatenate(rows), dtype=kind, device=device, copy=False)
 
-def _followed(binding, guides, weights):
-    """`GuideWeights`, points and normals of the guides that strands follow: few strands have no need of all guides."""
-    import warp as wp
-
-    # A kernel given memory of another device reads garbage, or causes an error that affects its whole device.
-    points, normals = guides.points.to(binding.positions.device), binding.guide_normals
-    if weights.indices.size > len(normals):
-        return weights, points, normals
-    indices = weights.indices.numpy()
+    # Few strands have no need of all guides.
+    indices = np.concatenate([rows_here(own.guide_weights.indices, chosen) for own, chosen in parts])
     followed, places = np.unique(np.append(-1, indices), return_inverse=True)
-    places = wp.array((places[1:] - 1).reshape(indices.shape), dtype=int, device=normals.device)
-    followed = wp.array(followed[1:], dtype=int, device=normals.device)
-    weights = replace(weights, indices=places, guide_count=len(followed))
-    return (
-        weights,
-        interpolation.guide_weights.rows(points, followed),
-        interpolation.guide_weights.rows(normals, followed),
+    followed, places = followed[1:], (places[1:] - 1).reshape(indices.shape)
+    guide_points, guide_normals = (
+        wp.array(rows_here(array, followed), dtype=wp.vec3, device=device, copy=False)
+        for array in (guides.points, binding.guide_normals)
     )
+    weights = interpolation.guide_weights.limited(
+        interpolation.guide_weights.GuideWeights(
+            wp.array(places, dtype=int, device=device),
+            joined(lambda own: own.guide_weights.weights, float),
+            joined(lambda own: own.guide_weights.turns, wp.vec2),
+            len(followed),
+        ),
+        guide_points,
+        guide_normals,
+        binding.limits,
+    )
+    points = interpolation.interpolation.interpolate(
+        joined(lambda own: own.positions, wp.vec3),
+        joined(lambda own: own.normals, wp.vec3),
+        guide_points,
+        guide_normals,
+        weights,
+        binding.keep_length,
+    )
+    ends = np.cumsum([len(chosen) for _own, chosen in parts]).tolist()
+    sums = [_rows_between(points, end - len(chosen), end) for end, (_own, chosen) in zip(ends, parts, strict=True)]
+    return sums, weights.weights.numpy()
+
+
+def _rows_between(points, first, end):
+    """Some rows of a Warp array, which Warp itself gives if there are any."""
+    import warp as wp
+
+    none = wp.empty((0, points.shape[1]), dtype=wp.vec3, device=points.device)
+    return points[first:end] if end > first else none

@@ -108,6 +108,9 @@ class GuideSettings(Settings):
         unit="ROTATION",
         subtype="ANGLE",
     )
+    drape: bool = param(
+        False, "Let the guides fall as they grow, until they rest on the surface; it takes up to a second"
+    )
 
 
 @dataclass(frozen=True)

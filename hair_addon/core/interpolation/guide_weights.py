@@ -64,11 +64,6 @@ class GuideWeights:
     turns: "wp.array2d[wp.vec2]"
     guide_count: int
 
-    def of(self, chosen: wp.array[int]) -> "GuideWeights":
-        """The same for some strands; chosen: int32 Warp array on the device."""
-        indices, weights, turns = (rows(array, chosen) for array in (self.indices, self.weights, self.turns))
-        return GuideWeights(indices, weights, turns, self.guide_count)
-
 
 @dataclass(frozen=True)
 class Limits:
@@ -90,10 +85,10 @@ class Reach:
 
     def of(self, guides: np.ndarray) -> np.ndarray:
         """Indices, rising, of the strands that follow any of some guides."""
-        strand_count = int(self.strands.max(initial=-1)) + 1
-        if len(guides) == len(self.starts) - 1:  # every strand follows some
-            return np.arange(strand_count)
-        is_reached = np.zeros(strand_count, bool)
+        is_reached = np.zeros(int(self.strands.max(initial=-1)) + 1, bool)
+        if len(guides) == len(self.starts) - 1:
+            is_reached[self.strands] = True
+            return np.flatnonzero(is_reached)
         for guide in guides:
             is_reached[self.strands[self.starts[guide] : self.starts[guide + 1]]] = True
         return np.flatnonzero(is_reached)
@@ -101,7 +96,11 @@ class Reach:
 
 def reach(guide_weights: GuideWeights, guide_count: int) -> Reach:
     """The `Reach` of guides, from the `GuideWeights` of the strands that follow them."""
-    indices = guide_weights.indices.numpy()
+    return reach_by(guide_weights.indices.numpy(), guide_count)
+
+
+def reach_by(indices: np.ndarray, guide_count: int) -> Reach:
+    """The `Reach` of guides, or whatever else strands go with: indices (S, k) int32 of those of each, -1 for none."""
     # Sorted as one number each, guide and then strand: four times as fast as by an order of indices.
     pairs = (indices.astype(np.int64) << 32) | np.arange(len(indices))[:, None]
     pairs = np.sort(pairs[indices >= 0])
@@ -112,6 +111,13 @@ def reach(guide_weights: GuideWeights, guide_count: int) -> Reach:
 def rows(array: wp.array, chosen: wp.array[int]) -> wp.array:
     """Some rows of a Warp array, in an array of their own; chosen: int32 Warp array on its device."""
     return wp.indexedarray(array, [chosen, *[None] * (array.ndim - 1)]).contiguous()
+
+
+def rows_here(array: wp.array, chosen: np.ndarray) -> np.ndarray:
+    """Some rows of a Warp array in the processor's memory; chosen: (M,) indices."""
+    if array.device.is_cpu:
+        return array.numpy()[chosen]
+    return rows(array, wp.array(chosen, dtype=int, device=array.device)).numpy()
 
 
 def find_candidates(

@@ -88,15 +88,15 @@ def _core_count(device):
 
 def _launch_parts(kernel, arguments, row_count, part_count, device):
     """Launch a kernel on parts of the rows, on as many threads as cores; arguments(part, first, end) are a part's."""
+    if part_count == 1:
+        kernel_cache.launch(kernel, dim=row_count, inputs=arguments(0, 0, row_count), device=device)
+        return
     bounds = np.linspace(0, row_count, part_count + 1).astype(int).tolist()
 
     def launch_part(part):
         first, end = bounds[part : part + 2]
         kernel_cache.launch(kernel, dim=end - first, inputs=arguments(part, first, end), device=device)
 
-    if part_count == 1:
-        launch_part(0)
-        return
     kernel_cache.load(device, kernel.module)  # once, not by each thread
     with ThreadPoolExecutor(min(_core_count(device), part_count)) as pool:
         list(pool.map(launch_part, range(part_count)))  # where the first exception is raised again

@@ -20,10 +20,10 @@ move_across(
     [&](int i, lanes s, lanes x, lanes& to_u, lanes& to_v) {
       const lanes wound = base * radius * profile(x) * smoothstep(s * (2.0f / turn));
       const lanes middle = 0.5f * (wound + radius_before);
-      const lanes rise = pitch * (1.0f + stretch * (1.0f - x));
+      const lanes rise = stretch != 0.0f ? pitch * (1.0f + stretch * (1.0f - x)) : lanes(pitch);
       lanes rate = 1.0f / sqrt_of(per_square * middle * middle + rise * rise);
       const lanes reach = rise * rate;
-      winding = 1.0f / rise;
+      winding = stretch != 0.0f ? 1.0f / rise : lanes(1.0f / pitch);
       if (keep != 1.0f) rate = (1.0f - keep) * winding + keep * rate;
       if (switchback > 0.0f) {
         // The sense of winding is a noise of the lock: -1 or 1 in each cell, and a short passage from cell to cell.

@@ -37,12 +37,15 @@ for (int wave = 0; wave < WAVES * octave_count; ++wave) {
   odd[wave] = weight * sine;
   if (wave % WAVES == WAVES - 1) octave_gain *= gain;
 }
+float frequencies[WAVES];
+for (int first = 0; first < WAVES; ++first) frequencies[first] = number[16 + first] / wavelength;
 const auto noise = [&](lanes s, lanes x, lanes& to_u, lanes& to_v) {
   to_u = 0.0f;
   to_v = 0.0f;
+#pragma unroll
   for (int first = 0; first < WAVES; ++first) {
     lanes sine, cosine;
-    sine_and_cosine((number[16 + first] / wavelength) * s, sine, cosine);
+    sine_and_cosine(frequencies[first] * s, sine, cosine);
     const float sense = first % 2 ? -1.0f : 1.0f;
     for (int wave = first; wave < WAVES * octave_count; wave += WAVES) {
       to_u += even[wave] * cosine - odd[wave] * sine;

@@ -105,8 +105,9 @@ const auto gather = [&](float thickness, float twist, lanes joined, float width,
     const vector beside = off - forwards * dot(off, forwards);
     const lanes square = dot(beside, beside), most = 0.25f * spacing * spacing;
     const auto is_off = square > most;
-    const lanes held = is_off ? sqrt_of(most / (is_off ? square : lanes(1.0f))) : lanes(1.0f);
-    t[i] = chosen(is_far, unit_or(way_on + beside * (0.7f * share * held * weight), lanes(1.0e-30f), t[i]), t[i]);
+    lanes back = 0.7f * share;
+    if (any_of(is_off)) back *= is_off ? sqrt_of(most / (is_off ? square : lanes(1.0f))) : lanes(1.0f);
+    t[i] = chosen(is_far, unit_or(way_on + beside * (back * weight), lanes(1.0e-30f), t[i]), t[i]);
     place = place + t[i] * d;
     drawn_before = drawn;
     // The strand's progress along the centre: as far as its length goes along the curve.

@@ -47,6 +47,7 @@
   };
   const auto read_rows = [&](const float* const* rows, auto first, lanes* out) {
     lanes parts[4];
+#pragma clang loop unroll(full)
     for (int lane = 0; lane < LANES; ++lane) {
       const four row = *reinterpret_cast<const four_anywhere*>(rows[lane] + first[lane]);
       reinterpret_cast<four*>(&parts[lane % 4])[lane / 4] = row;
@@ -56,6 +57,7 @@
   const auto write_rows = [&](const lanes* values, float* const* rows, int first) {
     lanes parts[4];
     transpose(values, parts);
+#pragma clang loop unroll(full)
     for (int lane = 0; lane < LANES; ++lane) {
       const four row = reinterpret_cast<const four*>(&parts[lane % 4])[lane / 4];
       *reinterpret_cast<four_anywhere*>(rows[lane] + first) = row;

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A program of styles as rows of numbers, a row for each step, as the kernel of steps.py reads them."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -13,10 +14,11 @@ NUMBERS = 24  # amount, vary; root, tip, exponent, whether flipped and start of 
 
 @dataclass(frozen=True)
 class Program:
-    """Steps as a kernel reads them: (N, CHOICES) int32 and (N, NUMBERS) float32."""
+    """Steps as a kernel reads them: (N, CHOICES) int32 and (N, NUMBERS) float32, which are not changed any more."""
 
     choices: np.ndarray
     numbers: np.ndarray
+    copies: dict[str, list[Any]] = field(init=False, default_factory=dict, compare=False)  # Warp arrays by device
 
     def __len__(self) -> int:
         return len(self.choices)

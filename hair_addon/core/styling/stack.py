@@ -5,7 +5,7 @@ Centre strands of clumps come first, level by level: each is styled by the steps
 before. Then all strands take the whole program in one launch.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -37,8 +37,9 @@ wp.set_module_options({"enable_backward": False})
 HAIR = "hair"  # what the strands are known by to the clump trees
 _AGAINST = -0.5  # mean cosine between guides and normals below which hair grows on the surface's other side
 
-# Points (N, P) [m] of strands of a binding, all or (N,) indices of some, for guides as they are followed now.
-StrandsOf = Callable[[HairBinding, np.ndarray | None], "wp.array2d[wp.vec3]"]
+# Points (N, P) [m] of a level's centre strands without styles, for guides as they are followed now, and (N,) indices of
+# these strands, None for all.
+Centres = tuple["wp.array2d[wp.vec3]", np.ndarray | None]
 
 
 @dataclass
@@ -76,23 +77,22 @@ class Styling:
         return self.followed.of(guides)
 
     def apply(
-        self, points: "wp.array2d[wp.vec3]", strands_of: StrandsOf, chosen: "wp.array[int] | None" = None
+        self, points: "wp.array2d[wp.vec3]", centres: "Sequence[Centres]", chosen: np.ndarray | None = None
     ) -> None:
-        """Style strands in place: points (M, P) [m] of all strands, or of (M,) chosen ones."""
+        """Style strands in place: points (M, P) [m] of all strands, or of (M,) chosen ones.
+
+        centres: `Centres` of each level, of those that `centres_of` names where strands are chosen.
+        """
         if not len(self.program):
             return
-        read = [None] * len(self.levels) if chosen is None else self._centres_of(chosen.numpy())
-        for level, some in zip(self.levels, read, strict=True):
-            if some is not None and not len(some):
-                continue
-            centres = strands_of(level.binding, some)
-            rows = None if some is None else wp.array(some, dtype=int, device=centres.device)
-            steps.apply_steps(centres, level.steps, level.data, self.axes, rows)
-            self._keep_centres(centres, np.arange(len(centres)) if some is None else some, level.first)
-        steps.apply_steps(points, self.program, self.data, self.axes, chosen)
+        require_count("clump levels", len(centres), len(self.levels))
+        for level, (its_points, rows) in zip(self.levels, centres, strict=True):
+            steps.apply_steps(its_points, level.steps, level.data, self.axes, _there(rows, points.device))
+            self._keep_centres(its_points, np.arange(len(its_points)) if rows is None else rows, level.first)
+        steps.apply_steps(points, self.program, self.data, self.axes, _there(chosen, points.device))
 
-    def _centres_of(self, chosen):
-        """For each level, the indices (M,) of the centres that some strands are gathered around, themselves or others.
+    def centres_of(self, chosen: np.ndarray) -> list[np.ndarray]:
+        """For each level, indices of the centres that some strands (M,) are gathered around, themselves or others.
 
         A centre is styled as a strand is, so it reads the centres of levels before its own.
         """
@@ -105,6 +105,8 @@ class Styling:
 
     def _keep_centres(self, centres, rows, first):
         """Write the points of centres of a level, and their arc lengths, where the kernel reads them."""
+        if not len(centres):
+            return
         into = self.data.centre_points
         require_count("clump centres", len(rows), len(centres))
         require_indices("clump centres", rows + first, len(into))
@@ -120,20 +122,28 @@ class Styling:
         """
         if not self.levels:
             return moved
-        is_moved = np.zeros(len(self.data.normals), bool)
-        is_moved[moved] = True
         changed: list[np.ndarray] = []
         for level in self.levels:
             is_changed = np.zeros(len(level.binding.roots), bool)
             is_changed[level.reach.of(combed)] = True
             members = level.data.members.numpy()
-            for row, of_row in enumerate(changed):
-                is_changed |= (members[row] >= 0) & of_row[members[row]]
-            changed.append(is_changed)
-        members = self.data.members.numpy()
-        for row, of_row in enumerate(changed):
-            is_moved |= (members[row] >= 0) & of_row[members[row]]
+            for row, centres in enumerate(changed):
+                is_changed |= np.isin(members[row], centres)
+            changed.append(np.flatnonzero(is_changed))
+        is_moved = np.zeros(len(self.data.normals), bool)
+        is_moved[moved] = True
+        for members, centres in zip(self._members_of, changed, strict=True):
+            is_moved[members.of(centres)] = True
         return np.flatnonzero(is_moved)
+
+    @cached_property
+    def _members_of(self):
+        """For each level, the strands that belong to each centre."""
+        rows = self.data.members.numpy()[: len(self.levels)]
+        return [
+            interpolation.guide_weights.reach_by(members[:, None], len(level.binding.roots))
+            for members, level in zip(rows, self.levels, strict=True)
+        ]
 
     def clumps(self) -> tuple[np.ndarray, np.ndarray] | None:
         """(S,) int32 and (S,) float32 in [0, 1): the finest clump of each strand and a random number of that clump.
@@ -156,6 +166,10 @@ class Styling:
             return None
         masks = dict(zip(programs.mask_keys(self.styles), self.data.masks.numpy(), strict=True))
         return strand_wetness.of_strands(self.styles, masks, self.data.identities.numpy())
+
+
+def _there(rows, device):
+    return None if rows is None else wp.array(rows, dtype=int, device=device)
 
 
 def _present(members):

@@ -122,7 +122,8 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const auto random = [&](int purpose) { return random_number(identity, seed, ints(purpose)); };
 
   // A_si = base · profile(x_i).
-  lanes base = number[0] * (1.0f - number[1] * random(VARY));
+  lanes base = number[0];
+  if (number[1] != 0.0f) base *= 1.0f - number[1] * random(VARY);
   if (mask >= 0) {
     for (int lane = 0; lane < LANES; ++lane) {
       set_lane(base, lane, get_lane(base, lane) * masks.data[size_t(mask) * masks.shape[1] + strand[lane]]);
@@ -167,12 +168,12 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
   const auto profile = [&](lanes x) {
     if (is_even) return lanes(at_root);
     // x of the tip is 1 but for rounding, which steep profiles are sensitive to.
-    const lanes part = exact_quotient_of(1.000001f * x - from, lanes(1.0f - from));
+    lanes part = 1.000001f * x - from;
+    if (from != 0.0f) part = exact_quotient_of(part, lanes(1.0f - from));
     lanes y = clamped(part, lanes(0.0f), lanes(1.0f));
-    if (is_flipped) {
-      y = 1.0f - power(1.0f - y, lanes(exponent));
-    } else if (!is_linear) {
-      y = y < least ? y * slope : power(y, lanes(exponent));
+    if (is_flipped || !is_linear) {
+      const lanes raised = power(is_flipped ? 1.0f - y : y, lanes(exponent));
+      y = is_flipped ? 1.0f - raised : (y < least ? y * slope : raised);
     }
     return lanes(at_root + (at_tip - at_root) * y);
   };

@@ -160,17 +160,24 @@ def apply_steps(
     rows = wp.empty(0, dtype=int, device=device) if chosen is None else chosen
     lanes = version.width if device.is_cpu else 1
     block_count = -(-len(points) // lanes)
-    there = [wp.array(array, dtype=kind, device=device) for array, kind in _program_arrays(program)]
     inputs = [points, rows, data.normals, data.identities, data.masks, data.members]
-    inputs += [data.centre_points, data.centre_normals, data.centre_identities, *there, wp.mat33(axes)]
+    inputs += [
+        data.centre_points,
+        data.centre_normals,
+        data.centre_identities,
+        *_copied(program, device),
+        wp.mat33(axes),
+    ]
     share_count = parallel.share_count(block_count, device, LEAST_BLOCKS)
     parallel.launch_shares(version.kernel, block_count, inputs, [[] for _ in range(share_count)], device)
 
 
-def _program_arrays(program):
-    choices = np.ascontiguousarray(program.choices, np.int32), int
-    numbers = np.ascontiguousarray(program.numbers, np.float32), float
-    return choices, numbers
+def _copied(program, device):
+    """The arrays of a program on a device: copied once, as a stroke launches the same program again and again."""
+    if device.alias not in program.copies:
+        choices = wp.array(program.choices, dtype=int, device=device)
+        program.copies[device.alias] = [choices, wp.array(program.numbers, dtype=float, device=device)]
+    return program.copies[device.alias]
 
 
 def _check(points, program, data, chosen, most_points):

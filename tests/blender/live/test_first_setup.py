@@ -10,6 +10,7 @@ import pytest
 from hair_addon.blender.host import paths
 from hair_addon.blender.live import first_setup
 from hair_addon.blender.settings import preferences
+from hair_addon.core.dynamics import draped_growth
 from hair_addon.core.grooming import groom
 from hair_addon.core.kernels import kernel_setup
 
@@ -20,6 +21,7 @@ def stamp(tmp_path, monkeypatch):
     path = tmp_path / "version"
     monkeypatch.setattr(first_setup, "_stamp", lambda: path)
     monkeypatch.setattr(preferences, "is_extension", lambda: True)
+    monkeypatch.setattr(draped_growth, "load_kernels", lambda *_arguments, **_named: None)
     yield path
     first_setup.unregister()
 

@@ -39,9 +39,9 @@ def test_a_style_is_in_strands_of_every_update(bound, styling):
     grown = following.growing_points(binding, guides, weights, styling=styling).result()
     np.testing.assert_array_equal(grown, whole)
     chosen = np.arange(3, 2000, 7)
-    of_chosen = following.weights_now(binding, guides, chosen)
-    some = following.follow_some(binding, guides, chosen, of_chosen, styling=styling)
+    some, shares = following.follow_some(binding, guides, chosen, styling=styling)
     np.testing.assert_allclose(some, whole[chosen], atol=1e-6)
+    np.testing.assert_array_equal(shares, weights.weights.numpy()[chosen])
 
 
 def test_identities_and_leaders_stay_while_guides_are_combed_and_weighed_again(bound):

@@ -119,9 +119,9 @@ def test_strands_in_the_processors_memory(head, scalp, guides, hair, hair_settin
     np.testing.assert_array_equal(made, hair.numpy())
     np.testing.assert_array_equal(given, 2.0 * hair.numpy())
     chosen = np.arange(3, 2000, 7)
-    some = following.follow_some(binding, guides, chosen, following.weights_now(binding, guides, chosen))
+    some, _shares = following.follow_some(binding, guides, chosen)
     np.testing.assert_array_equal(some, made[chosen])
-    some = following.follow_some(binding, guides, chosen, following.weights_now(binding, guides, chosen), twice)
+    some, _shares = following.follow_some(binding, guides, chosen, twice)
     np.testing.assert_array_equal(some, given[chosen])
 
 

@@ -74,7 +74,7 @@ MISMATCHES = {
     "regions": lambda _: guide_weights.find_candidates(
         vectors(9), vectors(9), vectors(3), vectors(3), 2, regions=(np.zeros(8, np.int32), np.zeros(3, np.int32))
     ),
-    "following: a strand that is not there": lambda g: following.weights_now(g[1], g[0], np.array([50])),
+    "following: a strand that is not there": lambda g: following.follow_some(g[1], g[0], np.array([50])),
     "following: other guides": lambda g: following.weights_now(g[1], replace_guides(g[0])),
     "growing into another array": lambda g: following.growing_points(
         g[1], g[0], weights_of(g), out=np.zeros((49, 41, 3), np.float32)
@@ -131,9 +131,8 @@ def test_no_strands_follow_no_guides(groomed):
     none = SurfacePoints(np.empty(0, np.int32), np.empty((0, 3), np.float32))
     bound = groom.bind_hair(SQUARE, guides, HairSettings(), roots=none, device=DEVICE)
     assert following.follow_guides(bound, guides).points.shape == (0, 41)
-    assert following.follow_some(
-        binding, guides, np.empty(0, np.int64), following.weights_now(binding, guides, np.empty(0, np.int64))
-    ).shape == (0, 41, 3)
+    points, shares = following.follow_some(binding, guides, np.empty(0, np.int64))
+    assert points.shape == (0, 41, 3) and shares.shape == (0, 8)
 
 
 @pytest.mark.parametrize("indices", [[], [0], [0, 6], [[3, 4], [5, 6]]])

@@ -43,7 +43,9 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
         return cost.guide_seconds(guide_settings, face_count) + cost.hair_seconds(hair_settings, face_count)
 
     def work(self, context):
-        return pipeline.adding_hair(surface_of(context.object), *self._settings(), context.evaluated_depsgraph_get())
+        may_drape = not self.properties.is_property_set("drape")
+        surface, depsgraph = surface_of(context.object), context.evaluated_depsgraph_get()
+        return pipeline.adding_hair(surface, *self._settings(), depsgraph, may_drape=may_drape)
 
     def message(self, made):
         guides, hair = made
@@ -55,6 +57,7 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
     def after(self, context, made):
         guides, hair = made
         setting_properties.show(self, guides.vellus.guides, GuideSettings)
+        self.drape = guides.vellus.guides.drape
         setting_properties.show(self, hair.vellus.hair, HairSettings)
         context.view_layer.update()  # to evaluate the new objects
         make_active(object_of(hair, context.view_layer), context.view_layer)

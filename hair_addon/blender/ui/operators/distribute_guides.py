@@ -40,12 +40,13 @@ class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
     def work(self, context):
         settings = setting_properties.given_settings(self, GuideSettings)
         depsgraph = context.evaluated_depsgraph_get()
-        return pipeline.distributing_guides(
-            surface_of(context.object), settings, depsgraph, guides_again(context.object)
-        )
+        surface, target = surface_of(context.object), guides_again(context.object)
+        may_drape = not self.properties.is_property_set("drape")
+        return pipeline.distributing_guides(surface, settings, depsgraph, target, may_drape=may_drape)
 
     def after(self, context, made):
         setting_properties.show(self, made.vellus.guides, GuideSettings)
+        self.drape = made.vellus.guides.drape
 
     def message(self, made):
         return "{count} guides", {"count": len(made.curves)}

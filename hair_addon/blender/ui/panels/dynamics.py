@@ -3,9 +3,11 @@
 
 import bpy
 
+from ...data import delivered_hair
 from ...groom import dynamics_notes, frame_folders
-from ...groom.selection import guides_of
+from ...groom.selection import guides_of, hair_of, object_of
 from ...live import dynamics_state, simulated_hair, unlocked_renders
+from ...settings import shared_wetness
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
 from .tab import HairTab, split, write
@@ -43,6 +45,7 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
             sides.operator("vellus.bake_dynamics", text="", icon="FILE_REFRESH").starts_over = True
         sides.operator("vellus.free_dynamics", text="", icon="TRASH")
         layout.prop(guides.vellus, "cache_folder")
+        _draw_delivery(layout, context)
         if guides.vellus.simulates:
             sentence, values = dynamics_state.state_of(guides)
             write(layout, context, interface_text(sentence, **values))
@@ -56,6 +59,21 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
         note = dynamics_notes.size_note(guides, context.scene)
         if note:
             write(layout, context, note, "INFO")
+
+
+def _draw_delivery(layout, context):
+    """The buttons of delivery, and what renders show of the active hair."""
+    hair = hair_of(context.object)
+    if hair is None:
+        return
+    layout.operator("vellus.deliver_dynamics", icon="EXPORT")
+    hair_object = object_of(hair, context.view_layer)
+    if hair_object is None or delivered_hair.modifier_of(hair_object) is None:
+        return
+    layout.operator("vellus.remove_delivery", icon="X")
+    is_outdated = dynamics_notes.is_delivery_outdated(hair)
+    said = "Delivered hair is of other baked frames: deliver it again" if is_outdated else "Renders play delivered hair"
+    write(layout, context, interface_text(said), "ERROR" if is_outdated else "INFO")
 
 
 def _settings_column(layout, context):
@@ -80,10 +98,15 @@ class VELLUS_PT_dynamics_material(_OfDynamics, bpy.types.Panel):
 
     def draw(self, context):
         column, settings = _settings_column(self.layout, context)
-        setting_rows.material_rows(column, settings)
-        note = dynamics_notes.bend_note(guides_of(context.object), context.scene)
+        guides = guides_of(context.object)
+        setting_rows.material_rows(column, settings, shared_wetness.slider_of(guides.vellus))
+        note = dynamics_notes.bend_note(guides, context.scene)
         if note:
             write(column, context, note, "INFO")
+        weakness = dynamics_notes.stiffness_note(guides)
+        if weakness:
+            write(column, context, weakness, "ERROR")
+            column.operator("vellus.stiffen_dynamics")
 
 
 class VELLUS_PT_dynamics_fiber(_OfDynamics, bpy.types.Panel):

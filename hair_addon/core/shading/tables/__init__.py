@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         dual_scattering,
         lookup_tables,
         strand_tables,
+        surface_albedo,
         table_axes,
         texel_kernels,
     )

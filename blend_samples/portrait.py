@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The demo's portrait: the head with a face, a bust and shoulder-length waves, under a key, a fill and two rims."""
+
+import math
+
+import bpy
+import brows  # beside this file
+import bust
+import eyes
+import head
+import numpy as np
+import skin
+from mathutils import Vector
+from mathutils.bvhtree import BVHTree
+
+from hair_addon import api
+from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
+
+SIZE = 900, 900  # pixels of a picture
+CAMERA, LOOK_AT, LENS = (0.70, -1.28, 0.73), Vector((0.010, -0.02, 0.682)), 104.0  # [m], [m], [mm]
+GAZE = (0.36, -1.2, 0.735)  # [m]: what the eyes look at, beside the camera
+
+LENGTH = 0.36  # [m] of guides on the crown
+_HAIRLINE_LENGTH = 0.45  # of those at the border, as a part of it
+_HAIRLINE_REACH = 0.030  # [m] over which lengths grow from the border
+_STEPS = 41  # points of a guide
+
+
+def dress(head_object, target=GAZE):
+    """Give the sample's head eyes that look at a point [m], brows, lashes, skin and a bust."""
+    openings = eyes.openings(head_object)
+    eyes.build(head_object, target)
+    skin.paint(head_object)
+    bust.build(head_object)
+    brows.build(head_object, openings)
+
+
+def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
+    """Shoulder-length hair with a parting; returns the objects `Guides` and `Hair`, as `head.grow` does."""
+    _add_density(head_object)
+    bpy.context.view_layer.objects.active = head_object
+    bpy.ops.vellus.distribute_guides(
+        guide_count=guide_count, seed=seed, density_group="guides", length=LENGTH, length_variation=0.0
+    )
+    guides = bpy.data.objects["Guides"]
+    _comb(guides, [head_object, bpy.data.objects["Bust"]], seed)
+    bpy.context.view_layer.objects.active = guides
+    bpy.ops.vellus.interpolate_hair(
+        strand_count=strand_count, seed=seed, density_group="scalp", radius=5.5e-5, point_count=61, tip_taper=0.25
+    )
+    hair = bpy.data.objects["Hair"]
+    set_styles(hair.data)
+    look = hair.data.vellus.appearance
+    look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", head.CHESTNUT
+    look.cuticle_angle, look.roughness = math.radians(5.0), roughness_from_beta_r(math.radians(7.5))
+    look.random_color = 0.15
+    return guides, hair
+
+
+def set_styles(hair):
+    """The portrait's own styles: loose waves in soft locks, uneven tips, some strands that fly away."""
+    api.set_styles(
+        hair,
+        [
+            api.Trim(random=0.22, seed=1),
+            api.Clump(size=0.020, amount=0.55, fine_amount=0.5, thickness=0.35, shape=0.25, stray=0.08, seed=2),
+            api.Curl(radius=0.0085, pitch=0.085, flatness=0.45, coherence=0.9, root=0.0, tip=1.0, seed=3),
+            api.Frizz(amplitude=0.0007, wavelength=0.05, stray=0.03, stray_gain=6.0, seed=4),
+        ],
+    )
+
+
+def _add_density(head_object):
+    """The vertex group `guides`: as `scalp`, denser at the hairline."""
+    positions = np.array([vertex.co for vertex in head_object.data.vertices])
+    above = head.above_hairline(positions)
+    weights = np.where(above > 0.0, 0.45 + 0.55 * np.exp(-above / 0.02), 0.0)
+    group = head_object.vertex_groups.new(name="guides")
+    for vertex in np.flatnonzero(weights > 0.0):
+        group.add([int(vertex)], float(weights[vertex]), "REPLACE")
+
+
+def _comb(guides, solids, seed):
+    """Comb guides to both sides of the parting, back over the ears and down onto the shoulders."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    surfaces = [BVHTree.FromObject(solid, depsgraph) for solid in solids]
+    curves = guides.data
+    points = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", points.ravel())
+    strands = points.reshape(len(curves.curves), -1, 3)
+    lengths = _lengths(strands[:, 0], np.random.default_rng(seed))
+    for strand, length in zip(strands, lengths, strict=True):
+        strand[:] = _combed(strand[0].tolist(), float(length), surfaces)
+    curves.attributes["position"].data.foreach_set("vector", points.ravel())
+    curves.update_tag()
+    bpy.context.view_layer.update()
+
+
+def _lengths(roots, rng):
+    """(S,) [m]: shorter at the hairline, and none like its neighbours."""
+    inside = np.clip(head.above_hairline(roots) / _HAIRLINE_REACH, 0.0, 1.0)
+    part = _HAIRLINE_LENGTH + (1.0 - _HAIRLINE_LENGTH) * np.sqrt(inside)
+    return LENGTH * part * rng.uniform(0.88, 1.06, len(roots))
+
+
+def _combed(root, length, surfaces):
+    """(P, 3) points from a root [m]: off the face, round the head, then down in front of the shoulder or behind it."""
+    step = length / (_STEPS - 1)
+    position = Vector(root)
+    _near, normal, _face, _distance = surfaces[0].find_nearest(position)
+    side = math.copysign(1.0, root[0] - head.PARTING)
+    front = _part(-root[1], 0.0, 0.12)
+    crown = _part(root[2], 0.79, 0.84)
+    sweep = Vector((side * (0.45 + 0.45 * front), 0.20 + 0.22 * front, -0.35 + 0.40 * front))
+    around = Vector((side * 0.42, 0.12 + 0.26 * front, -0.85))
+    fall = Vector((-side * 0.10, -0.14 * _part(abs(root[0]), 0.02, 0.07), -1.0))
+    direction = ((0.55 + 0.45 * crown) * normal + sweep.normalized()).normalized()
+    volume = 0.007 + 0.013 * crown
+    combed = [position.copy()]
+    for i in range(1, _STEPS):
+        gone = i * step
+        aim = sweep.lerp(around, _part(gone, 0.02, 0.08)).lerp(fall, _part(gone, 0.07, 0.16)).normalized()
+        direction = (direction + 0.30 * aim).normalized()
+        ahead = position + step * direction
+        for surface, clearance in zip(surfaces, (0.003 + volume * _part(gone, 0.0, 0.05), 0.008), strict=True):
+            near, near_normal, _face, _distance = surface.find_nearest(ahead)
+            height = (ahead - near).dot(near_normal)
+            if height < clearance:
+                ahead += (clearance - height) * near_normal
+        direction = (ahead - position).normalized()
+        position = position + step * direction
+        combed.append(position.copy())
+    return _smoothed(np.array(combed))
+
+
+def _smoothed(points, passes=3):
+    """The same points with softer bends; both ends stay."""
+    for _pass in range(passes):
+        points[1:-1] = 0.25 * points[:-2] + 0.5 * points[1:-1] + 0.25 * points[2:]
+    return points
+
+
+def _part(value, low, high):
+    part = min(1.0, max(0.0, (value - low) / (high - low)))
+    return part * part * (3.0 - 2.0 * part)
+
+
+def light():
+    """Camera and lights of the portrait; the scene's own size."""
+    head.light()
+    scene = bpy.context.scene
+    scene.render.resolution_x, scene.render.resolution_y = SIZE
+    camera = scene.camera
+    camera.location, camera.data.lens = CAMERA, LENS
+    _point_at(camera)
+    _place("Key", (0.62, -1.10, 1.38), 21.0, 0.35)
+    _place("Rim", (-0.55, 0.95, 1.25), 30.0, 0.4)
+    _place("Fill", (-1.0, -1.0, 0.72), 4.5, 0.9)
+    second = bpy.data.objects.new("Rim 2", bpy.data.objects["Rim"].data.copy())
+    scene.collection.objects.link(second)
+    _place("Rim 2", (1.05, 0.75, 1.05), 12.0, 0.4)
+    bpy.context.view_layer.update()
+
+
+def _place(name, location, watts, size):
+    lamp = bpy.data.objects[name]
+    lamp.location, lamp.data.energy, lamp.data.size = location, watts, size
+    _point_at(lamp)
+
+
+def _point_at(turned):
+    turned.rotation_euler = (LOOK_AT - turned.location).to_track_quat("-Z", "Y").to_euler()

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that plays frames of a file: Blender's own *Mesh Sequence Cache* in the place where hair follows its surface.
+
+Files that link the hair, render farms and Blender without the add-on play it.
+"""
+
+from pathlib import Path
+
+import bpy
+
+from . import follow_nodes
+
+ROOT = "vellus_hair"  # of a file's hierarchy, by which the modifier is known whatever its name is
+
+_NAME = "Delivered Hair"
+
+
+def modifier_of(hair_object):
+    """The modifier that plays delivered frames; None where hair follows its surface."""
+    found = (modifier for modifier in hair_object.modifiers if is_ours(modifier))
+    return next(found, None)
+
+
+def is_ours(modifier):
+    """Whether a modifier plays delivered frames."""
+    return modifier.type == "MESH_SEQUENCE_CACHE" and modifier.object_path.startswith(f"/{ROOT}/")
+
+
+def is_delivered(hair):
+    """Whether an object of hair Curves plays delivered frames."""
+    return any(modifier_of(user) is not None for user in objects_of(hair))
+
+
+def objects_of(hair):
+    """The objects of hair Curves, in all scenes."""
+    return [user for user in bpy.data.objects if user.type == "CURVES" and user.data == hair]
+
+
+def deliver(hair, cache_file, object_path):
+    """Let all objects of hair Curves play frames of a CacheFile, in place of following their surface."""
+    for user in objects_of(hair):
+        if user.library is not None:
+            continue
+        take_off(user)
+        modifier = user.modifiers.new(_NAME, "MESH_SEQUENCE_CACHE")
+        modifier.cache_file, modifier.object_path = cache_file, object_path
+        following = follow_nodes.modifier_of(user)
+        place = 0
+        if following is not None:
+            place = user.modifiers.find(following.name)
+            following.show_viewport = following.show_render = False
+        user.modifiers.move(len(user.modifiers) - 1, place)
+
+
+def take_off(hair_object):
+    """Let an object's hair follow its surface again; whether it played delivered frames."""
+    modifier = modifier_of(hair_object)
+    if modifier is None:
+        return False
+    hair_object.modifiers.remove(modifier)
+    following = follow_nodes.modifier_of(hair_object)
+    if following is not None:
+        following.show_viewport = following.show_render = True
+    return True
+
+
+def open_file(path):
+    """A new CacheFile of a file, relative to the .blend where that is saved."""
+    before = {*bpy.data.cache_files}
+    bpy.ops.cachefile.open(filepath=str(path))
+    (made,) = {*bpy.data.cache_files} - before
+    if bpy.data.filepath:
+        made.filepath = bpy.path.relpath(str(path))
+    return made
+
+
+def close_files(path):
+    """Remove the CacheFiles of a file, which is about to be replaced: modifiers play nothing until it is opened."""
+    opened = [c for c in bpy.data.cache_files if c.library is None and _absolute(c.filepath) == path]
+    bpy.data.batch_remove(opened)
+
+
+def _absolute(filepath):
+    return Path(bpy.path.abspath(filepath)).resolve()
+
+
+def new_probe(hair_object):
+    """A copy of an object that shows its Curves as their surface carries them, and no modifiers after that.
+
+    It is visible whatever is hidden, and to be removed.
+    """
+    probe = hair_object.copy()
+    bpy.context.scene.collection.objects.link(probe)
+    probe.hide_viewport = probe.hide_render = False
+    following = follow_nodes.modifier_of(probe)
+    last = -1 if following is None else probe.modifiers.find(following.name)
+    for place, modifier in reversed([*enumerate(probe.modifiers)]):
+        if place > last or is_ours(modifier):
+            probe.modifiers.remove(modifier)
+    if following is not None:
+        follow_nodes.modifier_of(probe).show_viewport = True
+    return probe

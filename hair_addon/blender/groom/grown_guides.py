@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that grow on a surface that was read, and are draped there where their settings say so, or new hair is to."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...core import dynamics
+from ...core.errors import HairError
+from ...core.geometry.mesh import SurfacePoints
+from ...core.geometry.strands import Strands
+from ...core.geometry.texture import Texture
+from ...core.grooming import cost, groom, groom_defaults
+from ...core.grooming.groom import GuideSettings
+from ...core.long_work import Progress, part_of
+from ..data.scene import Surface
+from ..settings import preferences
+from ..settings.translations import error_text
+
+HANGING = 0.5  # gravity from which new hair hangs, of a dome: less makes fur, which stands
+_QUICK = 1.0  # [s] that draping new hair may take
+_GROWN = 0.6  # part of the progress
+
+
+@dataclass(frozen=True)
+class GrownGuides:
+    """Guides, and a sentence that says why they are not draped where they should be."""
+
+    strands: Strands
+    status: str = ""
+
+
+def draped_if_new(
+    given: GuideSettings, completed: GuideSettings, surface: Surface, density: np.ndarray | None
+) -> GuideSettings:
+    """Completed settings that drape new guides on a dome such as a scalp, where that takes a second at most.
+
+    given: the settings before they were completed for the surface; density: their mask. Who gives their gravity, or
+    draws flow lines, has said how guides grow.
+    """
+    is_free = given.gravity is None and not given.flow_lines
+    if not is_free or groom_defaults.known(completed.gravity) < HANGING:
+        return replace(completed, drape=False)
+    face_count = int(dynamics.draped_growth.within_reach(surface.mesh, completed, density).sum())
+    return replace(completed, drape=cost.drape_seconds(completed.guide_count, face_count) <= _QUICK)
+
+
+def grow(
+    surface: Surface,
+    settings: GuideSettings,
+    mask: tuple[np.ndarray | None, Texture | None],
+    flow: np.ndarray | None,
+    progress: Progress,
+    roots: SurfacePoints | None = None,
+) -> GrownGuides:
+    """The `GrownGuides` of completed settings; mask: (density, texture), flow and roots as in
+    `groom.distribute_guides`. Guides that cannot be draped stay as they grew. Raises `HairError`.
+    """
+    density, texture = mask
+    device = preferences.device()
+    guides = groom.distribute_guides(
+        surface.mesh,
+        replace(settings, drape=False),
+        density=density,
+        texture=texture,
+        mirror_normal=surface.mirror_normal,
+        shape=surface.shape,
+        roots=roots,
+        flow=flow,
+        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
+        device=device,
+        progress=part_of(progress, 0.0, _GROWN) if settings.drape else progress,
+    )
+    if not settings.drape:
+        return GrownGuides(guides)
+    try:
+        settled = dynamics.draped_growth.settled(
+            guides,
+            surface.mesh,
+            settings,
+            density=density,
+            texture=texture,
+            mirror_normal=surface.mirror_normal,
+            progress=part_of(progress, _GROWN, 1.0),
+        )
+    except HairError as error:
+        return GrownGuides(guides, error_text(error))
+    return GrownGuides(settled)

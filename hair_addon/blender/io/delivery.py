@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Delivery: hair of baked guides as frames of a USD file, which Blender plays without the add-on."""
+
+import contextlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.files.whole_file import require_place, whole_file
+from ...core.long_work import Stage
+from ..data import curves, delivered_hair, scene, simulated_guides
+from ..groom import frame_folders, selection
+from ..host import running, scene_time
+from ..host.datablocks import Remembered
+from ..host.notices import name_of
+from ..live import live_hair
+from . import hair_file, strand_arrays
+
+
+@dataclass(frozen=True)
+class Delivered:
+    """Hair that was delivered: the file, its frames, how many strands, and the size of the file [bytes]."""
+
+    path: Path
+    first: int
+    last: int
+    strand_count: int
+    byte_count: int
+
+
+@dataclass
+class _Task:
+    """Hair that is being delivered."""
+
+    hair: Remembered
+    probe: Remembered
+    counts: np.ndarray  # points of strands
+    path: str = ""  # in the file
+
+
+def path_of(guides, blend_path=None):
+    """The file that hair of some guides is delivered to: beside a .blend, the open one for None. Raises `HairError`."""
+    if blend_path is None:
+        if not bpy.data.filepath:
+            raise HairError("Hair is delivered to a file beside the .blend file: save the file first.")
+        blend_path = Path(bpy.data.filepath)
+    kept = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name_of(guides))
+    return blend_path.with_name(f"{blend_path.stem}_{kept}.usdc")
+
+
+def delivering(guides, path, blender_scene):
+    """Write the hair of baked guides to a file and let it play that, as work in steps: a computation a sample.
+
+    Frames are those of the scene and the one after; where motion blur is on, also the times between them that Cycles
+    samples. The scene is at the time where it was, on every way out. Raises `HairError`.
+    """
+    frames = scene_time.scene_frames()
+    frame_folders.require_frames(guides, range(frames.start, frames.stop + 1))
+    chosen = _deliverable(guides)
+    hair_file.require_ours(path)
+    require_place(path)
+    times = _times(blender_scene, frames, chosen)
+    present = scene_time.time_of(blender_scene)
+    with contextlib.ExitStack() as stack:
+        stack.callback(_go_to, blender_scene, present)
+        tasks = [_begin(hair, stack) for hair in chosen]
+        units = scene_time.frame_rate(blender_scene), strand_arrays.metres_per_unit(blender_scene)
+        yield Stage("Delivering", 0.0)
+        with whole_file(path) as partial:
+            with hair_file.HairFile(partial, path, *units) as file:
+                for task in tasks:
+                    task.path = file.add(name_of(task.hair.find()), task.counts)
+                for index, time in enumerate(times):
+                    _go_to(blender_scene, time)
+                    _require_shown(guides, time)
+                    read = [_read(task, time) for task in tasks]
+                    yield _writing(file, tasks, read, time, index / len(times))
+            byte_count = partial.stat().st_size
+            delivered_hair.close_files(path)
+    cache_file = delivered_hair.open_file(path)
+    key = frame_folders.frames_of(guides).manifest.key
+    for task in tasks:
+        hair = task.hair.find()
+        delivered_hair.deliver(hair, cache_file, task.path)
+        hair.vellus.delivered_key = key
+    strand_count = sum(len(task.counts) for task in tasks)
+    return Delivered(path, frames[0], frames[-1], strand_count, byte_count)
+
+
+def take_off(guides):
+    """Let the hair of some guides follow them again; returns how many hair there are that did not. The file stays."""
+    delivered = [hair for hair in curves.followers(guides) if delivered_hair.is_delivered(hair)]
+    if not delivered:
+        raise HairError('No hair of the guides "{name}" plays delivered frames.', name=name_of(guides))
+    for hair in delivered:
+        curves.require_editable(hair)
+        for user in delivered_hair.objects_of(hair):
+            delivered_hair.take_off(user)
+        hair.vellus.delivered_key = ""
+    return len(delivered)
+
+
+def _deliverable(guides):
+    """Hair Curves that follow guides, and have objects in the view layer. Raises `HairError`."""
+    layer = bpy.context.view_layer
+    chosen = [hair for hair in curves.followers(guides) if selection.object_of(hair, layer) is not None]
+    if not chosen:
+        raise HairError('No hair in this view layer follows the guides "{name}".', name=name_of(guides))
+    for hair in chosen:
+        curves.require_editable(hair)
+        if not len(hair.curves):
+            raise HairError('"{name}" has no strands.', name=name_of(hair))
+    return chosen
+
+
+def _times(blender_scene, frames, chosen):
+    """Times of samples, in order: also of what an exposure of the first and the last frame sees."""
+    steps = [_motion_steps(user) for hair in chosen for user in delivered_hair.objects_of(hair)]
+    between = scene_time.exposure_times(blender_scene, max(steps))
+    sampled = {frame + offset for frame in frames for offset in between}
+    return sorted(sampled | {float(frame) for frame in (*frames, frames.stop)})
+
+
+def _motion_steps(hair_object):
+    """Cycles' steps of an object's motion blur; 1 where Cycles is off."""
+    cycles = getattr(hair_object, "cycles", None)
+    return min(getattr(cycles, "motion_steps", 1), 7)
+
+
+def _begin(hair, stack):
+    probe = delivered_hair.new_probe(selection.object_of(hair, bpy.context.view_layer))
+    remembered = Remembered(probe)
+    stack.callback(_remove, remembered)
+    return _Task(Remembered(hair), remembered, curves.point_counts(hair))
+
+
+def _remove(remembered):
+    with contextlib.suppress(HairError):  # deleted meanwhile, by a script
+        bpy.data.objects.remove(remembered.find())
+
+
+def _go_to(blender_scene, time):
+    """Change the time, and let hair follow as it does without a long operation."""
+    with running.set_aside():
+        scene_time.go_to_time(blender_scene, time)
+        live_hair.write_all()
+        bpy.context.view_layer.update()
+
+
+def _require_shown(guides, time):
+    """Raise `HairError` where a baked frame could not be read: guides would be as combed."""
+    if time > guides.vellus.dynamics.start_frame and not simulated_guides.is_shown(guides):
+        raise HairError(
+            'Frame {frame} of the guides "{name}" cannot be read: bake it again.',
+            frame=f"{time:g}",
+            name=name_of(guides),
+        )
+
+
+def _read(task, time):
+    """(points, radii, matrix) of hair where its surface carries it now. Raises `HairError`."""
+    evaluated = task.probe.find().evaluated_get(scene.present_depsgraph())
+    if not np.array_equal(curves.point_counts(evaluated.data), task.counts):
+        name, frame = name_of(task.hair.find()), f"{time:g}"
+        raise HairError(
+            'The number of strands of "{name}" changes in frame {frame}: remove its keys.', name=name, frame=frame
+        )
+    points = curves.read_points(evaluated.data)
+    if not np.isfinite(points).all():
+        name, frame = name_of(task.hair.find()), f"{time:g}"
+        raise HairError('"{name}" has non-finite coordinates in frame {frame}.', name=name, frame=frame)
+    return points, curves.read_radii(evaluated.data), np.array(evaluated.matrix_world)
+
+
+def _writing(file, tasks, read, time, part):
+    """A function of (progress) that writes the samples of one time."""
+
+    def write(progress):
+        progress(f"Frame {time:g}", part)
+        for task, sample in zip(tasks, read, strict=True):
+            file.write(time, task.path, *sample)
+        file.save(time)
+
+    return write

@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A USD file of hair that moves, written sample by sample: it grows on the disk, not in memory."""
+
+import re
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ..data.delivered_hair import ROOT
+from ..host import paths
+
+_CREATOR = "creator"  # entry of the file that says who wrote it
+_PROGRAM = "Vellus delivered hair"
+
+
+def require_ours(path):
+    """Raise `HairError` unless a file at `path` may be replaced: there is none, or it is of this kind."""
+    if not path.exists():
+        return
+    _require_usd()
+    from pxr import Sdf, Tf
+
+    try:
+        layer = Sdf.Layer.OpenAsAnonymous(str(path), metadataOnly=True)
+    except Tf.ErrorException:
+        layer = None
+    if layer is None or layer.customLayerData.get(_CREATOR) != _PROGRAM:
+        raise HairError(
+            "{path} was not made by Deliver Hair: move it, or save the .blend under another name.", path=path
+        )
+
+
+def _require_usd():
+    """Raise `HairError` where this build of Blender has no USD."""
+    if not paths.has_operator("wm.usd_export"):
+        raise HairError("Hair cannot be delivered: this build of Blender lacks USD.")
+    bpy.utils.expose_bundled_modules()
+
+
+def _failed(path, error):
+    """A `HairError` with the cause that USD gives, among much else."""
+    cause = re.search(r"Error occurred writing file: ([^']*)", str(error))
+    return HairError(
+        "{path} cannot be written: {cause}.", path=path, cause=cause[1] if cause else "the disk may be full"
+    )
+
+
+class HairFile:
+    """Strands of several hair objects at several times, in Blender's axes and a scene's units.
+
+    A context: the file is whole after it. Methods raise `HairError` where the disk is full; final_path: that it names.
+    """
+
+    def __init__(self, path: Path, final_path: Path, frame_rate: float, metres_per_unit: float) -> None:
+        _require_usd()
+        from pxr import Tf, Usd, UsdGeom
+
+        self._path = final_path
+        try:
+            self._stage = Usd.Stage.CreateNew(str(path))
+        except Tf.ErrorException as error:
+            raise _failed(final_path, error) from error
+        self._stage.GetRootLayer().customLayerData = {_CREATOR: _PROGRAM, "version": paths.addon_version()}
+        UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.z)
+        UsdGeom.SetStageMetersPerUnit(self._stage, metres_per_unit)
+        self._stage.SetTimeCodesPerSecond(frame_rate)
+        self._stage.SetFramesPerSecond(frame_rate)
+        self._stage.SetDefaultPrim(UsdGeom.Xform.Define(self._stage, f"/{ROOT}").GetPrim())
+        self._times = []
+        self._hair = {}  # path in the file → _Hair
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_error):
+        self._hair.clear()
+        self._stage = None  # lets go of the file
+
+    def add(self, name, counts):
+        """Add hair by name; returns its path in the file. counts: (S,) points of its strands, the same at all times."""
+        from pxr import Tf
+
+        path = f"/{ROOT}/{Tf.MakeValidIdentifier(name)}"
+        while path in self._hair:
+            path += "_"
+        self._hair[path] = _Hair(self._stage, path, counts)
+        return path
+
+    def write(self, time, path, points, radii, matrix):
+        """Write a sample: points (N, 3) and radii (N,) float32 in local coordinates, matrix (4, 4) local → world."""
+        self._hair[path].write(time, points, radii, matrix)
+
+    def save(self, time):
+        """Write what was added to the disk; time: of the samples, in frames."""
+        from pxr import Tf
+
+        self._times.append(time)
+        try:
+            self._stage.SetStartTimeCode(min(self._times))
+            self._stage.SetEndTimeCode(max(self._times))
+            self._stage.GetRootLayer().Save()
+        except Tf.ErrorException as error:
+            raise _failed(self._path, error) from error
+
+
+class _Hair:
+    """The prim of one hair object."""
+
+    def __init__(self, stage, path, counts):
+        from pxr import UsdGeom, Vt
+
+        curves = UsdGeom.BasisCurves.Define(stage, path)
+        curves.CreateTypeAttr(UsdGeom.Tokens.linear)
+        curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
+        curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(counts, np.int32)))
+        curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+        self._points, self._extent, self._widths = (
+            curves.CreatePointsAttr(),
+            curves.CreateExtentAttr(),
+            curves.CreateWidthsAttr(),
+        )
+        self._transform = curves.AddTransformOp()
+        self._last = None  # (time, widths) of the sample before
+
+    def write(self, time, points, radii, matrix):
+        from pxr import Gf, Vt
+
+        points = np.ascontiguousarray(points, np.float32)
+        reach = radii.max(initial=0.0)
+        bounds = np.stack([points.min(axis=0) - reach, points.max(axis=0) + reach])
+        self._points.Set(Vt.Vec3fArray.FromNumpy(points), time)
+        self._extent.Set(Vt.Vec3fArray.FromNumpy(np.float32(bounds)), time)
+        self._transform.Set(Gf.Matrix4d(np.asarray(matrix, np.float64).T.tolist()), time)  # rows of vectors
+        self._write_widths(time, 2.0 * radii)
+
+    def _write_widths(self, time, widths):
+        """Only where they change: between samples readers interpolate."""
+        from pxr import Vt
+
+        before, self._last = self._last, (time, widths)
+        if before is not None and np.array_equal(before[1], widths):
+            return
+        for at, values in [before, self._last] if before is not None else [self._last]:
+            self._widths.Set(Vt.FloatArray.FromNumpy(np.ascontiguousarray(values, np.float32)), at)

@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that are draped once they are grown: new hair hangs, and lies on its surface in place of passing through it.
+
+What grows on a surface is simulated as if it grew on a human scalp, whatever the size of the surface, as all lengths of
+new hair follow from it (grooming/groom_defaults.py). So hair of a giant and of a mouse look alike, and a setting of
+gravity in place of the scene's says how far it falls.
+"""
+
+import math
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from .. import grooming
+from ..geometry.mesh import TriMesh, positions
+from ..geometry.strands import Strands, from_numpy
+from ..geometry.texture import Texture
+from ..grooming import groom_defaults
+from ..grooming.groom import GuideSettings, distribute_guides
+from ..kernels import kernel_setup
+from ..long_work import Progress, no_progress, part_of
+from ..placement.domain import Mirror
+from . import contact_queries, detail, draping, hair_volume, rod_solver
+from .settings import DynamicsSettings
+
+SCALP = 0.055  # [m²], of a human head
+# Loose hair, two millimetres from the skin: guides stand for wisps, whose strands lie beside them.
+_HAIR = DynamicsSettings(bend_stiffness=0.5, collision_distance=2e-3, substeps=2)
+_SECONDS = 1.0
+_EARTH = 9.81  # [m/s²]
+_GROWN = 0.6  # part of the progress
+
+
+def grow(mesh: TriMesh, settings: GuideSettings, *, progress: Progress = no_progress, **ground: Any) -> Strands:
+    """`groom.distribute_guides` with the same arguments, draped where the settings say so. Raises `HairError`."""
+    if not settings.drape:
+        return distribute_guides(mesh, settings, progress=progress, **ground)
+    guides = distribute_guides(mesh, settings, progress=part_of(progress, 0.0, _GROWN), **ground)
+    mask = ground.get("density"), ground.get("texture")
+    settings = groom_defaults.complete(settings, mesh, *mask)
+    normal = ground.get("mirror_normal", (1.0, 0.0, 0.0))
+    return settled(guides, mesh, settings, *mask, mirror_normal=normal, progress=part_of(progress, _GROWN, 1.0))
+
+
+def settled(
+    guides: Strands,
+    mesh: TriMesh,
+    settings: GuideSettings,
+    density: np.ndarray | None = None,
+    texture: Texture | None = None,
+    *,
+    mirror_normal: Any = (1.0, 0.0, 0.0),
+    progress: Progress = no_progress,
+) -> Strands:
+    """Guides that have grown on a mesh, where they come to rest. settings: completed for the mesh.
+
+    The other arguments are those of `groom.distribute_guides`. Raises `HairError` where guides cannot be draped.
+    """
+    device = guides.points.device
+    load_kernels(device, progress)
+    metres = math.sqrt(SCALP / groom_defaults.grown_area(mesh, density, texture))  # in a unit of the mesh
+    gravity = (0.0, 0.0, -_EARTH * groom_defaults.known(settings.gravity))
+    used, triangles = np.unique(mesh.triangles[within_reach(mesh, settings, density)], return_inverse=True)
+    center = mesh.vertices[used].mean(axis=0, dtype=np.float64)
+    surface = TriMesh(
+        (metres * (mesh.vertices[used] - center)).astype(np.float32), triangles.reshape(-1, 3).astype(np.int32)
+    )
+    grown = guides.numpy()
+
+    def tell(part):
+        progress("Draping guides", part)
+
+    points = draping.draped(metres * (grown - center), surface, _HAIR, gravity, _SECONDS, device, tell)
+    points = (points / metres + center).astype(np.float32)
+    points[:, 0] = grown[:, 0]  # to the last bit: where the surface has them
+    if settings.symmetric:
+        mirror = Mirror(np.asarray(mirror_normal, np.float64))
+        points = grooming.guide_growth.mirrored(points, positions(mesh, guides.roots), mirror)
+    return from_numpy(points, guides.roots, device)
+
+
+def within_reach(mesh: TriMesh, settings: GuideSettings, density: np.ndarray | None = None) -> np.ndarray:
+    """(F,) bool: the triangles that guides may come near to: those near the box of where they grow.
+
+    settings: completed for the mesh; density: as in `groom.distribute_guides`.
+    """
+    grown_on = mesh.vertices if density is None else _corners_with(mesh, np.asarray(density) > 0.0)
+    reach = groom_defaults.known(settings.length) * (1.0 + settings.length_variation)
+    low, high = grown_on.min(axis=0) - reach, grown_on.max(axis=0) + reach
+    return ((mesh.corners.max(axis=1) >= low) & (mesh.corners.min(axis=1) <= high)).all(axis=1)
+
+
+def _corners_with(mesh, is_chosen):
+    """(N, 3): the corners of the triangles that have a chosen vertex."""
+    return mesh.corners[is_chosen[mesh.triangles].any(axis=1)].reshape(-1, 3)
+
+
+def load_kernels(
+    device: wp.DeviceLike, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS
+) -> None:
+    """Load what `settled` launches, as `groom.load_kernels` does; same arguments."""
+    modules = (contact_queries, detail, hair_volume, rod_solver)
+    kernel_setup.load([wp.get_module(module.__name__) for module in modules], device, progress, most_threads)

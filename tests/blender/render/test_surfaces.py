@@ -1,0 +1,220 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surfaces look as in Cycles: rough and shiny, dielectric and metal, in their images' colors, part by part."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import surface_materials
+from hair_addon.blender.data.scene import read_camera
+from hair_addon.blender.gpu import drawing, visibility_buffer
+from hair_addon.blender.host import notices
+from hair_addon.blender.render import drawn_scene, offscreen
+from hair_addon.core.imaging.pixel_sampling import PictureSettings
+
+SIZE = 48
+
+
+def picture():
+    """(H, W, 4) linear pixels of the scene by Vellus, first row at the bottom."""
+    return offscreen.draw_picture(PictureSettings(width=SIZE, height=SIZE, samples_per_side=4, is_transparent=True))
+
+
+def by_cycles(tmp_path):
+    """The same by Cycles: light that arrives straight from lamps and the world."""
+    scene = bpy.context.scene
+    scene.render.engine = "CYCLES"
+    scene.render.resolution_x = scene.render.resolution_y = SIZE
+    scene.render.film_transparent = True
+    scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
+    cycles = scene.cycles
+    cycles.samples, cycles.use_denoising, cycles.use_adaptive_sampling, cycles.max_bounces = 64, False, False, 0
+    cycles.pixel_filter_type, cycles.blur_glossy = "BOX", 0.0
+    scene.render.filepath = str(tmp_path / "cycles.exr")
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(scene.render.filepath, check_existing=False)
+    pixels = np.array(image.pixels[:], np.float32).reshape(SIZE, SIZE, 4)
+    bpy.data.images.remove(image)
+    return pixels
+
+
+def material_of(surface, **inputs):
+    """A new material of a mesh object: values of its Principled BSDF, whose node is returned."""
+    material = bpy.data.materials.new("Surface")
+    surface.data.materials.append(material)
+    principled = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    for name, value in inputs.items():
+        principled.inputs[name.replace("_", " ")].default_value = value
+    return principled
+
+
+@pytest.fixture
+def stage(scene):
+    """A scene with an orthographic camera that looks along Y at two metres, without lights; nothing in it."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
+    camera.location, camera.rotation_euler = (0.0, -4.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
+    return scene
+
+
+def sun(*angles, strength=3.0):
+    lamp = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
+    lamp.data.angle, lamp.data.energy, lamp.rotation_euler = 0.0, strength, angles
+    bpy.context.scene.collection.objects.link(lamp)
+
+
+def ball(**inputs):
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=6, radius=0.9)
+    bpy.context.object.data.shade_smooth()
+    material_of(bpy.context.object, **inputs)
+    return bpy.context.object
+
+
+def image_of(pixels, name="Image", is_data=False):
+    """An image of (H, W, 3) values as they are stored."""
+    height, width, _rgb = pixels.shape
+    image = bpy.data.images.new(name, width, height, is_data=is_data)
+    image.pixels.foreach_set(np.dstack([pixels, np.ones((height, width))]).astype(np.float32).ravel())
+    image.update()
+    return image
+
+
+def link_image(principled, image, socket="Base Color"):
+    tree = principled.id_data
+    node = tree.nodes.new("ShaderNodeTexImage")
+    node.image = image
+    tree.links.new(node.outputs["Color"], principled.inputs[socket])
+    return node
+
+
+@pytest.mark.parametrize("metallic", [0.0, 1.0])
+@pytest.mark.parametrize("roughness", [0.15, 0.3, 0.6, 1.0])
+def test_a_sphere_reflects_as_in_cycles(roughness, metallic, stage, tmp_path):
+    ball(Base_Color=(0.5, 0.25, 0.1, 1.0), Roughness=roughness, Metallic=metallic, IOR=1.6)
+    sun(math.radians(50.0), 0.0, math.radians(30.0))
+    ours, theirs = picture(), by_cycles(tmp_path)
+    inside = (ours[..., 3] > 0.999) & (theirs[..., 3] > 0.999)
+    np.testing.assert_allclose(ours[inside].mean(axis=0), theirs[inside].mean(axis=0), rtol=0.03)
+    error = np.abs(ours - theirs)[inside].mean(axis=0)[:3] / theirs[inside].mean(axis=0)[:3]
+    # The smallest highlight is as wide as the normal's change from sample to sample.
+    assert error.max() < (0.15 if roughness < 0.2 else 0.05)
+
+
+def test_a_sphere_in_a_grey_world_is_as_bright_as_in_cycles(stage, tmp_path):
+    ball(Base_Color=(0.5, 0.25, 0.1, 1.0), Roughness=0.5)
+    world = stage.world = bpy.data.worlds.new("World")
+    next(n for n in world.node_tree.nodes if n.type == "BACKGROUND").inputs["Color"].default_value = (0.5, 0.5, 0.5, 1)
+    ours, theirs = picture(), by_cycles(tmp_path)
+    inside = (ours[..., 3] > 0.999) & (theirs[..., 3] > 0.999)
+    np.testing.assert_allclose(ours[inside].mean(axis=0), theirs[inside].mean(axis=0), rtol=0.03)
+
+
+def plane(size=2.0):
+    """A plane that faces the camera, with a UV map, active."""
+    bpy.ops.mesh.primitive_plane_add(size=size, rotation=(math.pi / 2, 0.0, 0.0))
+    return bpy.context.object
+
+
+def compare(tmp_path, rtol=0.03):
+    """Hold a picture against that of Cycles, in the mean of the whole and of 4 × 4 parts."""
+    ours, theirs = (
+        p.reshape(4, SIZE // 4, 4, SIZE // 4, 4).mean(axis=(1, 3)) for p in (picture(), by_cycles(tmp_path))
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=rtol, atol=0.01 * theirs[..., :3].max())
+    np.testing.assert_allclose(ours.mean(axis=(0, 1)), theirs.mean(axis=(0, 1)), rtol=rtol)
+
+
+@pytest.mark.parametrize("placed", ["as it is", "mapped"])
+def test_a_plane_has_its_images_colors(placed, stage, rng, tmp_path):
+    principled = material_of(plane(), Roughness=0.7)
+    node = link_image(principled, image_of(rng.uniform(0.2, 1.0, (8, 8, 3))))
+    node.interpolation = "Closest"
+    if placed == "mapped":
+        tree = principled.id_data
+        mapping, coordinates = tree.nodes.new("ShaderNodeMapping"), tree.nodes.new("ShaderNodeTexCoord")
+        tree.links.new(coordinates.outputs["UV"], mapping.inputs["Vector"])
+        tree.links.new(mapping.outputs["Vector"], node.inputs["Vector"])
+        mapping.inputs["Location"].default_value = (0.25, 0.125, 0.0)
+        mapping.inputs["Rotation"].default_value[2] = math.radians(90.0)
+        mapping.inputs["Scale"].default_value = (2.0, 0.5, 1.0)
+    sun(math.radians(50.0), 0.0, math.radians(30.0))
+    compare(tmp_path)
+
+
+def test_roughness_and_normals_are_those_of_images(stage, tmp_path):
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=96, ring_count=48, radius=0.9)
+    bpy.context.object.data.shade_smooth()
+    principled = material_of(bpy.context.object, Base_Color=(0.3, 0.3, 0.3, 1.0), Metallic=1.0)
+    checks = np.indices((8, 8)).sum(axis=0) % 2
+    rough = link_image(principled, image_of(np.repeat(0.4 + 0.3 * checks[..., None], 3, axis=2), "Rough", True))
+    u, v = np.meshgrid(np.arange(64), np.arange(64))
+    slopes = np.stack([0.4 * np.sin(u / 64 * 8 * math.pi), 0.4 * np.sin(v / 64 * 4 * math.pi), np.ones((64, 64))], -1)
+    slopes /= np.linalg.norm(slopes, axis=-1, keepdims=True)
+    tree = principled.id_data
+    tree.links.new(rough.outputs["Color"], principled.inputs["Roughness"])
+    tree.links.remove(principled.inputs["Base Color"].links[0])
+    bend = tree.nodes.new("ShaderNodeNormalMap")
+    bend.inputs["Strength"].default_value = 0.8
+    tree.links.new(bend.outputs["Normal"], principled.inputs["Normal"])
+    bumps = link_image(principled, image_of(0.5 * slopes + 0.5, "Normals", True))
+    tree.links.new(bumps.outputs["Color"], bend.inputs["Color"])
+    tree.links.remove(principled.inputs["Base Color"].links[0])
+    sun(math.radians(50.0), 0.0, math.radians(30.0))
+    ours, theirs = picture(), by_cycles(tmp_path)
+    inside = (ours[..., 3] > 0.999) & (theirs[..., 3] > 0.999)
+    assert np.abs(ours - theirs)[inside].mean() < 0.06 * theirs[inside][:, :3].mean()
+
+
+def test_each_face_has_the_color_of_its_slot(stage):
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=1, size=2.0, rotation=(math.pi / 2, 0.0, 0.0))
+    grid = bpy.context.object
+    for color in ((0.8, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.8, 0.0, 1.0)):
+        material_of(grid, Base_Color=color, Specular_IOR_Level=0.0)
+    right = max(grid.data.polygons, key=lambda face: face.center.x)
+    right.material_index = 2
+    sun(math.radians(90.0), 0.0, 0.0, strength=math.pi)
+    drawn = picture()
+    np.testing.assert_allclose(drawn[:, : SIZE // 2 - 1, :3].mean(axis=(0, 1)), (0.8, 0.0, 0.0), atol=2e-3)
+    np.testing.assert_allclose(drawn[:, SIZE // 2 + 1 :, :3].mean(axis=(0, 1)), (0.0, 0.8, 0.0), atol=2e-3)
+
+
+def test_without_its_image_a_surface_has_its_color_and_says_so_once(stage, tmp_path, capsys):
+    notices.said_cache.clear()
+    principled = material_of(plane(), Base_Color=(0.2, 0.4, 0.6, 1.0), Specular_IOR_Level=0.0)
+    missing = bpy.data.images.new("Lost", 1, 1)
+    missing.source, missing.filepath = "FILE", str(tmp_path / "lost.png")
+    link_image(principled, missing)
+    sun(math.radians(90.0), 0.0, 0.0, strength=math.pi)
+    np.testing.assert_allclose(picture()[..., :3].mean(axis=(0, 1)), (0.2, 0.4, 0.6), atol=2e-3)
+    picture()
+    assert capsys.readouterr().err.count('The image "Lost" is missing') == 1
+
+
+def test_a_frame_of_an_unchanged_scene_reads_no_material(stage, monkeypatch):
+    link_image(material_of(plane()), image_of(np.full((4, 4, 3), 0.5)))
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(stage, bpy.context.view_layer, depsgraph)
+    for name in ("read_material", "ImageMap"):
+        monkeypatch.setattr(surface_materials, name, None)
+    camera = read_camera(stage, depsgraph, SIZE, SIZE)
+    for _frame in range(2):
+        buffer = visibility_buffer.VisibilityBuffer(SIZE, SIZE)
+        drawn_scene.draw_behind_hair(drawn, drawing.view_record(*camera, SIZE), buffer, is_transparent=True)
+
+
+def test_what_is_behind_a_clear_surface_is_seen_through_its_highlight(stage):
+    material_of(plane(4.0), Base_Color=(0.3, 0.3, 0.3, 1.0), Specular_IOR_Level=0.0)
+    sun(math.radians(90.0), 0.0, 0.0, strength=math.pi)
+    bare = picture()[..., :3]
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=64, ring_count=32, radius=0.9, location=(0.0, -1.0, 0.0))
+    bpy.context.object.data.shade_smooth()
+    material_of(bpy.context.object, Transmission_Weight=1.0, Roughness=0.1)
+    seen = picture()[..., :3]
+    middle = slice(SIZE // 2 - 1, SIZE // 2 + 1)
+    assert seen[middle, middle].min() > 2.0 * bare.max()  # the sun, in the sphere
+    beside = seen[SIZE // 2, SIZE // 4]
+    np.testing.assert_allclose(beside, bare[SIZE // 2, SIZE // 4] * 0.96, rtol=0.05)

@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Delivered hair as a Blender without the add-on has it, in a process of its own."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+
+PROGRAM = """
+import sys
+import bpy
+import numpy as np
+
+path, out, *times = sys.argv[1:]
+bpy.ops.wm.open_mainfile(filepath=path)
+assert "hair_addon" not in sys.modules and not hasattr(bpy.types.Curves, "vellus")
+scene, hair = bpy.context.scene, bpy.data.objects["Hair"]
+found = {}
+for time in map(float, times):
+    scene.frame_set(int(time // 1), subframe=time % 1)
+    curves = hair.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    points = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", points.ravel())
+    found[str(time)] = points
+np.savez(out, **found)
+scene.render.filepath = out + ".png"
+bpy.ops.render.render(write_still=True)
+"""
+
+
+def without_addon(path, folder, times):
+    """({time: (N, 3) float32} of the object Hair of a .blend, and a picture at the last time) in another process."""
+    out = folder / "elsewhere.npz"
+    words = [sys.executable, "-c", PROGRAM, str(path), str(out), *map(str, times)]
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    subprocess.run(words, check=True, cwd=folder, env=environment, capture_output=True, timeout=300)
+    with np.load(out) as found:
+        return {float(name): found[name] for name in found}, out.with_name(out.name + ".png")
