@@ -6,7 +6,7 @@ After an event nothing is drawn or computed from what was cached before it. Func
 """
 
 from ..data import simulated_guides
-from ..gpu import lights, shaders, world_texture
+from ..gpu import lights, shaders, surface_shading, world_texture
 from ..groom import bindings, frame_folders, guide_simulation
 from ..host import notices
 from ..render import hair_cache, region_pictures, viewport
@@ -41,6 +41,7 @@ OTHERS = (
     frame_folders.folder_cache,
     guide_simulation.stiffness_cache,
     shaders.complaint_cache,
+    surface_shading.texture_cache,
     notices.said_cache,
 )
 
