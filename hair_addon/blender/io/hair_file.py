@@ -27,7 +27,9 @@ def require_ours(path):
     except Tf.ErrorException:
         layer = None
     if layer is None or layer.customLayerData.get(_CREATOR) != _PROGRAM:
-        raise HairError("{path} was not made by Deliver Hair: move it, or save the .blend under another name.", path=path)
+        raise HairError(
+            "{path} was not made by Deliver Hair: move it, or save the .blend under another name.", path=path
+        )
 
 
 def _require_usd():
@@ -81,7 +83,9 @@ class HairFile:
         from pxr import Tf
 
         wanted = f"/{ROOT}/{Tf.MakeValidIdentifier(name)}"
-        path = next(p for p in (wanted, *(f"{wanted}_{n}" for n in range(1, 1 + len(self._hair)))) if p not in self._hair)
+        path = next(
+            p for p in (wanted, *(f"{wanted}_{n}" for n in range(1, 1 + len(self._hair)))) if p not in self._hair
+        )
         self._hair[path] = _Hair(self._stage, path, counts)
         return path
 
