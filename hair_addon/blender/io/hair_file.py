@@ -82,10 +82,9 @@ class HairFile:
         """Add hair by name; returns its path in the file. counts: (S,) points of its strands, the same at all times."""
         from pxr import Tf
 
-        wanted = f"/{ROOT}/{Tf.MakeValidIdentifier(name)}"
-        path = next(
-            p for p in (wanted, *(f"{wanted}_{n}" for n in range(1, 1 + len(self._hair)))) if p not in self._hair
-        )
+        path = f"/{ROOT}/{Tf.MakeValidIdentifier(name)}"
+        while path in self._hair:
+            path += "_"
         self._hair[path] = _Hair(self._stage, path, counts)
         return path
 
