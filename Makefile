@@ -1,7 +1,7 @@
 # make demo and make test work from a fresh clone: dependencies are installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
-.PHONY: help demo compare turntable test desktop bench build lint lock samples clean
+.PHONY: help demo compare turntable dynamics test desktop bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
 # Let uv use the system's certificates, as pip does: some networks have their own.
@@ -31,6 +31,9 @@ compare: $(installed) ## the head rendered by Cycles and Vellus: mean colours an
 
 turntable: $(installed) ## a turntable of the head, 24 frames by the command line, in out/turntable; resumable
 	$(python) blend_samples/turntable.py --out out/turntable $(ARGS)
+
+dynamics: $(installed) ## hair that moves: strips, plots and a film in out/dynamics; ARGS="shaking plots" for some
+	$(python) blend_samples/dynamics.py --out out/dynamics $(ARGS)
 
 build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
 	$(python) tools/build_extension.py $(PLATFORM)

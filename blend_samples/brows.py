@@ -10,11 +10,11 @@ from mathutils.bvhtree import BVHTree
 
 from hair_addon import api
 
-BROWN = (0.35, 0.75, 1.40)  # absorption per fibre radius
+BROWN = (0.9, 1.6, 2.6)  # absorption per fibre radius
 _DEPTH = 0.0003  # [m] of the patches below the skin
 
-# Of the left brow, from the nose outward: place along X and height [m], half width [m], direction of its hair [rad] from
-# outward to upward.
+# Of the left brow, from the nose outward: place along X and height [m], half width [m], direction of its hair [rad]
+# from outward to upward.
 _BROW = np.array(
     [
         (0.0130, 0.7440, 0.0032, math.radians(62.0)),
@@ -38,8 +38,8 @@ def build(head_object, openings):
     brows = [_brow(skin, side) for side in (1.0, -1.0)]
     lashes = [lash for opening in openings for lash in _lashes(opening)]
     return (
-        _hair("Brows", brows, head_object, strand_count=900, radius=3.6e-5, tip_taper=0.2),
-        _hair("Lashes", lashes, head_object, strand_count=560, radius=4.5e-5, tip_taper=0.15),
+        _hair("Brows", brows, head_object, strand_count=900, radius=4.5e-5, tip_taper=0.3),
+        _hair("Lashes", lashes, head_object, strand_count=560, radius=6.5e-5, tip_taper=0.3),
     )
 
 
@@ -54,9 +54,9 @@ def _brow(skin, side):
         # Hair of the upper and of the lower border turns toward the middle.
         turns = angle - 0.35 * row
         lengths = _BROW_LENGTH * (0.75 + 0.45 * np.sin(np.pi * np.clip(along + 0.12, 0.0, 1.0)))
-        guides.append([
-            _lying(skin, *line[i], side, turns[i], lengths[i] * (1.0 - 0.25 * abs(row))) for i in range(_BROW_STEPS)
-        ])
+        guides.append(
+            [_lying(skin, *line[i], side, turns[i], lengths[i] * (1.0 - 0.25 * abs(row))) for i in range(_BROW_STEPS)]
+        )
     return np.array(roots), np.array(guides)
 
 

@@ -8,8 +8,11 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import head  # beside this file
+import dynamics_film  # beside this file
+import dynamics_scene
+import head
 import parting
+import portrait
 
 import hair_addon
 
@@ -18,7 +21,9 @@ FOLDER = Path(__file__).resolve().parent
 
 def build_head():
     """The head with 200 guides and 30,000 strands."""
-    head.grow(head.build())
+    skull = head.build()
+    head.grow(skull)
+    portrait.dress(skull)
     head.light()
 
 
@@ -28,10 +33,17 @@ def build_parting():
     _guides, hair = head.grow(skull, guide_count=300)
     hair.data.vellus.hair.part_lines = parting.draw_part_line(skull).name
     bpy.context.view_layer.update()
+    portrait.dress(skull)
     head.light()
 
 
-SAMPLES = {"head": build_head, "parting": build_parting}
+def build_dynamics():
+    """The head, which turns to both sides, with hair that simulates: play it, or bake it."""
+    dynamics_scene.build()
+    dynamics_film.prepare()
+
+
+SAMPLES = {"head": build_head, "parting": build_parting, "dynamics": build_dynamics}
 
 
 def main():

@@ -17,6 +17,7 @@ import warp as wp
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import head  # beside this file
+import portrait
 
 import hair_addon
 
@@ -46,6 +47,7 @@ def build(strand_count, sample_count):
     """The head in warm light from behind, rendered without a background and with all passes."""
     head_object = head.build()
     _guides, hair = head.grow(head_object, strand_count=strand_count)
+    portrait.dress(head_object)
     head.light()
     look = hair.data.vellus.appearance
     look.mode, look.absorption, look.roughness = "energy", (0.19, 0.40, 0.88), 0.28

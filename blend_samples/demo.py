@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """make demo: the report's pictures and its two results tables, made on this machine.
 
-Writes head.blend, kajiya_kay.png, marschner.png, dual_scattering.png, styled.png (the same hair, wavy) and
+Writes head.blend, kajiya_kay.png, marschner.png, dual_scattering.png, styled.png (the same hair, curly) and
 tables/{m,n,n_trt}.exr to a folder.
 """
 
@@ -20,6 +20,7 @@ import warp as wp
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import head  # beside this file
+import portrait
 
 import hair_addon
 from hair_addon import api
@@ -28,7 +29,7 @@ from hair_addon.blender.gpu import drawing, visibility_buffer
 from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.core.geometry import bspline
 
-STYLE = "WAVY"  # of styled.png
+STYLE = "CURLY"  # of styled.png
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
 REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
 REPORT_FRAMES = {("Marschner", 10_000): 25, ("Kajiya-Kay", 10_000): 36}
@@ -45,24 +46,32 @@ def main():
     gpu.init()
     wp.config.log_level = wp.LOG_WARNING
     head_object = head.build()
-    guides, hair = head.grow(head_object)
-    head.light()
+    portrait.dress(head_object)
+    guides, hair = portrait.grow(head_object)
+    portrait.light()
     print(f"{len(guides.data.curves)} guides, {len(hair.data.curves)} strands in {time.perf_counter() - started:.1f} s")
     bpy.context.view_layer.objects.active = hair
     bpy.ops.vellus.bake_tables(directory=str(out / "tables"))
     bpy.ops.wm.save_as_mainfile(filepath=str(out / "head.blend"), compress=True)
     for model in MODELS.values():
         hair.data.vellus.model = model
-        bpy.ops.vellus.render_picture(filepath=str(out / f"{model.lower()}.png"))
+        draw(out / f"{model.lower()}.png")
     look = hair.data.vellus.appearance
     classic_roughness = look.roughness
-    look.mode, look.absorption, look.roughness = "energy", head.AUBURN, 0.3
-    bpy.ops.vellus.render_picture(filepath=str(out / "dual_scattering.png"))
+    look.mode, look.absorption, look.roughness = "energy", portrait.AUBURN, 0.25
+    draw(out / "dual_scattering.png", samples_per_side=4)
     draw_styled(hair.data, out / "styled.png")
     look.mode, look.roughness = "classic", classic_roughness
     print_spline_table()
+    portrait.undress(head_object)
     print_frame_table(guides, hair)
     print(f"\nmade in {time.perf_counter() - started:.1f} s: {out}")
+
+
+def draw(path, samples_per_side=3):
+    """Draw the portrait."""
+    width, height = portrait.SIZE
+    bpy.ops.vellus.render_picture(filepath=str(path), width=width, height=height, samples_per_side=samples_per_side)
 
 
 def draw_styled(hair, path):
@@ -71,8 +80,8 @@ def draw_styled(hair, path):
     before = settings.point_count, settings.tip_taper
     api.apply_style_preset(hair, STYLE)
     bpy.context.view_layer.update()
-    bpy.ops.vellus.render_picture(filepath=str(path))
-    api.set_styles(hair, [])
+    draw(path)
+    portrait.set_styles(hair)
     settings.point_count, settings.tip_taper = before
     bpy.context.view_layer.update()
 

@@ -8,9 +8,9 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-RADIUS = 0.0140  # [m] of an eyeball
+RADIUS = 0.0150  # [m] of an eyeball
 IRIS_RADIUS = 0.0047
-PUPIL_RADIUS = 0.0017
+PUPIL_RADIUS = 0.0019
 _GAP = 0.0007  # [m] between an eyeball and the lids
 _BULGE = 0.0010  # [m] of a cornea over the eyeball's sphere
 
@@ -18,7 +18,7 @@ _SEGMENTS = 64
 _IMAGE_SIZE = 512  # pixels
 _IRIS_PART = 0.8  # of the image's radius: the rest is the sclera
 
-_IRIS_RINGS = np.array([0.0, 0.16, 0.33, 0.36, 0.42, 0.55, 0.7, 0.85, 0.95, 1.0])  # of the iris' radius
+_IRIS_RINGS = np.array([0.0, 0.19, 0.38, 0.41, 0.46, 0.55, 0.7, 0.85, 0.95, 1.0])  # of the iris' radius
 _SCLERA_RINGS = 24
 _CORNEA_RINGS = np.linspace(0.0, 1.25, 12)
 
@@ -94,10 +94,12 @@ def _ball(center, axes):
     # The iris is a shallow cone behind the cornea; the pupil a hole in it.
     depth = np.where(is_pupil, 0.0016, 0.0008 - 0.0006 * _IRIS_RINGS)
     angles = np.linspace(np.arcsin(IRIS_RADIUS / RADIUS), np.pi, _SCLERA_RINGS + 1)[1:]
-    profile = np.concatenate([
-        np.stack([radii, limbus - depth], axis=1),
-        RADIUS * np.stack([np.sin(angles), np.cos(angles)], axis=1),
-    ])
+    profile = np.concatenate(
+        [
+            np.stack([radii, limbus - depth], axis=1),
+            RADIUS * np.stack([np.sin(angles), np.cos(angles)], axis=1),
+        ]
+    )
     places = np.concatenate([_IRIS_PART * _IRIS_RINGS, np.linspace(_IRIS_PART, 1.0, _SCLERA_RINGS + 1)[1:]])
     return _revolved(center, axes, profile, places, slots=(len(_IRIS_RINGS) - 1, 1, 0))
 
@@ -178,8 +180,8 @@ def eye_image():
     iris = distance / _IRIS_PART
     fibres = _fibres(azimuth, iris)
     near_pupil = np.exp(-(((iris - 0.42) / 0.14) ** 2))[..., None]
-    color = np.array([0.34, 0.44, 0.38]) * (0.55 + 0.75 * fibres[..., None])
-    color = color * (1.0 - 0.75 * near_pupil) + 0.75 * near_pupil * np.array([0.52, 0.38, 0.20])
+    color = np.array([0.29, 0.355, 0.30]) * (0.55 + 0.75 * fibres[..., None])
+    color = color * (1.0 - 0.75 * near_pupil) + 0.75 * near_pupil * np.array([0.42, 0.30, 0.16])
     color *= (1.0 - 0.75 * _step(iris, 0.80, 1.0))[..., None]  # the dark ring at the border
     color *= _step(iris, PUPIL_RADIUS / IRIS_RADIUS - 0.03, PUPIL_RADIUS / IRIS_RADIUS + 0.03)[..., None]
     white = np.array([0.86, 0.83, 0.80]) - _step(distance, 0.82, 0.92)[..., None] * np.array([0.05, 0.20, 0.20])

@@ -16,11 +16,12 @@ from mathutils.bvhtree import BVHTree
 from hair_addon import api
 from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 
-SIZE = 900, 900  # pixels of a picture
+SIZE = 800, 800  # pixels of a picture
 CAMERA, LOOK_AT, LENS = (0.70, -1.28, 0.73), Vector((0.010, -0.02, 0.682)), 104.0  # [m], [m], [mm]
+AUBURN = (0.27, 0.54, 1.10)  # absorption per fibre radius
 GAZE = (0.36, -1.2, 0.735)  # [m]: what the eyes look at, beside the camera
 
-LENGTH = 0.36  # [m] of guides on the crown
+LENGTH = 0.32  # [m] of guides on the crown
 _HAIRLINE_LENGTH = 0.45  # of those at the border, as a part of it
 _HAIRLINE_REACH = 0.030  # [m] over which lengths grow from the border
 _STEPS = 41  # points of a guide
@@ -33,6 +34,15 @@ def dress(head_object, target=GAZE):
     skin.paint(head_object)
     bust.build(head_object)
     brows.build(head_object, openings)
+
+
+def undress(head_object):
+    """Remove what `dress` added, but the skin."""
+    for name in ("Brows", "Lashes", "Bust", "Eyes", "Corneas"):
+        bpy.data.objects.remove(bpy.data.objects[name])
+    for made in [o for o in head_object.children_recursive if o.name.startswith(("Brows", "Lashes"))]:
+        bpy.data.objects.remove(made)
+    bpy.context.view_layer.update()
 
 
 def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
@@ -111,16 +121,16 @@ def _combed(root, length, surfaces):
     side = math.copysign(1.0, root[0] - head.PARTING)
     front = _part(-root[1], 0.0, 0.12)
     crown = _part(root[2], 0.79, 0.84)
-    sweep = Vector((side * (0.45 + 0.45 * front), 0.20 + 0.22 * front, -0.35 + 0.40 * front))
-    around = Vector((side * 0.42, 0.12 + 0.26 * front, -0.85))
-    fall = Vector((-side * 0.10, -0.14 * _part(abs(root[0]), 0.02, 0.07), -1.0))
+    sweep = Vector((side * (0.35 + 0.45 * front), 0.15 + 0.30 * front**4, -0.45 + 0.45 * front))
+    around = Vector((side * 0.12, 0.05 + 0.36 * front**4, -0.95))
+    fall = Vector((-side * 0.22, -0.12 * _part(abs(root[0]), 0.02, 0.07), -1.0))
     direction = ((0.55 + 0.45 * crown) * normal + sweep.normalized()).normalized()
     volume = 0.007 + 0.013 * crown
     combed = [position.copy()]
     for i in range(1, _STEPS):
         gone = i * step
         aim = sweep.lerp(around, _part(gone, 0.02, 0.08)).lerp(fall, _part(gone, 0.07, 0.16)).normalized()
-        direction = (direction + 0.30 * aim).normalized()
+        direction = (direction + 0.42 * aim).normalized()
         ahead = position + step * direction
         for surface, clearance in zip(surfaces, (0.003 + volume * _part(gone, 0.0, 0.05), 0.008), strict=True):
             near, near_normal, _face, _distance = surface.find_nearest(ahead)
@@ -153,12 +163,12 @@ def light():
     camera = scene.camera
     camera.location, camera.data.lens = CAMERA, LENS
     _point_at(camera)
-    _place("Key", (0.62, -1.10, 1.38), 21.0, 0.35)
+    _place("Key", (0.55, -1.15, 1.30), 22.0, 0.30)
     _place("Rim", (-0.55, 0.95, 1.25), 30.0, 0.4)
     _place("Fill", (-1.0, -1.0, 0.72), 4.5, 0.9)
     second = bpy.data.objects.new("Rim 2", bpy.data.objects["Rim"].data.copy())
     scene.collection.objects.link(second)
-    _place("Rim 2", (1.05, 0.75, 1.05), 12.0, 0.4)
+    _place("Rim 2", (1.05, 0.75, 1.05), 22.0, 0.4)
     bpy.context.view_layer.update()
 
 

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-COLOR = (0.60, 0.385, 0.285)  # linear RGB: the mean
+COLOR = (0.56, 0.335, 0.240)  # linear RGB: the mean
 _SIZE = 512  # pixels
 _SAMPLES_PER_TEXEL = 6
 _DILATIONS = 6  # texels that colors reach past the seams of the UV map

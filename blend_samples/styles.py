@@ -17,6 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import guide_tool_pictures  # beside this file
 import head
+import portrait
 
 import hair_addon
 from hair_addon import api
@@ -43,6 +44,7 @@ def main():
     hair_addon.register()
     gpu.init()
     hair = build()
+    portrait.dress(bpy.data.objects["Head"])
     out = given.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
     chosen = [name for name in GALLERY if not given.names or name in given.names]

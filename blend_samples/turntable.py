@@ -18,6 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import head  # beside this file
 import OpenEXR
+import portrait
 
 import hair_addon
 from hair_addon.blender.render import offscreen
@@ -59,6 +60,7 @@ def _build(path):
     """The head with its hair, which turns once about the vertical in front of a camera and lights that stay."""
     skull = head.build()
     head.grow(skull)
+    portrait.dress(skull)
     head.light()
     scene = bpy.context.scene
     # The last frame is followed by the first: it is a step short of a whole turn.

@@ -30,8 +30,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
-from .api_dynamics import DynamicsSettings, dynamics_of, set_dynamics
+from .api_arguments import are_arrays, changed, choice, curves_object_of, heard, mesh_of, path_of, require_no_names
+from .api_dynamics import (
+    DynamicsSettings,
+    bake_dynamics,
+    deliver_dynamics,
+    dynamics_of,
+    remove_delivery,
+    set_dynamics,
+    simulate,
+)
 from .api_guide_tools import change_guides
 from .api_styles import (
     Bend,
@@ -91,20 +99,24 @@ __all__ = [
     "add_style",
     "apply_settings",
     "apply_style_preset",
+    "bake_dynamics",
     "bake_tables",
     "change_guides",
+    "deliver_dynamics",
     "distribute_guides",
     "draw",
     "dynamics_of",
     "interpolate_hair",
     "load_settings",
     "points",
+    "remove_delivery",
     "render",
     "save_settings",
     "set_dynamics",
     "set_styles",
     "settings_of",
     "shade",
+    "simulate",
     "styles_of",
     "table_settings",
     "use_as_guides",
@@ -174,7 +186,7 @@ def use_as_guides(
     if are_arrays(surface):
         return _guides_of_arrays(curves, mesh_of(surface), every)
 
-    curves_object = _curves_object(curves)
+    curves_object = curves_object_of(curves)
     if surface is None:
         surface = blender.groom.hand_made_guides.find_surface(curves_object, _depsgraph().view_layer)
     work = blender.groom.hand_made_guides.using_as_guides(
@@ -224,7 +236,9 @@ def interpolate_hair(
     if masks is not None:
         raise HairError("masks are for plain arrays: name a vertex group of the surface in the style.")
     styles, _names = require_styles(styles)
-    growing = blender.groom.pipeline.interpolating_hair(_guides(guides), settings, _depsgraph(), styles=styles)
+    growing = blender.groom.pipeline.interpolating_hair(
+        blender.data.arguments.guides_of(guides), settings, _depsgraph(), styles=styles
+    )
     hair = run_now(growing, progress)
     blender.groom.writing.keep_styles(hair, styles)
     return hair
@@ -375,20 +389,6 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
 
 def _curves(given, kind=None):
     return blender.data.arguments.curves_of(given, kind)
-
-
-def _guides(given):
-    return blender.data.arguments.guides_of(given)
-
-
-def _curves_object(given):
-    """Return a curves object, given as such or as its Curves datablock. Raises `HairError`."""
-
-    view_layer = _depsgraph().view_layer
-    curves_object = given if hasattr(given, "matrix_world") else blender.groom.selection.object_of(given, view_layer)
-    if not blender.groom.foreign_curves.is_foreign(curves_object):
-        raise HairError(f"{getattr(given, 'name', given)!r} is not a curves object, or is already guides or hair.")
-    return curves_object
 
 
 def _surface_object(given):

@@ -82,3 +82,12 @@ def heard(progress: object) -> Progress:
     if not callable(progress):
         raise HairError(f"progress must be a function of (step, part), not {described(progress)}.")
     return progress
+
+
+def curves_object_of(given: Any) -> Any:
+    """Return a curves object that is neither guides nor hair, given as such or as its Curves. Raises `HairError`."""
+    view_layer = blender.data.scene.present_depsgraph().view_layer
+    curves_object = given if hasattr(given, "matrix_world") else blender.groom.selection.object_of(given, view_layer)
+    if not blender.groom.foreign_curves.is_foreign(curves_object):
+        raise HairError(f"{getattr(given, 'name', given)!r} is not a curves object, or is already guides or hair.")
+    return curves_object

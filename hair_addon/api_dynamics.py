@@ -1,21 +1,40 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The Python interface's functions of dynamics; api.py offers them."""
 
+from collections.abc import Iterable, Iterator
+from pathlib import Path
 from typing import Any
 
-from .api_arguments import changed, choice
-from .core import lazy
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .api_arguments import changed, choice, heard, mesh_of
+from .core import dynamics, lazy
 from .core.dynamics.presets import PRESETS, applied
 from .core.dynamics.settings import DynamicsSettings
+from .core.errors import HairError
+from .core.geometry.strands import Strands, check_strands
+from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, plain_value
 
 blender = lazy.Package(".blender", __package__)
 
 Curves = Any
 
-__all__ = ["DynamicsSettings", "dynamics_of", "set_dynamics"]
+__all__ = [
+    "DynamicsSettings",
+    "bake_dynamics",
+    "deliver_dynamics",
+    "dynamics_of",
+    "remove_delivery",
+    "set_dynamics",
+    "simulate",
+]
 
 _SWITCH = Param("")
+_FRAME = Param("", low=-1_048_574, high=1_048_574)  # Blender's
+_RATE = Param("", above=0.0)
+_COMPONENT = Param("")
 
 
 def dynamics_of(guides: Curves) -> DynamicsSettings:
@@ -24,7 +43,7 @@ def dynamics_of(guides: Curves) -> DynamicsSettings:
     >>> api.dynamics_of(bpy.data.objects["Guides"]).bend_stiffness
     8.0
     """
-    return blender.settings.properties.dynamics_of(blender.data.arguments.curves_of(guides, "GUIDES").vellus)
+    return blender.settings.properties.own_dynamics_of(blender.data.arguments.curves_of(guides, "GUIDES").vellus)
 
 
 def set_dynamics(
@@ -46,7 +65,7 @@ def set_dynamics(
     """
     target = blender.data.arguments.curves_of(guides, "GUIDES")
     if settings is None or isinstance(settings, str):
-        present = blender.settings.properties.dynamics_of(target.vellus)
+        present = blender.settings.properties.own_dynamics_of(target.vellus)
         settings = present if settings is None else applied(present, choice(settings, "dynamics preset", PRESETS))
     wanted = changed(DynamicsSettings, settings, changes)
     if simulates is not None:
@@ -55,3 +74,104 @@ def set_dynamics(
     if simulates is not None:
         target.vellus.simulates = simulates
     return wanted
+
+
+def bake_dynamics(
+    guides: Curves,
+    last_frame: int | None = None,
+    *,
+    starts_over: bool = False,
+    progress: Progress = no_progress,
+) -> range:
+    """Simulate guide Curves from their start frame on, write the frames to their cache folder, and return these.
+
+    last_frame: the scene's last for None; starts_over: simulate frames again that are there, instead of going on after
+    them; progress(step, part): callback, which may raise to stop: frames so far are kept. The guides simulate from then
+    on. Raises `HairError` where the folder cannot be written, the .blend was not saved, or memory is short.
+
+    >>> guides = bpy.data.objects["Guides"]
+    >>> guides.data.vellus.cache_folder = "haircache"
+    >>> bpy.context.scene.frame_end = 3
+    >>> api.bake_dynamics(guides)
+    range(1, 4)
+    """
+    target = blender.data.arguments.guides_of(guides)
+    scene_time = blender.host.scene_time
+    last = scene_time.scene_frames()[-1] if last_frame is None else last_frame
+    last = plain_value("last_frame", last, 1, _FRAME)
+    starts_over = plain_value("starts_over", starts_over, False, _SWITCH)
+    work = blender.groom.guide_baking.baking([target], last, scene_time.present_scene(), starts_over)
+    (baked,) = run_now(work, heard(progress))
+    target.vellus.simulates = True
+    return range(baked.first, baked.last + 1)
+
+
+def deliver_dynamics(guides: Curves, *, progress: Progress = no_progress) -> Path:
+    """Write the hair of baked guides to a USD file beside the .blend, let Blender play it, and return its path.
+
+    Files that link the hair, render farms and Blender without Vellus show it then. The frames are those of the scene.
+    Raises `HairError` where a frame is not baked, the .blend was not saved, or the file cannot be written.
+
+    >>> api.deliver_dynamics(bpy.data.objects["Guides"]).name
+    'shot_Guides.usdc'
+    """
+    target = blender.data.arguments.guides_of(guides)
+    delivery = blender.io.delivery
+    work = delivery.delivering(target, delivery.path_of(target), blender.host.scene_time.present_scene())
+    return run_now(work, heard(progress)).path
+
+
+def remove_delivery(guides: Curves) -> None:
+    """Let the hair of guide Curves follow them again, instead of the delivered frames. The file stays.
+
+    Raises `HairError` where no hair plays delivered frames.
+
+    >>> api.remove_delivery(bpy.data.objects["Guides"])
+    """
+    blender.io.delivery.take_off(blender.data.arguments.curves_of(guides, "GUIDES"))
+
+
+def simulate(
+    poses: Iterable[ArrayLike],
+    triangles: ArrayLike,
+    guides: Strands,
+    settings: DynamicsSettings | None = None,
+    *,
+    frame_rate: float = 24.0,
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
+    **changes: Any,
+) -> Iterator[np.ndarray]:
+    """Simulate guides on a mesh of plain arrays that moves: a generator of (G, P, 3) float32 [m], one for each pose.
+
+    poses: for each frame the vertices (V, 3) [m], read when the frame is asked for; guides: `Strands` on the first of
+    them, as `distribute_guides` returns them, which come out first as they are; triangles: (F, 3) indices of vertices,
+    wound so that normals point out. settings: `DynamicsSettings`; changes: its fields by name; frame_rate: poses a
+    second; gravity: [m/s²]. Raises `HairError` for what cannot be simulated, and later for a pose that has other
+    vertices, or non-finite ones.
+
+    >>> import numpy as np
+    >>> vertices = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], np.float32)
+    >>> triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    >>> guides = api.distribute_guides((vertices, triangles), guide_count=20, length=0.05)
+    >>> poses = (vertices + np.float32([0.01 * frame, 0, 0]) for frame in range(3))
+    >>> [points.shape for points in api.simulate(poses, triangles, guides, wetness=1.0)]
+    [(20, 41, 3), (20, 41, 3), (20, 41, 3)]
+    """
+    wanted = changed(DynamicsSettings, settings, changes)
+    if wanted.colliders:
+        raise HairError("colliders names a collection of a .blend file: leave it empty for plain arrays.")
+    rate = plain_value("frame_rate", frame_rate, 1.0, _RATE)
+    x, y, z = plain_value("gravity", gravity, (0.0, 0.0, 0.0), _COMPONENT)
+    if not isinstance(guides, Strands):
+        raise HairError("guides must be Strands, as distribute_guides() returns for arrays.")
+    check_strands(guides)
+    try:
+        coming = iter(poses)
+        first = next(coming, None)
+    except TypeError as error:
+        raise HairError("poses must be an iterable of vertices (V, 3), one array for each frame.") from error
+    if first is None:
+        raise HairError("poses has no frame: give the vertices that the guides were grown on.")
+    mesh = mesh_of((first, triangles))
+    dynamics.moving_mesh.require(mesh, guides)
+    return dynamics.moving_mesh.simulated(mesh, guides, coming, wanted, 1.0 / rate, (x, y, z))

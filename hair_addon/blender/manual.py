@@ -44,7 +44,7 @@ _OPERATORS = {
     ),
     "strands": ("interpolate_hair",),
     "dynamics": (
-        *("play_dynamics", "bake_dynamics", "free_dynamics", "apply_dynamics_preset"),
+        *("play_dynamics", "bake_dynamics", "free_dynamics", "apply_dynamics_preset", "stiffen_dynamics"),
         *("deliver_dynamics", "remove_delivery"),
     ),
     "styles": (

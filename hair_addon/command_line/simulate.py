@@ -26,6 +26,11 @@ def add(verbs):
     parser.add_argument(
         "--guides", action="append", metavar="NAME", help="guides to simulate; may be repeated [all that simulate]"
     )
+    parser.add_argument(
+        "--deliver",
+        metavar="FILE",
+        help="also write a .blend whose hair plays the frames without Vellus, and beside it the files that it plays",
+    )
     parser.add_argument("--overwrite", action="store_true", help="simulate existing frames again")
     options.add_scripts(parser)
     options.add_common(parser)
@@ -35,11 +40,14 @@ def add(verbs):
 def run(given, console):
     """Open the file and bake its guides."""
     blender.io.mesh_files.require_blend(given.input)
+    if given.deliver is not None:
+        _require_delivery(given)
     opening.open_file(given, console)
     last = blender.host.scene_time.scene_frames()[-1] if given.last_frame is None else given.last_frame
     guides = [_named(name) for name in given.guides] if given.guides else blender.groom.frame_folders.simulating()
     if not guides:
         raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")
+    _warn_of_memory(guides, console)
     started = time.perf_counter()
 
     def tell(baked):
@@ -52,6 +60,35 @@ def run(given, console):
 
     scene = blender.host.scene_time.present_scene()
     run_now(blender.groom.guide_baking.baking(guides, last, scene, given.overwrite, tell), console.progress)
+    if given.deliver is not None:
+        _deliver(given, guides, scene, console)
+
+
+def _require_delivery(given):
+    """Raise `HairError` unless a delivered .blend could be written."""
+    if given.deliver.suffix.lower() != ".blend":
+        raise HairError(f"--deliver writes a .blend file, not {given.deliver}.")
+    if given.deliver.resolve() == given.input.resolve():
+        raise HairError("--deliver would replace the file that is simulated: choose another name.")
+    blender.io.groom_files.require_writable(given.deliver)
+
+
+def _deliver(given, guides_list, scene, console):
+    for guides in guides_list:
+        guides.vellus.simulates = True
+        path = blender.io.delivery.path_of(guides, given.deliver.absolute())
+        made = run_now(blender.io.delivery.delivering(guides, path, scene), console.progress)
+        name = blender.host.notices.name_of(guides)
+        values = {"verb": "simulate", "input": str(given.input), "guides": name, "delivered": str(path)}
+        values |= {"first": made.first, "last": made.last, "strands": made.strand_count, "bytes": made.byte_count}
+        console.result(values, f"{name}: frames {made.first} to {made.last} delivered in {path}")
+    blender.io.groom_files.save_copy(given.deliver)
+
+
+def _warn_of_memory(guides, console):
+    part = blender.host.memory.share_of_free(blender.groom.guide_baking.memory_of(guides))
+    if part > blender.host.memory.MUCH:
+        console.warn(f"Simulating takes {round(100.0 * part)} % of the free memory.")
 
 
 def _named(name):

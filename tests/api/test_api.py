@@ -51,6 +51,7 @@ def scalp(sphere):
 
 def test_examples_of_functions_run(scalp, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    bpy.ops.wm.save_as_mainfile(filepath="shot.blend")
     monkeypatch.setattr(warp.config, "log_level", warp.LOG_WARNING)
     documented, runner = examples()[1:], doctest.DocTestRunner()
     for example in documented:

@@ -49,6 +49,10 @@ def hair_of_arrays(guides, arrays=None):
     return api.interpolate_hair(guides, mesh=(np.eye(3), TRIANGLE) if arrays is None else arrays, strand_count=5)
 
 
+def simulate(poses, guides=None, triangles=TRIANGLE, **changes):
+    return api.simulate(poses, triangles, strands() if guides is None else guides, **changes)
+
+
 def evaluated_curves(name):
     return data(name).evaluated_get(bpy.context.evaluated_depsgraph_get()).data
 
@@ -104,6 +108,30 @@ REFUSED = {
         "simulates must be True or",
     ),
     "dynamics of hair": (lambda: api.set_dynamics(data("Hair"), "WET"), "'Hair' is not Vellus guides"),
+    "a fraction of a frame to bake": (
+        lambda: api.bake_dynamics(data("Guides"), 2.5),
+        "last_frame must be a whole number",
+    ),
+    "a file to bake beside": (lambda: api.bake_dynamics(data("Guides"), 3), "relative to the .blend file"),
+    "a last frame before the first": (lambda: api.bake_dynamics(data("Guides"), -3), "begins in frame 1"),
+    "hair to bake": (lambda: api.bake_dynamics(data("Hair")), "'Hair' is not Vellus guides"),
+    "a number to start over": (
+        lambda: api.bake_dynamics(data("Guides"), 3, starts_over=1),
+        "starts_over must be True or",
+    ),
+    "delivery of an unsaved file": (lambda: api.deliver_dynamics(data("Guides")), "save the file first"),
+    "no delivery to remove": (lambda: api.remove_delivery(data("Guides")), "plays delivered frames"),
+    "no poses": (lambda: simulate([]), "poses has no frame"),
+    "a number for poses": (lambda: simulate(3), "poses must be an iterable"),
+    "flat poses": (lambda: simulate([np.arange(9.0)]), "A mesh is vertices"),
+    "an infinite pose": (lambda: simulate([np.full((3, 3), np.inf)]), "non-finite"),
+    "guides of an object": (lambda: simulate([np.eye(3)], data("Guides")), "guides must be Strands"),
+    "guides of another mesh": (lambda: simulate([np.eye(3)], strands(), [[0, 1, 9]]), "uses vertex 9"),
+    "no frame rate": (lambda: simulate([np.eye(3)], frame_rate=0), "frame_rate must be"),
+    "gravity of two numbers": (lambda: simulate([np.eye(3)], gravity=(0, 1)), "gravity needs 3 numbers"),
+    "infinite gravity": (lambda: simulate([np.eye(3)], gravity=(0, 0, -math.inf)), "gravity must be"),
+    "a collection for arrays": (lambda: simulate([np.eye(3)], colliders="Body"), "names a collection"),
+    "dynamics of another class": (lambda: simulate([np.eye(3)], settings=api.Clump()), "settings must be"),
     "plots of none": (lambda: api.bake_tables("tables", has_plots=None, size=16), "has_plots must be True or False"),
     # Objects.
     "bytes for a surface": (lambda: api.distribute_guides(b"Sphere"), "neither a mesh object"),

@@ -1,15 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Simulated strands of 25 points: beside Blender's Hair Dynamics, and on a ball beside none, in one run."""
+"""Simulated strands of 25 points: beside Blender's Hair Dynamics, touching and free, and with hair that follows."""
 
+import contextlib
+import functools
 import os
+import time
 
 import bpy
+import gpu
 import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core.dynamics import rod_solver
-from tests.benchmarks.test_hair_speed import best_times, report
+import hair_addon
+from hair_addon.blender.groom import bindings, guide_simulation
+from hair_addon.blender.live import invalidation, live_hair, simulated_hair
+from hair_addon.core.dynamics import rod_solver, root_motion, rotations, simulation
+from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.geometry.mesh import TriMesh
+from hair_addon.core.geometry.sampling import sample_surface
+from tests.benchmarks.test_hair_speed import Time, best_times, report
+from tests.benchmarks.test_live_editing import View, on_gpu
+from tests.support.meshes import HEAD, read_obj
 from tests.support.rod_contact import Ball, advance_touching, planes_of
 from tests.support.rods import FRAME, Simulation, in_lanes, line
 
@@ -138,3 +150,146 @@ def test_touching_costs_little():
     report("Dynamics, contact", 1024, times, {"touching": 2}, "free")
     loading = times["neither"].work
     assert times["touching"].work - loading < 2.0 * (times["free"].work - loading)
+
+
+def finer(mesh):
+    """A mesh whose triangles are split in four."""
+    corners = mesh.vertices[mesh.triangles]
+    middles = (corners + np.roll(corners, -1, axis=1)) / 2.0
+    (a, b, c), (ab, bc, ca) = np.moveaxis(corners, 1, 0), np.moveaxis(middles, 1, 0)
+    parts = np.concatenate([np.stack(part, axis=1) for part in ((a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca))])
+    vertices, triangles = np.unique(parts.reshape(-1, 3), axis=0, return_inverse=True)
+    return TriMesh(vertices.astype(np.float32), triangles.reshape(-1, 3).astype(np.int32))
+
+
+class OnHead:
+    """4,000 guides on the scalp of the sample head: free, or colliding with it while it is still or turns at 1.5 Hz."""
+
+    def __init__(self, head, is_colliding, is_turning):
+        scalp = np.clip((head.vertices[:, 2] - 0.755) / 0.01, 0.0, 1.0)
+        roots = sample_surface(head, 4000, seed=0, density=scalp)
+        places = np.einsum("nc,ncx->nx", roots.barycentric, head.corners[roots.triangle]).astype(np.float64)
+        a, b, c = np.moveaxis(head.corners[roots.triangle], 1, 0)
+        normals = np.cross(b - a, c - a)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        t = np.linspace(0.0, LENGTH, 41)[:, None]
+        groom = places[:, None] + t * normals[:, None]
+        self.head, self.is_colliding, self.is_turning = head, is_colliding, is_turning
+        self.pose = root_motion.RootPose(places, np.tile(rotations.IDENTITY, (len(places), 1)))
+        settings = DynamicsSettings(hair_friction=0.0, hair_pressure=0.0, automatic_substeps=False, substeps=4)
+        self.frame, still = 0, root_motion.RigidMotion(rotations.IDENTITY, np.zeros(3), np.zeros(3))
+        self.simulation = simulation.Simulation(groom, settings, self.pose, self.world(still))
+
+    def world(self, motion):
+        """The world where the head has moved."""
+        head = simulation.Obstacle("Head", self.head.vertices.astype(np.float64), self.head.triangles)
+        return simulation.World(obstacles=(head.moved(motion),) if self.is_colliding else ())
+
+    def advance(self):
+        """The next frame."""
+        self.frame += 1
+        angle = 0.5 * np.sin(2.0 * np.pi * 1.5 * FRAME * self.frame) if self.is_turning else 0.0
+        turn = np.array([0.0, 0.0, np.sin(angle / 2.0), np.cos(angle / 2.0)])
+        motion = root_motion.RigidMotion(turn, np.array([0.0, -0.06, 0.75]), np.zeros(3))
+        self.simulation.advance(self.pose.moved(motion), self.world(motion), FRAME)
+
+
+@pytest.mark.long
+def test_four_thousand_guides_on_a_head():
+    """As they fall and swing on 34,000 triangles, beside the same guides that meet nothing."""
+    head = finer(read_obj(HEAD))
+    ways = {"free": OnHead(head, False, True), "still": OnHead(head, True, False), "turning": OnHead(head, True, True)}
+    for _ in range(12):  # hair has come to lie on the head
+        for way in ways.values():
+            way.advance()
+    times = best_times({name: way.advance for name, way in ways.items()}, 12)
+    report("Dynamics, on a head", 4000, times, {"still": 2, "turning": 4}, "free")
+    assert times["still"].work < times["turning"].work < 40.0 * times["free"].work
+
+
+class Parts:
+    """Time that functions take, called within a frame."""
+
+    def __init__(self, monkeypatch):
+        self._patch = monkeypatch
+        self.times = {}
+
+    def watch(self, name, owner, function):
+        """Add the time of each call of a module's or class's function."""
+        called = getattr(owner, function)
+
+        @functools.wraps(called)
+        def timed(*given, **options):
+            with self.of(name):
+                return called(*given, **options)
+
+        self._patch.setattr(owner, function, timed)
+
+    @contextlib.contextmanager
+    def of(self, name):
+        """Add the time until the end of a block."""
+        clock, work = time.perf_counter(), time.process_time()
+        yield
+        spent = self.times.setdefault(name, [])
+        spent.append(Time(time.perf_counter() - clock, time.process_time() - work))
+
+    def medians(self):
+        """{name: `Time`}, medians."""
+        return {
+            name: Time(*(float(np.median([getattr(t, kind) for t in spent])) for kind in ("clock", "work")))
+            for name, spent in self.times.items()
+        }
+
+
+@pytest.mark.long
+def test_hair_that_follows_simulated_guides(monkeypatch):
+    """100,000 strands between 1,000 guides on a head that bends: a frame of a window, and its parts, printed."""
+    hair_addon.register()
+    gpu.init()
+    try:
+        _play(monkeypatch)
+    finally:
+        live_hair.cancel_writing()
+        invalidation.clear()
+        hair_addon.unregister()
+
+
+def _play(monkeypatch):
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.obj_import(filepath=str(HEAD))
+    head = bpy.context.selected_objects[0]
+    bpy.context.view_layer.objects.active = head
+    bend = head.modifiers.new("Bend", "SIMPLE_DEFORM")
+    bend.deform_method, bend.deform_axis = "BEND", "Y"
+    for frame, angle in ((1, 0.0), (7, 0.3), (13, -0.3), (19, 0.3)):
+        bend.angle = angle
+        bend.keyframe_insert("angle", frame=frame)
+    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    bpy.ops.vellus.add_hair(guide_count=1000, length=LENGTH, strand_count=100_000)
+    guides, hair = (bpy.data.hair_curves[name] for name in ("Guides", "Hair"))
+    guides.vellus.simulates = True
+    view, parts = View(), Parts(monkeypatch)
+    for frame in range(1, 5):  # compiles
+        bpy.context.scene.frame_set(frame)
+        view.redraw()
+    assert guides.vellus.dynamics_status == ""
+    parts.watch("simulating", guide_simulation.GuideSimulation, "advance")
+    parts.watch("reading the surface", guide_simulation, "read")
+    for frame in range(5, 17):
+        with parts.of("a frame"):
+            with parts.of("Blender's frame, simulating and following"):
+                bpy.context.scene.frame_set(frame)
+                _ = bindings.of(hair).points  # strands that grow in other threads
+            with parts.of("upload"):
+                on_gpu(hair)
+            with parts.of("drawing"):
+                view.redraw()
+    times = parts.medians()
+    report("Dynamics, hair that follows", 100_000, times, {}, "a frame")
+    print(f"{1.0 / times['a frame'].clock:.1f} frames a second; stretch {_stretch(guides):.1e}")
+    assert len(parts.times["simulating"]) == 12
+
+
+def _stretch(guides):
+    """The largest of all simulated segments."""
+    return abs(simulated_hair.played_cache.get(guides.session_uid).simulated.simulation.stretch()).max()

@@ -2,13 +2,16 @@
 """simulate: frames baked from the command line, gone on with, and rendered; what is wrong is one sentence."""
 
 import subprocess
+from pathlib import Path
 
 import bpy
 import numpy as np
 import pytest
 
+from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.host import memory
 from tests.support.commands import ROOT, command, run, run_here
-from tests.support.reading import read_picture
+from tests.support.reading import evaluated_points, read_picture
 from tests.support.swung import simulate, swing
 
 
@@ -70,3 +73,56 @@ def test_files_without_simulated_guides_are_refused(shot):
     bpy.ops.wm.save_mainfile()
     ended = run_here("simulate", shot)
     assert ended.status == 1 and "no guides that simulate" in ended.errors
+
+
+def test_what_is_baked_is_told(shot):
+    def told():
+        (guides,) = run_here("info", shot, "--json").results[0]["guides"]
+        return guides["baked"]
+
+    assert told() is None
+    run_here("simulate", shot, "--last-frame", "4")
+    baked = told()
+    assert (baked["first"], baked["last"], baked["state"]) == (1, 4, "complete")
+    assert baked["missing"] == baked["outdated"] == []
+    next(Path(baked["folder"]).glob("+00000003.npz")).unlink()
+    state = bpy.data.objects["Guides"].data.vellus
+    state.dynamics.damping = 0.1
+    bpy.context.scene.render.fps = 30
+    bpy.ops.wm.save_mainfile()
+    assert (told()["missing"], told()["outdated"]) == ([3], ["frame rate", "settings"])
+    assert "outdated: ['frame rate', 'settings']" in run_here("info", shot).out
+
+
+def test_a_delivered_file_needs_no_cache(shot, tmp_path):
+    out = tmp_path / "elsewhere" / "delivered.blend"
+    told = run_here("simulate", shot, "--deliver", out, "--json").results[-1]
+    assert told["delivered"] == str(out.with_name("delivered_Guides.usdc")) and (told["first"], told["last"]) == (1, 6)
+    assert [*sorted(path.name for path in out.parent.iterdir())] == ["delivered.blend", "delivered_Guides.usdc"]
+    hair = bpy.data.objects["Hair"]
+    bpy.context.scene.frame_set(5)
+    live = evaluated_points(hair)
+    bpy.ops.wm.open_mainfile(filepath=str(out))
+    (cache_file,) = bpy.data.cache_files
+    assert cache_file.filepath == "//delivered_Guides.usdc"
+    bpy.data.hair_curves["Guides"].vellus.cache_folder = "//nothing"
+    bpy.context.scene.frame_set(5)
+    np.testing.assert_allclose(evaluated_points(bpy.data.objects["Hair"]), live, atol=1e-6)
+    frame_folders.require_baked(range(1, 7))
+    for name in (shot, tmp_path / "delivered.usdc"):
+        assert run_here("simulate", shot, "--deliver", name).status == 1
+
+
+def test_too_little_memory_is_told(shot, monkeypatch):
+    needed = guide_baking.memory_of([bpy.data.hair_curves["Guides"]])
+    monkeypatch.setattr(memory, "free_bytes", lambda: needed * 2)
+    warned = run_here("simulate", shot, "--last-frame", "1")
+    assert warned.status == 0 and "takes 50 % of the free memory" in warned.errors
+    monkeypatch.setattr(memory, "free_bytes", lambda: needed * 1.4)
+    refused = run_here("simulate", shot, "--overwrite")
+    assert refused.status == 1 and "use fewer guides" in refused.errors
+    assert memory.share_of_free(needed) > memory.MOST and not guide_baking.is_baking()
+
+
+def test_free_memory_is_what_the_system_says():
+    assert memory.free_bytes() > 50e6

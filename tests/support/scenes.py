@@ -2,6 +2,7 @@
 """Fixtures: Blender without a window, the registered add-on, and scenes for hair."""
 
 import math
+from types import SimpleNamespace
 
 import bpy
 import gpu
@@ -11,6 +12,7 @@ import pytest
 import hair_addon
 import tests.support.examples  # noqa: F401 (for what it sets)
 from hair_addon.blender.data import curves
+from hair_addon.blender.host import running
 from tests.support.guide_tools import wave
 from tests.support.imported import curves_object, lines_on
 from tests.support.reading import vertex_positions
@@ -168,3 +170,24 @@ def waved(hair):
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     bpy.ops.ed.undo_push(message="combed")
     return bpy.data.objects["Hair"]
+
+
+@pytest.fixture
+def window(scene):
+    """The context of a window, whose timers are counted."""
+    timers = []
+    manager = SimpleNamespace(
+        event_timer_add=lambda seconds, window: timers.append(seconds) or "timer",
+        event_timer_remove=lambda timer: timers.pop(),
+        modal_handler_add=lambda operator: None,
+    )
+    status = []
+    yield SimpleNamespace(
+        window_manager=manager,
+        window=None,
+        workspace=SimpleNamespace(status_text_set=status.append),
+        screen=SimpleNamespace(areas=[]),
+        timers=timers,
+        status=status,
+    )
+    assert not timers and running.job() is None

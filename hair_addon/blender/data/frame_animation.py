@@ -12,19 +12,19 @@ from ...core.dynamics.collider_settings import ColliderSettings, contact_of
 from ...core.errors import HairError
 from ...core.files import frame_manifest
 from ..host.notices import name_of
-from ..settings import setting_properties
+from ..settings import properties, setting_properties
 from . import curves, force_fields, scene, simulated_world
 
 _HALF = 16  # digits of a digest, for what carries guides, and for what else acts on them
 
-SURFACE, SURROUNDINGS = "the surface", "colliders, force fields or gravity"
+SURFACE, SURROUNDINGS = "the surface", "colliders, force fields, gravity or keyed settings"
 
 
 def digest_of(guides, blender_scene, depsgraph, settings):
     """32 hexadecimal digits of what moves guides with these `DynamicsSettings` in a depsgraph's frame.
 
-    Half of them are of the surface at their roots and its size, half of colliders, force fields and gravity. Raises
-    `HairError` where the surface cannot be read.
+    Half of them are of the surface at their roots and its size, half of colliders, force fields, gravity and settings
+    that are keyed. Raises `HairError` where the surface cannot be read.
     """
     metres = simulated_world.metres_of(blender_scene, settings)
     surface = guides.surface
@@ -57,7 +57,9 @@ def _acting(guides, blender_scene, depsgraph, settings, metres):
         if not (settings.collides_with_surface and collider == guides.surface)
     ]
     fields, _refused = force_fields.read(depsgraph, metres)
-    return [_rounded(gravity), colliders, [[_rounded(value) for value in asdict(one).values()] for one in fields]]
+    keyed = [getattr(settings, name) for name in sorted(properties.keyed_dynamics_of(guides.vellus))]
+    acting_fields = [[_rounded(value) for value in asdict(one).values()] for one in fields]
+    return [_rounded(gravity), colliders, acting_fields, [_rounded(value) for value in keyed]]
 
 
 def _collider(collider, depsgraph, settings, metres):

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         groom_settings,
         grown_guides,
         guide_additions,
+        guide_draping,
         guide_tools,
         hair_styles,
         hair_systems,

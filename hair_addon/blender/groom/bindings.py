@@ -41,6 +41,7 @@ class BoundHair:
     styles: StyledHair
     shares: np.ndarray | None = None  # (S, k) float32, the weights of each strand's guides as they are combed now
     growing: Future | None = None  # of `points`
+    free: Future | None = None  # of the points that follow guides, where `points` are kept outside of something
     is_written: bool = False  # whether the datablock holds these points
     has_moved_only: bool = False  # whether only points, and perhaps the guide map, are unwritten
     is_map_written: bool = False  # whether the datablock holds this guide map
@@ -94,6 +95,20 @@ class BoundHair:
             self._points_have_moved()
         return moved
 
+    def hold(self, points: np.ndarray) -> None:
+        """Have these points in place of those that follow guides, until they grow again."""
+        self.free, self.growing = self.growing, Future()
+        self.growing.set_result(points)
+
+    def let_go(self) -> None:
+        """Have the points that follow guides again, after `hold`."""
+        if self.free is not None:
+            self.growing, self.free = self.free, None
+
+    def is_due(self) -> None:
+        """Note that points are to be written again, though none has moved."""
+        self._points_have_moved()
+
     def _points_have_moved(self):
         self.has_moved_only = self.is_written or self.has_moved_only
         self.is_written = False
@@ -105,6 +120,7 @@ class BoundHair:
 
     def grow(self, chosen: np.ndarray | None = None) -> None:
         """Compute strands for `guides`, in other threads or, where they are (M,) indices of some, at once."""
+        self.let_go()
         binding, styling, axes = self.binding, self.styles.styling, self.surface.to_local_axes
         guides = self.guides if styling is None else styling.guides(self.guides)
         if chosen is None:
@@ -135,7 +151,7 @@ class BoundHair:
             self.catch_up()
             self.straight = None
         elif self.straight is None:
-            self.straight = replace(self, styles=self._unstyled(), growing=None, shares=None)
+            self.straight = replace(self, styles=self._unstyled(), growing=None, free=None, shares=None)
             self.straight.grow()
 
     def catch_up(self) -> None:

@@ -4,6 +4,8 @@
 Panels ask with every redraw, so geometry is not read.
 """
 
+import math
+
 import bpy
 from bpy.types import Curves, Scene
 
@@ -13,7 +15,7 @@ from ..data import simulated_world
 from ..data.curves import is_hand_made
 from ..settings import properties
 from ..settings.translations import error_text, interface_text
-from . import frame_folders
+from . import frame_folders, guide_simulation
 
 LONGEST = 1.5  # [m]: longer hair is probably of a character that is not modeled to scale
 TYPICAL_LENGTH = 0.1  # [m], of hand-made guides: the setting does not apply to them
@@ -36,6 +38,32 @@ def bend_note(guides: Curves, blender_scene: Scene) -> str:
     )
 
 
+def stiffness_note(guides: Curves) -> str:
+    """How many guides cannot hold their shape, as a translated sentence; empty where all can, or nobody knows yet."""
+    try:
+        settings = properties.dynamics_of(guides.vellus)
+    except HairError:
+        return ""  # `bend_note` says it
+    needed = guide_simulation.known_stiffness(guides, settings)
+    if needed is None or settings.hold > 0.0:
+        return ""
+    count = int((needed > settings.bend_stiffness).sum())
+    if not count:
+        return ""
+    return interface_text(
+        "{count} of {total} guides cannot hold their shape: they need a bend stiffness of {stiffness}.",
+        count=count,
+        total=len(needed),
+        stiffness=f"{rounded_up(float(needed.max())):g}",
+    )
+
+
+def rounded_up(stiffness: float) -> float:
+    """A stiffness to two digits, and not less."""
+    unit = 10.0 ** (math.floor(math.log10(stiffness)) - 1)
+    return float(f"{math.ceil(stiffness / unit) * unit:.2g}")
+
+
 def size_note(guides: Curves, blender_scene: Scene) -> str:
     """What to do about guides that are too long to be hair, as a translated sentence; empty where they are not."""
     length = _length(guides, blender_scene)
@@ -50,7 +78,7 @@ def size_note(guides: Curves, blender_scene: Scene) -> str:
 def is_delivery_outdated(hair: Curves) -> bool:
     """Whether guides were baked otherwise since their hair was delivered, as far as is known without reading files."""
     kept = frame_folders.folder_cache.get(hair.vellus.guide_curves.session_uid)
-    manifest = None if kept is None else kept[1].manifest
+    manifest = None if kept is None or kept[1] is None else kept[1].manifest
     return manifest is not None and hair.vellus.delivered_key != manifest.key
 
 

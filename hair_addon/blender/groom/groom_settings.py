@@ -22,7 +22,7 @@ def settings_of(hair: Curves) -> GroomSettings:
     guide_settings = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
     look, tables = properties.own_look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
     styles, names = style_items.styles_of(hair.vellus), style_items.names_of(hair.vellus)
-    dynamics = properties.dynamics_of(guides.vellus)
+    dynamics = properties.own_dynamics_of(guides.vellus)
     return GroomSettings(guide_settings, hair_settings, look, tables, styles, names, dynamics)
 
 
@@ -57,7 +57,7 @@ def assign_look(hair: Curves, look: Appearance) -> None:
 def assign_dynamics(guides: Curves, settings: DynamicsSettings) -> None:
     """Assign settings of the simulation to guide Curves; the same settings again mark nothing. Raises `HairError`."""
     curves.require_editable(guides)
-    if properties.dynamics_of(guides.vellus) != setting_properties.as_stored(settings):
+    if properties.own_dynamics_of(guides.vellus) != setting_properties.as_stored(settings):
         setting_properties.assign(guides.vellus.dynamics, settings)
 
 

@@ -40,9 +40,9 @@ def draped_if_new(
     """
     is_free = given.gravity is None and not given.flow_lines
     if not is_free or groom_defaults.known(completed.gravity) < HANGING:
-        return completed
+        return replace(completed, drape=False)
     face_count = int(dynamics.draped_growth.within_reach(surface.mesh, completed, density).sum())
-    return replace(completed, drape=cost.drape_seconds(completed, face_count) <= _QUICK)
+    return replace(completed, drape=cost.drape_seconds(completed.guide_count, face_count) <= _QUICK)
 
 
 def grow(

@@ -15,10 +15,11 @@ from ...core.errors import HairError
 from ...core.files import array_file, frame_cache, frame_manifest
 from ...core.files.frame_cache import FrameCache
 from ...core.files.frame_manifest import Manifest
+from ...core.grooming import cost
 from ...core.long_work import Stage, Work
 from ...core.params import given
 from ..data import scene as scenes
-from ..host import scene_time
+from ..host import memory, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import properties
@@ -58,13 +59,23 @@ class BakedFrame:
     folder: Path
 
 
+def memory_of(guides_list: Sequence[Curves]) -> int:
+    """Memory that baking guides takes while it runs [bytes]."""
+    counts = [(guides.vellus.dynamics.vertex_count, len(guides.curves)) for guides in guides_list]
+    return sum(cost.simulation_bytes(*count) for count in counts)
+
+
 def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
-    """{part: digest} of what the frames of some guides follow from, but for the animation. Raises `HairError`."""
-    settings = properties.dynamics_of(guides.vellus)
+    """{part: digest} of what the frames of some guides follow from, but for the animation, of settings too.
+
+    Raises `HairError`.
+    """
+    settings = given(guide_simulation.simulated(properties.dynamics_of(guides.vellus)))
+    keyed = properties.keyed_dynamics_of(guides.vellus)
     return frame_manifest.digests_of(
         {
             "solver": SOLVER_VERSION,
-            "settings": given(settings),
+            "settings": {name: value for name, value in settings.items() if name not in keyed},
             "guides": guide_simulation.combed_points(guides),
             "surface": guides.vellus.topology,
             "frame rate": scene.render.fps / scene.render.fps_base,
@@ -86,6 +97,7 @@ def baking(
     called for each frame of each guides when it is written. Raises `HairError`.
     """
     global _baking
+    memory.require(memory_of(guides_list))
     present = scene_time.frame_of(scene)
     _baking = True
     with contextlib.ExitStack() as stack:
@@ -165,7 +177,7 @@ def _begin(guides, last, scene, starts_over, stack):
 def _read(task, scene, depsgraph):
     """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
     guides = task.guides.find()
-    settings = properties.dynamics_of(guides.vellus)
+    settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     if settings != task.simulated.settings:  # keyed
         task.simulated.change(settings)
     read = guide_simulation.read(guides, scene, depsgraph, settings)

@@ -16,8 +16,12 @@ from ...core.errors import HairError
 from ..data import attributes, curves, guide_poses, simulated_world
 from ..data.guide_poses import GuidePose
 from ..host import scene_time
+from ..host.caches import Cache
 from ..settings import preferences, properties
 from . import staleness
+
+# session_uid of guides → ((G,) bend stiffness that each needs to hold its shape, `_load` of the settings then)
+stiffness_cache = Cache()
 
 
 @dataclass(frozen=True)
@@ -88,7 +92,7 @@ class GuideSimulation:
 
 def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:
     """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
-    settings = properties.dynamics_of(guides.vellus)
+    settings = simulated(properties.dynamics_of(guides.vellus))
     frame = read(guides, scene, depsgraph, settings)
     pose, metres = frame.pose, simulated_world.metres_of(scene, settings)
     local = combed_points(guides)
@@ -98,6 +102,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
     digest, topology = staleness.guides_digest(guides), guides.vellus.topology
+    _keep_stiffness(guides, settings, pose, local, frame.world.gravity)
     begun = GuideSimulation(digest, topology, settings, pose, local[:, 0].copy(), simulation, metres)
     begun.see(frame)
     return begun
@@ -110,6 +115,46 @@ def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsS
     rate = scene.render.fps / scene.render.fps_base
     seconds = settings.time_scale / rate
     return FrameInput(scene_time.frame_of(scene), pose, world, seconds, tuple(errors))
+
+
+def simulated(settings: DynamicsSettings) -> DynamicsSettings:
+    """Settings without those that guides do not follow from, but hair: to be compared with others."""
+    return replace(settings, keeps_hair_outside=False)
+
+
+def needed_stiffness(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> np.ndarray:
+    """(G,) bend stiffness with which each guide can hold its shape, 0 of those that hang. Raises `HairError`."""
+    settings = properties.dynamics_of(guides.vellus)
+    frame = read(guides, scene, depsgraph, settings)
+    return _keep_stiffness(guides, settings, frame.pose, combed_points(guides), frame.world.gravity)
+
+
+def known_stiffness(guides: Curves, settings: DynamicsSettings) -> np.ndarray | None:
+    """The same from when they began to be simulated, with the settings of now; None if they never were."""
+    kept = stiffness_cache.get(guides.session_uid)
+    if kept is None or len(kept[0]) != len(guides.curves):
+        return None
+    stiffness, ratio = kept
+    return stiffness * (_load(settings) / ratio)
+
+
+def _keep_stiffness(guides, settings, pose, local, gravity):
+    """Keep and return (G,) bend stiffnesses; local: `combed_points`; gravity: of the world [m/s²]."""
+    groom = pose.groom(local)
+    standing = pose.root_pose(pose).carried(groom - groom[:, :1])
+    vertices = dynamics.detail.vertices_of(standing, settings.vertex_count)
+    material = dynamics.material.material_of(settings, np.linalg.norm(np.diff(vertices, axis=1), axis=2))
+    x, y, z = (settings.gravity * component for component in gravity)
+    factors = dynamics.sag_free.least_stiffnesses(vertices, material, (x, y, z))
+    needed = factors * settings.bend_stiffness
+    stiffness_cache.keep(guides.session_uid, (needed, _load(settings)))
+    return needed
+
+
+def _load(settings):
+    """A measure of how much stiffness the material needs, whatever its own is."""
+    one = replace(settings, bend_stiffness=1.0)
+    return dynamics.stiffness_advice.weight_ratio(one, 1.0, abs(settings.gravity)) or 1.0
 
 
 def in_metres(settings: DynamicsSettings, metres: float) -> DynamicsSettings:

@@ -13,27 +13,23 @@ from itertools import pairwise
 import numpy as np
 from bpy.types import Curves, Depsgraph
 
-from ...core import dynamics, geometry, grooming
+from ...core import geometry, grooming
 from ...core.errors import HairError
 from ...core.geometry import mesh as mesh_math
-from ...core.geometry.mesh import SurfacePoints, TriMesh
+from ...core.geometry.mesh import SurfacePoints
 from ...core.grooming.guide_tool_settings import (
     AttractSettings,
     CopySettings,
-    DrapeSettings,
     LengthSettings,
     LiftSettings,
     SmoothSettings,
     ToolSettings,
     TrimSettings,
 )
-from ..data import attributes, curves, cutters, guide_curves, posed_strands, scene, simulated_world
+from ..data import attributes, curves, cutters, guide_curves, posed_strands, scene
 from ..data.scene import Surface
 from ..host.notices import name_of
-from ..settings import preferences, properties
-from . import guide_simulation
 
-LEAST_STIFFNESS = 1e-3  # of dynamics' settings
 _FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still floats
 
 
@@ -149,10 +145,22 @@ def reshape(guides: CombedGuides, shaped: Shaping) -> int:
     points. Guides of no weight, and of a single point, are not given to it.
     """
     after = guides.points.copy()
+    for chosen, places in to_shape(guides):
+        after[places] = shaped(guides.points[places], chosen)
+    return write_shapes(guides, after)
+
+
+def to_shape(guides: CombedGuides) -> list[tuple[np.ndarray, np.ndarray]]:
+    """[((M,) indices of guides, (M, P) of their points)] of those with weight and several points, by their number."""
+    found = []
     for count in np.unique(guides.counts[(guides.counts > 1) & (guides.weights > 0.0)]):
         chosen = np.flatnonzero((guides.counts == count) & (guides.weights > 0.0))
-        places = guides.of_count(int(count), chosen)
-        after[places] = shaped(guides.points[places], chosen)
+        found.append((chosen, guides.of_count(int(count), chosen)))
+    return found
+
+
+def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
+    """Write points (N, 3) [m] of guides; returns how many have changed. Raises `HairError`."""
     if not np.abs(after).max() < _FARTHEST:  # also refuses NaN
         raise HairError("The guides would extend too far from their surface: use smaller values.")
     is_moved = (after != guides.points).any(axis=1)
@@ -202,34 +210,6 @@ def lift(datablock: Curves, settings: LiftSettings, depsgraph: Depsgraph) -> int
     return reshape(
         guides, lambda points, chosen: lifted(points, guides.normals[chosen], settings, guides.weights[chosen])
     )
-
-
-def drape(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> int:
-    """Let guides fall on their surface as it is deformed now, until they are at rest; returns and raises as above."""
-    guides = read(datablock, settings, depsgraph)
-    dynamics_settings = properties.dynamics_of(datablock.vellus)
-    stiffness = max(settings.stiffness * dynamics_settings.bend_stiffness, LEAST_STIFFNESS)
-    dynamics_settings = replace(dynamics_settings, bend_stiffness=stiffness)
-    blender_scene = depsgraph.scene
-    gravity = tuple(blender_scene.gravity) if blender_scene.use_gravity else simulated_world.NO_GRAVITY
-    metres = simulated_world.metres_of(blender_scene, dynamics_settings)
-    posed, surface = guides.posed(), guides.surface
-    mesh = TriMesh(surface.posed_mesh.vertices * np.float32(metres), surface.posed_mesh.triangles)
-
-    def shaped(points, chosen):
-        there = metres * posed[guides.of_count(points.shape[1], chosen)].astype(np.float64)
-        settled = dynamics.draping.draped(
-            there,
-            mesh,
-            guide_simulation.in_metres(dynamics_settings, metres),
-            gravity,
-            settings.seconds,
-            preferences.device(),
-        )
-        at_rest = guides.carried_back((settled / metres).astype(np.float32), chosen)
-        return grooming.guide_segments.blended(points, at_rest, guides.weights[chosen])
-
-    return reshape(guides, shaped)
 
 
 def attract(datablock: Curves, settings: AttractSettings, depsgraph: Depsgraph) -> int:

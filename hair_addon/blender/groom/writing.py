@@ -13,7 +13,7 @@ from ..data import attributes, curves, curves_objects
 from ..data.scene import Surface
 from ..materials import looks
 from ..settings import setting_properties, style_items
-from . import bindings, staleness
+from . import bindings, hair_outside, staleness
 from .bindings import BoundHair
 from .grown_guides import GrownGuides
 
@@ -88,6 +88,7 @@ def write_hair(target: Curves) -> None:
             looks.evaluate_shading(target)
     if not bound.is_map_written and not attributes.is_from_library(target):
         curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
+    hair_outside.keep_outside(target, bound)
     curves.write_points(target, bound.growing)
     state.is_stale = False  # as another choice of guides marks it
     state.followed = staleness.guides_digest(state.guide_curves)

@@ -81,7 +81,7 @@ def bind_simulated():
     for guides in frame_folders.simulating():
         scene_time.go_to(blender_scene, guides.vellus.dynamics.start_frame)
         for hair in curves.followers(guides):
-            if hair.vellus.is_live:
+            if hair.vellus.is_live and not curves.follows_library(hair):
                 live_hair.make_again(hair, scene.present_depsgraph())
 
 

@@ -35,15 +35,22 @@ def write(path, guides, hair, file_axes):
     file_axes: (3, 3), Blender's axes → those that arrays are to be in. The file appears whole or not at all.
     Raises `HairError`.
     """
+    ending = path.suffix.lower()
+    if ending == ".blend":
+        save_copy(path)
+        return
     with whole_file(path) as partial:
-        ending = path.suffix.lower()
-        if ending == ".blend":
-            bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
-        elif ending == ".npz":
+        if ending == ".npz":
             np.savez(partial, **arrays(guides, hair, file_axes))
         else:
             _select(guides, hair)
             _export(partial, ending, guides, hair)
+
+
+def save_copy(path):
+    """Write all of the open file to another .blend, whole or not at all. Raises `HairError`."""
+    with whole_file(path) as partial:
+        bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 
 
 def arrays(guides, hair, file_axes):

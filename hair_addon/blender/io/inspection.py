@@ -8,9 +8,10 @@ import bpy
 from ...core.errors import HairError
 from ...core.grooming import cost
 from ...core.grooming.groom import GuideSettings, HairSettings
-from ..data import curves, scene
+from ..data import curves, delivered_hair, scene
 from ..data.curves import followers
-from ..groom import diagnostics
+from ..groom import diagnostics, frame_folders, guide_baking
+from ..host import scene_time
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, style_items
 from . import strand_arrays
@@ -47,9 +48,39 @@ def _guides(datablock):
         "hair": [name_of(hair) for hair in followers(datablock)],
         "settings": _settings(lambda: setting_properties.to_settings(datablock.vellus.guides, GuideSettings)),
         "simulates": datablock.vellus.simulates,
-        "dynamics": _settings(lambda: properties.dynamics_of(datablock.vellus)),
+        "dynamics": _settings(lambda: properties.own_dynamics_of(datablock.vellus)),
+        "baked": _baked(datablock),
         "warnings": _warnings(datablock),
     }
+
+
+def _baked(guides):
+    """What is baked of guides, and in what it is outdated; None where nothing is."""
+    frames = frame_folders.frames_of(guides)
+    if frames is None or frames.manifest is None:
+        return None
+    manifest, there = frames.manifest, set(frames.frame_numbers())
+    wanted = range(manifest.first, manifest.last + 1)
+    return {
+        "folder": str(frames.folder),
+        "first": manifest.first,
+        "last": manifest.last,
+        "state": manifest.state,
+        "missing": [number for number in wanted if number not in there],
+        "outdated": _changed_parts(guides, manifest),
+    }
+
+
+def _changed_parts(guides, manifest):
+    """What frames follow from that has changed since they were baked: settings, guides, surface and others."""
+    if manifest.guide_count != len(guides.curves):
+        return ["guides"]
+    try:
+        present = guide_baking.key_of(guides, scene_time.present_scene())
+    except HairError as error:
+        return [str(error)]
+    baked = manifest.keys[-1]
+    return sorted(part for part in {*present, *baked} if present.get(part) != baked.get(part))
 
 
 def _hair(datablock):
@@ -62,6 +93,7 @@ def _hair(datablock):
         "surface": datablock.surface and name_of(datablock.surface),
         "guides": state.guide_curves and name_of(state.guide_curves),
         "is_combed": curves.is_combed(datablock),
+        "is_delivered": delivered_hair.is_delivered(datablock),
         "model": state.model,
         "settings": _settings(lambda: setting_properties.to_settings(state.hair, HairSettings)),
         "appearance": _settings(lambda: properties.own_look_of(state)),

@@ -7,7 +7,7 @@ After an event nothing is drawn or computed from what was cached before it. Func
 
 from ..data import simulated_guides
 from ..gpu import lights, shaders, world_texture
-from ..groom import bindings, frame_folders
+from ..groom import bindings, frame_folders, guide_simulation
 from ..host import notices
 from ..render import hair_cache, region_pictures, viewport
 from ..settings import animated
@@ -39,6 +39,7 @@ OTHERS = (
     every_frame.before_cache,
     unlocked_renders.noted_cache,
     frame_folders.folder_cache,
+    guide_simulation.stiffness_cache,
     shaders.complaint_cache,
     notices.said_cache,
 )

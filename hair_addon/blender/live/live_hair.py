@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, drawn_lines, masks, simulated_guides
-from ..groom import bindings, edited_surfaces, painted_masks, pipeline, staleness, writing
+from ..groom import bindings, edited_surfaces, hair_outside, painted_masks, pipeline, staleness, writing
 from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
@@ -50,7 +50,10 @@ def follow_guides(hair, depsgraph, local=None):
         make_again(hair, depsgraph)
     elif len(moved):
         hair_cache.move(hair.session_uid, moved, bound.shown.growing)
-        _write_soon(hair)
+        write_soon(hair)
+    elif hair_outside.is_wanted(hair):
+        bound.is_due()  # colliders may have moved
+        write_soon(hair)
 
 
 def show_guides(guides, points, depsgraph):
@@ -112,7 +115,7 @@ def make_again(hair, depsgraph):
         hair.vellus.status = str(error)
         return
     invalidation.strands_made(hair)
-    _write_soon(hair)
+    write_soon(hair)
 
 
 def _follow_linked(hair, depsgraph):
@@ -127,7 +130,7 @@ def _follow_linked(hair, depsgraph):
     bindings.keep(hair, bound)
     _follow_simulated(hair)
     invalidation.strands_made(hair)
-    _write_soon(hair)
+    write_soon(hair)
 
 
 def _follow_simulated(hair):
@@ -151,7 +154,7 @@ def _restyled(hair):
         state.is_stale = False
         return
     invalidation.strands_made(hair)
-    _write_soon(hair)
+    write_soon(hair)
 
 
 def is_ahead(hair):
@@ -188,6 +191,9 @@ def _write(hair):
     """Write hair that is newer than its datablock. An error becomes its status, so that other hair is written."""
     try:
         writing.write_hair(hair)
+        bound = bindings.of(hair)
+        if bound is not None and bound.free is not None:
+            invalidation.strands_made(hair)  # of which some were kept outside
     except HairError as error:
         bindings.invalidate(hair)
         hair.vellus.status = str(error)
@@ -200,7 +206,8 @@ def cancel_writing():
         bpy.app.timers.unregister(write_after_pause)
 
 
-def _write_soon(hair):
+def write_soon(hair):
+    """Write hair after a pause in which nothing changes, without a window at once."""
     if not has_window():
         _write(hair)
         return

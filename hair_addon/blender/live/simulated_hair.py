@@ -12,9 +12,9 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ..data import scene, simulated_guides
-from ..groom import frame_folders, guide_baking, guide_simulation
-from ..groom.guide_simulation import GuideSimulation
+from ..data import curves, scene, simulated_guides
+from ..groom import bindings, frame_folders, guide_baking, guide_simulation, hair_outside
+from ..groom.guide_simulation import GuideSimulation, simulated
 from ..host import running, scene_time
 from ..host.caches import Cache
 from ..settings import properties
@@ -103,10 +103,20 @@ def _note_change(guides, blender_scene, depsgraph):
     try:
         if frame_folders.is_simulated(guides):
             _follow_known(guides, blender_scene, depsgraph)
+            _write_again(guides)
         _note_state(guides, blender_scene)
         guides.vellus.dynamics_status = ""
     except HairError as error:
         guides.vellus.dynamics_status = str(error)
+
+
+def _write_again(guides):
+    """Write the hair of guides again where it is to be kept outside of something, or not any more."""
+    for hair in curves.followers(guides):
+        bound = bindings.of(hair)
+        if bound is not None and hair_outside.is_wanted(hair) != (bound.free is not None):
+            bound.is_due()
+            live_hair.write_soon(hair)
 
 
 def _points_at(guides, time, checked_in=None):
@@ -177,6 +187,7 @@ def _begin(guides, blender_scene, depsgraph):
 
 def _advance(played, guides, blender_scene, depsgraph, settings):
     """Simulate one frame more, with the settings as they are now."""
+    settings = simulated(settings)
     if settings != played.simulated.settings:
         played.simulated.change(settings)
         played.outdated = played.frame

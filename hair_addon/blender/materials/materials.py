@@ -6,7 +6,7 @@ import bpy
 from ...core.shading import appearance
 from ..data import curves as curves_door
 from ..host.notices import name_of
-from ..settings import properties, setting_properties, style_items
+from ..settings import properties, setting_properties, shared_wetness
 from . import strand_nodes, wet_nodes
 
 HAIR_NODE = "ShaderNodeBsdfHairPrincipled"
@@ -41,7 +41,7 @@ def write_hair_material(curves):
                 curves_door.write_randoms(curves)  # hair of before this attribute
             if _has_places(curves):
                 _fill(node, material, properties.dry_look_of(curves.vellus))
-                wettest = wet_nodes.write(material.node_tree, node, properties.wetness_of(curves.vellus))
+                wettest = wet_nodes.write(material.node_tree, node, shared_wetness.of_hair(curves.vellus))
                 _fill(wettest, material, look)
             else:
                 wet_nodes.remove(material.node_tree, node)
@@ -50,7 +50,7 @@ def write_hair_material(curves):
 
 def _has_places(curves):
     """Whether strands differ in wetness."""
-    least, most = properties.wetness_of(curves.vellus)
+    least, most = shared_wetness.of_hair(curves.vellus)
     return least < most and curves_door.has_wetness(curves)
 
 
@@ -72,8 +72,7 @@ def _shows_another_look(material, curves):
 def _values(curves):
     state = curves.vellus
     values = setting_properties.values_of(state.appearance, setting_properties.names_of(appearance.Appearance))
-    least = values["wetness"]
-    most = max(least, style_items.wetness_of(state))
+    least, most = shared_wetness.of_hair(state)
     return values | {"wetness": (least if curves_door.has_wetness(curves) else most, most)}
 
 

@@ -25,7 +25,7 @@ from ..groom import bindings
 from ..host import paths
 from ..host.caches import Cache
 from ..host.notices import name_of
-from ..settings import preferences, properties
+from ..settings import preferences, properties, shared_wetness
 
 # Tables of this many settings are kept: one groom and the last few positions of a slider.
 _SHADING_CAPACITY = 8
@@ -272,7 +272,7 @@ def shading_of(datablock, strands=None):
     """
     state = datablock.vellus
     wettest = _shading_of_look(state, properties.look_of(state))
-    least, most = properties.wetness_of(state)
+    least, most = shared_wetness.of_hair(state)
     if strands is None or strands.wetness is None or least == most:
         return wettest
     driest = _shading_of_look(state, properties.dry_look_of(state))

@@ -21,16 +21,32 @@ def mark_shown(group, _context):
     group.id_data.update_tag()
 
 
-def mark_both(group, context):
-    """Do both: for settings that change the shape and the look of hair."""
-    mark_geometry(group, context)
-    mark_shading(group, context)
-
-
 def mark_dynamics(group, _context):
     """Simulate from now on with other settings: frames that were simulated before are outdated. Guides stay combed."""
     group.id_data.vellus.is_dynamics_stale = True
     group.id_data.update_tag()
+
+
+def mark_water(group, context):
+    """Update what shades hair, and simulate its guides with another weight; group: of the hair."""
+    mark_shading(group, context)
+    guides = group.id_data.vellus.guide_curves
+    if guides is not None and guides.vellus.simulates and guides.is_editable:
+        mark_dynamics(guides.vellus, context)
+
+
+def mark_wet_style(group, context):
+    """Do it, and style the hair again."""
+    mark_geometry(group, context)
+    mark_water(group, context)
+
+
+def mark_water_of_guides(group, context):
+    """Simulate guides with another weight, and update what shades the hair that follows them."""
+    mark_dynamics(group, context)
+    for curves in bpy.data.hair_curves:
+        if curves.vellus.guide_curves == group.id_data and curves.is_editable:
+            mark_shading(curves.vellus, context)
 
 
 def mark_colliding(group, context):

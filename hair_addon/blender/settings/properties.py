@@ -5,6 +5,8 @@ A change marks its Curves as stale and tags them; handlers.py is notified by the
 that sets ten properties costs one evaluation, and hair in an undo step always matches its settings.
 """
 
+from dataclasses import replace
+
 import bpy
 
 from ...core.dynamics.collider_settings import ColliderSettings
@@ -14,8 +16,16 @@ from ...core.imaging.pixel_sampling import PassSettings, RenderSettings
 from ...core.shading import appearance
 from ...core.shading.appearance import Appearance
 from ...core.shading.tables import lookup_tables
-from . import setting_properties, style_items
-from .marks import mark_colliding, mark_dynamics, mark_geometry, mark_shading, mark_shown
+from . import setting_properties, shared_wetness, style_items, style_keys
+from .marks import (
+    mark_colliding,
+    mark_dynamics,
+    mark_geometry,
+    mark_shading,
+    mark_shown,
+    mark_water,
+    mark_water_of_guides,
+)
 from .translations import CONTEXT
 
 _RELATIVE = {"PATH_SUPPORTS_BLEND_RELATIVE"}  # paths may begin with //
@@ -40,20 +50,14 @@ def own_look_of(state):
     return setting_properties.to_settings(state.appearance, Appearance)
 
 
-def wetness_of(state):
-    """(least, most) wetness of a hair: that of its look, which all strands have, and of its wettest style if more."""
-    least = own_look_of(state).wetness
-    return least, max(least, setting_properties.shortest(style_items.wetness_of(state)))
-
-
 def look_of(state):
-    """The dry `Appearance` that a hair is shaded with, which is as wet as its look or its wettest style."""
-    return appearance.wetted(own_look_of(state), wetness_of(state)[1])
+    """The dry `Appearance` that a hair is shaded with, which is as wet as `shared_wetness.of_hair`."""
+    return appearance.wetted(own_look_of(state), shared_wetness.of_hair(state)[1])
 
 
 def dry_look_of(state):
     """The same of strands that no style wets, where these have places."""
-    return appearance.wetted(own_look_of(state), wetness_of(state)[0])
+    return appearance.wetted(own_look_of(state), shared_wetness.of_hair(state)[0])
 
 
 def own_table_settings_of(state):
@@ -61,9 +65,21 @@ def own_table_settings_of(state):
     return setting_properties.to_settings(state.marschner, lookup_tables.Settings, skip=appearance.TABLE_FIELDS)
 
 
-def dynamics_of(state):
+def own_dynamics_of(state):
     """The `DynamicsSettings` of guides as they are set; state: their `VellusCurves`. Raises `HairError`."""
     return setting_properties.to_settings(state.dynamics, DynamicsSettings)
+
+
+def dynamics_of(state):
+    """The `DynamicsSettings` that guides move by: as wet as their hair. Raises `HairError`."""
+    return replace(own_dynamics_of(state), wetness=shared_wetness.of_guides(state))
+
+
+def keyed_dynamics_of(state):
+    """Names of the settings that `dynamics_of` gives that keys or drivers move."""
+    paths = style_keys.keyed_paths(state.id_data)
+    names = {name for name in setting_properties.names_of(DynamicsSettings) if f"vellus.dynamics.{name}" in paths}
+    return names | ({"wetness"} if shared_wetness.is_keyed(state) else set())
 
 
 def table_settings_of(state, look=None):
@@ -78,6 +94,10 @@ def table_settings_of(state, look=None):
 
 def _renew_passes(_group, context):
     context.view_layer.update_render_passes()
+
+
+def _all_but_wetness(settings_class):
+    return set(setting_properties.names_of(settings_class)) - {"wetness"}
 
 
 class VellusGuideSettings(bpy.types.PropertyGroup):
@@ -95,7 +115,10 @@ class VellusHairSettings(bpy.types.PropertyGroup):
 class VellusAppearance(bpy.types.PropertyGroup):
     """Appearance of hair, in the viewport and in Cycles"""
 
-    __annotations__ = setting_properties.annotations(Appearance, mark_shading)
+    __annotations__ = {
+        **setting_properties.annotations(Appearance, mark_shading),
+        **setting_properties.annotations(Appearance, mark_water, skip=_all_but_wetness(Appearance)),
+    }
 
 
 class VellusMarschnerSettings(bpy.types.PropertyGroup):
@@ -107,9 +130,12 @@ class VellusMarschnerSettings(bpy.types.PropertyGroup):
 class VellusDynamicsSettings(bpy.types.PropertyGroup):
     """Simulation of guides"""
 
-    __annotations__ = setting_properties.annotations(
-        DynamicsSettings, mark_dynamics, unkeyed=_UNKEYED, override=OVERRIDABLE
-    )
+    __annotations__ = {
+        **setting_properties.annotations(DynamicsSettings, mark_dynamics, unkeyed=_UNKEYED, override=OVERRIDABLE),
+        **setting_properties.annotations(
+            DynamicsSettings, mark_water_of_guides, skip=_all_but_wetness(DynamicsSettings), override=OVERRIDABLE
+        ),
+    }
 
 
 class VellusCollider(bpy.types.PropertyGroup):

@@ -13,15 +13,15 @@ from ...core.params import declared
 from ...core.styling.kinds import DESCRIPTIONS, KINDS, LABELS, MOST_STYLES, kind_of
 from ..host.notices import text_of
 from . import setting_properties, style_keys
-from .marks import mark_both, mark_geometry
+from .marks import mark_geometry, mark_wet_style
 from .translations import CONTEXT
 
 _UNKEYED = ("seed",)  # strands would jump
 
 
 def _group_class(kind):
-    """A property group of the settings of a kind. Water is seen in shading too."""
-    update = mark_both if kind == "WET" else mark_geometry
+    """A property group of the settings of a kind. Water is seen in shading and in motion too."""
+    update = mark_wet_style if kind == "WET" else mark_geometry
     annotations = setting_properties.annotations(KINDS[kind], update, unkeyed=_UNKEYED)
     contents = {"__doc__": DESCRIPTIONS[kind], "__annotations__": annotations, "__module__": __name__}
     return type(f"Vellus{LABELS[kind]}", (bpy.types.PropertyGroup,), contents)
@@ -133,7 +133,7 @@ def add(state, settings, name="", place=None):
     places = [index + (index >= place) for index in range(len(names))]
     style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state)))
     state.active_style = place
-    mark_both(state, None)
+    mark_wet_style(state, None)
 
 
 def duplicate(state, place):
@@ -209,7 +209,7 @@ def _follow(state, names, order):
     """Bring keys up to date, and mark the hair; order: index before of each style in the list, None for a new one."""
     places = [order.index(index) if index in order else None for index in range(len(names))]
     style_keys.follow(state.id_data, style_keys.Rearrangement(names, places, names_of(state)))
-    mark_both(state, None)
+    mark_wet_style(state, None)
 
 
 def values_of(item):

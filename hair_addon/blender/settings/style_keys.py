@@ -108,6 +108,19 @@ def _follow_action(curves, action, slot, rearrangement):
     return action
 
 
+def keyed_paths(curves):
+    """The data paths of Curves that keys, NLA strips or drivers move."""
+    animation = curves.animation_data
+    if animation is None:
+        return set()
+    moving = [fcurve.data_path for fcurve in animation.drivers]
+    for user in (animation, *_strips(animation)):
+        if user.action is not None and user.action_slot is not None:
+            bags = _channelbags(user.action, user.action_slot.handle)
+            moving += [fcurve.data_path for bag in bags for fcurve in bag.fcurves]
+    return set(moving)
+
+
 def _channelbags(action, handle):
     strips = (strip for layer in action.layers for strip in layer.strips)
     return [bag for strip in strips for bag in strip.channelbags if bag.slot_handle == handle]

@@ -35,12 +35,12 @@ _PROFILE = tuple(
     if name not in setting_properties.names_of(StyleSettings)
 )
 
-_MATERIAL = ("bend_stiffness", "twist_stiffness", "stretch_stiffness", "tip_stiffness", "damping", "weight", "wetness")
+_MATERIAL = ("bend_stiffness", "twist_stiffness", "stretch_stiffness", "tip_stiffness", "damping", "weight")
 _FIBRE = ("youngs_modulus", "shear_modulus", "fibre_radius", "density")
 _FORCES = ("gravity", "air_drag", "force_fields", "inertia")
 _SHAPE = ("hold", "hold_tip", "sag_free", "pinned")
 _COLLIDERS = ("collides_with_surface", "colliders")
-_CONTACT = ("collision_distance", "friction")
+_CONTACT = ("collision_distance", "friction", "keeps_hair_outside")
 _VOLUME = ("hair_friction", "hair_pressure", "cell_size")
 
 
@@ -62,11 +62,11 @@ def search_row(layout, owner, name, source, collection, **details):
     _value_side(layout, owner, name).prop_search(owner, name, source, collection, text="", **details)
 
 
-def _value_side(layout, owner, name):
+def _value_side(layout, owner, name, title=""):
     sides = layout.split(factor=NAME_SHARE)
     name_side = sides.row()
     name_side.alignment = "RIGHT"
-    name_side.label(text=interface_text(owner.bl_rna.properties[name].name), translate=False)
+    name_side.label(text=interface_text(title or owner.bl_rna.properties[name].name), translate=False)
     value_side = sides.column()
     value_side.use_property_split = False
     return value_side
@@ -176,9 +176,13 @@ def style_mask_rows(layout, item, surface):
     row(layout, owner, "invert_mask")
 
 
-def material_rows(layout, owner):
-    """Stiffness, damping and weight; owner: has the properties of `DynamicsSettings`, as for the rows below."""
+def material_rows(layout, owner, wetness):
+    """Stiffness, damping and weight; owner: has the properties of `DynamicsSettings`, as for the rows below.
+
+    wetness: (owner, name) of the slider that wets the hair, which may be that of its look or of a Wet style.
+    """
     rows(layout, owner, DynamicsSettings, _MATERIAL)
+    _value_side(layout, *wetness, title="Wetness").prop(*wetness, text="")
 
 
 def fibre_rows(layout, owner):
@@ -213,7 +217,7 @@ def volume_rows(layout, owner):
 
 def solver_rows(layout, owner):
     """All other settings of the simulation."""
-    apart = (_MATERIAL, _FIBRE, _FORCES, _SHAPE, _COLLIDERS, _CONTACT, _VOLUME)
+    apart = (_MATERIAL, ("wetness",), _FIBRE, _FORCES, _SHAPE, _COLLIDERS, _CONTACT, _VOLUME)
     rows(layout, owner, DynamicsSettings, others(DynamicsSettings, *apart))
 
 

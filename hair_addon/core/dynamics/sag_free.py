@@ -63,14 +63,16 @@ def sag_free(groom: np.ndarray, material: Material, gravity: tuple[float, float,
 
 
 def least_stiffness(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> float:
-    """The factor of `material`'s stiffness of bending at which strands (S, M+1, 3) [m] can hold their shape.
+    """The factor of `material`'s stiffness of bending at which strands (S, M+1, 3) [m] can hold their shape."""
+    return float(least_stiffnesses(groom, material, gravity).max(initial=0.0))
 
-    Strands that hang, whose tip is the lowest point, need none.
-    """
+
+def least_stiffnesses(groom: np.ndarray, material: Material, gravity: tuple[float, float, float]) -> np.ndarray:
+    """(S,) float64: the same of each strand. Strands that hang, whose tip is the lowest point, need none."""
     down = np.asarray(gravity, np.float64)
     size = float(np.linalg.norm(down))
     if size == 0.0:
-        return 0.0
+        return np.zeros(len(groom))
     heights = -np.asarray(groom, np.float64) @ (down / size)
     is_hanging = heights[:, -1] <= heights.min(axis=1)
     lengths = material.lengths.sum(axis=1)
@@ -79,7 +81,7 @@ def least_stiffness(groom: np.ndarray, material: Material, gravity: tuple[float,
     )
     stiffness = (joint_lengths / material.bend_compliances).min(axis=1)  # EI, where it is least
     load = material.masses.sum(axis=1) * size * lengths**2 / stiffness  # Γ
-    return float(np.max(np.where(is_hanging, 0.0, load), initial=0.0)) / GREENHILL
+    return np.where(is_hanging, 0.0, load) / GREENHILL
 
 
 def _forces(material, gravity):

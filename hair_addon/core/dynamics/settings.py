@@ -105,6 +105,11 @@ class DynamicsSettings(Settings):
         True, "Keep the hair outside the surface it grows on", label="Collide with surface"
     )
     colliders: str = param("", "Collection of the meshes that the hair collides with")
+    keeps_hair_outside: bool = param(
+        False,
+        "Keep the hair between guides outside too, in renders and exports; while playing, hair may pass through",
+        label="Keep hair outside",
+    )
     collision_distance: float = param(
         1e-3,
         "Distance that the hair keeps from colliders",

@@ -29,8 +29,12 @@ _HAIR_FACE_SECONDS, _STRAND_SECONDS = 2.5e-6, 3e-6
 # Simulating: a frame, and a vertex in a substep, with contact.
 _FRAME_SECONDS, _VERTEX_SECONDS = 0.02, 4e-7
 
-# Draping as guides grow: once, a triangle within their reach, and a guide.
-_DRAPE_SECONDS, _DRAPE_FACE_SECONDS, _DRAPE_GUIDE_SECONDS = 0.15, 4e-6, 5e-4
+# While they are simulated: a guide, and a vertex of it.
+_SIMULATED_GUIDE_BYTES, _SIMULATED_VERTEX_BYTES = 30_000, 600
+
+# Draping: once, a triangle of the surface, and a guide in a substep.
+_DRAPE_SECONDS, _DRAPE_FACE_SECONDS, _DRAPE_GUIDE_SECONDS = 0.15, 4e-6, 1e-5
+GROWN_SUBSTEPS = 48  # of guides that are draped as they grow
 
 _TEXEL_SECONDS = 1.5e-6  # of all of the Marschner tables together
 
@@ -60,17 +64,22 @@ def guide_seconds(settings: GuideSettings, face_count: int) -> float:
     rounds = min(settings.relax_iterations, _MOST_ROUNDS)
     guide = _GUIDE_SECONDS + rounds * _GUIDE_ROUND_SECONDS + (_SPREAD_SECONDS if rounds else 0.0)
     placing = settings.guide_count * guide + face_count * (_FACE_SECONDS + rounds * _FACE_ROUND_SECONDS)
-    return placing + (drape_seconds(settings, face_count) if settings.drape else 0.0)
+    return placing + (drape_seconds(settings.guide_count, face_count) if settings.drape else 0.0)
 
 
-def drape_seconds(settings: GuideSettings, face_count: int) -> float:
-    """How long draping guides that have grown takes [s]; face_count: triangles within their reach."""
-    return _DRAPE_SECONDS + settings.guide_count * _DRAPE_GUIDE_SECONDS + face_count * _DRAPE_FACE_SECONDS
+def drape_seconds(guide_count: int, face_count: int, substeps: int = GROWN_SUBSTEPS) -> float:
+    """How long draping guides takes [s]; face_count: triangles that they may touch; substeps: in all."""
+    return _DRAPE_SECONDS + guide_count * substeps * _DRAPE_GUIDE_SECONDS + face_count * _DRAPE_FACE_SECONDS
 
 
 def hair_seconds(settings: HairSettings, face_count: int) -> float:
     """How long growing strands between guides takes [s]; settings: `HairSettings`; face_count as above."""
     return settings.strand_count * _STRAND_SECONDS + face_count * _HAIR_FACE_SECONDS
+
+
+def simulation_bytes(vertex_count: int, guide_count: int) -> int:
+    """Memory that simulating guides takes while it runs [bytes]; vertex_count: of a guide."""
+    return guide_count * (_SIMULATED_GUIDE_BYTES + vertex_count * _SIMULATED_VERTEX_BYTES)
 
 
 def table_seconds(size: int) -> float:

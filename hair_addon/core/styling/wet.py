@@ -4,7 +4,7 @@
 With w the amount: guides lean down by cling · w over the first 0.3; strands are smoothed over twice the lock
 size by relax · w, and clump in two levels with amounts 0.92 w^1.5 (large) and 0.92 w^½ (small; 9.2 w up to w = 0.01, as
 a root begins vertically). Shading takes the same w as its wetness, that of each strand where a mask or a variation
-makes them differ (strand_wetness.py).
+makes them differ (strand_wetness.py), and so do simulated guides.
 """
 
 from dataclasses import dataclass

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Baked guides: the groom first, the same bits from any state on, and hair that follows them in every frame."""
 
+import shutil
+
 import bpy
 import numpy as np
 import pytest
@@ -82,6 +84,23 @@ def test_stopped_baking_keeps_what_it_has(swung):
     assert cache.manifest.state == "part" and cache.frame_numbers() == list(range(1, 9))
     bake(guides)
     assert cache.read_manifest().state == "complete"
+
+
+def test_a_folder_that_goes_away_ends_baking(swung):
+    guides, _hair = swung
+    scene = bpy.context.scene
+    scene.frame_set(5)
+
+    def remove(step, _part):
+        if step == "Frame 4":
+            shutil.rmtree(frame_folders.folder_of(guides.data))
+
+    with pytest.raises(HairError, match="lost its manifest"):
+        bake(guides, progress=remove)
+    assert scene.frame_current == 5 and not guide_baking.is_baking()
+    assert not frame_folders.folder_of(guides.data).exists()
+    bake(guides, 6)
+    assert frame_cache.FrameCache(frame_folders.folder_of(guides.data)).manifest.state == "complete"
 
 
 def test_roots_stay_on_a_surface_that_bends(arm, tmp_path):

@@ -9,13 +9,13 @@ import pytest
 
 from hair_addon.blender.data import follow_nodes
 from hair_addon.blender.groom import dynamics_notes, frame_folders, guide_baking
-from hair_addon.blender.host import running
 from hair_addon.blender.io import delivery
 from hair_addon.blender.live import live_hair
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import Stopped, run_now
 from tests.support.delivered import without_addon
 from tests.support.following import grow
+from tests.support.modal import Operator, drive
 from tests.support.reading import evaluated_points, everything, read_picture
 from tests.support.rendering import light_up
 from tests.support.swung import simulate
@@ -80,7 +80,7 @@ def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_pat
     made = deliver(shot)
     assert made.path == tmp_path / "shot_Guides.usdc" and made.byte_count == made.path.stat().st_size
     assert largest_difference(live(times), before) < 1e-6
-    assert largest_difference({time: before[4.0] for time in times}, before) > 0.01
+    assert largest_difference(dict.fromkeys(times, before[4.0]), before) > 0.01
     bpy.ops.wm.save_mainfile()
     found, picture = without_addon(tmp_path / "shot.blend", tmp_path, times)
     assert largest_difference(found, before) < 1e-6
@@ -221,11 +221,33 @@ def test_a_full_disk_is_told(shot, tmp_path):
         assert not [*tmp_path.glob(".vellus*")]
 
 
-def test_in_a_window_hair_is_followed_in_each_frame_although_an_operator_runs(shot, monkeypatch):
-    """Viewports go first there, and nothing follows while long work runs."""
+def test_all_hair_of_the_guides_is_delivered_whatever_its_name_and_the_frame_rate(shot):
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    bpy.ops.vellus.interpolate_hair(strand_count=30)
+    other = next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.hair.strand_count == 30)
+    other.name = other.data.name = "9 Härchen/é"
+    other.hide_viewport = True
+    scene = bpy.context.scene
+    scene.render.fps_base, scene.unit_settings.scale_length = 1.001, 0.01
+    before = live((4.0, 4.75))
+    made = deliver(shot)
+    assert (
+        made.strand_count == 130 and other.modifiers[0].object_path != bpy.data.objects["Hair"].modifiers[0].object_path
+    )
+    other.hide_viewport = False
+    assert largest_difference(live((4.0, 4.75)), before) < 1e-5  # time in seconds is rounded
+    delivered = evaluated_points(other)
+    delivery.take_off(shot)
+    assert abs(evaluated_points(other) - delivered).max() < 1e-5
+    scene.frame_set(1)
+    assert abs(evaluated_points(other) - delivered).max() > 0.01
+
+
+def test_in_a_window_hair_is_followed_although_an_operator_runs(window, shot, monkeypatch):
+    """Viewports go first there, and nothing else follows while long work runs."""
     before = live((4.0, 4.75))
     monkeypatch.setattr(live_hair, "has_window", lambda: True)
-    monkeypatch.setattr(running, "_job", object())
-    deliver(shot)
+    operator = Operator(delivery.delivering(shot, delivery.path_of(shot), bpy.context.scene))
+    assert drive(operator, window) == {"FINISHED"}
     monkeypatch.undo()
     assert largest_difference(live((4.0, 4.75)), before) < 1e-6

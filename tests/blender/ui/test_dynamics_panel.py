@@ -37,7 +37,7 @@ def test_every_setting_has_a_row(state, active):
 HIDDEN = {
     "nothing to collide with": (
         {"collides_with_surface": False},
-        {"collision_distance", "friction"},
+        {"collision_distance", "friction", "keeps_hair_outside"},
     ),
     "a collection": ({"collides_with_surface": False, "colliders": "Body"}, set()),
     "no forces between strands": ({"hair_friction": 0.0, "hair_pressure": 0.0}, {"cell_size"}),

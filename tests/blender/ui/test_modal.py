@@ -13,61 +13,12 @@ from hair_addon.blender.host import running
 from hair_addon.blender.live import handlers
 from hair_addon.blender.render import offscreen
 from hair_addon.blender.settings import setting_properties
-from hair_addon.blender.ui.operators.modal import LongOperator
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.long_work import Job, run_now
+from tests.support.modal import ESC, TIMER, Operator, drive
 from tests.support.reading import points, snapshot
-
-TIMER = SimpleNamespace(type="TIMER", value="NOTHING")
-ESC = SimpleNamespace(type="ESC", value="PRESS")
-
-
-class Operator(LongOperator):
-    """Stands in for a registered operator, which only Blender can make."""
-
-    def __init__(self, work):
-        self._given, self.reported = work, []
-
-    def work(self, _context):
-        return self._given
-
-    def message(self, made):
-        return "{count} guides", {"count": made}
-
-    def report(self, kinds, text):
-        self.reported.append((*kinds, text))
-
-
-@pytest.fixture
-def window(scene):
-    """The context of a window, whose timers are counted."""
-    timers = []
-    manager = SimpleNamespace(
-        event_timer_add=lambda seconds, window: timers.append(seconds) or "timer",
-        event_timer_remove=lambda timer: timers.pop(),
-        modal_handler_add=lambda operator: None,
-    )
-    status = []
-    yield SimpleNamespace(
-        window_manager=manager,
-        window=None,
-        workspace=SimpleNamespace(status_text_set=status.append),
-        screen=SimpleNamespace(areas=[]),
-        timers=timers,
-        status=status,
-    )
-    assert not timers and running.job() is None
-
-
-def drive(operator, window):
-    """Send timer events until the operator ends."""
-    outcome = operator.begin(window)
-    while outcome == {"RUNNING_MODAL"}:
-        if running.job().is_done or operator.reported:
-            outcome = operator.modal(window, TIMER)
-    return outcome
 
 
 def test_work_ends_as_it_would_at_once(window):

@@ -7,6 +7,7 @@ from ...data import delivered_hair
 from ...groom import dynamics_notes, frame_folders
 from ...groom.selection import guides_of, hair_of, object_of
 from ...live import dynamics_state, simulated_hair, unlocked_renders
+from ...settings import shared_wetness
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
 from .tab import HairTab, split, write
@@ -97,10 +98,15 @@ class VELLUS_PT_dynamics_material(_OfDynamics, bpy.types.Panel):
 
     def draw(self, context):
         column, settings = _settings_column(self.layout, context)
-        setting_rows.material_rows(column, settings)
-        note = dynamics_notes.bend_note(guides_of(context.object), context.scene)
+        guides = guides_of(context.object)
+        setting_rows.material_rows(column, settings, shared_wetness.slider_of(guides.vellus))
+        note = dynamics_notes.bend_note(guides, context.scene)
         if note:
             write(column, context, note, "INFO")
+        weakness = dynamics_notes.stiffness_note(guides)
+        if weakness:
+            write(column, context, weakness, "ERROR")
+            column.operator("vellus.stiffen_dynamics")
 
 
 class VELLUS_PT_dynamics_fiber(_OfDynamics, bpy.types.Panel):

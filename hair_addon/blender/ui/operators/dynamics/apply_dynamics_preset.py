@@ -31,6 +31,6 @@ class VELLUS_OT_apply_dynamics_preset(HairOperator, bpy.types.Operator):
 
     def change(self, context):
         guides = guides_of(context.object)
-        wanted = applied(properties.dynamics_of(guides.vellus), self.preset)
+        wanted = applied(properties.own_dynamics_of(guides.vellus), self.preset)
         groom_settings.assign_dynamics(guides, wanted)
         return PRESETS[self.preset][0], {}

@@ -7,7 +7,7 @@ from .....core.errors import HairError
 from .....core.grooming import cost
 from ....groom import guide_baking
 from ....groom.selection import guides_of
-from ....host import scene_time
+from ....host import memory, scene_time
 from ....settings import properties
 from ....settings.translations import report_text
 from ..modal import LongOperator
@@ -38,10 +38,18 @@ class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
         guides = guides_of(context.object)
         if not bpy.data.filepath and guides.vellus.cache_folder.startswith("//"):
             raise HairError("Baked frames are kept beside the .blend file: save the file first.")
+        self._say_memory(guide_baking.memory_of([guides]))
         guides.vellus.simulates = True
         last = scene_time.scene_frames()[-1]
         (baked,) = yield from guide_baking.baking([guides], last, context.scene, self.starts_over)
         return baked
+
+    def _say_memory(self, byte_count):
+        """Warn of work that takes much of the free memory; Esc stops it."""
+        part = memory.share_of_free(byte_count)
+        if memory.MUCH < part <= memory.MOST:
+            said = "Baking takes {percent}% of the free memory"
+            self.report({"WARNING"}, report_text(said, percent=round(100.0 * part)))
 
     def message(self, made):
         if made.broken:

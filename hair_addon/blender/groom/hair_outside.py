@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that is kept out of what its simulated guides collide with, where it is written: for renders and exports."""
+
+from dataclasses import replace
+
+from bpy.types import Curves
+
+from ...core import dynamics
+from ...core.errors import HairError
+from ..data import guide_poses, scene, simulated_guides, simulated_world
+from ..host import notices, scene_time
+from ..settings import preferences, properties
+from .bindings import BoundHair
+
+_SKIN = 1e-5  # [m] that hair keeps from the surface it grows on
+
+
+def is_wanted(hair: Curves) -> bool:
+    """Whether hair is to be kept outside in the frame that its guides are shown in."""
+    guides = hair.vellus.guide_curves
+    return guides is not None and guides.vellus.dynamics.keeps_hair_outside and simulated_guides.is_shown(guides)
+
+
+def keep_outside(hair: Curves, bound: BoundHair) -> None:
+    """Move strands that are about to be written out of the surface and the colliders of their guides."""
+    bound.let_go()
+    if not is_wanted(hair):
+        return
+    try:
+        settings = properties.dynamics_of(hair.vellus.guide_curves.vellus)
+        blender_scene, depsgraph = scene_time.present_scene(), scene.present_depsgraph()
+        metres = simulated_world.metres_of(blender_scene, settings)
+        pose = guide_poses.read(hair, depsgraph, metres)
+        world, _errors = simulated_world.read(blender_scene, depsgraph, settings, pose, hair.surface)
+        obstacles = [replace(one, distance=_SKIN) if one.vertices is pose.vertices else one for one in world.obstacles]
+        there = pose.to_world(bound.points)
+        moved, is_moved = dynamics.outside.kept_outside(there, obstacles, preferences.device())
+    except HairError as error:
+        notices.say(str(error))
+        return
+    if is_moved.any():
+        kept = bound.points.copy()
+        kept[is_moved, 1:] = pose.to_rest(moved)[is_moved, 1:]
+        bound.hold(kept)

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Wetness, one value of hair and of its guides: the largest that look, Wet styles and dynamics are set to.
+
+Materials, viewports and the simulation read it here, so any of these sliders changes what hair looks like and how it
+moves; the Wet style also gives it the shape of wet hair.
+"""
+
+import bpy
+
+from . import setting_properties, style_items, style_keys
+
+
+def of_hair(state):
+    """(least, most) wetness of a hair, of strands that no style wets and of the wettest; state: its `VellusCurves`."""
+    guides = state.guide_curves
+    of_dynamics = 0.0 if guides is None else _value(guides.vellus.dynamics)
+    least = max(_value(state.appearance), of_dynamics)
+    return least, max(least, setting_properties.shortest(style_items.wetness_of(state)))
+
+
+def of_guides(state):
+    """The wetness that guides move with: that of their wettest hair, or their own where that is more."""
+    return max([_value(state.dynamics), *(of_hair(hair.vellus)[1] for hair in _followers(state))])
+
+
+def slider_of(state):
+    """(property group, name) of the setting that wets the hair of some guides most; of dynamics where nothing does.
+
+    A Wet style comes first, also a dry one: it is what changes all that water does.
+    """
+    found = [(_value(state.dynamics), 0, state.dynamics, "wetness")]
+    for hair in _followers(state):
+        found.append((_value(hair.vellus.appearance), -1, hair.vellus.appearance, "wetness"))
+        items = (item for item in hair.vellus.styles if item.kind == "WET" and item.wet.is_on)
+        found += [(setting_properties.shortest(item.wet.amount), 1, item.wet, "amount") for item in items]
+    return max(found, key=lambda one: one[:2])[2:]
+
+
+def _value(group):
+    """The wetness of a group; of one that a script has set to no number, none."""
+    value = setting_properties.shortest(group.wetness)
+    return value if 0.0 <= value <= 1.0 else 0.0
+
+
+def _followers(state):
+    guides = state.id_data
+    return [c for c in bpy.data.hair_curves if c.vellus.guide_curves == guides and c.vellus.kind == "HAIR" and c.users]
+
+
+def is_keyed(state):
+    """Whether the wetness that guides move with is moved by keys or drivers."""
+    if "vellus.dynamics.wetness" in style_keys.keyed_paths(state.id_data):
+        return True
+    return any(_is_keyed_of_hair(hair) for hair in _followers(state))
+
+
+def _is_keyed_of_hair(hair):
+    paths = style_keys.keyed_paths(hair)
+    ends = (".wet.amount", ".wet.is_on")
+    return any(path == "vellus.appearance.wetness" or path.endswith(ends) for path in paths)

@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides on a mesh whose vertices move from frame to frame, simulated: plain arrays in, plain arrays out."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+
+from ..errors import HairError
+from ..geometry import mesh as mesh_math
+from ..geometry import surface_deform
+from ..geometry.mesh import Faces, TriMesh
+from ..geometry.strands import Strands
+from . import rotations
+from .root_motion import RootPose
+from .settings import DynamicsSettings
+from .simulation import Obstacle, Simulation, World
+
+
+def simulated(
+    mesh: TriMesh,
+    guides: Strands,
+    poses: Iterable[np.ndarray],
+    settings: DynamicsSettings,
+    seconds: float,
+    gravity: tuple[float, float, float],
+    device: wp.DeviceLike = None,
+) -> Iterator[np.ndarray]:
+    """Guides (G, P, 3) float32 [m] in each frame: first as they were combed, then one frame for each pose.
+
+    mesh: the surface in the first frame; guides: `Strands` on it, that `require` lets pass; poses: (V, 3) [m] of its
+    vertices in the frames after; seconds: that a frame takes; gravity: [m/s²]. Raises `HairError`.
+    """
+    surface = _Surface(mesh, guides, settings.size)
+    groom = guides.numpy().astype(np.float64)
+    scaled = replace(
+        settings,
+        collision_distance=settings.size * settings.collision_distance,
+        cell_size=settings.size * settings.cell_size,
+    )
+
+    def world(vertices, number):
+        obstacles = (surface.obstacle(vertices, scaled),) if settings.collides_with_surface else ()
+        return World(gravity, obstacles, time=number * seconds)
+
+    start, seconds = surface.pose(mesh.vertices), seconds * settings.time_scale
+    at_first = world(mesh.vertices, 0)
+    simulation = Simulation(settings.size * groom, scaled, start, at_first, device)
+    for _ in range(settings.preroll):
+        simulation.advance(start, at_first, seconds)
+    yield guides.numpy().copy()
+    for number, given in enumerate(poses, start=1):
+        vertices = _checked(given, number, len(mesh.vertices))
+        simulation.advance(surface.pose(vertices), world(vertices, number), seconds)
+        yield (simulation.points() / settings.size).astype(np.float32)
+
+
+def require(mesh: TriMesh, guides: Strands) -> None:
+    """Raise `HairError` unless guides can be simulated on a mesh."""
+    mesh_math.check_mesh(mesh)
+    mesh_math.check_points(mesh, guides.roots)
+
+
+def _checked(given, number, vertex_count):
+    """(V, 3) float32 of a pose. Raises `HairError`, which names it."""
+    try:
+        vertices = np.asarray(given, np.float32)
+    except (TypeError, ValueError, OverflowError):
+        vertices = np.empty(0)
+    if vertices.shape != (vertex_count, 3) or not np.isfinite(vertices).all():
+        raise HairError(f"Pose {number} must be finite numbers of shape ({vertex_count}, 3), as the first one.")
+    return vertices
+
+
+class _Surface:
+    """A mesh that moves, in units of which `size` are a metre."""
+
+    def __init__(self, mesh, guides, size):
+        self._mesh, self._size = mesh, size
+        self._faces = Faces(mesh.triangles.ravel(), np.arange(0, mesh.triangles.size + 1, 3, dtype=np.int32))
+        self._places = mesh.triangles[guides.roots.triangle], guides.roots.barycentric
+        corners, weights = self._places
+        roots = np.einsum("nc,ncx->nx", weights, mesh.vertices[corners])
+        self._reach = max(float(np.ptp(mesh.vertices, axis=0).max()), 1e-20)
+        # Each root, and a point along each axis from it.
+        self._crosses = roots[:, None] + self._reach * np.concatenate([np.zeros((1, 3)), np.eye(3)])
+
+    def pose(self, vertices):
+        """The `RootPose` of guides where the mesh has these vertices."""
+        corners, weights = self._places
+        positions = np.einsum("nc,ncx->nx", weights.astype(np.float64), vertices.astype(np.float64)[corners])
+        motion = surface_deform.motion(self._mesh.vertices, vertices, self._faces, corners)
+        posed = surface_deform.carry(self._crosses.astype(np.float32), motion, *self._places).astype(np.float64)
+        left, _sizes, right = np.linalg.svd(np.swapaxes(posed[:, 1:] - posed[:, :1], 1, 2))
+        return RootPose(self._size * positions, rotations.from_matrices(left @ right))
+
+    def obstacle(self, vertices, settings):
+        """The mesh itself, which guides collide with."""
+        vertices = self._size * vertices.astype(np.float64)
+        distance = settings.collision_distance
+        return Obstacle("surface", vertices, self._mesh.triangles, settings.friction, distance)

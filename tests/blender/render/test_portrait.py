@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The face of the sample head: eyes behind their lids that look at a point, hair of brows and lashes at the skin."""
+
+import importlib
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+import pytest
+from mathutils.bvhtree import BVHTree
+
+from hair_addon import api
+
+SAMPLES = Path(__file__).resolve().parents[3] / "blend_samples"
+TARGET = np.array([0.3, -1.0, 0.74])
+
+
+@pytest.fixture(scope="module")
+def samples():
+    """The modules of blend_samples, with a dressed head in the scene."""
+    sys.path.insert(0, str(SAMPLES))
+    try:
+        eyes, head, portrait = map(importlib.import_module, ("eyes", "head", "portrait"))
+    finally:
+        sys.path.remove(str(SAMPLES))
+    built = head.build()
+    before = places(built)
+    portrait.dress(built, TARGET)
+    return eyes, built, before
+
+
+def places(mesh_object):
+    """(V, 3) of a mesh object's own vertices."""
+    positions = np.empty((len(mesh_object.data.vertices), 3), np.float32)
+    mesh_object.data.vertices.foreach_get("co", positions.ravel())
+    return positions
+
+
+def halves(positions):
+    """Those on the left and those on the right."""
+    return positions[positions[:, 0] > 0.0], positions[positions[:, 0] < 0.0]
+
+
+def test_a_face_leaves_the_head_as_it_is(samples):
+    _eyes, built, before = samples
+    np.testing.assert_array_equal(places(built), before)
+
+
+def test_eyes_are_behind_their_lids_and_fill_the_hole(samples):
+    eyes, built, _before = samples
+    for opening, ball in zip(eyes.openings(built), halves(places(bpy.data.objects["Eyes"])), strict=True):
+        border = np.concatenate([opening.upper, opening.lower])
+        assert np.ptp(border[:, 0]) > 0.02  # both corners were found
+        sphere_front = [ball[np.argsort(np.hypot(*(ball - place)[:, [0, 2]].T))[:8], 1].min() for place in border]
+        gaps = np.array(sphere_front) - border[:, 1]
+        assert gaps.min() > 0.0
+        assert np.median(gaps) < 0.003
+
+
+def test_both_eyes_look_at_the_point(samples):
+    for ball in halves(places(bpy.data.objects["Eyes"])):
+        gaze = ball[:64].mean(axis=0) - ball[-64:].mean(axis=0)  # from the back pole to the pupil
+        towards = TARGET - ball[-64:].mean(axis=0)
+        cosine = gaze @ towards / np.linalg.norm(gaze) / np.linalg.norm(towards)
+        assert cosine > 0.9999
+
+
+@pytest.mark.parametrize("name", ["Brows", "Lashes"])
+def test_brows_and_lashes_grow_out_of_the_skin(name, samples):
+    _eyes, built, _before = samples
+    skin = BVHTree.FromObject(built, bpy.context.evaluated_depsgraph_get())
+    roots = api.points(bpy.data.objects[name])[:, 0]
+    away = [skin.find_nearest(root.tolist())[3] for root in roots[::7]]
+    assert max(away) < 0.001
+    assert all(len(half) > 0.4 * len(roots) for half in halves(roots))

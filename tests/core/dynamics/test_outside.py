@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands kept outside of colliders: none of their points is inside, roots stay, lengths nearly do."""
+
+import numpy as np
+import pytest
+
+from hair_addon.core.dynamics.outside import kept_outside
+from hair_addon.core.dynamics.simulation import Obstacle
+from hair_addon.core.errors import HairError
+from tests.support.meshes import subdivided_sphere
+
+RADIUS, DISTANCE = 0.02, 1e-3
+
+
+@pytest.fixture
+def ball():
+    """An `Obstacle` of 2 cm, 10 cm up."""
+    mesh = subdivided_sphere(4, RADIUS)
+    return Obstacle("Ball", mesh.vertices + np.array([0.0, 0.0, 0.1]), mesh.triangles, distance=DISTANCE)
+
+
+@pytest.fixture
+def strands(rng):
+    """(400, 41, 3): from a plane upwards, 20 cm, curled, a third of them through the ball."""
+    along = np.linspace(0.0, 0.2, 41)
+    curl = 0.004 * np.stack([np.sin(150.0 * along), np.cos(150.0 * along) - 1.0, 0.0 * along], axis=1)
+    roots = np.concatenate([rng.uniform(-0.05, 0.05, (400, 2)), np.zeros((400, 1))], axis=1)
+    straight = np.stack([0.0 * along, 0.0 * along, along], axis=1)
+    return roots[:, None] + straight + curl
+
+
+def from_middle(points):
+    return np.linalg.norm(points - [0.0, 0.0, 0.1], axis=-1)
+
+
+def lengths(points):
+    return np.linalg.norm(np.diff(points, axis=1), axis=2)
+
+
+def test_no_point_is_inside_and_lengths_nearly_stay(ball, strands, device):
+    kept, is_moved = kept_outside(strands, [ball], device)
+    a, b, c = np.moveaxis(ball.vertices[ball.triangles] - [0.0, 0.0, 0.1], 1, 0)
+    normals = np.cross(b - a, c - a)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    inscribed = np.einsum("fx,fx->f", normals, a).min()
+    assert from_middle(kept).min() > inscribed + DISTANCE - 2e-6
+    assert (from_middle(strands) < RADIUS).any(axis=1).sum() > 30
+    assert is_moved[(from_middle(strands) < RADIUS).any(axis=1)].all()
+    np.testing.assert_array_equal(kept[:, 0], strands[:, 0])
+    assert abs(lengths(kept).sum(axis=1) / lengths(strands).sum(axis=1) - 1.0).max() < 0.01
+
+
+def test_strands_that_are_outside_stay_bit_by_bit(ball, strands, device):
+    kept, is_moved = kept_outside(strands, [ball], device)
+    is_far = (from_middle(strands) > RADIUS + DISTANCE + 1e-5).all(axis=1)
+    assert is_far.sum() > 100 and not is_moved[is_far].any()
+    np.testing.assert_array_equal(kept[~is_moved], strands[~is_moved])
+    np.testing.assert_array_equal(kept_outside(kept, [ball], device)[0][~is_moved], strands[~is_moved])
+
+
+def test_strands_do_not_depend_on_each_other(ball, strands, device):
+    kept, _ = kept_outside(strands, [ball], device)
+    order = np.random.default_rng(1).permutation(len(strands))
+    np.testing.assert_allclose(kept_outside(strands[order], [ball], device)[0], kept[order], atol=1e-7)
+
+
+def test_without_colliders_nothing_moves(strands, device):
+    kept, is_moved = kept_outside(strands, [], device)
+    assert kept is not None and not is_moved.any()
+    np.testing.assert_array_equal(kept, strands)
+
+
+def test_points_that_are_not_finite_are_refused(ball, strands, device):
+    strands[3, 4, 1] = np.nan
+    with pytest.raises(HairError, match="finite"):
+        kept_outside(strands, [ball], device)
