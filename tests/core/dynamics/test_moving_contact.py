@@ -71,6 +71,12 @@ def test_a_point_that_is_not_asked_has_no_plane_to_miss(device, rng):
             np.testing.assert_array_equal(
                 final, asking.find(there, before, STEP, is_final=True, is_skipping=False).numpy()
             )
+            strands = strands + rng.choice([0.0, 0.001], (160, 1, 1), p=[0.8, 0.2]) * rng.normal(size=(160, 1, 3))
+            there = lanes_of(strands, device)
+            again = sparing.find(there, before, STEP, is_final=True, is_again=True).numpy().copy()
+            np.testing.assert_array_equal(
+                again, asking.find(there, before, STEP, is_final=True, is_skipping=False).numpy()
+            )
     assert spared > 0.1 and found > 0.1
 
 
