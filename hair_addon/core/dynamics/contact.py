@@ -58,6 +58,7 @@ class Contacts:
         shape = groups, PLANE * self._vertex_count, lanes
         self.planes, self.found_planes = (wp.zeros(shape, dtype=float, device=device) for _ in range(2))
         self._middle_planes = wp.zeros((groups, PLANE * (self._vertex_count - 1), lanes), dtype=float, device=device)
+        self._none = wp.empty((0, 0, 0), dtype=float, device=device)
         self._build_count = colliders.build_count
         self.measure(groom)
 
@@ -82,15 +83,15 @@ class Contacts:
         last_positions: Any,
         duration: float,
         is_final: bool = False,
-        is_again: bool = False,
+        moved: Any = None,
         is_skipping: bool = True,
     ) -> Any:
         """Return `planes` for the predicted positions of a substep, which began at `last_positions`.
 
         Called in every substep, then once more with `is_final`: what is near is followed from one to the next.
         duration [s] of the substep. is_final: afterwards, for points that are still inside, `found_planes`: segments
-        are not asked, and nothing rises; is_again: once more, for points that have moved since. is_skipping: off asks
-        the surface for every point, which finds the same.
+        are not asked, and nothing rises; moved: (groups, 1, lanes) numbers, not zero for strands some of whose points
+        have moved since: only these ask again. is_skipping: off asks the surface for every point, which finds the same.
         """
         self._require_shape(positions)
         self._require_shape(last_positions)
@@ -101,6 +102,10 @@ class Contacts:
         if self.colliders.mesh is None:
             planes.zero_()
             return planes
+        is_again = moved is not None
+        if is_again:
+            require_count("groups", moved.shape[0], self._shape[0])
+            require_count("lanes", moved.shape[2], self._shape[2])
         surface, rise = self._surface(), 0.0 if is_final else RISE * duration
         for is_middle in (0,) if is_final else (1, 0):
             samples = self._middles if is_middle else self._vertices
@@ -108,7 +113,7 @@ class Contacts:
             self._launch(
                 contact_queries.find_planes,
                 [surface, positions, last_positions, self._middle_planes],
-                [is_middle, rise, int(is_final), int(is_again), int(is_skipping)],
+                [is_middle, rise, int(is_final), int(is_again), int(is_skipping), moved if is_again else self._none],
                 [*kept, self._middle_planes if is_middle else planes],
             )
         return planes

@@ -270,6 +270,7 @@ def find_planes(
     is_final: int,
     is_again: int,
     is_skipping: int,
+    moved: wp.array3d[float],
     first: int,
     # outputs
     rest: wp.array3d[float],
@@ -284,6 +285,12 @@ def find_planes(
     first_lane = (thread % part_count) * lanes_at_once
     first_sample = ((thread // part_count) % run_count) * samples_at_once
     group = thread // (part_count * run_count)
+    if is_again != 0:
+        moved_count = float(0.0)
+        for lane in range(first_lane, first_lane + lanes_at_once):
+            moved_count += moved[group, 0, lane]
+        if moved_count == 0.0:
+            return
     for sample in range(first_sample, first_sample + samples_at_once):
         is_any = _put_needs(
             group,

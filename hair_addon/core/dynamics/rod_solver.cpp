@@ -37,6 +37,7 @@
 //   array_t<float> airs, drags, accelerations    3, 1, 3 rows a point: [m/s], factor, [m/s²]; each may be empty
 //   array_t<float> scratches               of a GPU: KEPT M + CONTACT (M + 1) rows
 //   array_t<float> reset_counts            1 row
+//   array_t<float> solved_again            1 row: 1 where AGAIN has moved a strand
 //
 // Constants: WIDTH, GROUP, MOST segments, and those that rod_solver.py explains.
 
@@ -109,6 +110,7 @@ const float *const groom = rows_of(grooms), *const groom_frame = rows_of(groom_f
 float *const x_before = rows_of(positions_before), *const q_before = rows_of(frames_before);
 float* const predicted_rows = rows_of(predictions);
 float *const mobility = rows_of(mobilities), *const resets = rows_of(reset_counts);
+float* const again = rows_of(solved_again);
 const float *const root_rows = rows_of(roots), *const found_rows = rows_of(found_planes);
 float* const plane_rows = rows_of(planes);
 const float *const air_rows = rows_of(airs), *const drag_rows = rows_of(drags);
@@ -163,6 +165,7 @@ for (int substep = first; substep < end; ++substep) {
       const float* found = found_rows + size_t(8 * i) * STRIDE;
       const lanes inside = get(found, 3) - dot(get_vector(found, 0), get_vector(x, i));
       const ints is_inside = inside > INSIDE * get(length, i - 1);
+      if (!any_of(is_inside)) continue;
       touches = touches | is_inside;
       for (int k = 0; k < 8; ++k) put(plane, k, is_inside ? get(found, k) : get(plane, k));
     }
@@ -189,7 +192,8 @@ for (int substep = first; substep < end; ++substep) {
       if (any_of(asked)) put_contacts(false, 1.0f, asked);
     }
     if (is_again && is_touching) repair(touches);
-    for (int i = 0; i <= segment_count; ++i) {
+    if (is_again) put(again, 0, touches ? lanes(1.0f) : lanes(0.0f));
+    for (int i = 0; i <= segment_count && (is_touching || !is_again); ++i) {
       lanes slid = is_again ? get(slip, i) : lanes(-1.0f);
       if (is_touching && i > pinned) {
         const vector n = get_vector(contact(i), 0);

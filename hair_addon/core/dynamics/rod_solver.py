@@ -81,6 +81,7 @@ class RodArrays:
     mobilities: wp.array  # M + 1
     # Counted.
     resets: wp.array  # 1, how often a strand was put back to its groom
+    solved_again: wp.array  # 1, whether AGAIN has moved it in this substep
 
 
 _ROWS = {
@@ -105,8 +106,9 @@ _ROWS = {
     "frames_before": (4, 0),
     "mobilities": (0, 1),
     "resets": None,
+    "solved_again": None,
 }
-_FIXED_ROWS = {"slow_drags": 1, "roots": ROOT_ROWS, "resets": 1}
+_FIXED_ROWS = {"slow_drags": 1, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
 
 
 def row_count(name: str, segment_count: int) -> int:
@@ -200,6 +202,7 @@ def _advance(
     frames_before: wp.array3d[float],
     mobilities: wp.array3d[float],
     reset_counts: wp.array3d[float],
+    solved_again: wp.array3d[float],
     planes: wp.array3d[float],
     found_planes: wp.array3d[float],
     airs: wp.array3d[float],
@@ -247,6 +250,7 @@ def _advance_blocks(
     frames_before: wp.array3d[float],
     mobilities: wp.array3d[float],
     reset_counts: wp.array3d[float],
+    solved_again: wp.array3d[float],
     planes: wp.array3d[float],
     found_planes: wp.array3d[float],
     airs: wp.array3d[float],
@@ -293,6 +297,7 @@ def _advance_blocks(
         frames_before,
         mobilities,
         reset_counts,
+        solved_again,
         planes,
         found_planes,
         airs,

@@ -199,7 +199,7 @@ class Simulation:
             rods.advance(step, substep, substep + 1, SOLVE, Surroundings(planes=planes))
             found = self._contacts.find(*places, step.size, is_final=True)
             rods.advance(step, substep, substep + 1, AGAIN, Surroundings(planes=planes, found_planes=found))
-            found = self._contacts.find(*places, step.size, is_final=True, is_again=True)
+            found = self._contacts.find(*places, step.size, is_final=True, moved=rods.arrays.solved_again)
             rods.advance(step, substep, substep + 1, FINISH, Surroundings(planes=found))
         self._since_rubbed += step.size
         if self._is_rubbing and self._since_rubbed >= _RUBBING - 1e-9:
