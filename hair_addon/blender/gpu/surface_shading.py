@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Drawing of lit surfaces, each material with its images."""
 
-import functools
-
 import gpu
 import numpy as np
 
 from ...core.shading.tables import surface_albedo
+from ..host.caches import Cache
 from . import drawing, shaders, uniforms
+
+texture_cache = Cache()  # of the textures that all surfaces are drawn with
 
 
 def draw(surface, parts, view, lights, scene_samplers):
@@ -43,13 +44,13 @@ def _texture(image_map):
     return texture
 
 
-@functools.cache
+@texture_cache.keeping
 def _white():
     """A texture for samplers that are not read."""
     return gpu.types.GPUTexture((1, 1), format="RGBA8")
 
 
-@functools.cache
+@texture_cache.keeping
 def _albedo_texture():
     table = surface_albedo.table()
     data = gpu.types.Buffer("FLOAT", table.size, np.ascontiguousarray(table).ravel())

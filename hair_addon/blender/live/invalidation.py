@@ -6,7 +6,7 @@ After an event nothing is drawn or computed from what was cached before it. Func
 """
 
 from ..data import simulated_guides
-from ..gpu import lights, shaders, world_texture
+from ..gpu import lights, shaders, surface_shading, world_texture
 from ..groom import bindings, frame_folders
 from ..host import notices
 from ..render import hair_cache, region_pictures, viewport
@@ -33,6 +33,7 @@ OTHERS = (
     hair_cache.shading_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,
+    surface_shading.texture_cache,
     simulated_hair.played_cache,
     simulated_hair.state_cache,
     frame_folders.folder_cache,
