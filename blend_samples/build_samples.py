@@ -38,7 +38,7 @@ def build_parting():
 
 
 def build_dynamics():
-    """The head, which turns to both sides, with hair that simulates: play it, or bake it."""
+    """The head, which turns to the side and back, with hair that simulates: play it, or bake it."""
     dynamics_scene.build()
     dynamics_film.prepare()
 

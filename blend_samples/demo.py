@@ -30,6 +30,7 @@ from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.core.geometry import bspline
 
 STYLE = "CURLY"  # of styled.png
+SAMPLES_PER_SIDE = 3  # of each pixel
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
 REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
 REPORT_FRAMES = {("Marschner", 10_000): 25, ("Kajiya-Kay", 10_000): 36}
@@ -59,7 +60,7 @@ def main():
     look = hair.data.vellus.appearance
     classic_roughness = look.roughness
     look.mode, look.absorption, look.roughness = "energy", portrait.AUBURN, 0.25
-    draw(out / "dual_scattering.png", samples_per_side=4)
+    draw(out / "dual_scattering.png")
     draw_styled(hair.data, out / "styled.png")
     look.mode, look.roughness = "classic", classic_roughness
     print_spline_table()
@@ -68,10 +69,10 @@ def main():
     print(f"\nmade in {time.perf_counter() - started:.1f} s: {out}")
 
 
-def draw(path, samples_per_side=3):
+def draw(path):
     """Draw the portrait."""
     width, height = portrait.SIZE
-    bpy.ops.vellus.render_picture(filepath=str(path), width=width, height=height, samples_per_side=samples_per_side)
+    bpy.ops.vellus.render_picture(filepath=str(path), width=width, height=height, samples_per_side=SAMPLES_PER_SIDE)
 
 
 def draw_styled(hair, path):

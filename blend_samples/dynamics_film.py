@@ -16,10 +16,11 @@ import numpy as np
 from hair_addon.core.files.whole_file import whole_file
 
 ROOT = Path(__file__).resolve().parent.parent
-LAST = 54  # frame
-SIZE = 320, 384  # pixels
-SAMPLE_COUNT = 8  # of a pixel, also over the time of the shutter
-TURN, TURN_SECONDS = 70.0, 0.5  # degrees
+LAST = 40  # frame
+SIZE = 240, 288  # pixels
+SAMPLE_COUNT, MOTION_STEPS = 4, 3  # of a pixel, and moments while the shutter is open
+STRAND_COUNT, RADIUS = 8000, 1.9e-4  # [m]: fewer and thicker strands, as the film is small
+TURNS, TURN_SECONDS = ((0.1, -40.0), (0.7, 40.0)), 0.4  # (second, degrees)
 
 
 def make(head_file, out):
@@ -42,17 +43,16 @@ def make(head_file, out):
 
 
 def turned(time):
-    """The head's angle [radians] at a time [s]: to one side, and back past the middle, each turn in half a second."""
-    steps = ((0.15, -TURN / 2.0), (1.0, TURN), (1.75, -TURN / 2.0))
+    """The head's angle [radians] at a time [s]: to the side, and back."""
     angle = 0.0
-    for start, degrees in steps:
+    for start, degrees in TURNS:
         part = float(np.clip((time - start) / TURN_SECONDS, 0.0, 1.0))
         angle += math.radians(degrees) * part**2 * (3.0 - 2.0 * part)
     return angle
 
 
 def prepare():
-    """Let the head of the open file turn to both sides, and its hair simulate, to be baked beside the file."""
+    """Let the head of the open file turn to the side and back, and its hair simulate, to be baked beside the file."""
     skull, guides, _hair = dynamics_scene.objects()
     dynamics_scene.turn(skull, 2, turned, LAST + 1)
     guides.data.vellus.cache_folder = "//haircache"
@@ -65,6 +65,10 @@ def prepare():
 def _build(head_file, path):
     bpy.ops.wm.open_mainfile(filepath=str(head_file))
     prepare()
+    bpy.context.scene.vellus.motion_steps = MOTION_STEPS
+    hair = dynamics_scene.objects()[2].data.vellus.hair
+    hair.strand_count, hair.radius = STRAND_COUNT, RADIUS
+    bpy.context.view_layer.update()
     with whole_file(path) as partial:
         bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 

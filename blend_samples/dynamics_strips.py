@@ -23,7 +23,7 @@ BALL_SEEN = (-0.06, 0.06, 0.69)  # [m]
 BALL_COLOR = (0.55, 0.62, 0.70, 1.0)
 WIND = 2.0  # [m/s]
 SHELTERED_DRAG = 0.2  # of a lone fiber's
-UPRIGHT_LENGTH = 0.11  # [m]
+UPRIGHT_LENGTH, UPRIGHT_STIFFNESS = 0.11, 2.0  # [m]: just stiff enough to stand
 SCREEN_RIGHT = np.array([-dynamics_scene.CAMERA[1], dynamics_scene.CAMERA[0], 0.0]) / math.hypot(
     *dynamics_scene.CAMERA[:2]
 )
@@ -150,7 +150,7 @@ def stand(is_sag_free=True):
     along = np.linspace(0.0, 1.0, strands.shape[1])[:, None]
     dynamics_scene.write_strands(guides, strands[:, :1] + UPRIGHT_LENGTH * along * out)
     api.set_styles(hair, [api.Clump(size=0.012, amount=0.8, seed=3)])
-    api.set_dynamics(guides, sag_free=is_sag_free)
+    api.set_dynamics(guides, sag_free=is_sag_free, bend_stiffness=UPRIGHT_STIFFNESS)
 
 
 def sag():

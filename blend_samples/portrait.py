@@ -16,12 +16,12 @@ from mathutils.bvhtree import BVHTree
 from hair_addon import api
 from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 
-SIZE = 800, 800  # pixels of a picture
-CAMERA, LOOK_AT, LENS = (0.70, -1.28, 0.73), Vector((0.010, -0.02, 0.682)), 104.0  # [m], [m], [mm]
+SIZE = 760, 760  # pixels of a picture
+CAMERA, LOOK_AT, LENS = (0.70, -1.28, 0.73), Vector((0.012, -0.02, 0.694)), 112.0  # [m], [m], [mm]
 AUBURN = (0.27, 0.54, 1.10)  # absorption per fibre radius
 GAZE = (0.36, -1.2, 0.735)  # [m]: what the eyes look at, beside the camera
 
-LENGTH = 0.32  # [m] of guides on the crown
+LENGTH = 0.34  # [m] of guides on the crown
 _HAIRLINE_LENGTH = 0.45  # of those at the border, as a part of it
 _HAIRLINE_REACH = 0.030  # [m] over which lengths grow from the border
 _STEPS = 41  # points of a guide
@@ -72,10 +72,10 @@ def set_styles(hair):
     api.set_styles(
         hair,
         [
-            api.Trim(random=0.22, seed=1),
-            api.Clump(size=0.020, amount=0.55, fine_amount=0.5, thickness=0.35, shape=0.25, stray=0.08, seed=2),
+            api.Trim(random=0.16, seed=1),
+            api.Clump(size=0.020, amount=0.7, fine_amount=0.6, thickness=0.25, shape=0.25, stray=0.05, seed=2),
             api.Curl(radius=0.0085, pitch=0.085, flatness=0.45, coherence=0.9, root=0.0, tip=1.0, seed=3),
-            api.Frizz(amplitude=0.0007, wavelength=0.05, stray=0.03, stray_gain=6.0, seed=4),
+            api.Frizz(amplitude=0.0005, wavelength=0.05, stray=0.03, stray_gain=7.0, tip=0.6, seed=4),
         ],
     )
 
@@ -132,15 +132,20 @@ def _combed(root, length, surfaces):
         aim = sweep.lerp(around, _part(gone, 0.02, 0.08)).lerp(fall, _part(gone, 0.07, 0.16)).normalized()
         direction = (direction + 0.42 * aim).normalized()
         ahead = position + step * direction
-        for surface, clearance in zip(surfaces, (0.003 + volume * _part(gone, 0.0, 0.05), 0.008), strict=True):
-            near, near_normal, _face, _distance = surface.find_nearest(ahead)
-            height = (ahead - near).dot(near_normal)
-            if height < clearance:
-                ahead += (clearance - height) * near_normal
+        ahead = _clear_of(surfaces[0], ahead, 0.003 + volume * _part(gone, 0.0, 0.05), Vector())
+        # On the shoulders hair slides to the chest or to the back, not along the arms.
+        ahead = _clear_of(surfaces[1], ahead, 0.008, Vector((0.0, 0.4 if root[1] > -0.02 else -0.4, 0.0)), sideways=0.5)
         direction = (ahead - position).normalized()
         position = position + step * direction
         combed.append(position.copy())
     return _smoothed(np.array(combed))
+
+
+def _clear_of(surface, position, clearance, slide, sideways=1.0):
+    """A place at least this far [m] from a surface: pushed along its normal, sideways by this part, and along slide."""
+    near, normal, _face, _distance = surface.find_nearest(position)
+    push = max(0.0, clearance - (position - near).dot(normal))
+    return position + push * (Vector((sideways * normal.x, normal.y, normal.z)) + slide)
 
 
 def _smoothed(points, passes=3):

@@ -125,7 +125,9 @@ def use(name):
         take_picture(OUT / "menu.png")
     count = len(bpy.context.window_manager.operators)
     yield from key("RET")
-    yield from wait_for(lambda: len(bpy.context.window_manager.operators) > count, 5.0)
+    yield from wait_for(
+        lambda: len(bpy.context.window_manager.operators) > count, 60.0
+    )  # kernels may be compiled first
     yield
     done = facts["tools"][name] = {"ran": bpy.context.window_manager.operators[-1].bl_idname}
     done["mode"], first = bpy.context.mode, guides()

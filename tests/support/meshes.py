@@ -49,6 +49,17 @@ def subdivided_sphere(levels, radius=1.0):
     return TriMesh(vertices.astype(np.float32), triangles.astype(np.int32))
 
 
+def split_in_four(mesh):
+    """The same surface, each triangle in four."""
+    middles = 0.5 * (mesh.corners + np.roll(mesh.corners, -1, axis=1))
+    vertices = np.concatenate([mesh.vertices, middles.reshape(-1, 3)])
+    vertices, numbers = np.unique(vertices.astype(np.float32), axis=0, return_inverse=True)
+    numbers = numbers.reshape(-1)
+    (a, b, c), (ab, bc, ca) = numbers[mesh.triangles].T, numbers[len(mesh.vertices) :].reshape(-1, 3).T
+    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
+    return TriMesh(vertices, np.concatenate([np.stack(part, axis=1) for part in parts]).astype(np.int32))
+
+
 def flat_grid(side_count, size=1.0):
     """A square in the XY plane, its normal up, of side_count² pairs of triangles."""
     x, y = np.meshgrid(*[np.linspace(0.0, size, side_count + 1)] * 2)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Attributes of Curves ↔ arrays."""
 
-import ctypes
-
 import numpy as np
+
+from ...core import kernels
 
 # Data types that can be read as arrays: (name of the value property, components, dtype).
 LAYOUTS = {
@@ -50,7 +50,7 @@ def write_positions(curves, points):
     if points.size != 3 * len(data):
         raise ValueError("points are not as many as those of the curves")
     if len(data):
-        ctypes.memmove(data[0].as_pointer(), points.ctypes.data, points.nbytes)
+        kernels.foreign_memory.write(data[0].as_pointer(), points)
 
 
 def is_from_library(curves):

@@ -165,8 +165,8 @@ def read_surface(surface_object, depsgraph):
         rest = _rest_positions(mesh, posed)
         faces = faces_of(mesh)
         if rest is not posed and (np.diff(faces.starts) > 3).any():
-            # Where polygons are cut depends on where vertices are: triangles are to stay the same in every pose. Written
-            # to the attribute, they would not reach the triangles that Blender keeps, of the evaluated mesh too.
+            # Where polygons are cut depends on where vertices are: triangles are to stay the same in every pose.
+            # Written to the attribute, positions would not reach triangles that Blender shares with the evaluated mesh.
             mesh.vertices.foreach_set("co", rest.ravel())
         corners = triangle_corners(mesh, faces, name_of(surface_object))
         triangles = faces.corner_vertices[corners]

@@ -22,12 +22,13 @@ def measure(hair, surfaces, opacities, clear=()):
     """Visibility textures {sampler: texture} of each strands and of each surface: two lists.
 
     hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU]; opacities: of each hair's strands, for which its
-    visibility holds; the surfaces' is for the first; clear: surfaces that hide nothing, which follow the others.
+    visibility holds; the surfaces' is for the densest; clear: surfaces that hide nothing, which follow the others.
     """
     receivers = [*surfaces, *clear]
     views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
     views += [_view_of_surface(surface) for surface in receivers]
-    for view, opacity in zip(views, opacities + [(opacities or [1.0])[0]] * len(receivers), strict=True):
+    of_surfaces = opacities[densest([strands for strands, _ in hair])] if hair else 1.0
+    for view, opacity in zip(views, opacities + [of_surfaces] * len(receivers), strict=True):
         view["seen_opacity"] = opacity
     places = [strands.texture for strands, _ in hair] + [surface.places for surface in receivers]
     targets = [_Target(view, texture) for view, texture in zip(views, places, strict=True)]
@@ -40,6 +41,11 @@ def measure(hair, surfaces, opacities, clear=()):
             target.add(lights, maps.samplers)
     textures = [target.textures for target in targets]
     return textures[: len(hair)], textures[len(hair) :]
+
+
+def densest(hair):
+    """Index of the `StrandsOnGPU` with most strands: brows do not color the shadow of the hair beside them."""
+    return max(range(len(hair)), key=lambda index: hair[index].strand_count)
 
 
 def _suns(directions, weights):

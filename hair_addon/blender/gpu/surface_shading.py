@@ -8,7 +8,7 @@ from ...core.shading.tables import surface_albedo
 from ..host.caches import Cache
 from . import drawing, shaders, uniforms
 
-texture_cache = Cache()  # name → texture that every surface is drawn with
+texture_cache = Cache()  # of the textures that all surfaces are drawn with
 
 
 def draw(surface, parts, view, lights, scene_samplers):
@@ -24,9 +24,8 @@ def draw(surface, parts, view, lights, scene_samplers):
     for first, count, material in parts:
         images = {name: _texture(getattr(material, name)) for name in shaders.SURFACE_IMAGES}
         blocks["surface"] = uniforms.uniform_buffer(_record(material, images))
-        samplers = {"surface_albedo": texture_cache.get("albedo", _albedo_texture)}
-        white = texture_cache.get("white", _white)
-        samplers |= {name: white if texture is None else texture for name, texture in images.items()}
+        samplers = {"surface_albedo": _albedo_texture()}
+        samplers |= {name: _white() if texture is None else texture for name, texture in images.items()}
         with drawing.bound(program, blocks, scene_samplers | samplers):
             surface.batch.draw_range(program, elem_start=first, elem_count=count)
 
@@ -45,11 +44,13 @@ def _texture(image_map):
     return texture
 
 
+@texture_cache.keeping
 def _white():
     """A texture for samplers that are not read."""
     return gpu.types.GPUTexture((1, 1), format="RGBA8")
 
 
+@texture_cache.keeping
 def _albedo_texture():
     table = surface_albedo.table()
     data = gpu.types.Buffer("FLOAT", table.size, np.ascontiguousarray(table).ravel())

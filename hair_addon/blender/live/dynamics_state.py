@@ -14,7 +14,7 @@ from . import live_hair
 
 _OTHER = {
     frame_animation.SURFACE: "Frames from {frame} on are baked with another animation of the surface: bake again",
-    frame_animation.SURROUNDINGS: "Frames from {frame} on are baked with other colliders or forces: bake again",
+    frame_animation.SURROUNDINGS: "Frames from {frame} on are baked with other colliders, forces or keys: bake again",
 }
 
 

@@ -6,7 +6,6 @@ import bpy
 from ..groom import frame_folders
 from ..host import notices
 from ..host.caches import Cache
-from ..settings.translations import interface_text
 
 SENTENCE = "In renders from this window hair follows its baked frames only with Lock Interface."
 
@@ -28,18 +27,7 @@ def end(blender_scene):
 
 
 def offer():
-    """For `bpy.app.timers`: a popup with the sentence and the setting."""
+    """For `bpy.app.timers`: the sentence and the setting, in a menu of the first window."""
     for window in bpy.context.window_manager.windows[:1]:
         with bpy.context.temp_override(window=window):
-            title = interface_text("Hair in This Render")
-            bpy.context.window_manager.popup_menu(_draw, title=title, icon="ERROR")
-
-
-def _draw(popup, context):
-    popup.layout.label(text=interface_text(SENTENCE), translate=False)
-    draw_setting(popup.layout, context)
-
-
-def draw_setting(layout, context):
-    """The setting that the sentence names, as a check box."""
-    layout.prop(context.scene.render, "use_lock_interface")
+            bpy.ops.wm.call_menu(name="VELLUS_MT_unlocked_render")

@@ -296,9 +296,10 @@ def draw_arrival(drawn, view, buffer):
 
 
 def _see_through_hair(drawn, view):
-    """The hair's shadow on a surface takes the first hair's colour: one colour a draw call."""
+    """The hair's shadow on a surface takes the colour of the hair with most strands: one colour a draw call."""
     if drawn.hair:
-        view["hair_forward"][:3], view["seen_opacity"] = drawn.hair[0][1].forward, drawn.hair[0][1].opacity
+        shading = drawn.hair[ambient_visibility.densest([strands for strands, *_ in drawn.hair])][1]
+        view["hair_forward"][:3], view["seen_opacity"] = shading.forward, shading.opacity
 
 
 def draw_surfaces(drawn, view):

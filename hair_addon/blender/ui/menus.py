@@ -5,7 +5,8 @@ import bpy
 
 from ..groom.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of
-from ..settings.translations import CONTEXT
+from ..live import unlocked_renders
+from ..settings.translations import CONTEXT, interface_text
 
 # In groups: length and shape, then number and place.
 _GUIDE_TOOLS = (
@@ -44,6 +45,18 @@ class VELLUS_MT_guide_tools(bpy.types.Menu):
 
     def draw(self, context):
         draw_guide_tools(self.layout)
+
+
+class VELLUS_MT_unlocked_render(bpy.types.Menu):
+    """What a render from a window could not show, and the setting that lets the next one"""
+
+    bl_label = "Hair in This Render"
+    bl_idname = "VELLUS_MT_unlocked_render"
+    bl_translation_context = CONTEXT
+
+    def draw(self, context):
+        self.layout.label(text=interface_text(unlocked_renders.SENTENCE), icon="ERROR", translate=False)
+        self.layout.prop(context.scene.render, "use_lock_interface")
 
 
 class VELLUS_MT_hair(bpy.types.Menu):
@@ -106,7 +119,7 @@ _ENTRIES = (
     ("VIEW3D_MT_edit_curves", _in_curves_menu),
 )
 
-CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair)
+CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair, VELLUS_MT_unlocked_render)
 
 
 def register():

@@ -55,8 +55,10 @@ class Contacts:
         self._shape = groups, rows, lanes
         device = colliders.device
         self._vertices, self._middles = (self._new_samples() for _ in range(2))
-        self.planes = wp.zeros((groups, PLANE * self._vertex_count, lanes), dtype=float, device=device)
+        shape = groups, PLANE * self._vertex_count, lanes
+        self.planes, self.found_planes = (wp.zeros(shape, dtype=float, device=device) for _ in range(2))
         self._middle_planes = wp.zeros((groups, PLANE * (self._vertex_count - 1), lanes), dtype=float, device=device)
+        self._none = wp.empty((0, 0, 0), dtype=float, device=device)
         self._build_count = colliders.build_count
         self.measure(groom)
 
@@ -76,22 +78,34 @@ class Contacts:
                 )
 
     def find(
-        self, positions: Any, last_positions: Any, duration: float, is_final: bool = False, is_skipping: bool = True
+        self,
+        positions: Any,
+        last_positions: Any,
+        duration: float,
+        is_final: bool = False,
+        moved: Any = None,
+        is_skipping: bool = True,
     ) -> Any:
         """Return `planes` for the predicted positions of a substep, which began at `last_positions`.
 
         Called in every substep, then once more with `is_final`: what is near is followed from one to the next.
-        duration [s] of the substep. is_final: afterwards, for points that are still inside: segments are not asked, and
-        nothing rises. is_skipping: off asks the surface for every point, which finds the same.
+        duration [s] of the substep. is_final: afterwards, for points that are still inside, `found_planes`: segments
+        are not asked, and nothing rises; moved: (groups, 1, lanes) numbers, not zero for strands some of whose points
+        have moved since: only these ask again. is_skipping: off asks the surface for every point, which finds the same.
         """
         self._require_shape(positions)
         self._require_shape(last_positions)
         if self._build_count != self.colliders.build_count:
             self._build_count = self.colliders.build_count
             self.forget()
+        planes = self.found_planes if is_final else self.planes
         if self.colliders.mesh is None:
-            self.planes.zero_()
-            return self.planes
+            planes.zero_()
+            return planes
+        is_again = moved is not None
+        if is_again:
+            require_count("groups", moved.shape[0], self._shape[0])
+            require_count("lanes", moved.shape[2], self._shape[2])
         surface, rise = self._surface(), 0.0 if is_final else RISE * duration
         for is_middle in (0,) if is_final else (1, 0):
             samples = self._middles if is_middle else self._vertices
@@ -99,10 +113,10 @@ class Contacts:
             self._launch(
                 contact_queries.find_planes,
                 [surface, positions, last_positions, self._middle_planes],
-                [is_middle, rise, int(is_final), int(is_skipping)],
-                [*kept, self._middle_planes if is_middle else self.planes],
+                [is_middle, rise, int(is_final), int(is_again), int(is_skipping), moved if is_again else self._none],
+                [*kept, self._middle_planes if is_middle else planes],
             )
-        return self.planes
+        return planes
 
     def forget(self) -> None:
         """Let every point ask the surface again: colliders or positions are others."""

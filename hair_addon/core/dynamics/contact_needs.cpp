@@ -15,7 +15,8 @@
 //   mat33 to_rest, vec3 moved                from places now to places at rest
 //   float largest_distance                   that any collider keeps [m]
 //   float rise                               of samples that the groom has inside [m]
-//   int is_final, int is_skipping            after the substep; 0: every sample looks
+//   int is_final, int is_skipping            after the solve; 0: every sample looks
+//   int is_again                             a sample that has not moved since it last looked keeps its plane
 //   array_t<float> rest                      distance in the groom [m]; changed by `rise`
 //   array_t<int> sides                       0 for those that do not look
 //   array_t<float> asked                     3 rows: place at rest where it last looked [m]
@@ -25,7 +26,7 @@
 //
 // Returns whether any of them looks, or has such a segment beside.
 //
-// Constants: WIDTH, PLANE, MARGIN, NEAR, MOST_MOTION, SLACK, BACK [m].
+// Constants: WIDTH, PLANE, MARGIN, NEAR, MOST_MOTION, SLACK, BACK, STAYED [m].
 
 {
 #include "lanes.h"
@@ -106,16 +107,21 @@ const vector place = turned(to_rest, vector{point.x - moved[0], point.y - moved[
 const lanes away = length_of(minus(place, get_vector(asked, sample)));
 const auto is_spared = (left - away > needed + SLACK) & where(is_skipping);
 needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper
+const auto is_kept = (away <= STAYED) & where(is_again);
 const auto is_number = length - length == 0.0f;
 const auto is_short = (segment <= 2.0f * most) & where(is_middle);
-const auto is_asking = is_number & !is_spared & !is_short;
-
-put(row_of(clear, sample), is_spared ? left : lanes(0.0f));
-put_ints(row_of(sides, sample), is_asking ? get_ints(row_of(sides, sample)) : ints(0));
-const int plane_row = PLANE * (is_middle ? sample : sample + 1);
-for (int k = 0; k < PLANE; ++k) put(row_of(out_planes, plane_row + k), lanes(0.0f));
-put(row_of(out_planes, plane_row + 3), is_asking ? needed : lanes(0.0f));
+const auto is_asking = is_number & !is_spared & !is_short & !is_kept;
 ints is_any = is_asking ? ints(1) : ints(0);
+if (is_again && !any_of(is_any)) return 0;
+
+put(row_of(clear, sample), is_kept ? before : is_spared ? left : lanes(0.0f));
+put_ints(row_of(sides, sample), is_asking | is_kept ? get_ints(row_of(sides, sample)) : ints(0));
+const int plane_row = PLANE * (is_middle ? sample : sample + 1);
+for (int k = 0; k < PLANE; ++k) {
+  const auto row = row_of(out_planes, plane_row + k);
+  const lanes value = k == 3 ? (is_asking ? needed : lanes(0.0f)) : lanes(0.0f);
+  put(row, is_kept ? get(row) : value);
+}
 if (!is_middle && !is_final) {
   const int segment_count = positions.shape[1] / 3 - 1;
   const auto has_plane = [&](int index) {

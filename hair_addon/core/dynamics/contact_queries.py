@@ -96,6 +96,7 @@ def _gap(planes: wp.array3d[float], group: int, row: int, lane: int, point: wp.v
         MOST_MOTION=MOST_MOTION,
         SLACK=1e-5,
         BACK=BACK,
+        STAYED=1e-7,
     )
 )
 def _put_needs(
@@ -115,6 +116,7 @@ def _put_needs(
     largest_distance: float,
     rise: float,
     is_final: int,
+    is_again: int,
     is_skipping: int,
     rest: wp.array3d[float],
     sides: wp.array3d[int],
@@ -187,11 +189,13 @@ def _choose(
 ):
     """Give a vertex the plane of a segment beside it whose middle is less in front of its own."""
     point = _vector(positions, group, vertex, lane)
+    own = _normal(planes, group, vertex, lane)
     least = _gap(planes, group, vertex, lane, point)
     chosen = int(-1)
     for segment in range(vertex - 1, wp.min(vertex + 1, sample_count)):
         gap = _gap(middle_planes, group, segment, lane, _sample(positions, group, segment, lane, 1))
-        if gap < least:
+        # A segment across a thin part has its ends on either side: it does not pull one through to the other.
+        if gap < least and wp.dot(own, _normal(middle_planes, group, segment, lane)) >= 0.0:
             least = gap
             chosen = segment
     if chosen < 0:
@@ -226,6 +230,8 @@ def _look_in(
     """Look for a surface in those lanes of which `_put_needs` said so."""
     row = sample + 1 - is_middle
     for lane in range(first_lane, first_lane + lanes_at_once):
+        if wp.length_sq(_normal(out_planes, group, row, lane)) > 0.0:
+            continue  # it keeps its plane
         needed = out_planes[group, _index(row, PLANE, 3), lane]
         is_beside = out_planes[group, _index(row, PLANE, 7), lane] > 0.0
         if is_beside:
@@ -262,7 +268,9 @@ def find_planes(
     is_middle: int,
     rise: float,
     is_final: int,
+    is_again: int,
     is_skipping: int,
+    moved: wp.array3d[float],
     first: int,
     # outputs
     rest: wp.array3d[float],
@@ -277,6 +285,12 @@ def find_planes(
     first_lane = (thread % part_count) * lanes_at_once
     first_sample = ((thread // part_count) % run_count) * samples_at_once
     group = thread // (part_count * run_count)
+    if is_again != 0:
+        moved_count = float(0.0)
+        for lane in range(first_lane, first_lane + lanes_at_once):
+            moved_count += moved[group, 0, lane]
+        if moved_count == 0.0:
+            return
     for sample in range(first_sample, first_sample + samples_at_once):
         is_any = _put_needs(
             group,
@@ -295,6 +309,7 @@ def find_planes(
             surface.largest_distance,
             rise,
             is_final,
+            is_again,
             is_skipping,
             rest,
             sides,

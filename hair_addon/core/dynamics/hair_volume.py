@@ -19,7 +19,7 @@ import numpy as np
 import warp as wp
 
 from ..errors import HairError
-from ..kernels import kernel_cache, parallel
+from ..kernels import kernel_cache, native_code, parallel
 from ..kernels.checks import require_count, require_indices
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
@@ -76,6 +76,8 @@ class HairVolume:
         self.grid: Any = None
         self._rest: Any = None
         self._mean: Any = None
+        self._kept_sums: list[Any] = []
+        self._fields: Any = None
 
     def fit(self, positions: Any, groom: Any) -> None:
         """Lay the grid over strands, and over the groom as it is carried by the surface; once a frame. [m]"""
@@ -112,8 +114,12 @@ class HairVolume:
         sums = self._sums(positions, velocities)
         mixed = -math.expm1(-max(friction, 0.0) * duration)
         groups, points, lanes = self._shape
-        inputs = [self.grid, self._masses, self._regions, positions, sums, self._rest, self._mean]
-        inputs += [mixed, duration * pressure, wetness, 0.5 * self.cell_size / duration]
+        fields = self._fields
+        shares = parallel.share_count(len(sums), self.device, _LEAST_ROWS)
+        inputs = [sums, self._rest, self._mean, wetness]
+        parallel.launch_shares(_mean_motion, len(sums), inputs, [[fields]] * shares, self.device)
+        inputs = [self.grid, self._masses, self._regions, positions, fields]
+        inputs += [mixed, duration * pressure, 0.5 * self.cell_size / duration]
         kernel_cache.load(self.device, _rub.module)
         shares = parallel.share_count(groups * points * lanes, self.device, _LEAST_ROWS // 8)
         parallel.launch_shares(_rub, groups * points * lanes, inputs, [[velocities]] * shares, self.device)
@@ -135,7 +141,7 @@ class HairVolume:
         count = groups * points * lanes
         shares = min(_MOST_SHARES, parallel.share_count(count, self.device, _LEAST_ROWS))
         width = 1 if velocities is None else 4
-        sums = [wp.zeros((cell_count, width), dtype=wp.int64, device=self.device) for _ in range(shares)]
+        sums = self._cleared(cell_count, width, shares)
         inputs = [self.grid, self._masses, self._regions, positions, positions if velocities is None else velocities]
         kernel_cache.load(self.device, _scatter.module)
         parallel.launch_shares(_scatter, count, inputs, [[each] for each in sums], self.device)
@@ -143,6 +149,18 @@ class HairVolume:
             total = sums[0].numpy()
             total += other.numpy()
         return sums[0]
+
+    def _cleared(self, cell_count, width, shares):
+        """Arrays of zeros: for motion the same ones as before, as fresh memory takes as long as a sum."""
+        if width == 1:
+            return [wp.zeros((cell_count, width), dtype=wp.int64, device=self.device) for _ in range(shares)]
+        if len(self._kept_sums) != shares or len(self._kept_sums[0]) != cell_count:
+            shape = cell_count, width
+            self._kept_sums = [wp.empty(shape, dtype=wp.int64, device=self.device) for _ in range(shares)]
+            self._fields = wp.empty(cell_count, dtype=wp.vec4, device=self.device)
+        for sums in self._kept_sums:
+            sums.zero_()
+        return self._kept_sums
 
     def _require_shape(self, array):
         groups, points, lanes = self._shape
@@ -177,12 +195,19 @@ def _cell_of(grid: Grid, place: wp.vec3, region: int):
 
 
 @wp.func
-def _part(place: wp.vec3, axis: int, step: int):
-    """The weight along an axis of the cell `step` after the one before a place."""
-    part = place[axis] - wp.floor(place[axis])
-    if step == 0:
-        return 1.0 - part
-    return part
+def _part(place: wp.vec3):
+    """Where a place is between the cell before it and the next one, along each axis."""
+    return wp.vec3(place[0] - wp.floor(place[0]), place[1] - wp.floor(place[1]), place[2] - wp.floor(place[2]))
+
+
+@wp.func_native(native_code.body(__file__, "hair_sums.cpp"))
+def _add(
+    row: int, across: int, along: int, part: wp.vec3, mass: float, velocity: wp.vec3, sums: wp.array2d[wp.int64]
+): ...
+
+
+@wp.func_native(native_code.body(__file__, "hair_motion.cpp"))
+def _around(row: int, across: int, along: int, part: wp.vec3, fields: wp.array[wp.vec4]) -> wp.spatial_vector: ...
 
 
 @wp.kernel
@@ -227,16 +252,7 @@ def _scatter(
     cell = _cell_of(grid, place, regions[group, lane])
     if cell < 0:
         return
-    for corner in range(8):
-        dx = corner >> 2
-        dy = (corner >> 1) & 1
-        dz = corner & 1
-        weight = _part(place, 0, dx) * _part(place, 1, dy) * _part(place, 2, dz) * mass * _UNIT
-        row = cell + (dx * grid.counts[1] + dy) * grid.counts[2] + dz
-        wp.atomic_add(out_sums, row, 0, wp.int64(wp.rint(weight)))
-        if with_momentum:
-            for axis in range(3):
-                wp.atomic_add(out_sums, row, axis + 1, wp.int64(wp.rint(weight * velocity[axis])))
+    _add(cell, grid.counts[1] * grid.counts[2], grid.counts[2], _part(place), mass * _UNIT, velocity, out_sums)
 
 
 @wp.kernel
@@ -252,17 +268,44 @@ def _average(
 
 
 @wp.kernel
+def _mean_motion(
+    sums: wp.array2d[wp.int64],
+    rest: wp.array2d[wp.int64],
+    mean: wp.array[wp.int64],
+    wetness: float,
+    first: int,
+    # outputs
+    out_fields: wp.array[wp.vec4],
+):
+    cell = first + wp.tid()
+    out_fields[cell] = wp.vec4()
+    if sums[cell, 0] == wp.int64(0) and (wetness == 0.0 or rest[cell, 0] == wp.int64(0)):
+        return
+    scale = 1.0
+    if mean[0] > wp.int64(0):
+        scale = float(mean[1]) / float(mean[0])
+    density = float(sums[cell, 0])
+    at_rest = float(rest[cell, 0])
+    excess = wp.max(density - _DENSE * wp.max(at_rest, 1.0 / scale), 0.0)
+    if density > _GONE * at_rest:
+        excess += wetness * wp.min(density - _THIN * at_rest, 0.0)
+    share = 0.0
+    if density > 0.0:
+        share = 1.0 / density
+    x = share * float(sums[cell, 1])
+    y = share * float(sums[cell, 2])
+    out_fields[cell] = wp.vec4(x, y, share * float(sums[cell, 3]), excess * scale)
+
+
+@wp.kernel
 def _rub(
     grid: Grid,
     masses: wp.array3d[float],
     regions: wp.array2d[int],
     positions: wp.array3d[float],
-    sums: wp.array2d[wp.int64],
-    rest: wp.array2d[wp.int64],
-    mean: wp.array[wp.int64],
+    fields: wp.array[wp.vec4],
     mixed: float,
     pressure: float,
-    wetness: float,
     fastest: float,
     first: int,
     # outputs
@@ -282,30 +325,9 @@ def _rub(
     cell = _cell_of(grid, place, regions[group, lane])
     if cell < 0:
         return
-    around = wp.vec3()
-    push = wp.vec3()
-    scale = 1.0
-    if mean[0] > wp.int64(0):
-        scale = float(mean[1]) / float(mean[0])
-    for corner in range(8):
-        dx = corner >> 2
-        dy = (corner >> 1) & 1
-        dz = corner & 1
-        wx = _part(place, 0, dx)
-        wy = _part(place, 1, dy)
-        wz = _part(place, 2, dz)
-        row = cell + (dx * grid.counts[1] + dy) * grid.counts[2] + dz
-        density = float(sums[row, 0])
-        if density > 0.0:
-            momentum = wp.vec3(float(sums[row, 1]), float(sums[row, 2]), float(sums[row, 3]))
-            around += (wx * wy * wz / density) * momentum
-        at_rest = float(rest[row, 0])
-        excess = wp.max(density - _DENSE * wp.max(at_rest, 1.0 / scale), 0.0)
-        if density > _GONE * at_rest:
-            excess += wetness * wp.min(density - _THIN * at_rest, 0.0)
-        slope = wp.vec3(float(2 * dx - 1) * wy * wz, float(2 * dy - 1) * wx * wz, float(2 * dz - 1) * wx * wy)
-        push -= excess * scale * grid.per_cell * slope
-    change = pressure * push
+    found = _around(cell, grid.counts[1] * grid.counts[2], grid.counts[2], _part(place), fields)
+    around = wp.spatial_top(found)
+    change = pressure * grid.per_cell * wp.spatial_bottom(found)
     size = wp.length(change)
     if size > fastest:
         change *= fastest / size

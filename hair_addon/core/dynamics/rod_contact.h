@@ -8,12 +8,13 @@
 //     p = -(g + n·U)                          what contact has to push; active where p > 0
 //     t = |T (x - x_before - s)|              how far the point slides, of the last pass
 //     a = 1 / (1 + μ p / max(t, CREEP h))     Coulomb: slides under μ p, creeps where it sticks
-//     x = x̃ - g n - (1 - a) T (x̃ - x_before - s) + F U,    F = AWAY n nᵀ + a T;    x = x̃ + U where it is not active
+//     x = x̃ - g n - (1 - a) T (x̃ - x_before - s) + F U - AWAY n nᵀ U',   F = AWAY n nᵀ + a T;   x̃ + U if not active
 //
 // F filters masses in the solve [Baraff98], and x follows from λ and the contact's state, so passes may change that at
-// will. In the first pass U is that of the last substep: it says who is pressed and who is lifted. There t is what
-// Coulomb's law gives, |T (x̃ + U - x_before - s)| - μ p, for a point that the rod hardly pulls; for one that the rod
-// drags along it is the last slide, as such a pull depends on a so much that the law would overshoot.
+// will. U' is U at the beginning of the pass: what the rod pushes, AWAY would else let in. In the first pass U is that
+// of the last substep: it says who is pressed and who is lifted. There t is what Coulomb's law gives,
+// |T (x̃ + U - x_before - s)| - μ p, for a point that the rod hardly pulls; for one that the rod drags along it is the
+// last slide, as such a pull depends on a so much that the law would overshoot.
 
 struct touch {
   vector n, point;
@@ -34,6 +35,7 @@ const auto touch_at = [&](int i, bool is_first, float carried) {
   const lanes push = -(gap + dot(n, pull));
   const vector moved_before = get_vector(x_before, i) + slide;
   const vector free_slide = across(predicted - moved_before);
+  lanes away = lanes(0.0f);
   lanes sliding = size_of(across(get_vector(x, i) - moved_before));
   if (is_first) {
     const lanes last = get(slip, i);
@@ -42,12 +44,13 @@ const auto touch_at = [&](int i, bool is_first, float carried) {
     const lanes own = dot(free_slide, free_slide), of_rod = dot(pull, pull);
     const lanes share = own / (own + ROD_SHARE * of_rod + 1.0e-30f);
     sliding = dragged + (alone - dragged) * share;
+    away = -AWAY * dot(n, pull);
     pull = vector{lanes(0.0f), lanes(0.0f), lanes(0.0f)};
   }
   const auto is_pressed = (dot(n, n) > 0.5f) & (push > 0.0f);
   const lanes loose = 1.0f / (1.0f + friction * higher_of(push, lanes(0.0f)) / higher_of(sliding, lanes(CREEP * h)));
   const lanes a = is_pressed ? loose : lanes(1.0f);
-  const vector pressed = predicted - n * gap - free_slide * (1.0f - a) + across(pull) * a + n * (AWAY * dot(n, pull));
+  const vector pressed = predicted - n * gap - free_slide * (1.0f - a) + across(pull) * a + n * away;
   return touch{chosen(is_pressed, n, vector{lanes(0.0f), lanes(0.0f), lanes(0.0f)}),
                chosen(is_pressed, pressed, predicted + pull), a, is_pressed};
 };

@@ -7,7 +7,7 @@
 // segment 0.
 //
 //   int block                              a group of strands on a processor, a strand on a GPU
-//   int stages                             which parts of a substep: PREDICT, SOLVE, FINISH
+//   int stages                             which parts of a substep: PREDICT, SOLVE, AGAIN, FINISH
 //   int first, end, count                  substeps first … end - 1 of the count in a frame
 //   int pinned                             points from the root that follow the surface beside point 0; M without SOLVE
 //   float h                                a substep [s]
@@ -30,11 +30,14 @@
 //   array_t<float> grooms, groom_frames    3 (M + 1), 4 M rows: the groom in the root's frame
 //   array_t<float> slow_drags              1 row: the rate of drag of slow air [1/s]
 //   array_t<float> roots                   14 rows: position, frame at the frame's start; position, frame at its end
-//   array_t<float> positions_before, frames_before, mobilities    3 (M + 1), 4 M, M + 1 rows: between stages
+//   array_t<float> positions_before, predictions    3 (M + 1) rows each: between stages
+//   array_t<float> frames_before, mobilities        4 M, M + 1 rows: between stages
 //   array_t<float> planes                  8 (M + 1) rows: n, offset, displacement, friction of each point; or empty
+//   array_t<float> found_planes            8 (M + 1) rows: planes after the solve, for AGAIN; or empty
 //   array_t<float> airs, drags, accelerations    3, 1, 3 rows a point: [m/s], factor, [m/s²]; each may be empty
 //   array_t<float> scratches               of a GPU: KEPT M + CONTACT (M + 1) rows
 //   array_t<float> reset_counts            1 row
+//   array_t<float> solved_again            1 row: 1 where AGAIN has moved a strand
 //
 // Constants: WIDTH, GROUP, MOST segments, and those that rod_solver.py explains.
 
@@ -46,7 +49,7 @@
 #include "vectors.h"
 #include "rod_rotations.h"
 
-constexpr int PREDICT = 1, SOLVE = 2, FINISH = 4;
+constexpr int PREDICT = 1, SOLVE = 2, FINISH = 4, AGAIN = 8;
 // What a segment keeps between factorisation and back substitution, and a point between contact passes.
 constexpr int LOWER = 0, UPPER = 21, RIGHT = 48, GRADIENT = 54, TURNING = 63, KEPT = 64;
 constexpr int CONTACT = 7;  // n, a, predicted point
@@ -105,8 +108,11 @@ const float *const bending = rows_of(bend_compliances), *const stretching = rows
 const float *const inverse_mass = rows_of(inverse_masses), *const inertia = rows_of(inertias);
 const float *const groom = rows_of(grooms), *const groom_frame = rows_of(groom_frames);
 float *const x_before = rows_of(positions_before), *const q_before = rows_of(frames_before);
+float* const predicted_rows = rows_of(predictions);
 float *const mobility = rows_of(mobilities), *const resets = rows_of(reset_counts);
-const float *const root_rows = rows_of(roots), *const plane_rows = rows_of(planes);
+float* const again = rows_of(solved_again);
+const float *const root_rows = rows_of(roots), *const found_rows = rows_of(found_planes);
+float* const plane_rows = rows_of(planes);
 const float *const air_rows = rows_of(airs), *const drag_rows = rows_of(drags);
 const float *const acceleration_rows = rows_of(accelerations);
 const bool has_planes = planes.shape[0] > 0, has_air = airs.shape[0] > 0, has_drag = drags.shape[0] > 0;
@@ -142,46 +148,60 @@ for (int substep = first; substep < end; ++substep) {
   if (stages & PREDICT) {
 #include "rod_predict.h"
   }
-  if (stages & SOLVE) {
+  if (stages & (SOLVE | AGAIN)) {
+    const bool is_again = stages & AGAIN;
 #include "rod_newton.h"
 #include "rod_contact.h"
-    ints touches = 0;  // lanes with any plane
-    if (has_planes) {
-      for (int i = pinned + 1; i <= segment_count; ++i) {
-        const vector n = get_vector(plane_rows + size_t(8 * i) * STRIDE, 0);
+#include "rod_repair.h"
+    // Lanes with any plane; again, those of which a point is inside one of those that were found since.
+    ints touches = 0;
+    for (int i = pinned + 1; has_planes && i <= segment_count; ++i) {
+      float* plane = plane_rows + size_t(8 * i) * STRIDE;
+      if (!is_again) {
+        const vector n = get_vector(plane, 0);
         touches = touches | (dot(n, n) > 0.5f);
+        continue;
       }
+      const float* found = found_rows + size_t(8 * i) * STRIDE;
+      const lanes inside = get(found, 3) - dot(get_vector(found, 0), get_vector(x, i));
+      const ints is_inside = inside > INSIDE * get(length, i - 1);
+      if (!any_of(is_inside)) continue;
+      touches = touches | is_inside;
+      for (int k = 0; k < 8; ++k) put(plane, k, is_inside ? get(found, k) : get(plane, k));
     }
     const bool is_touching = any_of(touches);
     if (is_touching) {
       for (int i = 0; i <= segment_count; ++i) {
         for (int k = 0; k < 3; ++k) put(contact(i), k, lanes(0.0f));
         put(contact(i), 3, lanes(1.0f));
-        put_vector(contact(i) + 4 * STRIDE, 0, get_vector(x, i));
+        if (!is_again) put_vector(predicted_rows, i, get_vector(x, i));
+        put_vector(contact(i) + 4 * STRIDE, 0, get_vector(predicted_rows, i));
       }
-      put_contacts(true, from_last, touches);
+      put_contacts(!is_again, is_again ? 1.0f : from_last, touches);
     }
-    ints asked = -1;
-    for (int pass = 0; pass < PASSES; ++pass) {
+    ints asked = is_again ? touches : ints(-1);
+    for (int pass = 0; pass < PASSES && any_of(asked); ++pass) {
       ints stepping = asked;
       for (int step = 0; step < STEPS && any_of(stepping); ++step) {
-        const bool is_first = pass == 0 && step == 0;
+        const bool is_first = pass == 0 && step == 0 && !is_again;
         const lanes turn = newton_step(is_first, is_first ? from_last : 1.0f, stepping, is_touching);
         stepping = stepping & (turn >= TURN);
       }
       if (!is_touching || pass + 1 == PASSES) break;
       asked = changed_contacts(asked & touches);
-      if (!any_of(asked)) break;
-      put_contacts(false, 1.0f, asked);
+      if (any_of(asked)) put_contacts(false, 1.0f, asked);
     }
-    for (int i = 0; i <= segment_count; ++i) {
-      lanes slid = -1.0f;
+    if (is_again && is_touching) repair(touches);
+    if (is_again) put(again, 0, touches ? lanes(1.0f) : lanes(0.0f));
+    for (int i = 0; i <= segment_count && (is_touching || !is_again); ++i) {
+      lanes slid = is_again ? get(slip, i) : lanes(-1.0f);
       if (is_touching && i > pinned) {
         const vector n = get_vector(contact(i), 0);
         const vector slide = get_vector(plane_rows + (size_t(8 * i) + 4) * STRIDE, 0);
         const vector moved = get_vector(x, i) - get_vector(x_before, i) - slide;
         const vector along = moved - n * dot(n, moved);
-        slid = dot(n, n) > 0.5f ? exact_sqrt_of(dot(along, along)) : lanes(-1.0f);
+        const lanes now = dot(n, n) > 0.5f ? exact_sqrt_of(dot(along, along)) : lanes(-1.0f);
+        slid = is_again ? (touches ? now : slid) : now;
       }
       put(slip, i, slid);
     }

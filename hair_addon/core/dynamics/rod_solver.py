@@ -24,7 +24,7 @@ MOST_SEGMENTS = 64
 LEAST_GROUPS = 8  # fewer are not worth a thread
 BLOCK = 32  # threads of a GPU: few, as strands are few and each has much to do
 
-PREDICT, SOLVE, FINISH = 1, 2, 4  # parts of a substep
+PREDICT, SOLVE, FINISH, AGAIN = 1, 2, 4, 8  # parts of a substep
 WHOLE = PREDICT | SOLVE | FINISH
 
 PLANE_ROWS = 8  # of a point: normal (3), offset n·c + r, displacement (3), friction
@@ -45,6 +45,8 @@ _CONSTANTS = {
     "CREEP": 1e-4,  # [m/s] of what friction holds
     "ROD_SHARE": 1.0,
     "CHANGE": 0.05,  # of friction, that asks for another pass
+    "INSIDE": 5e-3,  # of a segment, that a point may be moved out, or a length be off, without another solve
+    "SWEEPS": 20,  # of a repair after that, at most
     "LEAST_INERTIA": 3e-6,  # of a frame, in h² (1 + τ / h) / the compliance of its joint; rounding shows from 1e-7 down
 }
 
@@ -74,10 +76,12 @@ class RodArrays:
     roots: wp.array  # ROOT_ROWS
     # Between the stages of a substep.
     positions_before: wp.array  # 3 (M + 1)
+    predictions: wp.array  # 3 (M + 1), where points go without the rod's forces and contact
     frames_before: wp.array  # 4 M
     mobilities: wp.array  # M + 1
     # Counted.
     resets: wp.array  # 1, how often a strand was put back to its groom
+    solved_again: wp.array  # 1, whether AGAIN has moved it in this substep
 
 
 _ROWS = {
@@ -98,11 +102,13 @@ _ROWS = {
     "slow_drags": None,
     "roots": None,
     "positions_before": (0, 3),
+    "predictions": (0, 3),
     "frames_before": (4, 0),
     "mobilities": (0, 1),
     "resets": None,
+    "solved_again": None,
 }
-_FIXED_ROWS = {"slow_drags": 1, "roots": ROOT_ROWS, "resets": 1}
+_FIXED_ROWS = {"slow_drags": 1, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
 
 
 def row_count(name: str, segment_count: int) -> int:
@@ -115,18 +121,19 @@ def row_count(name: str, segment_count: int) -> int:
 class Surroundings:
     """What acts on points in a substep, each optional: (groups, rows a point times points, lanes) float32.
 
-    planes: `plane_row` says where; airs: velocity of the air [m/s], 3 rows a point; drags: factor of air drag, 1;
-    accelerations: [m/s²], 3.
+    planes: `plane_row` says where; found_planes: the same after the solve, for AGAIN; airs: velocity of the air [m/s],
+    3 rows a point; drags: factor of air drag, 1; accelerations: [m/s²], 3.
     """
 
     planes: wp.array | None = None
+    found_planes: wp.array | None = None
     airs: wp.array | None = None
     drags: wp.array | None = None
     accelerations: wp.array | None = None
 
 
 EMPTY = Surroundings()
-_SURROUNDING_ROWS = {"planes": PLANE_ROWS, "airs": 3, "drags": 1, "accelerations": 3}
+_SURROUNDING_ROWS = {"planes": PLANE_ROWS, "found_planes": PLANE_ROWS, "airs": 3, "drags": 1, "accelerations": 3}
 
 
 def plane_row(point: int, field: int) -> int:
@@ -191,10 +198,13 @@ def _advance(
     slow_drags: wp.array3d[float],
     roots: wp.array3d[float],
     positions_before: wp.array3d[float],
+    predictions: wp.array3d[float],
     frames_before: wp.array3d[float],
     mobilities: wp.array3d[float],
     reset_counts: wp.array3d[float],
+    solved_again: wp.array3d[float],
     planes: wp.array3d[float],
+    found_planes: wp.array3d[float],
     airs: wp.array3d[float],
     drags: wp.array3d[float],
     accelerations: wp.array3d[float],
@@ -236,10 +246,13 @@ def _advance_blocks(
     slow_drags: wp.array3d[float],
     roots: wp.array3d[float],
     positions_before: wp.array3d[float],
+    predictions: wp.array3d[float],
     frames_before: wp.array3d[float],
     mobilities: wp.array3d[float],
     reset_counts: wp.array3d[float],
+    solved_again: wp.array3d[float],
     planes: wp.array3d[float],
+    found_planes: wp.array3d[float],
     airs: wp.array3d[float],
     drags: wp.array3d[float],
     accelerations: wp.array3d[float],
@@ -280,10 +293,13 @@ def _advance_blocks(
         slow_drags,
         roots,
         positions_before,
+        predictions,
         frames_before,
         mobilities,
         reset_counts,
+        solved_again,
         planes,
+        found_planes,
         airs,
         drags,
         accelerations,
@@ -330,12 +346,13 @@ def advance(
     """Advance strands by substeps first … end - 1 of a frame's `step.count`; end: all that are left for None.
 
     stages: PREDICT leaves in `positions` where points go without the rod's forces, for which planes of contact may then
-    be found; SOLVE moves them to where they end; FINISH moves out what is inside planes, and computes velocities. One
-    launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
+    be found; SOLVE moves them to where they end; AGAIN solves once more for strands of which a point is inside one of
+    `found_planes`, which then takes the place of its plane; FINISH moves out what is inside planes, and computes
+    velocities. One launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
     """
     end = step.count if end is None else end
     if step.pinned == arrays.lengths.shape[1]:  # nothing is free
-        stages &= ~SOLVE
+        stages &= ~(SOLVE | AGAIN)
     device = arrays.positions.device
     _check(arrays, step, scratch, surroundings)
     if first < 0 or end > step.count:

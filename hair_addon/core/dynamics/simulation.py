@@ -22,7 +22,7 @@ from .colliders import Collider, Colliders
 from .contact import Contacts
 from .hair_volume import LEAST_CELL, HairVolume
 from .material import material_of
-from .rod_solver import FINISH, PREDICT, SOLVE, Surroundings
+from .rod_solver import AGAIN, FINISH, PREDICT, SOLVE, Surroundings
 from .rods import Rods, combed_shape, step_of
 from .root_motion import RigidMotion, RootPose
 from .settings import DynamicsSettings
@@ -197,8 +197,10 @@ class Simulation:
             places = rods.arrays.positions, rods.arrays.positions_before
             planes = self._contacts.find(*places, step.size)
             rods.advance(step, substep, substep + 1, SOLVE, Surroundings(planes=planes))
-            planes = self._contacts.find(*places, step.size, is_final=True)
-            rods.advance(step, substep, substep + 1, FINISH, Surroundings(planes=planes))
+            found = self._contacts.find(*places, step.size, is_final=True)
+            rods.advance(step, substep, substep + 1, AGAIN, Surroundings(planes=planes, found_planes=found))
+            found = self._contacts.find(*places, step.size, is_final=True, moved=rods.arrays.solved_again)
+            rods.advance(step, substep, substep + 1, FINISH, Surroundings(planes=found))
         self._since_rubbed += step.size
         if self._is_rubbing and self._since_rubbed >= _RUBBING - 1e-9:
             settings = self.settings

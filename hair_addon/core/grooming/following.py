@@ -178,8 +178,11 @@ def _sums_of_some(parts, guides):
 
     # Few strands have no need of all guides.
     indices = np.concatenate([rows_here(own.guide_weights.indices, chosen) for own, chosen in parts])
-    followed, places = np.unique(np.append(-1, indices), return_inverse=True)
-    followed, places = followed[1:], (places[1:] - 1).reshape(indices.shape)
+    is_followed = np.zeros(len(guides) + 1, bool)
+    is_followed[indices] = True
+    is_followed[-1] = False  # where there is none, index -1
+    followed, places = np.flatnonzero(is_followed), (np.cumsum(is_followed) - 1)[indices]
+    places[indices < 0] = -1
     guide_points, guide_normals = (
         wp.array(rows_here(array, followed), dtype=wp.vec3, device=device, copy=False)
         for array in (guides.points, binding.guide_normals)

@@ -80,12 +80,25 @@ def test_frames_of_another_animation_are_said(guides):
     turn(0.0, 16)
     assert said(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
     lift_ball(6)
-    sentence = "Frames from {frame} on are baked with other colliders or forces: bake again"
+    sentence = "Frames from {frame} on are baked with other colliders, forces or keys: bake again"
     assert said(guides, *range(1, 21)) == (sentence, {"frame": 7})
     bake(guides, 20)
     assert said(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
     bpy.context.scene.gravity.z = -5.0
     assert said(guides, 9, 4) == (sentence, {"frame": 4})
+
+
+def test_other_keys_of_a_setting_are_said(guides):
+    settings = guides.data.vellus.dynamics
+    for frame, drag in ((6, 1.0), (12, 2.0)):
+        settings.air_drag = drag
+        settings.keyframe_insert("air_drag", frame=frame)
+    bake(guides, 20)
+    assert said(guides, *range(1, 21))[0] == "Frames {first} to {last} are baked"
+    settings.air_drag = 3.0
+    settings.keyframe_insert("air_drag", frame=12)
+    sentence = "Frames from {frame} on are baked with other colliders, forces or keys: bake again"
+    assert said(guides, *range(1, 21)) == (sentence, {"frame": 7})
 
 
 def test_baked_frames_are_of_the_same_animation_in_another_session(guides, tmp_path):

@@ -71,6 +71,13 @@ def test_a_point_that_is_not_asked_has_no_plane_to_miss(device, rng):
             np.testing.assert_array_equal(
                 final, asking.find(there, before, STEP, is_final=True, is_skipping=False).numpy()
             )
+            is_moved = rng.random((160, 1, 1)) < 0.02
+            strands = strands + 0.001 * is_moved * rng.normal(size=(160, 1, 3))
+            there, moved = lanes_of(strands, device), lanes_of(is_moved.repeat(3, axis=2), device)
+            again = sparing.find(there, before, STEP, is_final=True, moved=moved).numpy().copy()
+            np.testing.assert_array_equal(
+                again, asking.find(there, before, STEP, is_final=True, is_skipping=False).numpy()
+            )
     assert spared > 0.1 and found > 0.1
 
 

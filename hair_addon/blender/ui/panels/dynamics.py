@@ -55,7 +55,7 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
             write(layout, context, guides.vellus.dynamics_status, "ERROR")
         if frame_folders.has_frames(guides) and not context.scene.render.use_lock_interface:
             write(layout, context, interface_text(unlocked_renders.SENTENCE), "INFO")
-            unlocked_renders.draw_setting(layout, context)
+            layout.prop(context.scene.render, "use_lock_interface")
         note = dynamics_notes.size_note(guides, context.scene)
         if note:
             write(layout, context, note, "INFO")

@@ -1,0 +1,33 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The mean motion of hair around a point, and the push of its pressure: six numbers from the eight cells around it.
+//
+// The body of `_around` in hair_volume.py. Parameters:
+//
+//   int row                       the cell before the point
+//   int across, int along         from a cell to the next one along x, along y; along z it is 1
+//   vec3 part                     where the point is between the cells, 0..1 along each axis
+//   array_t<vec4> fields          of each cell the mean velocity [m/s], and how much too dense it is
+//
+// Returns Σ w v, and -Σ excess ∇w by the size of a cell.
+
+{
+float around[4] = {0.0f, 0.0f, 0.0f, 0.0f}, push[3] = {0.0f, 0.0f, 0.0f};
+for (int corner = 0; corner < 8; ++corner) {
+  const int dx = corner >> 2, dy = (corner >> 1) & 1, dz = corner & 1;
+  const float wx = dx ? part[0] : 1.0f - part[0], wy = dy ? part[1] : 1.0f - part[1];
+  const float wz = dz ? part[2] : 1.0f - part[2], weight = wx * wy * wz;
+  const auto& field = fields.data[row + dx * across + dy * along + dz];
+  for (int k = 0; k < 4; ++k) around[k] += weight * field[k];
+  const float excess = field[3];
+  push[0] += (dx ? -excess : excess) * wy * wz;
+  push[1] += (dy ? -excess : excess) * wx * wz;
+  push[2] += (dz ? -excess : excess) * wx * wy;
+}
+wp::spatial_vector found;
+for (int k = 0; k < 3; ++k) {
+  found[k] = around[k];
+  found[3 + k] = push[k];
+}
+return found;
+}
