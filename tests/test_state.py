@@ -38,7 +38,6 @@ PURE = {
     "core/geometry/bspline.py: _flat_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
     "core/params.py: _declared",
-    "core/shading/tables/surface_albedo.py: table",
 }
 
 _DISPLAYS = (ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.Set, ast.SetComp)
