@@ -13,10 +13,12 @@ import guide_tool_pictures
 import imbuf
 import numpy as np
 import ratio_plot
+from mathutils import Matrix, Vector
 
 from hair_addon import api
 
 PAGE_WIDTH, PAGE_BITS = 1540, 0xF8  # pixels, and what is kept of a color, of a picture of the documentation
+NECK = Vector((0.0, -0.03, 0.65))  # [m]
 BALL_RADIUS = 0.02  # [m]
 BALL_SPEED = 0.25  # [m/s]
 BALL_SEEN = (-0.06, 0.06, 0.69)  # [m]
@@ -122,9 +124,14 @@ def push_ball():
 
 
 def nod():
-    """Nod twice."""
+    """Nod twice, about the neck."""
     skull, _guides, _hair = dynamics_scene.objects()
-    dynamics_scene.turn(skull, 0, dynamics_scene.shaking(16.0, 1.5, 1.4), RESTED)
+    angle = dynamics_scene.shaking(16.0, 1.5, 1.4)
+    dynamics_scene.turn(skull, 0, angle, SETTLED)
+    for frame in range(1, SETTLED + 1):
+        turn = Matrix.Rotation(angle(dynamics_scene.time_of(frame)), 3, "X")
+        skull.location = NECK - turn @ NECK
+        skull.keyframe_insert("location", frame=frame)
 
 
 def wet():
