@@ -28,7 +28,8 @@ from .root_motion import RigidMotion, RootPose
 from .settings import DynamicsSettings
 
 MOST_SUBSTEPS = 64
-_LONGEST_WAY = 0.01  # [m] that roots and colliders move in a substep, less where segments are shorter
+_LONGEST_WAY = 0.01  # [m] that roots and colliders move in a substep, less where segments are shorter,
+_SHORTEST_WAY = 0.003  # but no less: short fur moves the same from there on
 _GRID = 0.125  # [m] between the places of the origin
 _RUBBING = 0.01  # [s] between effects of hair on hair, at least
 _ASKED = 256  # guides that are asked how far others are
@@ -259,7 +260,7 @@ class Simulation:
             return self.settings.substeps
         way = np.linalg.norm(after.positions - before.positions, axis=1).max()
         way = max(float(way), self._colliders.largest_motion)
-        longest = min(_LONGEST_WAY, float(self._material.lengths.mean()))
+        longest = min(_LONGEST_WAY, max(float(self._material.lengths.mean()), _SHORTEST_WAY))
         return min(max(math.ceil(way / longest), self.settings.substeps), MOST_SUBSTEPS)
 
     def _put_back_broken(self):
