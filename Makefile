@@ -14,7 +14,7 @@ peers = .venv/peers
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "make %-9s %s\n", $$1, $$2 }' Makefile
 
-demo: $(installed) ## the head with 200 guides and 30,000 strands: images and tables in out/demo
+demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and tables in out/demo
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
 
 test: $(installed) ## all tests except long benchmarks and tests in a window, in up to four processes
