@@ -6,10 +6,11 @@ points are of whole numbers: in any order, on any number of cores, they are the 
 
     ρ_c = Σ w m,  P_c = Σ w m v                                   trilinear weights w; ρ⁰ of the groom
     v_i ← (1 - f) v_i + f Σ w P_c / ρ_c,  f = 1 - exp(-k_f Δt)    friction: keeps momentum
-    v_i ← v_i - Δt (k_p / ρ̄) Σ_c (ρ_c - 1.2 max(ρ⁰_c, ρ̄))₊ ∇w_ic  pressure, |Δv| ≤ ½ cell / Δt
+    v_i ← v_i - Δt (k_p / ρ̄) Σ_c (ρ_c - 1.2 max(ρ⁰_c, ρ̄, ρ¹))₊ ∇w_ic  pressure, |Δv| ≤ ½ cell / Δt
     wet: the same with (ρ_c - 0.8 ρ⁰_c)₋ where ρ_c > 0.2 ρ⁰_c      cohesion
 
-ρ̄ is the mean of ρ⁰ over its cells. Without it in the pressure, hair could not fall where the groom has none.
+ρ̄ is the mean of ρ⁰ over its cells. Without it in the pressure, hair could not fall where the groom has none. ρ¹ is the
+most that a straight strand has in a cell by itself: without it strands that stand alone would push themselves.
 """
 
 import math
@@ -76,6 +77,8 @@ class HairVolume:
         self.grid: Any = None
         self._rest: Any = None
         self._mean: Any = None
+        self._alone = 0.0  # ρ¹
+        self._weights: Any = None
         self._kept_sums: list[Any] = []
         self._fields: Any = None
 
@@ -95,6 +98,7 @@ class HairVolume:
         self.grid.low, self.grid.counts = wp.vec3i(*map(int, first)), wp.vec3i(*map(int, counts))
         self.grid.per_cell = 1.0 / self.cell_size
         self._rest = self._sums(groom, None)
+        self._alone = self._most_of_one(groom)
         self._mean = wp.zeros(2, dtype=wp.int64, device=self.device)
         kernel_cache.launch(_average, len(self._rest), inputs=[self._rest], outputs=[self._mean], device=self.device)
 
@@ -116,13 +120,26 @@ class HairVolume:
         groups, points, lanes = self._shape
         fields = self._fields
         shares = parallel.share_count(len(sums), self.device, _LEAST_ROWS)
-        inputs = [sums, self._rest, self._mean, wetness]
+        inputs = [sums, self._rest, self._mean, self._alone, wetness]
         parallel.launch_shares(_mean_motion, len(sums), inputs, [[fields]] * shares, self.device)
         inputs = [self.grid, self._masses, self._regions, positions, fields]
         inputs += [mixed, duration * pressure, 0.5 * self.cell_size / duration]
         kernel_cache.load(self.device, _rub.module)
         shares = parallel.share_count(groups * points * lanes, self.device, _LEAST_ROWS // 8)
         parallel.launch_shares(_rub, groups * points * lanes, inputs, [[velocities]] * shares, self.device)
+
+    def _most_of_one(self, groom):
+        """What a straight strand of mean mass has at most in a cell: a point, or all points of a cell's length."""
+        if self._weights is None:
+            masses = self._masses.numpy().astype(np.float64)
+            points = groom.numpy().astype(np.float64).reshape(len(masses), -1, 3, masses.shape[2])
+            lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).mean(axis=1)
+            is_strand = (masses > 0.0).any(axis=1) & (lengths > 0.0)
+            self._weights = masses.mean(axis=1)[is_strand], lengths[is_strand]
+        masses, lengths = self._weights
+        if not len(masses):
+            return 0.0
+        return float(2.0**20 * (masses * np.maximum(1.0, self.cell_size / lengths)).mean())
 
     def _cells(self, low, high):
         """(cell size, first cell, number of cells along each axis) of a grid over a box, with a cell around it."""
@@ -272,6 +289,7 @@ def _mean_motion(
     sums: wp.array2d[wp.int64],
     rest: wp.array2d[wp.int64],
     mean: wp.array[wp.int64],
+    alone: float,
     wetness: float,
     first: int,
     # outputs
@@ -286,7 +304,7 @@ def _mean_motion(
         scale = float(mean[1]) / float(mean[0])
     density = float(sums[cell, 0])
     at_rest = float(rest[cell, 0])
-    excess = wp.max(density - _DENSE * wp.max(at_rest, 1.0 / scale), 0.0)
+    excess = wp.max(density - _DENSE * wp.max(wp.max(at_rest, alone), 1.0 / scale), 0.0)
     if density > _GONE * at_rest:
         excess += wetness * wp.min(density - _THIN * at_rest, 0.0)
     share = 0.0

@@ -175,3 +175,17 @@ def test_what_does_not_fit_is_refused(hair, device):
         HairVolume(masses, np.full((8, 8), 2**30), 0.01)
     with pytest.raises(HairError):
         hair.volume().rub(masses, masses, STEP, 1.0, 1.0)
+
+
+@pytest.mark.parametrize("spacing", [0.002, 0.006, 0.013])
+def test_a_straight_strand_alone_is_not_pushed(rng, device, spacing):
+    """Wherever and along whatever direction it lies in the grid, of cells longer or shorter than its segments."""
+    for _ in range(40):
+        along = rng.normal(size=3)
+        line = rng.uniform(0.0, 0.02, 3) + spacing * np.arange(12)[:, None] * along / np.linalg.norm(along)
+        hair = Hair(rng, device, LANES, len(line))
+        hair.points = np.repeat(line[None], LANES, axis=0).astype(np.float32)
+        hair.masses[:], hair.masses[1:] = 1.0, 0.0  # the other lanes have no strand
+        elsewhere = hair.points + np.float32(0.3)  # where the groom was
+        after = hair.rubbed(hair.volume(groom=elsewhere), friction=0.0, pressure=50.0)
+        np.testing.assert_array_equal(after[0], hair.velocities[0])
