@@ -116,12 +116,7 @@ def by_vellus(size):
 def line(row):
     """A scene in one line."""
     values = row["scene"]
-    hair = ", ".join(
-        " ".join(
-            [one["area"], one["look"].lower(), f"{one['length']:.2f} m", f"{one['strand_count'] // 1000}k", *one["styles"]]
-        ).strip()
-        for one in values["hair"]
-    )
+    hair = ", ".join(_hair(one) for one in values["hair"])
     lights = " ".join(light["kind"].lower() for light in values["lights"]) or "no light"
     ratios = " ".join(f"{value:5.2f}" for value in row["ratio"])
     return (
@@ -130,12 +125,18 @@ def line(row):
     )
 
 
+def _hair(values):
+    words = values["area"], values["look"].lower(), f"{values['length']:.2f} m", f"{values['strand_count'] // 1000}k"
+    return " ".join(word for word in (*words, *values["styles"]) if word)
+
+
 def summary(rows):
     """The distribution of the largest deviations in a channel."""
     deviations = np.array([row["deviation"] for row in rows])
     structures = np.array([row["structure"] for row in rows])
     return (
-        f"{len(rows)} scenes: within 8 % {np.mean(deviations < 0.08):.0%}, within 15 % {np.mean(deviations < 0.15):.0%}, "
+        f"{len(rows)} scenes: within 8 % {np.mean(deviations < 0.08):.0%}, "
+        f"within 15 % {np.mean(deviations < 0.15):.0%}, "
         f"median {np.median(deviations):.1%}, worst {deviations.max():.0%}; "
         f"structure median {np.median(structures):.3f}, worst {structures.min():.3f}"
     )
