@@ -22,6 +22,7 @@ void main()
                                      light.power.rgb,
                                      light.cos_cone,
                                      light.blend,
+                                     light.radius,
                                      drawn_position);
       irradiance += cosine * facing * surface_visibility(light, drawn_position, view.hair_forward.rgb);
     }
