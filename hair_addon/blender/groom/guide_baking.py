@@ -145,8 +145,7 @@ def _end(scene, present, baked):
 
 def _begin(guides, last, scene, starts_over, stack):
     """A `Task` in its first frame."""
-    settings = properties.dynamics_of(guides.vellus)
-    start = settings.start_frame
+    start = properties.dynamics_of(guides.vellus).start_frame
     if last < start:
         raise HairError(
             "The simulation begins in frame {start}, after the last frame to bake, {last}.", start=start, last=last
@@ -166,7 +165,7 @@ def _begin(guides, last, scene, starts_over, stack):
     writer = stack.enter_context(frame_cache.baking(folder, manifest))
     guides_named, there = Remembered(guides), FrameCache(folder)
     numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}
-    digest = bake_resuming.digest_of(guides, scene, settings)
+    digest = bake_resuming.digest_of(guides, scene, properties.dynamics_of(guides.vellus))
     found = there.read_frame(start)
     if found is None or (found.key, found.digest) != (manifest.key, digest):
         numbers = set()

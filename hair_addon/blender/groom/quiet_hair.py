@@ -13,15 +13,15 @@ from ..settings import properties
 
 @contextlib.contextmanager
 def unevaluated(guides_list: Sequence[Curves], scene: Scene) -> Generator[None]:
-    """Disable all hair and guides in viewports, and enable those again that were, on every way out.
+    """Disable hair and guides in viewports, and enable those again that were, on every way out.
 
     Only without a window, and if the meshes that the guides need are visible: what is hidden may be evaluated only
-    because hair follows it.
+    because hair follows it. Those with keys or drivers stay: Blender moves no settings of what it does not evaluate.
     """
     if not bpy.app.background or not all(needed.visible_get() for needed in _needed(guides_list)):
         yield
         return
-    hidden = [o for o in scene.objects if o.type == "CURVES" and o.data.vellus.kind != "NONE" and not o.hide_viewport]
+    hidden = [curves_object for curves_object in scene.objects if _may_hide(curves_object)]
     uids = {curves_object.session_uid for curves_object in hidden}
     try:
         for curves_object in hidden:
@@ -31,6 +31,12 @@ def unevaluated(guides_list: Sequence[Curves], scene: Scene) -> Generator[None]:
         for curves_object in bpy.data.objects:  # one that was deleted meanwhile is not among them
             if curves_object.session_uid in uids:
                 curves_object.hide_viewport = False
+
+
+def _may_hide(curves_object):
+    if curves_object.type != "CURVES" or curves_object.hide_viewport:
+        return False
+    return curves_object.data.vellus.kind != "NONE" and curves_object.data.animation_data is None
 
 
 def _needed(guides_list: Sequence[Curves]) -> list[Object]:

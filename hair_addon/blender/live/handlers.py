@@ -168,7 +168,7 @@ def after_frame_change(scene, depsgraph):
     if scene_time.may_write(scene, depsgraph) and animated.follow(depsgraph):
         # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
         is_render = scene_time.is_rendered(depsgraph)
-        _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, [])
+        _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, {})
         if is_render:
             live_hair.write_all()
     if scene_time.may_write(scene, depsgraph):

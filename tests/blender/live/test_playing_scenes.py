@@ -64,7 +64,8 @@ def test_units_of_the_scene_do_not_matter(swung):
     bpy.context.scene.unit_settings.scale_length = 0.01
     guides.data.vellus.dynamics.collision_distance *= 100.0
     guides.data.vellus.dynamics.cell_size *= 100.0
-    np.testing.assert_allclose(played(guides), expected, atol=1e-4)
+    # A thousandth of a strand: contact enlarges what is rounded otherwise.
+    np.testing.assert_allclose(played(guides), expected, atol=5e-4)
 
 
 def test_a_mirrored_surface_moves_hair_as_its_mirror_image(swung):
