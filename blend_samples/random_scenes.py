@@ -118,7 +118,11 @@ def line(row):
     values = row["scene"]
     hair = ", ".join(
         " ".join(
-            [one["area"], one["look"].lower(), f"{one['length']:.2f} m", f"{one['strand_count'] // 1000}k", *one["styles"]]
+            [
+                *(one["area"], one["look"].lower()),
+                *(f"{one['length']:.2f} m", f"{one['strand_count'] // 1000}k"),
+                *one["styles"],
+            ]
         ).strip()
         for one in values["hair"]
     )
@@ -135,7 +139,8 @@ def summary(rows):
     deviations = np.array([row["deviation"] for row in rows])
     structures = np.array([row["structure"] for row in rows])
     return (
-        f"{len(rows)} scenes: within 8 % {np.mean(deviations < 0.08):.0%}, within 15 % {np.mean(deviations < 0.15):.0%}, "
+        f"{len(rows)} scenes: within 8 % {np.mean(deviations < 0.08):.0%}, "
+        f"within 15 % {np.mean(deviations < 0.15):.0%}, "
         f"median {np.median(deviations):.1%}, worst {deviations.max():.0%}; "
         f"structure median {np.median(structures):.3f}, worst {structures.min():.3f}"
     )
