@@ -8,6 +8,7 @@ import pytest
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.materials import looks, materials
 from hair_addon.core.shading import appearance
+from tests.support.guide_tools import grown_from_nothing, lengths_of
 from tests.support.reading import points
 
 
@@ -37,6 +38,17 @@ def test_hair_follows_animated_settings_in_each_frame(keyed_hair, frame, count, 
     look = appearance.Appearance(melanin=melanin)
     wanted = appearance.principled_sockets(look)["Absorption Coefficient"]
     np.testing.assert_allclose(absorption(keyed_hair), wanted, rtol=1e-5)
+
+
+def test_keyed_guides_grow_again_and_hair_follows_them(hair):
+    guides = bpy.data.objects["Guides"]
+    for frame, length in ((1, 0.5), (11, 0.1)):
+        guides.data.vellus.guides.length = length
+        guides.data.keyframe_insert("vellus.guides.length", frame=frame)
+    for frame, length in ((1, 0.5), (6, 0.3), (11, 0.1)):
+        bpy.context.scene.frame_set(frame)
+        assert lengths_of(points(guides)).mean() == pytest.approx(length, rel=0.05)  # they vary
+        np.testing.assert_array_equal(points(hair), grown_from_nothing(hair))
 
 
 def test_a_frame_is_the_same_whichever_came_before(keyed_hair):
