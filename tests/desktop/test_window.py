@@ -167,9 +167,10 @@ def test_selected_hair_is_outlined_by_its_silhouette(walk):
     assert ((red > green) & (green > blue)).mean() > 0.9
     assert np.count_nonzero(is_line) > 500
     distance = distance_transform_edt(np.abs(plain - bare).max(axis=-1) <= 2.0 / 255.0)
-    assert distance[is_line].max() < 8.0
-    # Wherever nothing but the background is around, a pixel in the middle of the line is orange.
-    assert is_line[np.abs(distance - 3.0) < 0.2].mean() > 0.8
+    # Before the head hair that it hides is outlined too, and hair that is seen there has gaps.
+    is_background = np.abs(bare - bare[0, 0]).max(axis=-1) <= 2.0 / 255.0
+    assert distance[is_line & is_background].max() < 8.0
+    assert is_line[is_background & (np.abs(distance - 3.0) < 0.2)].mean() > 0.8
 
 
 def test_our_engine_draws_surfaces_and_hair_in_the_window(walk):
