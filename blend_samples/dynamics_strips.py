@@ -25,6 +25,8 @@ BALL_SEEN = (-0.06, 0.06, 0.69)  # [m]
 BALL_COLOR = (0.55, 0.62, 0.70, 1.0)
 WIND = 2.0  # [m/s]
 SHELTERED_DRAG = 0.2  # of a lone fiber's
+NOD_STIFFNESS = 60.0  # with which hair that rises at the parting stays up when it is wet
+UPRIGHT_SEEN, UPRIGHT_LENS = (0.0, 0.015, 0.735), 62.0  # [m], [mm]
 UPRIGHT_LENGTH, UPRIGHT_STIFFNESS = 0.11, 2.0  # [m]: just stiff enough to stand
 SCREEN_RIGHT = np.array([-dynamics_scene.CAMERA[1], dynamics_scene.CAMERA[0], 0.0]) / math.hypot(
     *dynamics_scene.CAMERA[:2]
@@ -125,7 +127,8 @@ def push_ball():
 
 def nod():
     """Nod twice, about the neck."""
-    skull, _guides, _hair = dynamics_scene.objects()
+    skull, guides, _hair = dynamics_scene.objects()
+    api.set_dynamics(guides, bend_stiffness=NOD_STIFFNESS)
     angle = dynamics_scene.shaking(16.0, 1.5, 1.4)
     dynamics_scene.turn(skull, 0, angle, SETTLED)
     for frame in range(1, SETTLED + 1):
@@ -158,6 +161,7 @@ def stand(is_sag_free=True):
     dynamics_scene.write_strands(guides, strands[:, :1] + UPRIGHT_LENGTH * along * out)
     api.set_styles(hair, [api.Clump(size=0.012, amount=0.8, seed=3)])
     api.set_dynamics(guides, sag_free=is_sag_free, bend_stiffness=UPRIGHT_STIFFNESS)
+    dynamics_scene.see_from(dynamics_scene.CAMERA, UPRIGHT_SEEN, UPRIGHT_LENS)
 
 
 def sag():
