@@ -43,7 +43,10 @@ def run(given, console):
     if given.deliver is not None:
         _require_delivery(given)
     opening.open_file(given, console)
-    last = blender.host.scene_time.scene_frames()[-1] if given.last_frame is None else given.last_frame
+    scene_last = blender.host.scene_time.scene_frames()[-1]
+    last = scene_last if given.last_frame is None else given.last_frame
+    if given.deliver is not None and last < scene_last:
+        raise HairError(f"--deliver needs all frames of the scene, to {scene_last}: leave out --last-frame {last}.")
     guides = [_named(name) for name in given.guides] if given.guides else blender.groom.frame_folders.simulating()
     if not guides:
         raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")

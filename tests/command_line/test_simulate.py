@@ -113,6 +113,12 @@ def test_a_delivered_file_needs_no_cache(shot, tmp_path):
         assert run_here("simulate", shot, "--deliver", name).status == 1
 
 
+def test_a_part_of_a_shot_is_not_delivered_and_not_simulated_for_it(shot, tmp_path):
+    refused = run_here("simulate", shot, "--deliver", tmp_path / "delivered.blend", "--last-frame", "4")
+    assert refused.status == 1 and "needs all frames of the scene, to 6" in refused.errors
+    assert not frame_folders.has_frames(bpy.data.hair_curves["Guides"])
+
+
 def test_too_little_memory_is_told(shot, monkeypatch):
     needed = guide_baking.memory_of([bpy.data.hair_curves["Guides"]])
     monkeypatch.setattr(memory, "free_bytes", lambda: needed * 2)
