@@ -17,7 +17,6 @@ from ...core.files.frame_cache import FrameCache
 from ...core.files.frame_manifest import Manifest
 from ...core.grooming import cost
 from ...core.long_work import Stage, Work
-from ...core.params import given
 from ..data import scene as scenes
 from ..host import memory, scene_time
 from ..host.datablocks import Remembered
@@ -70,12 +69,11 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
 
     Raises `HairError`.
     """
-    settings = given(guide_simulation.simulated(properties.dynamics_of(guides.vellus)))
-    keyed = properties.keyed_dynamics_of(guides.vellus)
+    settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
     return frame_manifest.digests_of(
         {
             "solver": SOLVER_VERSION,
-            "settings": {name: value for name, value in settings.items() if name not in keyed},
+            "settings": guide_simulation.unkeyed(guides, settings),
             "guides": guide_simulation.combed_points(guides),
             "surface": guides.vellus.topology,
             "frame rate": scene.render.fps / scene.render.fps_base,

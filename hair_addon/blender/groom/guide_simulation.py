@@ -6,6 +6,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 from bpy.types import Curves, Depsgraph, Scene
@@ -13,6 +14,7 @@ from bpy.types import Curves, Depsgraph, Scene
 from ...core import dynamics
 from ...core.dynamics.settings import DynamicsSettings
 from ...core.errors import HairError
+from ...core.params import given
 from ..data import attributes, curves, guide_poses, simulated_world
 from ..data.guide_poses import GuidePose
 from ..host import scene_time
@@ -120,6 +122,12 @@ def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsS
 def simulated(settings: DynamicsSettings) -> DynamicsSettings:
     """Settings without those that guides do not follow from, but hair: to be compared with others."""
     return replace(settings, keeps_hair_outside=False)
+
+
+def unkeyed(guides: Curves, settings: DynamicsSettings) -> dict[str, Any]:
+    """{name: value} of the settings that are the same in all frames: keys and drivers move the others."""
+    keyed = properties.keyed_dynamics_of(guides.vellus)
+    return {name: value for name, value in given(settings).items() if name not in keyed}
 
 
 def needed_stiffness(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> np.ndarray:

@@ -188,9 +188,11 @@ def _begin(guides, blender_scene, depsgraph):
 def _advance(played, guides, blender_scene, depsgraph, settings):
     """Simulate one frame more, with the settings as they are now."""
     settings = simulated(settings)
-    if settings != played.simulated.settings:
+    before = played.simulated.settings
+    if settings != before:
         played.simulated.change(settings)
-        played.outdated = played.frame
+        if guide_simulation.unkeyed(guides, settings) != guide_simulation.unkeyed(guides, before):
+            played.outdated = played.frame
     read = guide_simulation.read(guides, blender_scene, depsgraph, settings)
     points = played.simulated.advance(read)
     played.frame += 1

@@ -139,7 +139,7 @@ class HairVolume:
         masses, lengths = self._weights
         if not len(masses):
             return 0.0
-        return float(2.0**20 * (masses * np.maximum(1.0, self.cell_size / lengths)).mean())
+        return float(_UNIT * (masses * np.maximum(1.0, self.cell_size / lengths)).mean())
 
     def _cells(self, low, high):
         """(cell size, first cell, number of cells along each axis) of a grid over a box, with a cell around it."""

@@ -49,6 +49,19 @@ def drawn(hair):
     return points(hair)
 
 
+def test_keys_of_settings_do_not_outdate_what_was_played(swung):
+    settings = swung[0].data.vellus.dynamics
+    for frame, drag in ((1, 1.0), (8, 3.0)):
+        settings.air_drag = drag
+        settings.keyframe_insert("air_drag", frame=frame)
+    play(1, 5)
+    sentence, values = dynamics_state.state_of(swung[0].data)
+    assert sentence.startswith("Simulated up to frame") and values["frame"] == 5
+    settings.damping = 0.1
+    play(6, 7)
+    assert "other settings" in dynamics_state.state_of(swung[0].data)[0]
+
+
 def test_playing_is_what_baking_gives(swung):
     guides, hair = swung
     play(1, 8)
