@@ -15,6 +15,7 @@
   const auto set_lane = [](auto& vector, int, auto value) { vector = value; };
   const auto floor_of = [](lanes value) { return floorf(value); };
   const auto sqrt_of = [](lanes value) { return sqrtf(value); };
+  const auto inverse_root_of = [](lanes value) { return rsqrtf(value); };
   const auto abs_of = [](lanes value) { return fabsf(value); };
   // Rounded to the nearest, also where a module's option `fast_math` approximates roots and divisions.
   const auto exact_sqrt_of = [](lanes value) { return __fsqrt_rn(value); };
@@ -33,6 +34,7 @@
   const auto set_lane = [](auto& vector, int lane, auto value) { vector[lane] = value; };
   const auto floor_of = [](lanes value) { return __builtin_elementwise_floor(value); };
   const auto sqrt_of = [](lanes value) { return __builtin_elementwise_sqrt(value); };
+  const auto inverse_root_of = [](lanes value) { return 1.0f / __builtin_elementwise_sqrt(value); };
   const auto abs_of = [](lanes value) { return __builtin_elementwise_abs(value); };
   const auto exact_sqrt_of = [](lanes value) { return __builtin_elementwise_sqrt(value); };
   const auto exact_quotient_of = [](lanes a, lanes b) { return a / b; };

@@ -92,7 +92,8 @@ const auto move_across = [&](auto offset, lanes before_u, lanes before_v, const 
     const auto has_length = d > 1.0e-12f;
     const vector nearly = made * (1.0f / (has_length ? size : lanes(1.0f)));
     // Unit but for rounding, which a step of Newton's method takes away.
-    next[i] = chosen(has_length, nearly * (1.5f - 0.5f * dot(nearly, nearly)), t[i]);
+    const vector direction = nearly * (1.5f - 0.5f * dot(nearly, nearly));
+    next[i] = any_of(!has_length) ? chosen(has_length, direction, t[i]) : direction;
     if (keep_length != 1.0f) next_length[i] = has_length ? size : d;
     passed(progress, forward, forwards, sideways, upward);
   }

@@ -39,33 +39,59 @@ for (int wave = 0; wave < WAVES * octave_count; ++wave) {
 }
 float frequencies[WAVES];
 for (int first = 0; first < WAVES; ++first) frequencies[first] = number[16 + first] / wavelength;
-const auto noise = [&](lanes s, lanes x, lanes& to_u, lanes& to_v) {
-  to_u = 0.0f;
-  to_v = 0.0f;
+// The noise at all points, in `place`, before any moves: its coefficients and what moves points across their strand do
+// not fit the registers of a GPU together. OCTAVES: at least as many as there are.
+const auto put_noise = [&](auto octaves) {
+  constexpr int OCTAVES = decltype(octaves)::value, COUNT = WAVES * OCTAVES;
+  lanes evens[COUNT], odds[COUNT];
 #pragma unroll
-  for (int first = 0; first < WAVES; ++first) {
-    lanes sine, cosine;
-    sine_and_cosine(frequencies[first] * s, sine, cosine);
-    const float sense = first % 2 ? -1.0f : 1.0f;
-    for (int wave = first; wave < WAVES * octave_count; wave += WAVES) {
-      to_u += even[wave] * cosine - odd[wave] * sine;
-      to_v += sense * (even[wave] * sine + odd[wave] * cosine);
-      // The next octave has twice the angle.
-      const lanes twice = 2.0f * sine * cosine;
-      cosine = 1.0f - 2.0f * sine * sine;
-      sine = twice;
-    }
+  for (int wave = 0; wave < COUNT; ++wave) {
+    const bool is_there = wave < WAVES * octave_count;
+    evens[wave] = is_there ? even[wave] : lanes(0.0f);
+    odds[wave] = is_there ? odd[wave] : lanes(0.0f);
   }
-  const lanes amount = size * profile(x);
-  to_u *= amount;
-  to_v *= amount;
+  lanes s = 0.0f;
+  for (int i = 0; i < point_count; ++i) {
+    if (i > 0) s += length[i];
+    lanes to_u = 0.0f, to_v = 0.0f;
+#pragma unroll
+    for (int first = 0; first < WAVES; ++first) {
+      lanes sine, cosine;
+      sine_and_cosine(frequencies[first] * s, sine, cosine);
+      const float sense = first % 2 ? -1.0f : 1.0f;
+#pragma unroll
+      for (int wave = first; wave < COUNT; wave += WAVES) {
+        to_u += evens[wave] * cosine - odds[wave] * sine;
+        to_v += sense * (evens[wave] * sine + odds[wave] * cosine);
+        // The next octave has twice the angle.
+        const lanes twice = 2.0f * sine * cosine;
+        cosine = 1.0f - 2.0f * sine * sine;
+        sine = twice;
+      }
+    }
+    const lanes amount = size * profile(s * per_total);
+    place[i].x = to_u * amount;
+    place[i].y = to_v * amount;
+  }
 };
-lanes root_u, root_v;
-noise(lanes(0.0f), lanes(0.0f), root_u, root_v);
+struct two_octaves {
+  enum { value = 2 };
+};
+struct most_octaves {
+  enum { value = MOST_OCTAVES };
+};
+if (octave_count <= 2) {
+  put_noise(two_octaves{});
+} else {
+  put_noise(most_octaves{});
+}
 move_across(
-    [&](int, lanes s, lanes x, lanes& to_u, lanes& to_v) { noise(s, x, to_u, to_v); },
-    root_u,
-    root_v,
+    [&](int i, lanes, lanes, lanes& to_u, lanes& to_v) {
+      to_u = place[i].x;
+      to_v = place[i].y;
+    },
+    place[0].x,
+    place[0].y,
     first_frame(reference()),
     [](lanes, lanes, const vector&, const vector&, const vector&) {}
 );

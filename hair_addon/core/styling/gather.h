@@ -107,7 +107,7 @@ const auto gather = [&](float thickness, float twist, lanes joined, float width,
     const auto is_off = square > most;
     lanes back = 0.7f * share;
     if (any_of(is_off)) back *= is_off ? sqrt_of(most / (is_off ? square : lanes(1.0f))) : lanes(1.0f);
-    t[i] = chosen(is_far, unit_or(way_on + beside * (back * weight), lanes(1.0e-30f), t[i]), t[i]);
+    t[i] = chosen(is_far, unit_or(way_on + beside * (back * weight), lanes(1.0e-18f), t[i]), t[i]);
     place = place + t[i] * d;
     drawn_before = drawn;
     // The strand's progress along the centre: as far as its length goes along the curve.

@@ -8,9 +8,9 @@ const auto smoothstep = [&](lanes value) {
 };
 // A direction as a unit vector; another one where it is shorter than `least`.
 const auto unit_or = [&](const vector& direction, lanes least, const vector& other) {
-  const lanes size = sqrt_of(dot(direction, direction));
-  const auto is_long = size > least;
-  return chosen(is_long, direction * (1.0f / (is_long ? size : lanes(1.0f))), other);
+  const lanes square = dot(direction, direction);
+  const auto is_long = square > least * least;
+  return chosen(is_long, direction * inverse_root_of(is_long ? square : lanes(1.0f)), other);
 };
 
 // u, perpendicular to the unit vector a, by the least rotation from a to the unit vector b [Bishop75]. Opposite

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How long a GPU takes to simulate a frame of guides, free and on a body that deforms.
+
+    .venv/bin/python tests/benchmarks/dynamics_on_gpu.py
+    .venv/bin/python tests/benchmarks/dynamics_on_gpu.py --strands 1000 --device cpu
+
+Strands of 15 cm and 32 points in frames of 1/24 s and 8 substeps. Free: their roots are shaken. On a body: a ball of 20,000
+triangles with strands all over, which bulges and turns, with hair volume and without. Milliseconds a frame on the clock,
+the shortest and the median, and the largest stretch of a segment.
+"""
+
+import argparse
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import warp as wp
+from scipy.spatial import ConvexHull
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from hair_addon.core.dynamics import root_motion, rotations, simulation
+from hair_addon.core.dynamics.settings import DynamicsSettings
+from tests.support import rods
+
+POINTS, LENGTH, SUBSTEPS = 32, 0.15, 8
+RADIUS = 0.1  # [m] of the ball
+TRIANGLES = 20_000
+
+
+def measured(name, advance, device, frames):
+    """Print how long frames take."""
+    for _ in range(4):
+        advance()
+    times = []
+    for _ in range(frames):
+        wp.synchronize_device(device)
+        start = time.perf_counter()
+        advance()
+        wp.synchronize_device(device)
+        times.append(time.perf_counter() - start)
+    print(f"  {name:44} {1e3 * min(times):8.2f} ms, median {1e3 * np.median(times):8.2f} ms", end="")
+
+
+class Free:
+    """Level strands whose roots are shaken; nothing else acts on them."""
+
+    def __init__(self, count, device):
+        roots = np.random.default_rng(0).normal(scale=0.05, size=(count, 1, 3))
+        groom = rods.line(LENGTH, POINTS) + roots
+        self.simulation = rods.Simulation(groom, substeps=SUBSTEPS, device=device)
+        self.frame = 0
+
+    def advance(self):
+        """The next frame."""
+        self.frame += 1
+        way = 0.02 * np.sin(2.0 * np.pi * rods.FRAME * self.frame)
+        self.simulation.roots = self.simulation.groom[:, 0] + [way, 0.0, 0.0]
+        self.simulation.advance()
+
+    def stretch(self):
+        """The largest."""
+        return abs(self.simulation.rods.stretch()).max()
+
+
+def ball():
+    """(directions (V, 3), triangles (F, 3) int32) of a ball, of triangles about as large as each other."""
+    count = TRIANGLES // 2 + 2
+    height = 1.0 - (2.0 * np.arange(count) + 1.0) / count  # a spiral that is even in area
+    angle = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    flat = np.sqrt(1.0 - height**2)
+    directions = np.stack([flat * np.cos(angle), flat * np.sin(angle), height], axis=-1)
+    triangles = ConvexHull(directions).simplices
+    a, b, c = np.moveaxis(directions[triangles], 1, 0)
+    is_inward = np.einsum("fc,fc->f", np.cross(b - a, c - a), a) < 0.0
+    triangles[is_inward] = triangles[is_inward][:, ::-1]
+    return directions, triangles.astype(np.int32)
+
+
+class OnBody:
+    """Strands all over a ball that bulges and turns, with hair among hair or without."""
+
+    def __init__(self, count, device, volume):
+        rng = np.random.default_rng(0)
+        directions, self.triangles = ball()
+        self.vertices = RADIUS * directions
+        out = rng.normal(size=(count, 3))
+        self.out = out / np.linalg.norm(out, axis=1, keepdims=True)
+        along = np.linspace(0.0, LENGTH, POINTS)[:, None]
+        groom = (RADIUS + 5e-4 + along) * self.out[:, None]
+        settings = DynamicsSettings(
+            hair_friction=volume, hair_pressure=volume, automatic_substeps=False, substeps=SUBSTEPS
+        )
+        self.frame = 0
+        pose, world = self._now()
+        self.simulation = simulation.Simulation(groom, settings, pose, world, device)
+
+    def _now(self):
+        """(pose of the roots, world) of the frame."""
+        swing = np.sin(2.0 * np.pi * 1.5 * rods.FRAME * self.frame)
+        turn = np.array([0.0, 0.0, np.sin(0.25 * swing), np.cos(0.25 * swing)])
+
+        def there(points):
+            bulge = 1.0 + 0.05 * swing * points[:, 2:] / RADIUS
+            return rotations.rotated(turn, points * bulge)
+
+        pose = root_motion.RootPose(there((RADIUS + 5e-4) * self.out), np.tile(turn, (len(self.out), 1)))
+        body = simulation.Obstacle("Body", there(self.vertices), self.triangles)
+        return pose, simulation.World(obstacles=(body,))
+
+    def advance(self):
+        """The next frame."""
+        self.frame += 1
+        self.simulation.advance(*self._now(), rods.FRAME)
+
+    def stretch(self):
+        """The largest."""
+        return abs(self.simulation.stretch()).max()
+
+
+def main():
+    """Print times."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--strands", type=int, nargs="+", default=[10_000, 100_000], help="[10000 100000]")
+    parser.add_argument("--frames", type=int, default=24, help="[24]")
+    parser.add_argument("--device", default="cuda:0" if wp.get_cuda_devices() else "cpu")
+    options = parser.parse_args()
+    device = wp.get_device(options.device)
+    for count in options.strands:
+        print(f"{device.name or device}: {count:,} strands of {POINTS} points, {SUBSTEPS} substeps")
+        ways = {
+            "free": Free(count, device),
+            "on a body of 20,000 triangles": OnBody(count, device, 0.0),
+            "on that body, hair among hair": OnBody(count, device, 0.1),
+        }
+        for name, way in ways.items():
+            measured(name, way.advance, device, options.frames)
+            print(f"; stretch {way.stretch():.1e}")
+
+
+if __name__ == "__main__":
+    main()
