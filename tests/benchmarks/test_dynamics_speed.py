@@ -15,12 +15,14 @@ import warp as wp
 import hair_addon
 from hair_addon.blender.groom import bindings, guide_simulation
 from hair_addon.blender.live import invalidation, live_hair, simulated_hair
+from hair_addon.blender.settings import preferences
 from hair_addon.core.dynamics import rod_solver, root_motion, rotations, simulation
 from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.geometry.mesh import TriMesh
 from hair_addon.core.geometry.sampling import sample_surface
 from tests.benchmarks.test_hair_speed import Time, best_times, report
 from tests.benchmarks.test_live_editing import View, on_gpu
+from tests.support.devices import DEVICE
 from tests.support.meshes import HEAD, read_obj
 from tests.support.rod_contact import Ball, advance_touching, planes_of
 from tests.support.rods import FRAME, Simulation, in_lanes, line
@@ -265,6 +267,7 @@ def _play(monkeypatch):
         bend.angle = angle
         bend.keyframe_insert("angle", frame=frame)
     monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(preferences, "device", lambda: DEVICE)
     bpy.ops.vellus.add_hair(guide_count=1000, length=LENGTH, strand_count=100_000)
     guides, hair = (bpy.data.hair_curves[name] for name in ("Guides", "Hair"))
     guides.vellus.simulates = True

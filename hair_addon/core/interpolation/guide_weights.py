@@ -85,12 +85,14 @@ class Reach:
 
     def of(self, guides: np.ndarray) -> np.ndarray:
         """Indices, rising, of the strands that follow any of some guides."""
-        is_reached = np.zeros(int(self.strands.max(initial=-1)) + 1, bool)
         if len(guides) == len(self.starts) - 1:
-            is_reached[self.strands] = True
-            return np.flatnonzero(is_reached)
-        for guide in guides:
-            is_reached[self.strands[self.starts[guide] : self.starts[guide + 1]]] = True
+            reached = self.strands
+        else:
+            # Of few guides: time that depends on their strands, not on all.
+            rows = [self.strands[self.starts[guide] : self.starts[guide + 1]] for guide in guides]
+            reached = np.concatenate([self.strands[:0], *rows])
+        is_reached = np.zeros(int(reached.max(initial=-1)) + 1, bool)
+        is_reached[reached] = True
         return np.flatnonzero(is_reached)
 
 
