@@ -6,7 +6,7 @@ in the groom, turned with the surface, so a strand leaves the surface at the ang
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
@@ -91,11 +91,11 @@ class Rods:
         rest = combed_shape(groom) if rest is None else rest
         self._root_frames = rest.frames[:, 0]  # in the groom, as are these roots
         self._roots = groom[:, 0]
-        names = [field.name for field in fields(RodArrays)]
         groups = -(-self.strand_count // self.lanes)
-        rows = {name: rod_solver.row_count(name, self.segment_count) for name in names}
-        shapes = {name: (groups, count, self.lanes) for name, count in rows.items()}
-        self.arrays = RodArrays(**{name: wp.zeros(shapes[name], dtype=float, device=self.device) for name in names})
+        self.arrays = RodArrays()
+        for name in rod_solver.ROWS:
+            shape = groups, rod_solver.row_count(name, self.segment_count), self.lanes
+            setattr(self.arrays, name, wp.zeros(shape, dtype=float, device=self.device))
         self._scratch = rod_solver.scratch(self.segment_count, groups, self.device)
         self._mass_unit = 1.0  # [kg]
         self._held = rest.multipliers
