@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         colliders,
         contact,
         contact_queries,
+        contact_substep,
         detail,
         draped_growth,
         draping,

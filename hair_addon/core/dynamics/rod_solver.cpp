@@ -38,7 +38,7 @@
 //     solved_again                         1 row: 1 where AGAIN has moved a strand
 //   Around around                          arrays of points, each may be empty:
 //     planes                               8 (M + 1) rows: n, offset, displacement, friction of each point
-//     found_planes                         8 (M + 1) rows: planes after the solve, for AGAIN
+//     found_planes                         8 (M + 1) rows: planes after the solve, for AGAIN and FINISH; those for none
 //     airs, drags, accelerations           3, 1, 3 rows a point: [m/s], factor, [m/s²]
 //   array_t<float> scratches               of a GPU: KEPT M + CONTACT (M + 1) rows
 //

@@ -121,7 +121,7 @@ def row_count(name: str, segment_count: int) -> int:
 class Surroundings:
     """What acts on points in a substep, each optional: (groups, rows a point times points, lanes) float32.
 
-    planes: `plane_row` says where; found_planes: the same after the solve, for AGAIN; airs: velocity of the air [m/s],
+    planes: `plane_row` says where; found_planes: the same after the solve, for AGAIN and FINISH; airs: velocity of the air [m/s],
     3 rows a point; drags: factor of air drag, 1; accelerations: [m/s²], 3.
     """
 
@@ -259,8 +259,8 @@ def advance(
 
     stages: PREDICT leaves in `positions` where points go without the rod's forces, for which planes of contact may then
     be found; SOLVE moves them to where they end; AGAIN solves once more for strands of which a point is inside one of
-    `found_planes`, which then takes the place of its plane; FINISH moves out what is inside planes, and computes
-    velocities. One launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
+    `found_planes`, which then takes the place of its plane; FINISH moves out what is inside the
+    planes found last, and computes velocities. One launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
     """
     numbers, around = kernel_inputs(arrays, step, scratch, first, end, surroundings)
     device, group_count = arrays.positions.device, len(arrays.positions)
@@ -286,14 +286,20 @@ def kernel_inputs(
     _check(arrays, step, scratch, surroundings)
     if first < 0 or end > step.count:
         raise HairError(f"Substeps {first} to {end} are not among {step.count}.")
-    numbers, around = Numbers(), Around()
+    numbers = Numbers()
     numbers.first, numbers.end, numbers.h, numbers.gravity = first, end, step.size, wp.vec3(*step.gravity)
     for name in _SHARED:
         setattr(numbers, name, getattr(step, name))
+    return numbers, around_of(surroundings)
+
+
+def around_of(surroundings: Surroundings) -> Around:
+    """Surroundings as kernels take them."""
+    around = Around()
     for name in _SURROUNDING_ROWS:
         if (array := getattr(surroundings, name)) is not None:
             setattr(around, name, array)
-    return numbers, around
+    return around
 
 
 def _check(arrays, step, scratch, surroundings):
