@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         contact_queries,
         contact_substep,
         detail,
+        distance_grid,
         draped_growth,
         draping,
         hair_volume,

@@ -62,6 +62,7 @@ class Colliders:
         self.device = wp.get_device(device)
         self.notes: list[HairError] = []  # who is left out, or stopped, in the last frame read
         self.build_count = 0  # of meshes made so far
+        self.read_count = 0  # of frames
         self.mesh: Any = None  # wp.Mesh in its present pose; None where nothing collides
         self.previous: Any = None  # (V,) vec3: the pose of the substep before
         self.face_colliders: Any = None  # (F,) int
@@ -90,6 +91,7 @@ class Colliders:
         changed stays where it was. Either is named in `notes`, with the frame.
         """
         self.notes = []
+        self.read_count += 1
         taken, known = [], {}
         for collider in colliders:
             is_new = collider.name not in self._known

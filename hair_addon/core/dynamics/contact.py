@@ -17,11 +17,13 @@ from ..kernels.checks import require_count
 from . import contact_queries
 from .colliders import Colliders
 from .contact_queries import PLANE, WIDTH, Asking, Samples
+from .distance_grid import distance_grid
 from .nearest_surface import Surface
 
 RISE = 0.02  # [m/s] at most, of a point that the groom has inside
 LEAST_ROWS = 128  # times `WIDTH` strands that are worth a thread
 
+_MOST_DRIFT = 0.5  # of a cell of the grid of distances, after which the next frame has a new one
 _DEEPEST = 0.1  # [m] inside that the groom is measured
 
 
@@ -45,8 +47,9 @@ class Contacts:
         device = colliders.device
         self.vertices, self.middles = (self._new_samples() for _ in range(2))
         self._planes: Any = None
+        self._grid: Any = None
         self._none = wp.empty((0, 0, 0), dtype=float, device=device)
-        self._build_count = colliders.build_count
+        self._build_count, self._read_count = colliders.build_count, colliders.read_count
         self.measure(groom)
 
     def measure(self, groom: Any) -> None:
@@ -77,7 +80,8 @@ class Contacts:
         """
         self._require_shape(positions)
         self._require_shape(last_positions)
-        self.follow()
+        if not is_final:
+            self.follow()
         if self._planes is None:
             self._planes = self.planes_of(self._shape[0])
         *either, middle_planes = self._planes
@@ -100,10 +104,27 @@ class Contacts:
         return planes
 
     def follow(self) -> None:
-        """Forget what was known of other colliders."""
+        """Keep what is known of the colliders true; once in a substep, after they were posed."""
         if self._build_count != self.colliders.build_count:
             self._build_count = self.colliders.build_count
             self.forget()
+        if self.colliders.mesh is None:
+            return
+        if self._grid is not None:
+            self._grid.drift += self.colliders.motion
+        is_new_frame = self._read_count != self.colliders.read_count
+        if self._grid is None or (is_new_frame and self._grid.drift > _MOST_DRIFT * self._grid.size):
+            self._grid = self._new_grid()
+        self._read_count = self.colliders.read_count
+
+    def _new_grid(self):
+        """The colliders' distances where they are, seen from where they were at rest."""
+        turned, moved = self.colliders.rigid_motion_so_far
+        mesh = self.colliders.mesh
+        vertices = (mesh.points.numpy() - moved) @ turned
+        groups, rows, lanes = self._shape
+        sample_count = groups * rows // 3 * lanes
+        return distance_grid(vertices, mesh.indices.numpy().reshape(-1, 3), sample_count, self.colliders.device)
 
     def planes_of(self, group_count: int) -> tuple[Any, Any, Any]:
         """Memory for planes of some groups: of vertices before and after the solve, and of segments."""
@@ -114,6 +135,7 @@ class Contacts:
 
     def forget(self) -> None:
         """Let every point ask the surface again: colliders or positions are others."""
+        self._grid = None
         for samples in (self.vertices, self.middles):
             samples.clear.zero_()
 
@@ -129,6 +151,7 @@ class Contacts:
             if array is None or array.shape != there.shape or not np.isfinite(array).all():
                 raise HairError("The state of contacts is not that of these strands.")
             there.assign(array)
+        self._grid = None
 
     def _arrays(self):
         for name, samples in (("vertex", self.vertices), ("middle", self.middles)):
@@ -153,6 +176,8 @@ class Contacts:
         (carry, carry_shift), surface.deformation = colliders.carry, colliders.deformation
         surface.carry, surface.carry_shift = wp.mat33(carry), wp.vec3(carry_shift)
         surface.to_rest, surface.moved = wp.mat33(turned.T), wp.vec3(moved)
+        if self._grid is not None:
+            surface.grid = self._grid
         return surface
 
     def _require_shape(self, positions):
