@@ -48,8 +48,10 @@ class Contacts:
         self.vertices, self.middles = (self._new_samples() for _ in range(2))
         self._planes: Any = None
         self._grid: Any = None
+        # How far colliders had drifted before the frame in which the grid was made, and in that frame [m].
+        self._grid_drift = self._first_drift = 0.0
         self._none = wp.empty((0, 0, 0), dtype=float, device=device)
-        self._build_count, self._read_count = colliders.build_count, colliders.read_count
+        self._counts, self._read_count = (colliders.build_count, colliders.jump_count), colliders.read_count
         self.measure(groom)
 
     def measure(self, groom: Any) -> None:
@@ -105,17 +107,19 @@ class Contacts:
 
     def follow(self) -> None:
         """Keep what is known of the colliders true; once in a substep, after they were posed."""
-        if self._build_count != self.colliders.build_count:
-            self._build_count = self.colliders.build_count
+        colliders = self.colliders
+        counts = colliders.build_count, colliders.jump_count
+        if self._counts != counts:
+            self._counts = counts
             self.forget()
-        if self.colliders.mesh is None:
+        if colliders.mesh is None:
             return
-        if self._grid is not None:
-            self._grid.drift += self.colliders.motion
-        is_new_frame = self._read_count != self.colliders.read_count
-        if self._grid is None or (is_new_frame and self._grid.drift > _MOST_DRIFT * self._grid.size):
-            self._grid = self._new_grid()
-        self._read_count = self.colliders.read_count
+        is_new_frame, self._read_count = self._read_count != colliders.read_count, colliders.read_count
+        drifted = colliders.drift_before - self._grid_drift
+        if self._grid is None or (is_new_frame and drifted > _MOST_DRIFT * self._grid.size):
+            self._grid, self._grid_drift, drifted = self._new_grid(), colliders.drift_before, 0.0
+            self._first_drift = colliders.drift
+        self._grid.drift = self._first_drift + drifted + colliders.drift
 
     def _new_grid(self):
         """The colliders' distances where they are, seen from where they were at rest."""
