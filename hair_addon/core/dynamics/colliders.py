@@ -18,7 +18,7 @@ from ..geometry.mesh import TriMesh
 from ..kernels import parallel
 from ..kernels.parallel import Rows
 from .closed_parts import outward, rims
-from .rigid_motion import STILL, RigidMotion
+from .rigid_motion import STILL, RigidMotion, largest
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -62,6 +62,8 @@ class Colliders:
         self.device = wp.get_device(device)
         self.notes: list[HairError] = []  # who is left out, or stopped, in the last frame read
         self.build_count = 0  # of meshes made so far
+        self.read_count = 0  # of frames
+        self.jump_count = 0  # of frames that did not begin where the one before was left
         self.mesh: Any = None  # wp.Mesh in its present pose; None where nothing collides
         self.previous: Any = None  # (V,) vec3: the pose of the substep before
         self.face_colliders: Any = None  # (F,) int
@@ -76,12 +78,17 @@ class Colliders:
         self.motion = 0.0
         # (matrix (3, 3), translation [m]) of points that move with the colliders, and what they deform by otherwise.
         self.carry, self.deformation = STILL, 0.0
+        # How far a vertex is from where it was when this frame began, and may be after all frames before from where it
+        # was in the beginning, but for their motion as a whole [m].
+        self.drift = self.drift_before = 0.0
         self._known: dict[str, _Known] = {}
         self._before: Any = None
         self._after: Any = None
         self._way: Any = None  # RigidMotion of the frame
+        self._end: Any = None  # (V, 3) vertices at its end
         self._part = 0.0
         self._is_still = True
+        self._posed: Any = None  # the vertices that the mesh has; None between two frames
 
     def read(self, colliders: Sequence[Collider], frame: int = 0) -> None:
         """Take the poses at the end of a frame: its beginning is the end of the frame before.
@@ -90,6 +97,7 @@ class Colliders:
         changed stays where it was. Either is named in `notes`, with the frame.
         """
         self.notes = []
+        self.read_count += 1
         taken, known = [], {}
         for collider in colliders:
             is_new = collider.name not in self._known
@@ -116,7 +124,8 @@ class Colliders:
         self.carry, self.deformation = self._way.carried(self._part, part)
         (turn, shift), (turned, moved) = self.rigid_motion, self.rigid_motion_so_far
         self.rigid_motion_so_far = turn @ turned, turn @ moved + shift
-        self._part = part
+        self.drift = self._way.between(0.0, part)[1]
+        self._part, self._posed = part, self._end if part == 1.0 else None
         parallel.launch(
             _interpolate,
             len(self._before),
@@ -162,6 +171,7 @@ class Colliders:
         self.previous, self._before, self._after = (wp.clone(points) for _ in range(3))
         indices = wp.array(triangles.astype(np.int32).ravel(), dtype=int, device=self.device)
         self.mesh = wp.Mesh(points=points, indices=indices)
+        self._posed = None
         self.face_colliders = wp.array(owners, dtype=int, device=self.device)
         self.rims = wp.array(np.concatenate([one.rims for one in known]), dtype=int, device=self.device)
 
@@ -169,18 +179,24 @@ class Colliders:
         """Write the vertices at the beginning and at the end of the frame, and pose the mesh at its beginning."""
         self._part, self.motion, self.deformation, self.largest_motion = 0.0, 0.0, 0.0, 0.0
         self.rigid_motion = self.carry = STILL
+        self.drift_before, self.drift = self.drift_before + self.drift, 0.0
         self._is_still = True
         if self.mesh is None:
             return
         before, after = np.concatenate(before), np.concatenate(after)
-        self._way = RigidMotion(before, after)
-        self.largest_motion = float(np.linalg.norm(after - before, axis=1).max())
+        if self._posed is None or not np.array_equal(self._posed, before):
+            self.mesh.points.assign(before)
+            self.mesh.refit()
+            self._posed = before
+            self.jump_count += 1
+        self.previous.assign(before)
+        self._is_still = np.array_equal(before, after)
+        if self._is_still:
+            return
+        self._way, self._end = RigidMotion(before, after), after
+        self.largest_motion = largest(after - before)
         self._before.assign(before)
         self._after.assign(after)
-        self.mesh.points.assign(before)
-        self.previous.assign(before)
-        self.mesh.refit()
-        self._is_still = self.largest_motion == 0.0
 
     def _set(self, colliders):
         rows = [(one.friction, one.distance, float(one.is_double_sided)) for one in colliders]
@@ -218,7 +234,7 @@ def _cause(collider, is_new):
         return "it has vertices with non-finite coordinates"
     if np.abs(vertices).max() > FARTHEST:
         return f"it extends more than {FARTHEST / 1000:g} km from the origin"
-    if not np.ptp(vertices, axis=0).any() or (is_new and not (mesh.areas > 0.0).any()):
+    if (vertices == vertices[0]).all() or (is_new and not (mesh.areas > 0.0).any()):
         return "its faces have no area"
     for name, value, most in (("friction", collider.friction, 100.0), ("distance", collider.distance, 10.0)):
         if not (math.isfinite(value) and 0.0 <= value <= most):

@@ -6,7 +6,6 @@ n (3), the offset n·c + r, the displacement of the surface at c in this substep
 A point in front has n·x ≥ offset; n = 0 where there is no contact.
 """
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,23 +16,15 @@ from ..kernels import kernel_cache, parallel
 from ..kernels.checks import require_count
 from . import contact_queries
 from .colliders import Colliders
-from .contact_queries import PLANE, WIDTH
+from .contact_queries import PLANE, WIDTH, Asking, Samples
+from .distance_grid import distance_grid
 from .nearest_surface import Surface
 
 RISE = 0.02  # [m/s] at most, of a point that the groom has inside
 LEAST_ROWS = 128  # times `WIDTH` strands that are worth a thread
 
+_MOST_DRIFT = 0.5  # of a cell of the grid of distances, after which the next frame has a new one
 _DEEPEST = 0.1  # [m] inside that the groom is measured
-
-
-@dataclass
-class Samples:
-    """Points of strands that ask for a plane, (groups, samples, lanes), and what they keep from substep to substep."""
-
-    rest: Any  # float [m]: the distance in the groom, negative inside, `NOWHERE` where no collider is near
-    sides: Any  # int: ± (1 + collider) of the double-sided one nearby, 0: none
-    asked: Any  # (groups, 3 samples, lanes) float [m]: where it last looked for a surface, `Surface.to_rest`
-    clear: Any  # float [m]: how far from there it was at least, less its motion since; negative for a point inside
 
 
 class Contacts:
@@ -54,28 +45,24 @@ class Contacts:
         self._vertex_count = rows // 3
         self._shape = groups, rows, lanes
         device = colliders.device
-        self._vertices, self._middles = (self._new_samples() for _ in range(2))
-        shape = groups, PLANE * self._vertex_count, lanes
-        self.planes, self.found_planes = (wp.zeros(shape, dtype=float, device=device) for _ in range(2))
-        self._middle_planes = wp.zeros((groups, PLANE * (self._vertex_count - 1), lanes), dtype=float, device=device)
+        self.vertices, self.middles = (self._new_samples() for _ in range(2))
+        self._planes: Any = None
+        self._grid: Any = None
+        # How far colliders had drifted before the frame in which the grid was made, and in that frame [m].
+        self._grid_drift = self._first_drift = 0.0
         self._none = wp.empty((0, 0, 0), dtype=float, device=device)
-        self._build_count = colliders.build_count
+        self._counts, self._read_count = (colliders.build_count, colliders.jump_count), colliders.read_count
         self.measure(groom)
 
     def measure(self, groom: Any) -> None:
         """Take other positions at rest: distances that points keep follow from them."""
         self._require_shape(groom)
         self.forget()
-        for is_middle, samples in enumerate((self._vertices, self._middles)):
+        for is_middle, samples in enumerate((self.vertices, self.middles)):
             samples.rest.fill_(contact_queries.NOWHERE)
             samples.sides.zero_()
             if self.colliders.mesh is not None:
-                self._launch(
-                    contact_queries.measure,
-                    [self._surface(), groom],
-                    [is_middle, _DEEPEST],
-                    [samples.rest, samples.sides],
-                )
+                self._launch(contact_queries.measure, [self.surface(), groom, is_middle, _DEEPEST], [samples])
 
     def find(
         self,
@@ -95,10 +82,12 @@ class Contacts:
         """
         self._require_shape(positions)
         self._require_shape(last_positions)
-        if self._build_count != self.colliders.build_count:
-            self._build_count = self.colliders.build_count
-            self.forget()
-        planes = self.found_planes if is_final else self.planes
+        if not is_final:
+            self.follow()
+        if self._planes is None:
+            self._planes = self.planes_of(self._shape[0])
+        *either, middle_planes = self._planes
+        planes = either[int(is_final)]
         if self.colliders.mesh is None:
             planes.zero_()
             return planes
@@ -106,21 +95,52 @@ class Contacts:
         if is_again:
             require_count("groups", moved.shape[0], self._shape[0])
             require_count("lanes", moved.shape[2], self._shape[2])
-        surface, rise = self._surface(), 0.0 if is_final else RISE * duration
+        surface = self.surface()
+        asking = asking_of(0.0 if is_final else duration, is_final, is_again, is_skipping)
         for is_middle in (0,) if is_final else (1, 0):
-            samples = self._middles if is_middle else self._vertices
-            kept = [samples.rest, samples.sides, samples.asked, samples.clear]
             self._launch(
                 contact_queries.find_planes,
-                [surface, positions, last_positions, self._middle_planes],
-                [is_middle, rise, int(is_final), int(is_again), int(is_skipping), moved if is_again else self._none],
-                [*kept, self._middle_planes if is_middle else planes],
+                [surface, asking, positions, last_positions, middle_planes, is_middle, moved if is_again else self._none],
+                [self.middles if is_middle else self.vertices, middle_planes if is_middle else planes],
             )
         return planes
 
+    def follow(self) -> None:
+        """Keep what is known of the colliders true; once in a substep, after they were posed."""
+        colliders = self.colliders
+        counts = colliders.build_count, colliders.jump_count
+        if self._counts != counts:
+            self._counts = counts
+            self.forget()
+        if colliders.mesh is None:
+            return
+        is_new_frame, self._read_count = self._read_count != colliders.read_count, colliders.read_count
+        drifted = colliders.drift_before - self._grid_drift
+        if self._grid is None or (is_new_frame and drifted > _MOST_DRIFT * self._grid.size):
+            self._grid, self._grid_drift, drifted = self._new_grid(), colliders.drift_before, 0.0
+            self._first_drift = colliders.drift
+        self._grid.drift = self._first_drift + drifted + colliders.drift
+
+    def _new_grid(self):
+        """The colliders' distances where they are, seen from where they were at rest."""
+        turned, moved = self.colliders.rigid_motion_so_far
+        mesh = self.colliders.mesh
+        vertices = (mesh.points.numpy() - moved) @ turned
+        groups, rows, lanes = self._shape
+        sample_count = groups * rows // 3 * lanes
+        return distance_grid(vertices, mesh.indices.numpy().reshape(-1, 3), sample_count, self.colliders.device)
+
+    def planes_of(self, group_count: int) -> tuple[Any, Any, Any]:
+        """Memory for planes of some groups: of vertices before and after the solve, and of segments."""
+        counts = self._vertex_count, self._vertex_count, self._vertex_count - 1
+        shapes = [(group_count, PLANE * count, self._shape[2]) for count in counts]
+        first, second, third = (wp.zeros(shape, dtype=float, device=self.colliders.device) for shape in shapes)
+        return first, second, third
+
     def forget(self) -> None:
         """Let every point ask the surface again: colliders or positions are others."""
-        for samples in (self._vertices, self._middles):
+        self._grid = None
+        for samples in (self.vertices, self.middles):
             samples.clear.zero_()
 
     def state(self) -> dict[str, np.ndarray]:
@@ -135,19 +155,22 @@ class Contacts:
             if array is None or array.shape != there.shape or not np.isfinite(array).all():
                 raise HairError("The state of contacts is not that of these strands.")
             there.assign(array)
+        self._grid = None
 
     def _arrays(self):
-        for name, samples in (("vertex", self._vertices), ("middle", self._middles)):
+        for name, samples in (("vertex", self.vertices), ("middle", self.middles)):
             yield from ((f"{name}_{what}", getattr(samples, what)) for what in ("rest", "sides", "clear"))
 
     def _new_samples(self):
         groups, _, lanes = self._shape
-        shape, device = (groups, self._vertex_count - 1, lanes), self.colliders.device
-        numbers = [wp.zeros(shape, dtype=float, device=device) for _ in range(2)]
-        asked = wp.zeros((groups, 3 * shape[1], lanes), dtype=float, device=device)
-        return Samples(numbers[0], wp.zeros(shape, dtype=int, device=device), asked, numbers[1])
+        shape, device, samples = (groups, self._vertex_count - 1, lanes), self.colliders.device, Samples()
+        samples.rest, samples.clear = (wp.zeros(shape, dtype=float, device=device) for _ in range(2))
+        samples.sides = wp.zeros(shape, dtype=int, device=device)
+        samples.asked = wp.zeros((groups, 3 * shape[1], lanes), dtype=float, device=device)
+        return samples
 
-    def _surface(self):
+    def surface(self) -> Surface:
+        """The colliders in their present pose, for kernels."""
         colliders, surface = self.colliders, Surface()
         surface.mesh, surface.points, surface.indices = colliders.mesh.id, colliders.mesh.points, colliders.mesh.indices
         surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
@@ -157,6 +180,8 @@ class Contacts:
         (carry, carry_shift), surface.deformation = colliders.carry, colliders.deformation
         surface.carry, surface.carry_shift = wp.mat33(carry), wp.vec3(carry_shift)
         surface.to_rest, surface.moved = wp.mat33(turned.T), wp.vec3(moved)
+        if self._grid is not None:
+            surface.grid = self._grid
         return surface
 
     def _require_shape(self, positions):
@@ -165,7 +190,7 @@ class Contacts:
         if not positions.is_contiguous or positions.device != self.colliders.device:
             raise HairError("Positions of strands must be one block of memory, on the colliders' device.")
 
-    def _launch(self, kernel, arrays, details, outputs):
+    def _launch(self, kernel, inputs, outputs):
         """Launch a kernel for all samples: on a processor a thread for `WIDTH` strands each, on all cores."""
         groups, _, lanes = self._shape
         device, count = self.colliders.device, self._vertex_count - 1
@@ -173,4 +198,12 @@ class Contacts:
         thread_count = groups * count * lanes // (at_once[0] * at_once[1])
         kernel_cache.load(device, kernel.module)
         shares = parallel.share_count(thread_count, device, LEAST_ROWS)
-        parallel.launch_shares(kernel, thread_count, [*arrays, count, *at_once, *details], [outputs] * shares, device)
+        parallel.launch_shares(kernel, thread_count, [*inputs, *at_once], [outputs] * shares, device)
+
+
+def asking_of(duration: float, is_final: bool = False, is_again: bool = False, is_skipping: bool = True) -> Asking:
+    """How samples ask in a substep of a duration [s], zero where nothing rises; the rest as in `Contacts.find`."""
+    asking = Asking()
+    asking.is_final, asking.is_again, asking.is_skipping = int(is_final), int(is_again), int(is_skipping)
+    asking.rise = RISE * duration
+    return asking

@@ -1,26 +1,21 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Which of LANES samples of strands look for a surface, and how far: on a processor the lanes of its vectors, on a GPU
-// one sample a thread. A sample that was farther away than it has come since, seen from the surface, is spared.
+// one sample a thread. A sample that was farther away than it has come since, seen from the surface, is spared, and so is
+// one that the grid of distances knows to be far away.
 //
 // The body of `_put_needs` in contact_queries.py. Parameters, of arrays (groups, rows, lanes):
 //
 //   int group, int sample, int first_lane    which samples
 //   int is_middle                            1: the middle of segment `sample`; 0: the vertex after it
+//   Asking asking                            is_final, is_skipping: after the solve; 0: every sample looks; is_again: a
+//                                            sample that has not moved since it last looked keeps its plane; rise [m]
+//   Surface surface                          motion, carry, deformation, to_rest, moved, largest_distance
 //   array_t<float> positions, last_positions 3 rows a vertex [m], now and when the substep began
 //   array_t<float> middle_planes             PLANE rows a segment
-//   float motion                             what the surface moves at most, but for its turn as a whole [m]
-//   mat33 carry, vec3 carry_shift            where what moves with it comes to in this substep
-//   float deformation                        and what it deforms by, at most [m]
-//   mat33 to_rest, vec3 moved                from places now to places at rest
-//   float largest_distance                   that any collider keeps [m]
-//   float rise                               of samples that the groom has inside [m]
-//   int is_final, int is_skipping            after the solve; 0: every sample looks
-//   int is_again                             a sample that has not moved since it last looked keeps its plane
-//   array_t<float> rest                      distance in the groom [m]; changed by `rise`
-//   array_t<int> sides                       0 for those that do not look
-//   array_t<float> asked                     3 rows: place at rest where it last looked [m]
-//   array_t<float> clear                     how far from there it was [m], less the surface's motion since; changed
+//   Samples samples                          rest: distance in the groom [m], changed by `rise`; sides: 0 for those that do
+//                                            not look; asked: 3 rows, place at rest where it last looked [m]; clear: how
+//                                            far from there it was [m], less the surface's motion since, changed
 //   array_t<float> out_planes                PLANE rows: zero, but for how far it looks [m] in place of the offset, and
 //                                            1 in place of the friction where a segment beside has a plane
 //
@@ -32,8 +27,8 @@
 #include "lanes.h"
 
 const size_t stride = positions.shape[2];
-const auto row_of = [&](auto& array, int row) {
-  return array.data + (size_t(group) * array.shape[1] + row) * stride + first_lane;
+const auto row_of = [&](const auto& array, int row) {
+  return array.data + size_t(group) * (array.strides[0] / sizeof(float)) + row * stride + first_lane;
 };
 #if defined(__CUDA_ARCH__)
 const auto get = [](const float* row) { return *row; };
@@ -60,7 +55,7 @@ struct vector {
 const auto length_of = [&](const vector& v) { return exact_sqrt_of(v.x * v.x + v.y * v.y + v.z * v.z); };
 const auto lower_of = [](lanes a, lanes b) { return a < b ? a : b; };
 const auto higher_of = [](lanes a, lanes b) { return a > b ? a : b; };
-const auto get_vector = [&](auto& array, int row) {
+const auto get_vector = [&](const auto& array, int row) {
   return vector{get(row_of(array, 3 * row)), get(row_of(array, 3 * row + 1)), get(row_of(array, 3 * row + 2))};
 };
 const auto between = [](const vector& a, const vector& b) {
@@ -76,6 +71,8 @@ const auto turned = [](const wp::mat33& m, const vector& v) {
 const auto where = [](int condition) { return condition ? ints(-1) : ints(0); };  // in all lanes
 const auto is_some = [](const vector& v) { return (v.x != 0.0f) | (v.y != 0.0f) | (v.z != 0.0f); };
 
+const bool is_final = asking.is_final != 0, is_again = asking.is_again != 0;
+const float deformation = surface.deformation, motion = surface.motion, rise = asking.rise;
 vector point = get_vector(positions, sample + 1), last = get_vector(last_positions, sample + 1);
 lanes segment = lanes(0.0f);
 if (is_middle) {
@@ -85,37 +82,57 @@ if (is_middle) {
   last = between(get_vector(last_positions, sample), last);
 }
 
-lanes at_rest = get(row_of(rest, sample));
+lanes at_rest = get(row_of(samples.rest, sample));
 if (rise > 0.0f) {
   at_rest = at_rest < 0.0f ? lower_of(at_rest + rise, lanes(0.0f)) : at_rest;
-  put(row_of(rest, sample), at_rest);
+  put(row_of(samples.rest, sample), at_rest);
 }
-const lanes most = lower_of(lanes(largest_distance), at_rest);
+const lanes most = lower_of(lanes(surface.largest_distance), at_rest);
 
 // As the surface sees it. Through a collider that does not deform a ray finds what has passed: the nearest surface is
 // looked for no farther than it may pull.
-const vector carried = turned(carry, last);
+const vector carried = turned(surface.carry, last);
 const vector way =
-    minus(point, vector{carried.x + carry_shift[0], carried.y + carry_shift[1], carried.z + carry_shift[2]});
+    minus(point, vector{carried.x + surface.carry_shift[0], carried.y + surface.carry_shift[1], carried.z + surface.carry_shift[2]});
 const lanes length = length_of(way);
 const lanes moving = lower_of(length, lanes(MOST_MOTION)) + deformation;
 lanes needed = abs_of(most) + MARGIN + (deformation > BACK ? moving : lower_of(moving, lanes(NEAR)));
 
-const lanes before = get(row_of(clear, sample));
+const lanes before = get(row_of(samples.clear, sample));
 const lanes left = is_final ? before : before - motion;
-const vector place = turned(to_rest, vector{point.x - moved[0], point.y - moved[1], point.z - moved[2]});
-const lanes away = length_of(minus(place, get_vector(asked, sample)));
-const auto is_spared = (left - away > needed + SLACK) & where(is_skipping);
+const vector place = turned(surface.to_rest, vector{point.x - surface.moved[0], point.y - surface.moved[1], point.z - surface.moved[2]});
+const lanes away = length_of(minus(place, get_vector(samples.asked, sample)));
+const auto is_spared = (left - away > needed + SLACK) & where(asking.is_skipping);
 needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper
 const auto is_kept = (away <= STAYED) & where(is_again);
 const auto is_number = length - length == 0.0f;
 const auto is_short = (segment <= 2.0f * most) & where(is_middle);
-const auto is_asking = is_number & !is_spared & !is_short & !is_kept;
+auto is_asking = is_number & !is_spared & !is_short & !is_kept;
+if (asking.is_skipping && any_of(is_asking) && surface.grid.distances.shape[0] > 0) {
+  const auto& grid = surface.grid;
+  // So far from any surface that neither the nearest one matters, nor any was passed on the way.
+  const lanes limit = higher_of(needed, length + 2.0f * (deformation + BACK)) + SLACK + grid.drift;
+  const auto to_grid = [&](lanes place, int axis) {
+    const lanes most = lanes(grid.size * static_cast<float>(grid.last[axis]));
+    return higher_of(lower_of(place - grid.low[axis], most), lanes(0.0f));
+  };
+  const vector inside{to_grid(place.x, 0), to_grid(place.y, 1), to_grid(place.z, 2)};
+  const vector outside = minus(vector{place.x - grid.low[0], place.y - grid.low[1], place.z - grid.low[2]}, inside);
+  const auto beside = [&](lanes along) { return to_ints(along * (1.0f / grid.size) + 0.5f); };
+  const ints i = beside(inside.x), j = beside(inside.y), k = beside(inside.z);
+  const vector vertex{to_lanes(i) * grid.size, to_lanes(j) * grid.size, to_lanes(k) * grid.size};
+  const ints index = (i * grid.distances.shape[1] + j) * grid.distances.shape[2] + k;
+  lanes distance = lanes(0.0f);
+  for (int l = 0; l < LANES; ++l) set_lane(distance, l, grid.distances.data[get_lane(index, l)]);
+  const lanes nearest = higher_of(distance - length_of(minus(inside, vertex)), lanes(0.0f));
+  const lanes beyond = length_of(outside);
+  is_asking = is_asking & !(exact_sqrt_of(nearest * nearest + beyond * beyond) > limit);
+}
 ints is_any = is_asking ? ints(1) : ints(0);
 if (is_again && !any_of(is_any)) return 0;
 
-put(row_of(clear, sample), is_kept ? before : is_spared ? left : lanes(0.0f));
-put_ints(row_of(sides, sample), is_asking | is_kept ? get_ints(row_of(sides, sample)) : ints(0));
+put(row_of(samples.clear, sample), is_kept ? before : is_spared ? left : lanes(0.0f));
+put_ints(row_of(samples.sides, sample), is_asking | is_kept ? get_ints(row_of(samples.sides, sample)) : ints(0));
 const int plane_row = PLANE * (is_middle ? sample : sample + 1);
 for (int k = 0; k < PLANE; ++k) {
   const auto row = row_of(out_planes, plane_row + k);

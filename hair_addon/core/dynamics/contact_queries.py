@@ -24,6 +24,26 @@ MOST_MOTION = wp.constant(0.5)  # [m] of a point in a substep that is looked for
 _AHEAD = wp.constant(0.01)  # [m] at most, looked for beyond what is needed, to spare later queries
 
 
+@wp.struct
+class Samples:
+    """Points of strands that ask for a plane, (groups, samples, lanes), and what they keep from substep to substep."""
+
+    rest: wp.array3d[float]  # [m]: the distance in the groom, negative inside, `NOWHERE` where no collider is near
+    sides: wp.array3d[int]  # ± (1 + collider) of the double-sided one nearby, 0: none
+    asked: wp.array3d[float]  # (groups, 3 samples, lanes) [m]: where it last looked for a surface, `Surface.to_rest`
+    clear: wp.array3d[float]  # [m]: how far from there it was at least, less its motion since; negative inside
+
+
+@wp.struct
+class Asking:
+    """How samples ask: as the flags of `Contacts.find` say."""
+
+    is_final: int
+    is_again: int
+    is_skipping: int
+    rise: float  # [m] in this substep, of samples that the groom has inside
+
+
 @wp.func
 def _index(row: int, per_vector: int, component: int):
     """The row of an array of vectors that holds a component."""
@@ -104,24 +124,12 @@ def _put_needs(
     sample: int,
     first_lane: int,
     is_middle: int,
+    asking: Asking,
+    surface: Surface,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
     middle_planes: wp.array3d[float],
-    motion: float,
-    carry: wp.mat33,
-    carry_shift: wp.vec3,
-    deformation: float,
-    to_rest: wp.mat33,
-    moved: wp.vec3,
-    largest_distance: float,
-    rise: float,
-    is_final: int,
-    is_again: int,
-    is_skipping: int,
-    rest: wp.array3d[float],
-    sides: wp.array3d[int],
-    asked: wp.array3d[float],
-    clear: wp.array3d[float],
+    samples: Samples,
     out_planes: wp.array3d[float],
 ) -> int: ...
 
@@ -136,17 +144,14 @@ def _look(
     sample: int,
     lane: int,
     needed: float,
-    rest: wp.array3d[float],
-    sides: wp.array3d[int],
-    asked: wp.array3d[float],
-    clear: wp.array3d[float],
+    samples: Samples,
     out_planes: wp.array3d[float],
 ):
     """Write the plane of one sample, if there is a surface as near as `needed`."""
     row = sample + 1 - is_middle
     point = _sample(positions, group, sample, lane, is_middle)
     last = _sample(last_positions, group, sample, lane, is_middle)
-    at_rest = rest[group, sample, lane]
+    at_rest = samples.rest[group, sample, lane]
     out_planes[group, _index(row, PLANE, 3), lane] = 0.0
     largest = wp.min(surface.largest_distance, at_rest)
     entry = Hit()
@@ -158,19 +163,19 @@ def _look(
         if entry.collider >= 0:
             needed = wp.max(needed, wp.abs(largest) + wp.min(wp.length(point - start), MOST_MOTION) + MARGIN)
             radius = wp.max(radius, needed)
-    hit = nearest(surface, point, last, radius, sides[group, sample, lane])
+    hit = nearest(surface, point, last, radius, samples.sides[group, sample, lane])
     if surface.deformation > BACK and at_rest >= 0.0 and hit.collider >= 0:
         entry = crossed(surface, point, last + hit.displacement, largest)
-    sides[group, sample, lane] = 0
-    _put_vector(asked, group, sample, lane, surface.to_rest * (point - surface.moved))
-    clear[group, sample, lane] = hit.gap
+    samples.sides[group, sample, lane] = 0
+    _put_vector(samples.asked, group, sample, lane, surface.to_rest * (point - surface.moved))
+    samples.clear[group, sample, lane] = hit.gap
     is_near = hit.collider >= 0 and hit.gap <= needed
     if entry.collider >= 0 and not (is_near and hit.distance <= 0.0 and wp.dot(hit.normal, entry.normal) > 0.0):
         hit = entry  # the nearest is not the front of what it came through
     elif not is_near:
         return
-    clear[group, sample, lane] = wp.min(clear[group, sample, lane], hit.distance)
-    sides[group, sample, lane] = hit.side
+    samples.clear[group, sample, lane] = wp.min(samples.clear[group, sample, lane], hit.distance)
+    samples.sides[group, sample, lane] = hit.side
     settings = surface.settings[hit.collider]
     offset = wp.dot(hit.normal, hit.place) + wp.min(settings[1], at_rest)
     if wp.dot(hit.normal, hit.normal) > 0.5:  # not of a face without an area
@@ -221,10 +226,7 @@ def _look_in(
     group: int,
     sample: int,
     first_lane: int,
-    rest: wp.array3d[float],
-    sides: wp.array3d[int],
-    asked: wp.array3d[float],
-    clear: wp.array3d[float],
+    samples: Samples,
     out_planes: wp.array3d[float],
 ):
     """Look for a surface in those lanes of which `_put_needs` said so."""
@@ -237,133 +239,138 @@ def _look_in(
         if is_beside:
             out_planes[group, _index(row, PLANE, 7), lane] = 0.0
         if needed > 0.0:
-            _look(
-                surface,
-                positions,
-                last_positions,
-                is_middle,
-                group,
-                sample,
-                lane,
-                needed,
-                rest,
-                sides,
-                asked,
-                clear,
-                out_planes,
-            )
+            _look(surface, positions, last_positions, is_middle, group, sample, lane, needed, samples, out_planes)
         if is_beside:
             _choose(positions, middle_planes, sample_count, group, row, lane, out_planes)
 
 
-@wp.kernel
-def find_planes(
+@wp.func
+def find_in(
     surface: Surface,
+    asking: Asking,
     positions: wp.array3d[float],
     last_positions: wp.array3d[float],
     middle_planes: wp.array3d[float],
-    sample_count: int,
-    samples_at_once: int,
-    lanes_at_once: int,
     is_middle: int,
-    rise: float,
-    is_final: int,
-    is_again: int,
-    is_skipping: int,
-    moved: wp.array3d[float],
-    first: int,
-    # outputs
-    rest: wp.array3d[float],
-    sides: wp.array3d[int],
-    asked: wp.array3d[float],
-    clear: wp.array3d[float],
+    group: int,
+    first_sample: int,
+    samples_at_once: int,
+    first_lane: int,
+    lanes_at_once: int,
+    samples: Samples,
     out_planes: wp.array3d[float],
-):
-    thread = first + wp.tid()
-    part_count = positions.shape[2] // lanes_at_once
-    run_count = sample_count // samples_at_once
-    first_lane = (thread % part_count) * lanes_at_once
-    first_sample = ((thread // part_count) % run_count) * samples_at_once
-    group = thread // (part_count * run_count)
-    if is_again != 0:
-        moved_count = float(0.0)
-        for lane in range(first_lane, first_lane + lanes_at_once):
-            moved_count += moved[group, 0, lane]
-        if moved_count == 0.0:
-            return
+) -> int:
+    """Write the planes of some samples of some lanes; whether any of them looked for a surface."""
+    is_near = int(0)
     for sample in range(first_sample, first_sample + samples_at_once):
         is_any = _put_needs(
             group,
             sample,
             first_lane,
             is_middle,
+            asking,
+            surface,
             positions,
             last_positions,
             middle_planes,
-            surface.motion,
-            surface.carry,
-            surface.carry_shift,
-            surface.deformation,
-            surface.to_rest,
-            surface.moved,
-            surface.largest_distance,
-            rise,
-            is_final,
-            is_again,
-            is_skipping,
-            rest,
-            sides,
-            asked,
-            clear,
+            samples,
             out_planes,
         )
         if is_any != 0:
+            is_near = 1
             _look_in(
                 surface,
                 positions,
                 last_positions,
                 middle_planes,
-                sample_count,
+                samples.rest.shape[1],
                 lanes_at_once,
                 is_middle,
                 group,
                 sample,
                 first_lane,
-                rest,
-                sides,
-                asked,
-                clear,
+                samples,
                 out_planes,
             )
+    return is_near
+
+
+@wp.func
+def any_moved(moved: wp.array3d[float], group: int, first_lane: int, lanes_at_once: int) -> int:
+    """Whether a strand of some lanes has moved."""
+    for lane in range(first_lane, first_lane + lanes_at_once):
+        if moved[group, 0, lane] != 0.0:
+            return 1
+    return 0
+
+
+@wp.kernel
+def find_planes(
+    surface: Surface,
+    asking: Asking,
+    positions: wp.array3d[float],
+    last_positions: wp.array3d[float],
+    middle_planes: wp.array3d[float],
+    is_middle: int,
+    moved: wp.array3d[float],
+    samples_at_once: int,
+    lanes_at_once: int,
+    first: int,
+    # outputs
+    samples: Samples,
+    out_planes: wp.array3d[float],
+):
+    thread = first + wp.tid()
+    part_count = positions.shape[2] // lanes_at_once
+    run_count = samples.rest.shape[1] // samples_at_once
+    first_lane = (thread % part_count) * lanes_at_once
+    first_sample = ((thread // part_count) % run_count) * samples_at_once
+    group = thread // (part_count * run_count)
+    if asking.is_again != 0:
+        if any_moved(moved, group, first_lane, lanes_at_once) == 0:
+            return
+    find_in(
+        surface,
+        asking,
+        positions,
+        last_positions,
+        middle_planes,
+        is_middle,
+        group,
+        first_sample,
+        samples_at_once,
+        first_lane,
+        lanes_at_once,
+        samples,
+        out_planes,
+    )
 
 
 @wp.kernel
 def measure(
     surface: Surface,
     positions: wp.array3d[float],
-    sample_count: int,
-    samples_at_once: int,
-    lanes_at_once: int,
     is_middle: int,
     radius: float,
+    samples_at_once: int,
+    lanes_at_once: int,
     first: int,
     # outputs
-    rest: wp.array3d[float],
-    sides: wp.array3d[int],
+    samples: Samples,
 ):
     thread = first + wp.tid()
     part_count = positions.shape[2] // lanes_at_once
-    run_count = sample_count // samples_at_once
+    run_count = samples.rest.shape[1] // samples_at_once
     first_lane = (thread % part_count) * lanes_at_once
     first_sample = ((thread // part_count) % run_count) * samples_at_once
     group = thread // (part_count * run_count)
     for sample in range(first_sample, first_sample + samples_at_once):
         for lane in range(first_lane, first_lane + lanes_at_once):
             point = _sample(positions, group, sample, lane, is_middle)
-            rest[group, sample, lane] = NOWHERE
-            sides[group, sample, lane] = 0
+            samples.rest[group, sample, lane] = NOWHERE
+            samples.sides[group, sample, lane] = 0
             if wp.isfinite(wp.length(point)):
                 hit = nearest(surface, point, point, radius, 0)
                 if hit.collider >= 0:
-                    rest[group, sample, lane] = hit.distance
-                    sides[group, sample, lane] = hit.side
+                    samples.rest[group, sample, lane] = hit.distance
+                    samples.sides[group, sample, lane] = hit.side

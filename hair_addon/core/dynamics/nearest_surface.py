@@ -3,6 +3,8 @@
 
 import warp as wp
 
+from .distance_grid import DistanceGrid
+
 BACK = wp.constant(1e-4)  # [m] before a point's last position, where its ray starts
 _AT_EDGE = wp.constant(1e-5)  # a barycentric coordinate that counts as zero
 _TINY = wp.constant(1e-6)  # [m]: nearer points take the normal of the face
@@ -29,6 +31,7 @@ class Surface:
     # How it has since the beginning: place at rest = to_rest (x - moved).
     to_rest: wp.mat33
     moved: wp.vec3
+    grid: DistanceGrid  # at rest
 
 
 @wp.struct

@@ -15,11 +15,11 @@ class RigidMotion:
         self._centre, end = (pose.mean(axis=0, dtype=np.float64) for pose in (before, after))
         self._way = end - self._centre
         start = before - self._centre.astype(np.float32)
-        self._radius = float(np.linalg.norm(start, axis=1).max())
+        self._radius = largest(start)
         end_offsets = after - end.astype(np.float32)
         self._axis, self._angle = _axis_and_angle(_rotation(start, end_offsets))
-        self._rest = _largest(end_offsets - start @ np.float32(self._turn(self._angle).T))
-        rest_of_none = _largest(end_offsets - start)
+        self._rest = largest(end_offsets - start @ np.float32(self._turn(self._angle).T))
+        rest_of_none = largest(end_offsets - start)
         if rest_of_none <= self._rest:
             self._angle, self._rest = 0.0, rest_of_none
 
@@ -74,5 +74,6 @@ def _axis_and_angle(turn):
     return 0.5 * twice / sine, angle
 
 
-def _largest(offsets):
-    return float(np.linalg.norm(offsets, axis=1).max())
+def largest(offsets: np.ndarray) -> float:
+    """The length of the longest of offsets (V, 3)."""
+    return math.sqrt(np.einsum("vi,vi->v", offsets, offsets).max())

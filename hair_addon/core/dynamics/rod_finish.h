@@ -5,11 +5,12 @@
 lanes stretch = 0.0f, reach = 0.0f, whole = 0.0f;
 ints is_sound = -1;
 const float per_step = 1.0f / h;
+const float* const last_plane_rows = around.found_planes.shape[0] > 0 ? found_rows : plane_rows;
 vector last = get_vector(x, 0);
 for (int i = 0; i <= segment_count; ++i) {
   vector point = get_vector(x, i);
   if (has_planes && i > pinned) {
-    const float* plane = plane_rows + size_t(8 * i) * STRIDE;
+    const float* plane = last_plane_rows + size_t(8 * i) * STRIDE;
     const vector n = get_vector(plane, 0);
     const lanes inside = dot(n, point) - get(plane, 3);
     point = chosen(inside < 0.0f, point - n * inside, point);

@@ -8,36 +8,41 @@
 //
 //   int block                              a group of strands on a processor, a strand on a GPU
 //   int stages                             which parts of a substep: PREDICT, SOLVE, AGAIN, FINISH
-//   int first, end, count                  substeps first … end - 1 of the count in a frame
-//   int pinned                             points from the root that follow the surface beside point 0; M without SOLVE
-//   float h                                a substep [s]
-//   float carried                          (h / h of the substep before the first)²
-//   vec3 gravity                           [m/s²]
-//   float damping_time                     Kelvin-Voigt time τ of bending and twisting [s]
-//   float twist_ratio                      compliance of twisting, in that of bending
-//   float drag_square, drag_root           of the rate of drag, times v [1/m] and ∛v [1/s ∛(s/m)]
-//   float hold, hold_tip                   pull to the groom [1/s²], and its part at the tip
-//   float most_stretch                     length of a segment by its rest length at which a strand is put back
-//   array_t<float> positions, velocities   3 (M + 1) rows [m], [m/s]
-//   array_t<float> frames, spins           4 M, 3 M rows: unit quaternions; angular velocities [1/s]
-//   array_t<float> multipliers             6 M rows λ_b, λ_s
-//   array_t<float> slips                   M + 1 rows: how far a point slid in the last substep, -1 without contact [m]
-//   array_t<float> lengths                 M rows [m]
-//   array_t<float> rests                   4 M rows: half of the rest rotation of a joint
-//   array_t<float> bend_compliances, stretch_compliances    M rows each, in the unit of mass of the inverse masses
-//   array_t<float> inverse_masses          M + 1 rows
-//   array_t<float> inertias                M rows
-//   array_t<float> grooms, groom_frames    3 (M + 1), 4 M rows: the groom in the root's frame
-//   array_t<float> slow_drags              1 row: the rate of drag of slow air [1/s]
-//   array_t<float> roots                   14 rows: position, frame at the frame's start; position, frame at its end
-//   array_t<float> positions_before, predictions    3 (M + 1) rows each: between stages
-//   array_t<float> frames_before, mobilities        4 M, M + 1 rows: between stages
-//   array_t<float> planes                  8 (M + 1) rows: n, offset, displacement, friction of each point; or empty
-//   array_t<float> found_planes            8 (M + 1) rows: planes after the solve, for AGAIN; or empty
-//   array_t<float> airs, drags, accelerations    3, 1, 3 rows a point: [m/s], factor, [m/s²]; each may be empty
+//   Numbers step                           what all strands share:
+//     first, end, count                    substeps first … end - 1 of the count in a frame
+//     pinned                               points from the root that follow the surface beside point 0; M without SOLVE
+//     h                                    a substep [s]
+//     carried                              (h / h of the substep before the first)²
+//     gravity                              [m/s²]
+//     damping_time                         Kelvin-Voigt time τ of bending and twisting [s]
+//     twist_ratio                          compliance of twisting, in that of bending
+//     drag_square, drag_root               of the rate of drag, times v [1/m] and ∛v [1/s ∛(s/m)]
+//     hold, hold_tip                       pull to the groom [1/s²], and its part at the tip
+//     most_stretch                         length of a segment by its rest length at which a strand is put back
+//   RodArrays strands                      arrays of strands:
+//     positions, velocities                3 (M + 1) rows [m], [m/s]
+//     frames, spins                        4 M, 3 M rows: unit quaternions; angular velocities [1/s]
+//     multipliers                          6 M rows λ_b, λ_s
+//     slips                                M + 1 rows: how far a point slid in the last substep, -1 without contact [m]
+//     lengths                              M rows [m]
+//     rests                                4 M rows: half of the rest rotation of a joint
+//     bend_compliances, stretch_compliances    M rows each, in the unit of mass of the inverse masses
+//     inverse_masses                       M + 1 rows
+//     inertias                             M rows
+//     grooms, groom_frames                 3 (M + 1), 4 M rows: the groom in the root's frame
+//     slow_drags                           1 row: the rate of drag of slow air [1/s]
+//     roots                                14 rows: position, frame at the frame's start; position, frame at its end
+//     positions_before, predictions        3 (M + 1) rows each: between stages
+//     frames_before, mobilities            4 M, M + 1 rows: between stages
+//     resets                               1 row
+//     solved_again                         1 row: 1 where AGAIN has moved a strand
+//   Around around                          arrays of points, each may be empty:
+//     planes                               8 (M + 1) rows: n, offset, displacement, friction of each point
+//     found_planes                         8 (M + 1) rows: planes after the solve, for AGAIN and FINISH; those for none
+//     airs, drags, accelerations           3, 1, 3 rows a point: [m/s], factor, [m/s²]
 //   array_t<float> scratches               of a GPU: KEPT M + CONTACT (M + 1) rows
-//   array_t<float> reset_counts            1 row
-//   array_t<float> solved_again            1 row: 1 where AGAIN has moved a strand
+//
+// Groups lie apart by an array's first stride, which is zero where all groups share memory one after the other.
 //
 // Constants: WIDTH, GROUP, MOST segments, and those that rod_solver.py explains.
 
@@ -98,26 +103,31 @@ const auto cube_root = [&](lanes value) {
   return root;
 };
 
-const auto rows_of = [&](auto& array) { return array.data + size_t(group) * array.shape[1] * STRIDE + lane; };
-const int segment_count = lengths.shape[1];
-float *const x = rows_of(positions), *const v = rows_of(velocities);
-float *const q = rows_of(frames), *const spin = rows_of(spins);
-float *const lambda = rows_of(multipliers), *const slip = rows_of(slips);
-const float *const length = rows_of(lengths), *const rest = rows_of(rests);
-const float *const bending = rows_of(bend_compliances), *const stretching = rows_of(stretch_compliances);
-const float *const inverse_mass = rows_of(inverse_masses), *const inertia = rows_of(inertias);
-const float *const groom = rows_of(grooms), *const groom_frame = rows_of(groom_frames);
-float *const x_before = rows_of(positions_before), *const q_before = rows_of(frames_before);
-float* const predicted_rows = rows_of(predictions);
-float *const mobility = rows_of(mobilities), *const resets = rows_of(reset_counts);
-float* const again = rows_of(solved_again);
-const float *const root_rows = rows_of(roots), *const found_rows = rows_of(found_planes);
-float* const plane_rows = rows_of(planes);
-const float *const air_rows = rows_of(airs), *const drag_rows = rows_of(drags);
-const float *const acceleration_rows = rows_of(accelerations);
-const bool has_planes = planes.shape[0] > 0, has_air = airs.shape[0] > 0, has_drag = drags.shape[0] > 0;
-const bool has_acceleration = accelerations.shape[0] > 0;
-const lanes slow_drag = get(rows_of(slow_drags), 0);
+const auto rows_of = [&](const auto& array) { return array.data + size_t(group) * (array.strides[0] / sizeof(float)) + lane; };
+const int segment_count = strands.lengths.shape[1];
+const int count = step.count, pinned = step.pinned;
+const float h = step.h, damping_time = step.damping_time, twist_ratio = step.twist_ratio;
+const float drag_square = step.drag_square, drag_root = step.drag_root, hold = step.hold, hold_tip = step.hold_tip;
+const float most_stretch = step.most_stretch;
+const wp::vec3 gravity = step.gravity;
+float *const x = rows_of(strands.positions), *const v = rows_of(strands.velocities);
+float *const q = rows_of(strands.frames), *const spin = rows_of(strands.spins);
+float *const lambda = rows_of(strands.multipliers), *const slip = rows_of(strands.slips);
+const float *const length = rows_of(strands.lengths), *const rest = rows_of(strands.rests);
+const float *const bending = rows_of(strands.bend_compliances), *const stretching = rows_of(strands.stretch_compliances);
+const float *const inverse_mass = rows_of(strands.inverse_masses), *const inertia = rows_of(strands.inertias);
+const float *const groom = rows_of(strands.grooms), *const groom_frame = rows_of(strands.groom_frames);
+float *const x_before = rows_of(strands.positions_before), *const q_before = rows_of(strands.frames_before);
+float* const predicted_rows = rows_of(strands.predictions);
+float *const mobility = rows_of(strands.mobilities), *const resets = rows_of(strands.resets);
+float* const again = rows_of(strands.solved_again);
+const float *const root_rows = rows_of(strands.roots), *const found_rows = rows_of(around.found_planes);
+float* const plane_rows = rows_of(around.planes);
+const float *const air_rows = rows_of(around.airs), *const drag_rows = rows_of(around.drags);
+const float *const acceleration_rows = rows_of(around.accelerations);
+const bool has_planes = around.planes.shape[0] > 0, has_air = around.airs.shape[0] > 0, has_drag = around.drags.shape[0] > 0;
+const bool has_acceleration = around.accelerations.shape[0] > 0;
+const lanes slow_drag = get(rows_of(strands.slow_drags), 0);
 
 #if defined(__CUDA_ARCH__)
 float* const scratch = rows_of(scratches);
@@ -130,7 +140,7 @@ const auto kept = [&](int j, int row) { return scratch + size_t(KEPT * j + row) 
 const auto contact = [&](int i) { return contacts + size_t(CONTACT * i) * STRIDE; };
 
 const float inverse_square = 1.0f / (h * h), damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
-for (int substep = first; substep < end; ++substep) {
+for (int substep = step.first; substep < step.end; ++substep) {
   // The root: positions linear, rotations nlerp, between the frame's two poses.
   const float part = static_cast<float>(substep + 1) / static_cast<float>(count);
   const float part_before = static_cast<float>(substep) / static_cast<float>(count);
@@ -143,7 +153,7 @@ for (int substep = first; substep < end; ++substep) {
   };
   const vector root = root_at(part), root_before = root_at(part_before);
   const quaternion root_frame = root_frame_at(part), frame_before = root_frame_at(part_before);
-  const float from_last = substep == first ? carried : 1.0f;
+  const float from_last = substep == step.first ? step.carried : 1.0f;
 
   if (stages & PREDICT) {
 #include "rod_predict.h"

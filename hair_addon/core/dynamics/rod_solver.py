@@ -9,7 +9,7 @@ Arrays are (groups, rows, lanes) float32: a group is as many strands as `lane_co
 number of every strand lies together. `to_lanes` and `from_lanes` convert.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
@@ -51,40 +51,40 @@ _CONSTANTS = {
 }
 
 
-@dataclass(frozen=True)
+@wp.struct
 class RodArrays:
     """All that a substep reads and writes of S strands of M segments, (groups, rows, lanes) float32 on one device."""
 
     # The state.
-    positions: wp.array  # 3 (M + 1) rows [m]
-    velocities: wp.array  # 3 (M + 1) [m/s]
-    frames: wp.array  # 4 M, unit quaternions x, y, z, w: a segment lies along its z axis
-    spins: wp.array  # 3 M, angular velocities [1/s]
-    multipliers: wp.array  # 6 M, of each segment λ_b (3), λ_s (3)
-    slips: wp.array  # M + 1, sliding in the last substep [m], -1 without contact
+    positions: wp.array3d[float]  # 3 (M + 1) rows [m]
+    velocities: wp.array3d[float]  # 3 (M + 1) [m/s]
+    frames: wp.array3d[float]  # 4 M, unit quaternions x, y, z, w: a segment lies along its z axis
+    spins: wp.array3d[float]  # 3 M, angular velocities [1/s]
+    multipliers: wp.array3d[float]  # 6 M, of each segment λ_b (3), λ_s (3)
+    slips: wp.array3d[float]  # M + 1, sliding in the last substep [m], -1 without contact
     # What the material and the groom say.
-    lengths: wp.array  # M [m]
-    rests: wp.array  # 4 M, half rest rotations of joints
-    bend_compliances: wp.array  # M, b / EI in units of the mean mass
-    stretch_compliances: wp.array  # M
-    inverse_masses: wp.array  # M + 1
-    inertias: wp.array  # M
-    grooms: wp.array  # 3 (M + 1), in the root's frame [m]
-    groom_frames: wp.array  # 4 M, in the root's frame
-    slow_drags: wp.array  # 1 [1/s]
+    lengths: wp.array3d[float]  # M [m]
+    rests: wp.array3d[float]  # 4 M, half rest rotations of joints
+    bend_compliances: wp.array3d[float]  # M, b / EI in units of the mean mass
+    stretch_compliances: wp.array3d[float]  # M
+    inverse_masses: wp.array3d[float]  # M + 1
+    inertias: wp.array3d[float]  # M
+    grooms: wp.array3d[float]  # 3 (M + 1), in the root's frame [m]
+    groom_frames: wp.array3d[float]  # 4 M, in the root's frame
+    slow_drags: wp.array3d[float]  # 1 [1/s]
     # What the surface says.
-    roots: wp.array  # ROOT_ROWS
+    roots: wp.array3d[float]  # ROOT_ROWS
     # Between the stages of a substep.
-    positions_before: wp.array  # 3 (M + 1)
-    predictions: wp.array  # 3 (M + 1), where points go without the rod's forces and contact
-    frames_before: wp.array  # 4 M
-    mobilities: wp.array  # M + 1
+    positions_before: wp.array3d[float]  # 3 (M + 1)
+    predictions: wp.array3d[float]  # 3 (M + 1), where points go without the rod's forces and contact
+    frames_before: wp.array3d[float]  # 4 M
+    mobilities: wp.array3d[float]  # M + 1
     # Counted.
-    resets: wp.array  # 1, how often a strand was put back to its groom
-    solved_again: wp.array  # 1, whether AGAIN has moved it in this substep
+    resets: wp.array3d[float]  # 1, how often a strand was put back to its groom
+    solved_again: wp.array3d[float]  # 1, whether AGAIN has moved it in this substep
 
 
-_ROWS = {
+ROWS = {
     "positions": (0, 3),
     "velocities": (0, 3),
     "frames": (4, 0),
@@ -113,7 +113,7 @@ _FIXED_ROWS = {"slow_drags": 1, "roots": ROOT_ROWS, "resets": 1, "solved_again":
 
 def row_count(name: str, segment_count: int) -> int:
     """Rows of one of the `RodArrays`."""
-    rows = _ROWS[name]
+    rows = ROWS[name]
     return _FIXED_ROWS[name] if rows is None else rows[0] * segment_count + rows[1] * (segment_count + 1)
 
 
@@ -121,7 +121,7 @@ def row_count(name: str, segment_count: int) -> int:
 class Surroundings:
     """What acts on points in a substep, each optional: (groups, rows a point times points, lanes) float32.
 
-    planes: `plane_row` says where; found_planes: the same after the solve, for AGAIN; airs: velocity of the air [m/s],
+    planes: `plane_row` says where; found_planes: the same after the solve, for AGAIN and FINISH; airs: velocity of the air [m/s],
     3 rows a point; drags: factor of air drag, 1; accelerations: [m/s²], 3.
     """
 
@@ -133,6 +133,18 @@ class Surroundings:
 
 
 EMPTY = Surroundings()
+_SHARED = (  # by a step and its `Numbers`
+    "count",
+    "pinned",
+    "carried",
+    "damping_time",
+    "twist_ratio",
+    "drag_square",
+    "drag_root",
+    "hold",
+    "hold_tip",
+    "most_stretch",
+)
 _SURROUNDING_ROWS = {"planes": PLANE_ROWS, "found_planes": PLANE_ROWS, "airs": 3, "drags": 1, "accelerations": 3}
 
 
@@ -163,148 +175,48 @@ class Step:
     carried: float = 1.0  # (h / h of the last substep)²
 
 
+@wp.struct
+class Numbers:
+    """A `Step` and which of its substeps, for kernels."""
+
+    first: int
+    end: int
+    count: int
+    pinned: int
+    h: float
+    carried: float
+    gravity: wp.vec3
+    damping_time: float
+    twist_ratio: float
+    drag_square: float
+    drag_root: float
+    hold: float
+    hold_tip: float
+    most_stretch: float
+
+
+@wp.struct
+class Around:
+    """`Surroundings` for kernels: empty arrays for those that are not there."""
+
+    planes: wp.array3d[float]
+    found_planes: wp.array3d[float]
+    airs: wp.array3d[float]
+    drags: wp.array3d[float]
+    accelerations: wp.array3d[float]
+
+
 @wp.func_native(native_code.body(__file__, "rod_solver.cpp", **_CONSTANTS))
-def _advance(
-    block: int,
-    stages: int,
-    first: int,
-    end: int,
-    count: int,
-    pinned: int,
-    h: float,
-    carried: float,
-    gravity: wp.vec3,
-    damping_time: float,
-    twist_ratio: float,
-    drag_square: float,
-    drag_root: float,
-    hold: float,
-    hold_tip: float,
-    most_stretch: float,
-    positions: wp.array3d[float],
-    velocities: wp.array3d[float],
-    frames: wp.array3d[float],
-    spins: wp.array3d[float],
-    multipliers: wp.array3d[float],
-    slips: wp.array3d[float],
-    lengths: wp.array3d[float],
-    rests: wp.array3d[float],
-    bend_compliances: wp.array3d[float],
-    stretch_compliances: wp.array3d[float],
-    inverse_masses: wp.array3d[float],
-    inertias: wp.array3d[float],
-    grooms: wp.array3d[float],
-    groom_frames: wp.array3d[float],
-    slow_drags: wp.array3d[float],
-    roots: wp.array3d[float],
-    positions_before: wp.array3d[float],
-    predictions: wp.array3d[float],
-    frames_before: wp.array3d[float],
-    mobilities: wp.array3d[float],
-    reset_counts: wp.array3d[float],
-    solved_again: wp.array3d[float],
-    planes: wp.array3d[float],
-    found_planes: wp.array3d[float],
-    airs: wp.array3d[float],
-    drags: wp.array3d[float],
-    accelerations: wp.array3d[float],
-    scratches: wp.array3d[float],
+def advance_block(
+    block: int, stages: int, step: Numbers, strands: RodArrays, around: Around, scratches: wp.array3d[float]
 ): ...
 
 
 @wp.kernel
 def _advance_blocks(
-    stages: int,
-    first: int,
-    end: int,
-    count: int,
-    pinned: int,
-    h: float,
-    carried: float,
-    gravity: wp.vec3,
-    damping_time: float,
-    twist_ratio: float,
-    drag_square: float,
-    drag_root: float,
-    hold: float,
-    hold_tip: float,
-    most_stretch: float,
-    positions: wp.array3d[float],
-    velocities: wp.array3d[float],
-    frames: wp.array3d[float],
-    spins: wp.array3d[float],
-    multipliers: wp.array3d[float],
-    slips: wp.array3d[float],
-    lengths: wp.array3d[float],
-    rests: wp.array3d[float],
-    bend_compliances: wp.array3d[float],
-    stretch_compliances: wp.array3d[float],
-    inverse_masses: wp.array3d[float],
-    inertias: wp.array3d[float],
-    grooms: wp.array3d[float],
-    groom_frames: wp.array3d[float],
-    slow_drags: wp.array3d[float],
-    roots: wp.array3d[float],
-    positions_before: wp.array3d[float],
-    predictions: wp.array3d[float],
-    frames_before: wp.array3d[float],
-    mobilities: wp.array3d[float],
-    reset_counts: wp.array3d[float],
-    solved_again: wp.array3d[float],
-    planes: wp.array3d[float],
-    found_planes: wp.array3d[float],
-    airs: wp.array3d[float],
-    drags: wp.array3d[float],
-    accelerations: wp.array3d[float],
-    scratches: wp.array3d[float],
-    first_block: int,
+    stages: int, step: Numbers, strands: RodArrays, around: Around, scratches: wp.array3d[float], first_block: int
 ):
-    _advance(
-        first_block + wp.tid(),
-        stages,
-        first,
-        end,
-        count,
-        pinned,
-        h,
-        carried,
-        gravity,
-        damping_time,
-        twist_ratio,
-        drag_square,
-        drag_root,
-        hold,
-        hold_tip,
-        most_stretch,
-        positions,
-        velocities,
-        frames,
-        spins,
-        multipliers,
-        slips,
-        lengths,
-        rests,
-        bend_compliances,
-        stretch_compliances,
-        inverse_masses,
-        inertias,
-        grooms,
-        groom_frames,
-        slow_drags,
-        roots,
-        positions_before,
-        predictions,
-        frames_before,
-        mobilities,
-        reset_counts,
-        solved_again,
-        planes,
-        found_planes,
-        airs,
-        drags,
-        accelerations,
-        scratches,
-    )
+    advance_block(first_block + wp.tid(), stages, step, strands, around, scratches)
 
 
 def lane_count(device: wp.DeviceLike) -> int:
@@ -347,29 +259,47 @@ def advance(
 
     stages: PREDICT leaves in `positions` where points go without the rod's forces, for which planes of contact may then
     be found; SOLVE moves them to where they end; AGAIN solves once more for strands of which a point is inside one of
-    `found_planes`, which then takes the place of its plane; FINISH moves out what is inside planes, and computes
-    velocities. One launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
+    `found_planes`, which then takes the place of its plane; FINISH moves out what is inside the
+    planes found last, and computes velocities. One launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
     """
-    end = step.count if end is None else end
-    if step.pinned == arrays.lengths.shape[1]:  # nothing is free
-        stages &= ~(SOLVE | AGAIN)
-    device = arrays.positions.device
-    _check(arrays, step, scratch, surroundings)
-    if first < 0 or end > step.count:
-        raise HairError(f"Substeps {first} to {end} are not among {step.count}.")
-    empty = wp.empty((0, 0, 0), dtype=float, device=device)
-    around = [getattr(surroundings, name) for name in _SURROUNDING_ROWS]
-    inputs = [stages, first, end, step.count, step.pinned, step.size, step.carried, wp.vec3(*step.gravity)]
-    inputs += [step.damping_time, step.twist_ratio, step.drag_square, step.drag_root, step.hold, step.hold_tip]
-    inputs += [step.most_stretch, *(getattr(arrays, field.name) for field in fields(arrays))]
-    inputs += [*(empty if array is None else array for array in around), scratch]
-    group_count = len(arrays.positions)
+    numbers, around = kernel_inputs(arrays, step, scratch, first, end, surroundings)
+    device, group_count = arrays.positions.device, len(arrays.positions)
+    inputs = [stages_of(arrays, step, stages), numbers, arrays, around, scratch]
     if device.is_cpu:
         share_count = parallel.share_count(group_count, device, LEAST_GROUPS)
         parallel.launch_shares(_advance_blocks, group_count, inputs, [[] for _ in range(share_count)], device)
     else:
         inputs.append(0)
         kernel_cache.launch(_advance_blocks, group_count * GPU_LANES, inputs, device=device, block_dim=block_dim)
+
+
+def stages_of(arrays: RodArrays, step: Step, stages: int) -> int:
+    """Those of some stages that strands take: nothing is solved where nothing is free."""
+    return stages & ~(SOLVE | AGAIN) if step.pinned == arrays.lengths.shape[1] else stages
+
+
+def kernel_inputs(
+    arrays: RodArrays, step: Step, scratch: wp.array, first: int, end: int | None, surroundings: Surroundings
+) -> tuple[Numbers, Around]:
+    """A step and surroundings as kernels take them. Raises `HairError` where counts do not match."""
+    end = step.count if end is None else end
+    _check(arrays, step, scratch, surroundings)
+    if first < 0 or end > step.count:
+        raise HairError(f"Substeps {first} to {end} are not among {step.count}.")
+    numbers = Numbers()
+    numbers.first, numbers.end, numbers.h, numbers.gravity = first, end, step.size, wp.vec3(*step.gravity)
+    for name in _SHARED:
+        setattr(numbers, name, getattr(step, name))
+    return numbers, around_of(surroundings)
+
+
+def around_of(surroundings: Surroundings) -> Around:
+    """Surroundings as kernels take them."""
+    around = Around()
+    for name in _SURROUNDING_ROWS:
+        if (array := getattr(surroundings, name)) is not None:
+            setattr(around, name, array)
+    return around
 
 
 def _check(arrays, step, scratch, surroundings):
@@ -382,7 +312,7 @@ def _check(arrays, step, scratch, surroundings):
         raise HairError(f"Of strands of {segment_count} segments, {step.pinned} cannot be pinned.")
     if not (step.size > 0.0 and step.count >= 1):
         raise HairError(f"A substep of {step.size:g} s cannot be simulated.")
-    expected = {field.name: row_count(field.name, segment_count) for field in fields(arrays)}
+    expected = {name: row_count(name, segment_count) for name in ROWS}
     given = {name: getattr(arrays, name) for name in expected}
     for name, rows in _SURROUNDING_ROWS.items():
         array = getattr(surroundings, name)

@@ -6,7 +6,7 @@ in the groom, turned with the surface, so a strand leaves the surface at the ang
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
@@ -91,12 +91,12 @@ class Rods:
         rest = combed_shape(groom) if rest is None else rest
         self._root_frames = rest.frames[:, 0]  # in the groom, as are these roots
         self._roots = groom[:, 0]
-        names = [field.name for field in fields(RodArrays)]
         groups = -(-self.strand_count // self.lanes)
-        rows = {name: rod_solver.row_count(name, self.segment_count) for name in names}
-        shapes = {name: (groups, count, self.lanes) for name, count in rows.items()}
-        self.arrays = RodArrays(**{name: wp.zeros(shapes[name], dtype=float, device=self.device) for name in names})
-        self._scratch = rod_solver.scratch(self.segment_count, groups, self.device)
+        self.arrays = RodArrays()
+        for name in rod_solver.ROWS:
+            shape = groups, rod_solver.row_count(name, self.segment_count), self.lanes
+            setattr(self.arrays, name, wp.zeros(shape, dtype=float, device=self.device))
+        self.scratch = rod_solver.scratch(self.segment_count, groups, self.device)
         self._mass_unit = 1.0  # [kg]
         self._held = rest.multipliers
         self.set_material(material, rest)
@@ -220,13 +220,17 @@ class Rods:
         block_dim: int = rod_solver.BLOCK,
     ) -> None:
         """Simulate substeps of a frame, as `rod_solver.advance` does."""
+        step = self.begun(step)
+        rod_solver.advance(self.arrays, step, self.scratch, first, end, stages, surroundings, block_dim)
+        if stages & rod_solver.FINISH:
+            self.step_size = step.size
+
+    def begun(self, step: Step) -> Step:
+        """A step that goes on from the last one."""
         if self.step_size == 0.0:  # the first: multipliers of the equilibrium, if the rest shape knows them
             self._put("multipliers", self._held * (step.size**2 / self._mass_unit))
             self.step_size = step.size
-        step = replace(step, carried=(step.size / self.step_size) ** 2)
-        rod_solver.advance(self.arrays, step, self._scratch, first, end, stages, surroundings, block_dim)
-        if stages & rod_solver.FINISH:
-            self.step_size = step.size
+        return replace(step, carried=(step.size / self.step_size) ** 2)
 
     def positions(self) -> np.ndarray:
         """(S, M+1, 3) float32 [m]."""

@@ -20,9 +20,10 @@ from . import detail, root_motion, rotations, sag_free
 from .air import Air, ForceField
 from .colliders import Collider, Colliders
 from .contact import Contacts
+from .contact_substep import TouchingStrands
 from .hair_volume import LEAST_CELL, HairVolume
 from .material import material_of
-from .rod_solver import AGAIN, FINISH, PREDICT, SOLVE, Surroundings
+from .rod_solver import Surroundings
 from .rods import Rods, combed_shape, step_of
 from .root_motion import RigidMotion, RootPose
 from .settings import DynamicsSettings
@@ -92,6 +93,7 @@ class Simulation:
         self._colliders = Colliders(self._device)
         self._read_obstacles(world.obstacles)
         self._contacts = Contacts(self._rods.arrays.positions, self._colliders)
+        self._touching = TouchingStrands(self._rods, self._contacts)
         self._air = Air(self._rods.arrays.slips.shape, self._device)
         self._volume = self._new_volume()
         self._since_rubbed = 0.0  # [s]
@@ -167,7 +169,8 @@ class Simulation:
         if self._is_free:
             self._rods.advance(step)
         else:
-            self._volume.fit(self._rods.arrays.positions, self._rods.carried_groom())
+            if self._is_rubbing:
+                self._volume.fit(self._rods.arrays.positions, self._rods.carried_groom())
             fields = [self._seen(field) for field in world.fields]
             for substep in range(count):
                 self._advance(step, substep, fields, world.time - seconds * (1.0 - substep / count))
@@ -194,14 +197,7 @@ class Simulation:
             rods.advance(step, substep, substep + 1, surroundings=around)
         else:
             self._colliders.pose((substep + 1) / step.count)
-            rods.advance(step, substep, substep + 1, PREDICT, around)
-            places = rods.arrays.positions, rods.arrays.positions_before
-            planes = self._contacts.find(*places, step.size)
-            rods.advance(step, substep, substep + 1, SOLVE, Surroundings(planes=planes))
-            found = self._contacts.find(*places, step.size, is_final=True)
-            rods.advance(step, substep, substep + 1, AGAIN, Surroundings(planes=planes, found_planes=found))
-            found = self._contacts.find(*places, step.size, is_final=True, moved=rods.arrays.solved_again)
-            rods.advance(step, substep, substep + 1, FINISH, Surroundings(planes=found))
+            self._touching.advance(step, substep, around)
         self._since_rubbed += step.size
         if self._is_rubbing and self._since_rubbed >= _RUBBING - 1e-9:
             settings = self.settings

@@ -150,7 +150,8 @@ def test_arrays_of_other_shapes_are_refused(device):
     for shape in ((2, 7, LANES), (2, 3, LANES)):
         with pytest.raises(HairError):
             Contacts(wp.zeros(shape, dtype=float, device=device), colliders)
-    contacts = Contacts(wp.zeros((2, 9, LANES), dtype=float, device=device), colliders)
+    good = wp.zeros((2, 9, LANES), dtype=float, device=device)
+    contacts = Contacts(good, colliders)
     for shape in ((1, 9, LANES), (2, 12, LANES), (2, 9, 4)):
         with pytest.raises(HairError):
-            contacts.find(wp.zeros(shape, dtype=float, device=device), contacts.planes, STEP)
+            contacts.find(wp.zeros(shape, dtype=float, device=device), good, STEP)

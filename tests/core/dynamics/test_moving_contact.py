@@ -62,10 +62,10 @@ def test_a_point_that_is_not_asked_has_no_plane_to_miss(device, rng):
             colliders.pose((step + 1) / 6)
             last, strands = strands, strands + speeds * rng.normal(size=(160, 1, 3))
             there, before = lanes_of(strands, device), lanes_of(last, device)
-            held = sparing._vertices.asked.numpy().copy()
+            held = sparing.vertices.asked.numpy().copy()
             planes = sparing.find(there, before, STEP).numpy().copy()
             np.testing.assert_array_equal(planes, asking.find(there, before, STEP, is_skipping=False).numpy())
-            spared += (held == sparing._vertices.asked.numpy()).mean() / 24
+            spared += (held == sparing.vertices.asked.numpy()).mean() / 24
             found += np.any(planes, axis=1).mean() / 24
             final = sparing.find(there, before, STEP, is_final=True).numpy().copy()
             np.testing.assert_array_equal(
