@@ -43,6 +43,7 @@ def in_frame(curves_object, frame, part=0.0):
     return points(curves_object)
 
 
+@pytest.mark.gate(id="V22")
 def test_the_first_frame_is_the_groom_bit_by_bit(swung):
     guides, hair = swung
     combed, before = points(guides), points(hair)
@@ -126,6 +127,7 @@ def test_roots_stay_on_a_surface_that_bends(arm, tmp_path):
         assert found and np.linalg.norm(np.array(nearest) - root) < 1e-4
 
 
+@pytest.mark.gate(id="V22")
 def test_hair_follows_between_frames(swung):
     guides, hair = swung
     bake(guides)

@@ -34,6 +34,7 @@ def drift(simulation):
     return np.linalg.norm(simulation.points - simulation.groom, axis=2).max()
 
 
+@pytest.mark.gate(id="V17")
 @pytest.mark.parametrize("length", [0.05, 0.1, 0.18])
 def test_the_groom_stays_as_it_was_combed(length):
     """For five seconds, where Γ ≤ 7: to a hundredth of a millimetre from the first frame on."""

@@ -141,6 +141,7 @@ def test_short_fur_needs_few_substeps(rng):
     assert np.linalg.norm(ends[1] - ends[0], axis=2).max() < 2e-4
 
 
+@pytest.mark.gate(id="V13")
 def test_it_goes_on_from_a_state_bit_by_bit(rng):
     groom, pose = fur(rng)
 
