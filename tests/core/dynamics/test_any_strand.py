@@ -87,8 +87,8 @@ def test_strands_in_thick_air_stay_as_they_are(thickness):
     """Fibres of 2 µm at rest, in air that makes points so many times heavier within a substep: nothing moves them.
 
     There frames turn much more easily than points move, and |d| = 1 in the matrix where d is a rounded direction would
-    cost it its definiteness: 2 to 99 % of these strands then break. G Gᵀ = 1 - e_v e_vᵀ does no harm: its rounding, some
-    2e-7 of a frame's mobility, is a tenth of the least compliance that LEAST_INERTIA leaves beside it.
+    cost it its definiteness: most of these strands would break. G Gᵀ = 1 - e_v e_vᵀ would do no harm: its rounding,
+    some 2e-7 of a frame's mobility, is a tenth of the least compliance that LEAST_INERTIA leaves beside it.
     """
     rng, vertex_count, size, damping, radius = np.random.default_rng(0), 65, FRAME / 2.0, 0.2, 2e-6
     segment = 0.05 / (vertex_count - 1)

@@ -81,7 +81,7 @@ def momenta(simulation, masses):
 
 
 def free_rod(substeps, seconds):
-    """Momenta before and after of a rod whose first segment holds nothing; the origin follows it, as it follows hair."""
+    """Momenta before and after of a rod whose first segment holds nothing; the origin follows it, as it does hair."""
     groom = curl(0.1, 25, 1)
     material = Simulation(groom, FREE).material
     bending, stretching = material.bend_compliances.copy(), material.stretch_compliances.copy()
