@@ -191,9 +191,19 @@ def test_energy_never_grows_without_drive():
 
 
 @pytest.mark.gate(id="V9")
-@pytest.mark.parametrize("vertex_count", [6, 13, 25])
-def test_what_is_let_fall_comes_to_rest(vertex_count):
-    """Three shapes, six stiffnesses over six decades, four numbers of substeps: 216 strands in all."""
+def test_what_is_let_fall_comes_to_rest():
+    """Three shapes of three numbers of vertices, six stiffnesses over six decades, four numbers of substeps."""
+    settled = [
+        is_settled
+        for vertex_count in (6, 13, 25)
+        for substeps in (1, 2, 4, 8)
+        for is_settled in settled_strands(vertex_count, substeps)
+    ]
+    assert len(settled) == 216
+    assert sum(settled) >= 214
+
+
+def settled_strands(vertex_count, substeps):
     shapes = np.concatenate(
         [
             line(0.15, vertex_count, (1.0, 0.0, 0.3)),
@@ -203,14 +213,11 @@ def test_what_is_let_fall_comes_to_rest(vertex_count):
     )
     stiffness = np.repeat(np.logspace(-3, 3, 6), 3)[:, None]
     groom = np.tile(shapes, (6, 1, 1))
-    settled = 0
-    for substeps in (1, 2, 4, 8):
-        compliances = Simulation(groom).material.bend_compliances / stiffness
-        simulation = Simulation(groom, replace(FIBRE, air_drag=3.0), substeps, bend_compliances=compliances)
-        simulation.advance(24 * 8)
-        assert np.isfinite(simulation.points).all()
-        settled += np.count_nonzero((simulation.speed < 5e-3) & (simulation.rods.reset_counts() == 0))
-    assert settled >= 71  # of 72
+    compliances = Simulation(groom).material.bend_compliances / stiffness
+    simulation = Simulation(groom, replace(FIBRE, air_drag=3.0), substeps, bend_compliances=compliances)
+    simulation.advance(24 * 8)
+    assert np.isfinite(simulation.points).all()
+    return (simulation.speed < 5e-3) & (simulation.rods.reset_counts() == 0)
 
 
 @pytest.mark.gate(id="V10")
