@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         grown_guides,
         guide_additions,
         guide_draping,
+        guide_regions,
         guide_tools,
         hair_styles,
         hair_systems,

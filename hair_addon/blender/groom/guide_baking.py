@@ -22,7 +22,7 @@ from ..host import memory, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import properties
-from . import bake_resuming, frame_folders, guide_simulation, quiet_hair
+from . import bake_resuming, frame_folders, guide_regions, guide_simulation, quiet_hair
 from .bake_resuming import Task
 
 SOLVER_VERSION = 1  # of all that frames follow from beside settings: raised when they come out otherwise
@@ -70,16 +70,24 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
     Raises `HairError`.
     """
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
-    return frame_manifest.digests_of(
-        {
-            "solver": SOLVER_VERSION,
-            "settings": guide_simulation.unkeyed(guides, settings),
-            "guides": guide_simulation.combed_points(guides),
-            "surface": guides.vellus.topology,
-            "frame rate": scene.render.fps / scene.render.fps_base,
-            "units": scene.unit_settings.scale_length,
-        }
-    )
+    parts = {
+        "solver": SOLVER_VERSION,
+        "settings": guide_simulation.unkeyed(guides, settings),
+        "guides": guide_simulation.combed_points(guides),
+        "surface": guides.vellus.topology,
+        "frame rate": scene.render.fps / scene.render.fps_base,
+        "units": scene.unit_settings.scale_length,
+    }
+    regions = _regions(guides)
+    return frame_manifest.digests_of(parts if regions is None else parts | {"parting": regions})
+
+
+def _regions(guides):
+    """Regions of guides, None for one; why they cannot be read, as then frames that are baked still play."""
+    try:
+        return guide_regions.regions_of(guides, scenes.present_depsgraph())
+    except HairError as error:
+        return str(error)
 
 
 def baking(

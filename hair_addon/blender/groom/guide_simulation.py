@@ -20,7 +20,7 @@ from ..data.guide_poses import GuidePose
 from ..host import scene_time
 from ..host.caches import Cache
 from ..settings import preferences, properties
-from . import staleness
+from . import guide_regions, staleness
 
 # session_uid of guides → ((G,) bend stiffness that each needs to hold its shape, `_load` of the settings then)
 stiffness_cache = Cache()
@@ -99,7 +99,12 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     pose, metres = frame.pose, simulated_world.metres_of(scene, settings)
     local = combed_points(guides)
     simulation = dynamics.simulation.Simulation(
-        pose.groom(local), in_metres(settings, metres), pose.root_pose(pose), frame.world, preferences.device()
+        pose.groom(local),
+        in_metres(settings, metres),
+        pose.root_pose(pose),
+        frame.world,
+        preferences.device(),
+        guide_regions.regions_of(guides, depsgraph),
     )
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)

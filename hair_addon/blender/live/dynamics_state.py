@@ -6,7 +6,7 @@ from typing import Any
 
 from ...core.errors import HairError
 from ..data import frame_animation
-from ..groom import frame_folders, guide_baking, staleness
+from ..groom import frame_folders, guide_baking, guide_regions, staleness
 from ..host import notices, scene_time
 from ..host.caches import Cache
 from ..settings import properties
@@ -89,7 +89,8 @@ def _inputs(guides, blender_scene):
     """What `guide_baking.key_of` follows from, quickly read."""
     state, rate = guides.vellus, blender_scene.render.fps / blender_scene.render.fps_base
     units = blender_scene.unit_settings.scale_length
-    return properties.dynamics_of(state), staleness.guides_digest(guides), state.topology, rate, units
+    parted = guide_regions.parting_keys(guides)
+    return properties.dynamics_of(state), staleness.guides_digest(guides), state.topology, rate, units, parted
 
 
 def _unknown():

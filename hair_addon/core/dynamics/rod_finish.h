@@ -16,7 +16,9 @@ for (int i = 0; i <= segment_count; ++i) {
     point = chosen(inside < 0.0f, point - n * inside, point);
     put_vector(x, i, point);
   }
-  put_vector(v, i, (point - get_vector(x_before, i)) * lanes(per_step));
+  // Divided by h, as it was multiplied by h: what h · (1 / h) is off by would grow with each substep.
+  const vector moved = point - get_vector(x_before, i);
+  put_vector(v, i, vector{moved.x / lanes(h), moved.y / lanes(h), moved.z / lanes(h)});
   if (i > 0) {
     const vector segment = point - last, from_root = point - root;
     const lanes size = get(length, i - 1);

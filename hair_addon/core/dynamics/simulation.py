@@ -23,7 +23,7 @@ from .contact import Contacts
 from .contact_substep import TouchingStrands
 from .hair_volume import LEAST_CELL, HairVolume
 from .material import material_of
-from .rod_solver import Surroundings
+from .rod_solver import Surroundings, to_lanes
 from .rods import Rods, combed_shape, step_of
 from .root_motion import RigidMotion, RootPose
 from .settings import DynamicsSettings
@@ -72,9 +72,17 @@ class Simulation:
     """Simulated guides, from the frame on in which they are as they were combed."""
 
     def __init__(
-        self, groom: np.ndarray, settings: DynamicsSettings, pose: RootPose, world: World, device: wp.DeviceLike = None
+        self,
+        groom: np.ndarray,
+        settings: DynamicsSettings,
+        pose: RootPose,
+        world: World,
+        device: wp.DeviceLike = None,
+        regions: np.ndarray | None = None,
     ) -> None:
         """groom: (G, P, 3) [m], combed guides before the surface turned them; pose: of their roots now.
+
+        regions: (G,) whole numbers from 0, guides of two of which do not rub or press on each other; None for one.
 
         Raises `HairError` where these are not finite, or of other guides.
         """
@@ -84,6 +92,8 @@ class Simulation:
         self._start, self._origin = pose, np.round(pose.positions.mean(axis=0) / _GRID) * _GRID
         self._scale = pose.scale
         self._groom = self._checked(groom)
+        self._regions = np.zeros(len(groom), np.int32) if regions is None else np.asarray(regions, np.int32)
+        require_count("regions", self._regions.size, len(groom))
         combed = self._combed()
         vertices = detail.vertices_of(combed, settings.vertex_count)
         self._material, rest = self._shapes(vertices)
@@ -102,7 +112,8 @@ class Simulation:
         """Hair among hair, with cells as large as guides are apart."""
         masses = self._material.masses / self._material.masses.mean()
         cell = self.settings.cell_size or max(LEAST_CELL, _mean_distance(self._start.positions))
-        return HairVolume(self._rods.in_lanes(masses, is_padded=False), cell_size=cell)
+        regions = to_lanes(self._regions, self._rods.lanes)[:, 0]
+        return HairVolume(self._rods.in_lanes(masses, is_padded=False), regions, cell)
 
     def _checked(self, groom):
         groom = np.asarray(groom, np.float64)

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import guide_poses, simulated_guides
-from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.groom import frame_folders, guide_baking, guide_regions
 from hair_addon.blender.live import dynamics_state
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import Stopped, run_now
+from tests.blender.data.test_partings import draw_line
 from tests.support.reading import evaluated_points, points
 from tests.support.swung import simulate, swing
 
@@ -43,6 +44,7 @@ def in_frame(curves_object, frame, part=0.0):
     return points(curves_object)
 
 
+@pytest.mark.gate(id="V22")
 def test_the_first_frame_is_the_groom_bit_by_bit(swung):
     guides, hair = swung
     combed, before = points(guides), points(hair)
@@ -126,6 +128,7 @@ def test_roots_stay_on_a_surface_that_bends(arm, tmp_path):
         assert found and np.linalg.norm(np.array(nearest) - root) < 1e-4
 
 
+@pytest.mark.gate(id="V22")
 def test_hair_follows_between_frames(swung):
     guides, hair = swung
     bake(guides)
@@ -157,6 +160,71 @@ def test_what_has_changed_since_is_said(swung, change):
         guides.data.attributes["position"].data[5].vector.x += 0.1
         bpy.context.scene.frame_set(5)
     assert "with other settings or guides" in dynamics_state.state_of(guides.data)[0]
+
+
+def test_a_moved_part_line_outdates_what_was_baked(swung):
+    """Not in other frames, nor where it divides the guides as before; nor is it played without."""
+    guides, hair = swung
+    unparted = guide_baking.key_of(guides.data, bpy.context.scene)
+    line = draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
+    line.parent = bpy.data.objects["Sphere"]
+    hair.data.vellus.hair.part_lines = "Line"
+    bpy.context.view_layer.update()
+    key = guide_baking.key_of(guides.data, bpy.context.scene)
+    assert {part for part in key if key[part] != unparted.get(part)} == {"parting"}
+    bake(guides, 6)
+    for frame in (1, 4, 6):
+        bpy.context.scene.frame_set(frame)
+        assert dynamics_state.state_of(guides.data)[0] == "Frames {first} to {last} are baked"
+    bpy.context.scene.frame_set(1)
+    line.location.x = 0.5
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(3)
+    assert "with other settings or guides" in dynamics_state.state_of(guides.data)[0]
+    line.location.x = 0.0
+    bpy.context.view_layer.update()
+    bpy.context.scene.frame_set(4)
+    assert dynamics_state.state_of(guides.data)[0] == "Frames {first} to {last} are baked"
+    bpy.data.objects.remove(line)
+    with pytest.raises(HairError, match="Line"):
+        bake(guides, 6)
+    assert guide_baking.key_of(guides.data, bpy.context.scene) != key
+
+
+@pytest.mark.gate(id="V20")
+@pytest.mark.parametrize("is_parted", [True, False])
+def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
+    """Where these are combed does not matter, but for the rounding of sums in mean masses."""
+    guides, hair = swung
+    guides.data.vellus.dynamics.hair_friction, guides.data.vellus.dynamics.hair_pressure = 50.0, 0.0
+    draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
+    hair.data.vellus.hair.part_lines = "Line" if is_parted else ""
+    bpy.context.view_layer.update()
+    across = points(guides)[:, 0, 0]
+    regions = guide_regions.regions_of(guides.data, bpy.context.evaluated_depsgraph_get())
+    if is_parted:
+        is_left = regions == regions[across.argmin()]
+        np.testing.assert_array_equal(is_left[abs(across) > 0.05], across[abs(across) > 0.05] < 0.0)
+    else:
+        is_left = across < 0.0
+        assert regions is None
+    ends = []
+    for _ in range(2):
+        bake(guides, 8, starts_over=True)
+        ends.append(frame_folders.frames_of(guides.data).read_frame(8).points)
+        comb_tips(guides, ~is_left)
+    moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1)
+    assert moved[~is_left].min() > 0.01
+    assert (moved[is_left].max() < 2e-4) == is_parted
+
+
+def comb_tips(guides, chosen):
+    """Bend some guides."""
+    there = points(guides)
+    there[chosen] += np.float32([0.0, 0.0, -0.1]) * np.linspace(0.0, 1.0, there.shape[1], dtype=np.float32)[:, None]
+    guides.data.attributes["position"].data.foreach_set("vector", there.ravel())
+    guides.data.update_tag()
+    bpy.context.view_layer.update()
 
 
 def test_a_copy_bakes_to_a_folder_of_its_own(swung):

@@ -71,6 +71,7 @@ def largest_difference(some, others):
     return max(abs(some[time] - others[time]).max() for time in some)
 
 
+@pytest.mark.gate(id="V23")
 def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_path):
     set_up_camera()
     times = (0.75, 1.0, 1.25, 4.75, LAST + 0.25, LAST, 4.0)

@@ -46,6 +46,7 @@ def bake_linear_motion(guides):
     frame_folders.forget(guides.data)
 
 
+@pytest.mark.gate(id="V23")
 @pytest.mark.long
 def test_cycles_blurs_as_velocities_of_the_points_do(baked, tmp_path):
     bpy.data.objects["Camera"].data.lens = 200.0
@@ -75,6 +76,7 @@ def test_cycles_blurs_as_velocities_of_the_points_do(baked, tmp_path):
     assert abs(followed - still).max() > 6.0 / 255.0
 
 
+@pytest.mark.gate(id="V22")
 def test_vectors_lead_from_frame_to_frame(baked, tmp_path, monkeypatch):
     seen = []
     draw = motion_vectors.draw

@@ -4,12 +4,13 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hair_addon.core.dynamics.material import Material, material_of
 from hair_addon.core.dynamics.settings import DynamicsSettings
-from tests.support.rods import Simulation
+from tests.support.rods import FRAME, Simulation
 
 STRANDS = 24  # of an example
 
@@ -24,6 +25,7 @@ def mixed(materials):
     return replace(materials[0], **arrays)
 
 
+@pytest.mark.gate(id="V14")
 @settings(max_examples=25, deadline=None)
 @given(
     vertex_count=st.integers(3, 65),
@@ -77,3 +79,28 @@ def test_any_strand_settles(vertex_count, substeps, gravity, damping, drag, kick
     rounding = 2.0**-20 * vertex_count * fall / sizes.min(axis=1)
     assert not simulation.rods.reset_counts().any()
     assert (stretch <= 0.02 + 5.0 * weight + rounding).all(), (stretch.max(), lengths[stretch.argmax()])
+
+
+@pytest.mark.gate(id="V14")
+@pytest.mark.parametrize("thickness", [1000.0, 3000.0, 10_000.0])
+def test_strands_in_thick_air_stay_as_they_are(thickness):
+    """Fibres of 2 µm at rest, in air that makes points so many times heavier within a substep: nothing moves them.
+
+    There frames turn much more easily than points move, and |d| = 1 in the matrix where d is a rounded direction would
+    cost it its definiteness: most of these strands would break. G Gᵀ = 1 - e_v e_vᵀ would do no harm: its rounding,
+    some 2e-7 of a frame's mobility, is a tenth of the least compliance that LEAST_INERTIA leaves beside it.
+    """
+    rng, vertex_count, size, damping, radius = np.random.default_rng(0), 65, FRAME / 2.0, 0.2, 2e-6
+    segment = 0.05 / (vertex_count - 1)
+    directions = 0.3 * rng.normal(size=(64, vertex_count - 1, 3)) / np.sqrt(3.0) + [1.0, 0.0, 0.0]
+    directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+    groom = np.concatenate([np.zeros((64, 1, 3)), segment * np.cumsum(directions, axis=1)], axis=1)
+    # As stiff as the inertia of a frame is at LEAST_INERTIA.
+    modulus = 1300.0 * segment**4 / (9e-6 * size**2 * (1.0 + damping / size) * radius**2) * 1e-9
+    fibre = DynamicsSettings(
+        bend_stiffness=1.0, youngs_modulus=modulus, shear_modulus=modulus / 2.7, fibre_radius=radius, damping=damping
+    )
+    simulation = Simulation(groom, fibre, 2, (0.0, 0.0, 0.0), slow_drags=np.full(64, thickness / size))
+    simulation.advance(24)
+    assert not simulation.rods.reset_counts().any()
+    assert abs(simulation.points - groom).max() < 1e-6

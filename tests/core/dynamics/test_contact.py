@@ -29,6 +29,7 @@ def released(substeps, surface):
     return np.array(heights)
 
 
+@pytest.mark.gate(id="V15")
 @pytest.mark.parametrize("substeps", [4, 8])
 def test_a_pressed_strand_is_let_go(substeps):
     """Off the plane within two frames; after a second where it is without the plane, to 0.1 % of its length."""
@@ -40,6 +41,7 @@ def test_a_pressed_strand_is_let_go(substeps):
 SLOPES = [(0.3, 10.0), (0.3, 16.0), (0.3, 17.5), (0.3, 30.0), (0.0, 30.0)]  # μ, degrees
 
 
+@pytest.mark.gate(id="V11")
 @pytest.mark.parametrize("friction,degrees", SLOPES)
 def test_a_free_strand_slides_or_sticks_on_an_incline(friction, degrees):
     """As Coulomb says, a = g (sin θ - μ cos θ); what sticks creeps by at most 0.1 mm/s."""
@@ -108,6 +110,7 @@ def tension_ratios(substeps):
     return mean[1:] / mean[0]
 
 
+@pytest.mark.gate(id="V11")
 @pytest.mark.parametrize("substeps,gate", [(8, 0.04), (32, 0.015)])
 def test_a_strand_around_a_cylinder_holds_as_a_capstan(substeps, gate):
     np.testing.assert_allclose(tension_ratios(substeps), np.exp(FRICTIONS[1:] * np.pi / 2.0), rtol=gate)
@@ -117,6 +120,7 @@ INCLINE = Plane((0.5, 0.0, np.cos(np.pi / 6.0)))
 STRESS = [(vertex_count, substeps) for vertex_count in (11, 41) for substeps in (2, 4, 8)]
 
 
+@pytest.mark.gate(id="V16")
 @pytest.mark.parametrize("vertex_count,substeps", STRESS)
 def test_strands_that_fall_on_something_stay_outside_and_whole(vertex_count, substeps):
     """Three shapes, friction 0 to 2, stiffness over six decades, on a plane, an incline and a ball: 648 strands."""
@@ -165,6 +169,7 @@ def hair_on_a_ball(count, vertex_count=25):
     return 0.0911 * out[:, None] + 0.2 * np.linspace(0.0, 1.0, vertex_count)[:, None] * lean[:, None]
 
 
+@pytest.mark.gate(id="V12")
 @pytest.mark.parametrize("substeps", [4, 8])
 def test_a_shaken_and_turned_head_keeps_its_hair_outside(substeps):
     """By 5 cm at 3 Hz and 70° at 1.5 Hz, with friction; 1 mm is kept, to a millionth of a metre."""
@@ -195,6 +200,7 @@ def test_a_shaken_and_turned_head_keeps_its_hair_outside(substeps):
     assert not rods.reset_counts().any()
 
 
+@pytest.mark.gate(id="V12")
 def test_a_ball_goes_through_hanging_hair_which_closes_behind_it():
     """A ball of 4 cm pushed through at 20 cm/s and out: a second later all hang as they did."""
     groom = np.concatenate(

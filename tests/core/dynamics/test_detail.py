@@ -52,11 +52,13 @@ def test_vertices_are_even(guides):
     np.testing.assert_allclose(vertices[:, [0, -1]], points[:, [0, -1]], atol=1e-7)
 
 
+@pytest.mark.gate(id="V18")
 def test_a_guide_at_rest_is_the_combed_one(guides):
     points, _vertices, rods, left = guides
     assert abs(detail.detailed_points(left, rods).numpy() - points).max() < 1e-6 * LENGTH
 
 
+@pytest.mark.gate(id="V18")
 def test_rigid_motion_is_exact(guides):
     points, vertices, rods, left = guides
     frames = rotations.product(TURN.as_quat(), combed_shape(vertices).frames)
@@ -65,6 +67,7 @@ def test_rigid_motion_is_exact(guides):
     assert abs(detail.detailed_points(left, rods).numpy() - expected).max() < 1e-5 * LENGTH
 
 
+@pytest.mark.gate(id="V18")
 def test_bent_curls_keep_their_length(guides):
     """A rod that bends by a right angle along its length takes its coils with it."""
     points, vertices, rods, left = guides

@@ -24,6 +24,7 @@ def settled(groom, seconds=6):
     return Simulation(groom, IN_THICK_AIR).advance(24 * seconds)
 
 
+@pytest.mark.gate(id="V1")
 @pytest.mark.parametrize(("length", "gate"), [(0.05, 0.0005), (0.1, 0.002), (0.2, 0.0045)])
 def test_a_level_strand_becomes_the_heavy_elastica(length, gate):
     """Whatever brakes it: drag that is not implicit with gravity would hold a part of the weight."""
@@ -37,6 +38,7 @@ def order(errors, counts):
     return np.log(errors[0] / errors[-1]) / np.log((counts[-1] - 1) / (counts[0] - 1))
 
 
+@pytest.mark.gate(id="V1")
 def test_the_error_is_of_second_order_in_the_vertices():
     counts = 11, 41
     errors = [largest_error(settled(line(0.1, n)), heavy_elastica(BENDING, WEIGHT, 0.1, n), 0.1) for n in counts]
@@ -52,6 +54,7 @@ ARCS = [
 LEVEL = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # the third column along x
 
 
+@pytest.mark.gate(id="V5")
 @pytest.mark.parametrize(("radius", "turns", "moment", "gate"), ARCS)
 def test_a_level_arc_bends_and_twists_as_kirchhoff_says(radius, turns, moment, gate):
     """Its moments are those of a rod without weight at the tip, so the reference is one that has found its clamp."""
@@ -74,6 +77,7 @@ def test_a_level_arc_bends_and_twists_as_kirchhoff_says(radius, turns, moment, g
     assert order(errors, counts) > 1.8
 
 
+@pytest.mark.gate(id="V6")
 def test_a_curl_at_rest_stays():
     simulation = Simulation(curl(0.15, 25), gravity=(0.0, 0.0, 0.0)).advance(240)
     assert abs(simulation.points - simulation.groom).max() < 1e-6

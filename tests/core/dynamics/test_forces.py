@@ -32,6 +32,7 @@ def drag_of_cylinder(speed, radius, length):
     return max(fit, 4.0 * np.pi * 1.81e-5 / (np.log(2.0 * length / radius) + 0.5))
 
 
+@pytest.mark.gate(id="V21")
 @pytest.mark.parametrize("substeps", [2, 8])
 @pytest.mark.parametrize("speed", [0.05, 0.5, 3.0])
 def test_a_limp_strand_hangs_straight_in_the_wind(speed, substeps):

@@ -59,6 +59,7 @@ def hair(rng, device):
     return Hair(rng, device)
 
 
+@pytest.mark.gate(id="V20")
 @pytest.mark.parametrize("friction", [0.5, 30.0, 1e6])
 def test_friction_keeps_momentum_and_takes_energy(hair, friction):
     before = hair.velocities.astype(np.float64)
@@ -80,6 +81,7 @@ def test_friction_leaves_what_moves_as_one(hair):
     assert np.array_equal(hair.rubbed(volume, 0.0), hair.velocities)
 
 
+@pytest.mark.gate(id="V20")
 def test_nothing_pushes_at_the_groom_and_what_is_pressed_spreads(hair):
     volume = hair.volume()
     np.testing.assert_array_equal(hair.rubbed(volume, 0.0, 0.5, 1.0), hair.velocities)
@@ -120,6 +122,7 @@ def test_sums_have_no_order(rng, hair, monkeypatch):
     np.testing.assert_array_equal(one, hair.rubbed(hair.volume(fitted=pressed), 30.0, 0.5, 0.5, pressed))
 
 
+@pytest.mark.gate(id="V20")
 def test_regions_do_not_feel_each_other(rng, device):
     """Two regions in one place move as each would alone."""
     both = Hair(rng, device)

@@ -45,6 +45,7 @@ def shake(frame):
     return RigidMotion(np.array([0.0, 0.0, np.sin(half), np.cos(half)]), NECK, way)
 
 
+@pytest.mark.gate(id="V12")
 def test_hair_on_a_shaken_head_stays_outside_and_whole(head):
     """No vertex nearer than its distance by a micrometre, no segment 3 % longer, and none put back."""
     guides, vertices = grown(head), head.vertices.astype(np.float64)

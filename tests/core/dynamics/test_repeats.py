@@ -46,12 +46,14 @@ def assert_equal(state, other):
         np.testing.assert_array_equal(state[name], other[name], err_msg=name)
 
 
+@pytest.mark.gate(id="V13")
 def test_again(groom):
     state = shaken(groom)
     assert np.isfinite(state["positions"]).all()
     assert_equal(state, shaken(groom))
 
 
+@pytest.mark.gate(id="V13")
 @pytest.mark.parametrize("frame", range(1, FRAMES))
 def test_resumed_from_any_frame(groom, frame):
     resumed = Simulation(groom)
@@ -59,6 +61,7 @@ def test_resumed_from_any_frame(groom, frame):
     assert_equal(shaken(groom), shaken(groom, simulation=resumed, first_frame=frame))
 
 
+@pytest.mark.gate(id="V13")
 def test_in_another_order(groom, rng):
     """No strand depends on those whose lanes are beside its own; also not on how many there are."""
     order = rng.permutation(COUNT)[: COUNT - 11]
@@ -67,6 +70,7 @@ def test_in_another_order(groom, rng):
         np.testing.assert_array_equal(state[name][order], other[name], err_msg=name)
 
 
+@pytest.mark.gate(id="V13")
 @pytest.mark.parametrize("core_count", [1, 2, 5])
 def test_on_other_numbers_of_threads(groom, monkeypatch, core_count):
     state = shaken(groom)
@@ -87,6 +91,7 @@ def test_stage_by_stage_and_substep_by_substep(groom):
     assert_equal(shaken(groom), simulation.rods.save())
 
 
+@pytest.mark.gate(id="V19")
 def test_at_other_frame_rates(groom):
     """24, 30 and 60 frames a second, in substeps of one size: a third of a second above still roots."""
     ends = []
@@ -119,11 +124,13 @@ def test_carried_strands_go_on_as_before(groom):
     np.testing.assert_array_equal(there.rods.save()["frames"][~chosen], here.rods.save()["frames"][~chosen])
 
 
+@pytest.mark.gate(id="V13")
 @pytest.mark.skipif(wp.get_device(DEVICE).is_cpu, reason="threads of a GPU stand in blocks")
 def test_in_blocks_of_any_size(groom):
     assert_equal(shaken(groom), shaken(groom, block_dim=128))
 
 
+@pytest.mark.gate(id="V13")
 @pytest.mark.skipif(wp.get_device(DEVICE).is_cpu, reason="needs both kinds of device")
 def test_on_both_kinds_of_device(groom):
     lengths = np.linalg.norm(np.diff(groom, axis=1), axis=2).sum(axis=1)

@@ -141,6 +141,7 @@ def test_short_fur_needs_few_substeps(rng):
     assert np.linalg.norm(ends[1] - ends[0], axis=2).max() < 2e-4
 
 
+@pytest.mark.gate(id="V13")
 def test_it_goes_on_from_a_state_bit_by_bit(rng):
     groom, pose = fur(rng)
 
@@ -227,6 +228,29 @@ def test_friction_between_hairs_makes_them_move_together(rng):
     simulation = Simulation(groom, DynamicsSettings(hair_pressure=100.0), pose, World(), DEVICE)
     simulation.advance(pose, World(), FRAME)
     np.testing.assert_allclose(simulation.points(), groom, atol=1e-5)
+
+
+@pytest.mark.gate(id="V20")
+def test_hair_of_another_region_is_not_felt(rng):
+    """Two coats in one place: with regions each moves as it would alone, as no momentum passes between them."""
+    groom, pose = fur(rng, 200)
+    is_kicked = np.arange(200) % 2 == 0
+    kicks = np.where(is_kicked[:, None], rng.normal(0.0, 0.01, (200, 3)), 0.0)
+    settings = DynamicsSettings(hair_friction=20.0, hair_pressure=0.0, cell_size=0.02, automatic_substeps=False)
+
+    def ends(chosen, regions=None):
+        own = replace(pose, positions=pose.positions[chosen], turns=pose.turns[chosen])
+        kicked = replace(own, positions=own.positions + kicks[chosen])
+        simulation = Simulation(groom[chosen], settings, own, NONE, DEVICE, regions)
+        for _ in range(6):
+            simulation.advance(kicked, NONE, FRAME)
+        return simulation.points()
+
+    alone, everyone = ends(~is_kicked), np.ones(200, bool)
+    np.testing.assert_allclose(ends(everyone, is_kicked)[~is_kicked], alone, atol=1e-6)
+    assert abs(ends(everyone)[~is_kicked] - alone).max() > 1e-4
+    with pytest.raises(HairError):
+        ends(everyone, np.zeros(3, int))
 
 
 @pytest.mark.parametrize("pinned", [0.5, 1.0])

@@ -1,0 +1,108 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Regions of guides: whole numbers, the same for guides whose hair may touch, by regions of the surface and part lines.
+
+A guide is on that side of a part line to which it has the shorter way. As ways do not cross lines, one that goes from
+border to border, or is closed, divides the guides as it does the surface. Past the end of another one its sides go on
+straight ahead, each with the guides that are nearer to it.
+"""
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+import warp as wp
+
+from ..geometry import closest_point, root_frames
+from ..geometry.mesh import SurfacePoints, TriMesh
+from . import part_lines
+from .part_lines import PartLines
+from .regions import Regions, kept_apart
+
+_APART = 1.0 / 16.0  # of the distance between points of a line: how far from it places beside it are
+_NEAREST = 8  # places on each side of a line that a guide's ways lead to
+_AT_ENDS = 8  # points of a line that tell in which direction it ends: single ones follow the faces of the surface
+_ROWS = 4096  # guides that are compared with a line at once
+
+
+def guide_regions(
+    mesh: TriMesh,
+    roots: SurfacePoints,
+    regions: Sequence[Regions] = (),
+    lines: PartLines | None = None,
+    device: wp.DeviceLike = "cpu",
+) -> np.ndarray:
+    """(G,) int32: alike for guides that are in one region of all `Regions` and on the same side of each line.
+
+    Numbered as `combined` does. mesh: checked, with the guides' roots on it; lines: as they are laid on it, or None.
+    """
+    labels = [np.zeros(len(roots), np.int32)]
+    apart = kept_apart(regions, roots, roots)
+    if apart is not None:
+        labels.append(apart[1])
+    if lines is not None:
+        labels += _sides(mesh, roots, lines, device)
+    return combined(labels)
+
+
+def combined(labels: Sequence[np.ndarray]) -> np.ndarray:
+    """(G,) int32: alike where all of some labels (G,) are, one array at least; numbered in the order of the guides."""
+    rows = np.stack([label.astype(np.int64) for label in labels], axis=1)
+    _, first, numbers = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[numbers.reshape(-1)].astype(np.int32)
+
+
+def _sides(mesh, roots, lines, device):
+    """For each line that is longer than a point (G,) bool: whether guides are on its left."""
+    surface = closest_point.SurfaceQuery(mesh, device=device)
+    frames = root_frames.rooted(mesh, roots, device)
+    points, starts = lines.points.numpy().astype(np.float64), lines.starts.numpy()
+    found = []
+    for (start, end), kind in zip(itertools.pairwise(starts), lines.ends.numpy(), strict=True):
+        line = points[start:end]
+        edges = np.diff(line, axis=0)
+        is_long = np.linalg.norm(edges, axis=1) > 0.0
+        if not is_long.any():
+            continue
+        firsts, edges = line[:-1][is_long], edges[is_long]
+        places = surface.nearest(np.concatenate([firsts + 0.25 * edges, firsts + 0.75 * edges]))
+        if not kind & part_lines.CLOSED:
+            count = min(_AT_ENDS, len(line) // 2)
+            edges[0], edges[-1] = line[count] - line[0], line[-1] - line[-1 - count]
+        on_line = root_frames.rooted(mesh, places, device)
+        found.append(_is_left(frames, on_line, np.concatenate([edges, edges]), lines))
+    return found
+
+
+def _is_left(frames, on_line, edges, lines):
+    """(G,) bool of roots with frames (positions, normals); on_line: the same of two places or more of one of the lines.
+
+    edges: (M, 3) of the line there [m]. No way at all leads to a line behind others: it does not matter to those roots.
+    """
+    roots, normals = frames
+    positions, places, ups = roots.numpy(), on_line[0].numpy(), on_line[1].numpy()
+    device, count = roots.device, len(places)
+    left = np.cross(ups, edges)
+    left *= _APART * np.median(np.linalg.norm(edges, axis=1)) / np.maximum(np.linalg.norm(left, axis=1), 1e-30)[:, None]
+    beside = np.concatenate([places + left, places - left]).astype(np.float32)  # the left ones first
+    candidates = np.concatenate(
+        [_nearest(positions, beside[:count]), count + _nearest(positions, beside[count:])], axis=1
+    )
+    ways = np.linalg.norm(positions[:, None] - beside[candidates], axis=2)
+    order = np.argsort(ways, axis=1, kind="stable")
+    candidates = wp.array(np.take_along_axis(candidates, order, axis=1), dtype=int, device=device)
+    ways = wp.array(np.take_along_axis(ways, order, axis=1), dtype=float, device=device)
+    there = wp.array(beside, dtype=wp.vec3, device=device)
+    facing = wp.array(np.concatenate([ups, ups]), dtype=wp.vec3, device=device)
+    part_lines.go_round(lines, roots, normals, there, facing, candidates, ways)
+    # Where all are infinite the first one still is as it was.
+    return (candidates.numpy()[:, 0] < count) & np.isfinite(ways.numpy()[:, 1])
+
+
+def _nearest(positions, places):
+    """(G, K) int32: the places nearest to each position, K at most `_NEAREST`."""
+    count = min(_NEAREST, len(places))
+    found = np.empty((len(positions), count), np.int32)
+    for first in range(0, len(positions), _ROWS):
+        distances = np.linalg.norm(positions[first : first + _ROWS, None] - places, axis=2)
+        found[first : first + _ROWS] = np.argpartition(distances, count - 1, axis=1)[:, :count]
+    return found
