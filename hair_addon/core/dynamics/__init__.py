@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         detail,
         draped_growth,
         draping,
+        hair_cells,
         hair_volume,
         material,
         moving_mesh,

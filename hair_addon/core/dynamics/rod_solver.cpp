@@ -15,7 +15,6 @@
 //   vec3 gravity                           [m/s²]
 //   float damping_time                     Kelvin-Voigt time τ of bending and twisting [s]
 //   float twist_ratio                      compliance of twisting, in that of bending
-//   float drag_square, drag_root           of the rate of drag, times v [1/m] and ∛v [1/s ∛(s/m)]
 //   float hold, hold_tip                   pull to the groom [1/s²], and its part at the tip
 //   float most_stretch                     length of a segment by its rest length at which a strand is put back
 //   array_t<float> positions, velocities   3 (M + 1) rows [m], [m/s]
@@ -28,7 +27,7 @@
 //   array_t<float> inverse_masses          M + 1 rows
 //   array_t<float> inertias                M rows
 //   array_t<float> grooms, groom_frames    3 (M + 1), 4 M rows: the groom in the root's frame
-//   array_t<float> slow_drags              1 row: the rate of drag of slow air [1/s]
+//   array_t<float> drag_rates              3 rows: the rate of drag of slow air [1/s]; by v [1/m], by ∛v [1/s ∛(s/m)]
 //   array_t<float> roots                   14 rows: position, frame at the frame's start; position, frame at its end
 //   array_t<float> positions_before, predictions    3 (M + 1) rows each: between stages
 //   array_t<float> frames_before, mobilities        4 M, M + 1 rows: between stages
@@ -117,7 +116,8 @@ const float *const air_rows = rows_of(airs), *const drag_rows = rows_of(drags);
 const float *const acceleration_rows = rows_of(accelerations);
 const bool has_planes = planes.shape[0] > 0, has_air = airs.shape[0] > 0, has_drag = drags.shape[0] > 0;
 const bool has_acceleration = accelerations.shape[0] > 0;
-const lanes slow_drag = get(rows_of(slow_drags), 0);
+const float* const drag_rate = rows_of(drag_rates);
+const lanes slow_drag = get(drag_rate, 0), drag_square = get(drag_rate, 1), drag_root = get(drag_rate, 2);
 
 #if defined(__CUDA_ARCH__)
 float* const scratch = rows_of(scratches);

@@ -71,7 +71,7 @@ class RodArrays:
     inertias: wp.array  # M
     grooms: wp.array  # 3 (M + 1), in the root's frame [m]
     groom_frames: wp.array  # 4 M, in the root's frame
-    slow_drags: wp.array  # 1 [1/s]
+    drag_rates: wp.array  # 3: of slow air [1/s], per speed across [1/m], and per its cube root
     # What the surface says.
     roots: wp.array  # ROOT_ROWS
     # Between the stages of a substep.
@@ -99,7 +99,7 @@ _ROWS = {
     "inertias": (1, 0),
     "grooms": (0, 3),
     "groom_frames": (4, 0),
-    "slow_drags": None,
+    "drag_rates": None,
     "roots": None,
     "positions_before": (0, 3),
     "predictions": (0, 3),
@@ -108,7 +108,7 @@ _ROWS = {
     "resets": None,
     "solved_again": None,
 }
-_FIXED_ROWS = {"slow_drags": 1, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
+_FIXED_ROWS = {"drag_rates": 3, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
 
 
 def row_count(name: str, segment_count: int) -> int:
@@ -154,8 +154,6 @@ class Step:
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  # [m/s²]
     damping_time: float = 0.0  # [s]
     twist_ratio: float = 1.0  # compliance of twisting in that of bending
-    drag_square: float = 0.0  # rate of air drag for a speed across [1/m]
-    drag_root: float = 0.0  # and for its cube root
     hold: float = 0.0  # [1/s²]
     hold_tip: float = 1.0
     pinned: int = 0  # points from the root that follow the surface, beside the root itself
@@ -176,8 +174,6 @@ def _advance(
     gravity: wp.vec3,
     damping_time: float,
     twist_ratio: float,
-    drag_square: float,
-    drag_root: float,
     hold: float,
     hold_tip: float,
     most_stretch: float,
@@ -195,7 +191,7 @@ def _advance(
     inertias: wp.array3d[float],
     grooms: wp.array3d[float],
     groom_frames: wp.array3d[float],
-    slow_drags: wp.array3d[float],
+    drag_rates: wp.array3d[float],
     roots: wp.array3d[float],
     positions_before: wp.array3d[float],
     predictions: wp.array3d[float],
@@ -224,8 +220,6 @@ def _advance_blocks(
     gravity: wp.vec3,
     damping_time: float,
     twist_ratio: float,
-    drag_square: float,
-    drag_root: float,
     hold: float,
     hold_tip: float,
     most_stretch: float,
@@ -243,7 +237,7 @@ def _advance_blocks(
     inertias: wp.array3d[float],
     grooms: wp.array3d[float],
     groom_frames: wp.array3d[float],
-    slow_drags: wp.array3d[float],
+    drag_rates: wp.array3d[float],
     roots: wp.array3d[float],
     positions_before: wp.array3d[float],
     predictions: wp.array3d[float],
@@ -271,8 +265,6 @@ def _advance_blocks(
         gravity,
         damping_time,
         twist_ratio,
-        drag_square,
-        drag_root,
         hold,
         hold_tip,
         most_stretch,
@@ -290,7 +282,7 @@ def _advance_blocks(
         inertias,
         grooms,
         groom_frames,
-        slow_drags,
+        drag_rates,
         roots,
         positions_before,
         predictions,
@@ -360,7 +352,7 @@ def advance(
     empty = wp.empty((0, 0, 0), dtype=float, device=device)
     around = [getattr(surroundings, name) for name in _SURROUNDING_ROWS]
     inputs = [stages, first, end, step.count, step.pinned, step.size, step.carried, wp.vec3(*step.gravity)]
-    inputs += [step.damping_time, step.twist_ratio, step.drag_square, step.drag_root, step.hold, step.hold_tip]
+    inputs += [step.damping_time, step.twist_ratio, step.hold, step.hold_tip]
     inputs += [step.most_stretch, *(getattr(arrays, field.name) for field in fields(arrays))]
     inputs += [*(empty if array is None else array for array in around), scratch]
     group_count = len(arrays.positions)
