@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Simulated characters that a shot links: baked in the shot, and moved there as in their own file."""
 
+import shutil
+
 import bpy
 import numpy as np
 import pytest
@@ -110,3 +112,28 @@ def test_a_shot_has_settings_of_its_own(character, tmp_path):
     bake()
     bpy.context.scene.frame_set(FRAME)
     assert np.abs(points(shown_hair()) - there).max() > 1e-3
+
+
+def test_characters_of_files_with_one_name_have_frames_of_their_own(character, tmp_path):
+    """Two folders with a character.blend each; the project may be moved as a whole."""
+    path, _there = character
+    project, moved = tmp_path / "project", tmp_path / "moved"
+    for owner in ("one", "other"):
+        (project / owner).mkdir(parents=True)
+        shutil.copy(path, project / owner)
+    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.save_as_mainfile(filepath=str(project / "shot.blend"))
+    for owner in ("one", "other"):
+        with bpy.data.libraries.load(str(project / owner / path.name), link=True, relative=True) as (_there, here):
+            here.collections = ["Character"]
+    for collection in bpy.data.collections:
+        bpy.context.scene.collection.children.link(collection)
+    bpy.ops.wm.save_mainfile()
+    bake(2)
+    folders = sorted(frame_folders.folder_of(guides).name for guides in frame_folders.simulating())
+    assert len(set(folders)) == 2
+    assert sorted(folder.name for folder in (project / "haircache").iterdir()) == folders
+    project.rename(moved)
+    bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend"))
+    for guides in frame_folders.simulating():
+        assert frame_folders.frames_of(guides).frame_numbers() == [1, 2, 3]

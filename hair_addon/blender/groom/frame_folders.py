@@ -36,7 +36,7 @@ def _identity_of(guides):
 def _identity_of_name(guides):
     """The same in every session of a file that was not saved since guides were baked, as by the command line."""
     name = name_of(guides)
-    of = name if guides.library is None else [name, Path(guides.library.filepath).name]
+    of = name if guides.library is None else [name, paths.from_open_file(guides.library)]
     return frame_manifest.digest(of)[:16]
 
 

@@ -25,7 +25,7 @@ from ..settings import properties
 from . import bake_resuming, frame_folders, guide_regions, guide_simulation, quiet_hair
 from .bake_resuming import Task
 
-SOLVER_VERSION = 1  # of all that frames follow from beside settings: raised when they come out otherwise
+SOLVER_VERSION = 2  # of all that frames follow from beside settings: raised when they come out otherwise
 STATE_FRAMES = 24  # between states
 _BEYOND = 1  # frames after the last one, for motion blur
 

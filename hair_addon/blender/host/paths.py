@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Paths that a .blend or a user names, operators that this Blender has, and the version that goes into file headers."""
 
+import contextlib
+import os
 import tomllib
 from functools import cache
 from pathlib import Path
@@ -24,6 +26,18 @@ def resolve(path, library=None):
     if path.startswith("\\\\"):
         raise HairError(f"{path} is on another computer, to which Vellus does not write: pick a local folder.")
     return Path(bpy.path.abspath(path, library=library)).resolve()
+
+
+def from_open_file(library):
+    """The path of a `bpy.types.Library` from the folder of the open file, so that a project may be moved as a whole.
+
+    Absolute where there is none: the file was never saved, or the library is on another drive.
+    """
+    path = os.path.normpath(bpy.path.abspath(library.filepath))
+    if bpy.data.filepath:
+        with contextlib.suppress(ValueError):
+            path = os.path.relpath(path, os.path.dirname(bpy.data.filepath))
+    return Path(path).as_posix()
 
 
 def has_operator(name):

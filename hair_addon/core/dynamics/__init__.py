@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         distance_grid,
         draped_growth,
         draping,
+        hair_cells,
         hair_volume,
         material,
         moving_mesh,

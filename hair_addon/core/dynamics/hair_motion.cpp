@@ -1,15 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The mean motion of hair around a point, and the push of its pressure: six numbers from the eight cells around it.
+// The mean motion of hair around a point, and the push of pressure and cohesion: six numbers from the eight cells around.
 //
 // The body of `_around` in hair_volume.py. Parameters:
 //
 //   int row                       the cell before the point
 //   int across, int along         from a cell to the next one along x, along y; along z it is 1
 //   vec3 part                     where the point is between the cells, 0..1 along each axis
-//   array_t<vec4> fields          of each cell the mean velocity [m/s], and how much too dense it is
+//   float wetness                 of the point's strand
+//   array_t<vec4> fields          of each cell the mean velocity [m/s], and e, how much too dense it is
+//   array_t<float> missing        of each cell s, how much too thin it is; empty where wetness is 0
 //
-// Returns Σ w v, and -Σ excess ∇w by the size of a cell.
+// Returns Σ w v, and -Σ (e - wetness s) ∇w by the size of a cell.
 
 {
 float around[4] = {0.0f, 0.0f, 0.0f, 0.0f}, push[3] = {0.0f, 0.0f, 0.0f};
@@ -17,9 +19,10 @@ for (int corner = 0; corner < 8; ++corner) {
   const int dx = corner >> 2, dy = (corner >> 1) & 1, dz = corner & 1;
   const float wx = dx ? part[0] : 1.0f - part[0], wy = dy ? part[1] : 1.0f - part[1];
   const float wz = dz ? part[2] : 1.0f - part[2], weight = wx * wy * wz;
-  const auto& field = fields.data[row + dx * across + dy * along + dz];
+  const int cell = row + dx * across + dy * along + dz;
+  const auto& field = fields.data[cell];
   for (int k = 0; k < 4; ++k) around[k] += weight * field[k];
-  const float excess = field[3];
+  const float excess = wetness > 0.0f ? field[3] - wetness * missing.data[cell] : field[3];
   push[0] += (dx ? -excess : excess) * wy * wz;
   push[1] += (dy ? -excess : excess) * wx * wz;
   push[2] += (dz ? -excess : excess) * wx * wy;

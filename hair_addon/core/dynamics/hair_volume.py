@@ -6,11 +6,16 @@ points are of whole numbers: in any order, on any number of cores, they are the 
 
     ρ_c = Σ w m,  P_c = Σ w m v                                   trilinear weights w; ρ⁰ of the groom
     v_i ← (1 - f) v_i + f Σ w P_c / ρ_c,  f = 1 - exp(-k_f Δt)    friction: keeps momentum
-    v_i ← v_i - Δt (k_p / ρ̄) Σ_c (ρ_c - 1.2 max(ρ⁰_c, ρ̄, ρ¹))₊ ∇w_ic  pressure, |Δv| ≤ ½ cell / Δt
-    wet: the same with (ρ_c - 0.8 ρ⁰_c)₋ where ρ_c > 0.2 ρ⁰_c      cohesion
+    e_c = (ρ_c - 1.2 max(ρ⁰_c, ρ̄, ρ¹))₊                          pressure: how much too dense
+    s_c = min(0.8 ρ⁰_c - ρ_c, 3 ρ_c)₊                             cohesion: how much too thin, but not torn apart
+    v_i ← v_i - Δt (k_p / ρ̄) Σ_c (e_c - wetness_i s_c) ∇w_ic      |Δv| ≤ ½ cell / Δt
 
 ρ̄ is the mean of ρ⁰ over its cells. Without it in the pressure, hair could not fall where the groom has none. ρ¹ is the
 most that a straight strand has in a cell by itself: without it strands that stand alone would push themselves.
+
+Hair that is at rest stays so. Where it is so dense that an explicit step would overshoot, e and s count for less:
+(ω Δt)² = 2 k_p ρ_c / ρ̄ (Δt / cell)² stays below 1. And ∇w jumps between cells, so a point that is pushed back and forth
+comes to where they meet (hair_cells.py).
 """
 
 import math
@@ -22,6 +27,7 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import kernel_cache, native_code, parallel
 from ..kernels.checks import require_count, require_indices
+from .hair_cells import Grid, cell_of, part_of, rubbed
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -36,16 +42,7 @@ _LEAST_ROWS = 20_000  # points that are worth a thread
 _UNIT = wp.constant(2.0**20)  # of sums, in a mean mass
 _FASTEST = wp.constant(1.0e4)  # [m/s] of points that count
 _FARTHEST = wp.constant(1.0e5)  # [m]
-_DENSE, _THIN, _GONE = wp.constant(1.2), wp.constant(0.8), wp.constant(0.2)
-
-
-@wp.struct
-class Grid:
-    """Cells of each region, whose corners are whole multiples of the cell size."""
-
-    low: wp.vec3i
-    counts: wp.vec3i
-    per_cell: float  # [1/m]
+_DENSE, _THIN, _LOOSE = wp.constant(1.2), wp.constant(0.8), wp.constant(3.0)
 
 
 class HairVolume:
@@ -81,6 +78,7 @@ class HairVolume:
         self._weights: Any = None
         self._kept_sums: list[Any] = []
         self._fields: Any = None
+        self._missing: Any = None  # s by ρ̄, of each cell; empty where all strands are dry
 
     def fit(self, positions: Any, groom: Any) -> None:
         """Lay the grid over strands, and over the groom as it is carried by the surface; once a frame. [m]"""
@@ -103,30 +101,41 @@ class HairVolume:
         kernel_cache.launch(_average, len(self._rest), inputs=[self._rest], outputs=[self._mean], device=self.device)
 
     def rub(
-        self, positions: Any, velocities: Any, duration: float, friction: float, pressure: float, wetness: float = 0.0
+        self, positions: Any, velocities: Any, duration: float, friction: float, pressure: float, wetness: Any = None
     ) -> None:
         """Change velocities [m/s] by what hair does to hair in a time [s]; roots keep theirs.
 
-        friction k_f [1/s], pressure k_p [m²/s²], wetness 0..1: of cohesion. After `fit` in this frame; points that
-        have left the grid since are left alone.
+        friction k_f [1/s], pressure k_p [m²/s²], wetness (groups, 1, lanes) of each strand, 0..1, None where all are
+        dry. After `fit` in this frame; points that have left the grid since are left alone.
         """
         self._require_shape(positions)
         self._require_shape(velocities)
-        values = duration, friction, pressure, wetness
+        values = duration, friction, pressure
         if self.grid is None or not all(map(math.isfinite, values)) or not duration > 0.0:
             return
+        wetness = wp.zeros((0, 0, 0), dtype=float, device=self.device) if wetness is None else wetness
         sums = self._sums(positions, velocities)
         mixed = -math.expm1(-max(friction, 0.0) * duration)
         groups, points, lanes = self._shape
-        fields = self._fields
+        if wetness.size:
+            for name, count, wanted in zip(("groups", "rows", "lanes"), wetness.shape, (groups, 1, lanes), strict=True):
+                require_count(name, count, wanted)
+        fields, missing = self._fields, self._missing_of(len(sums) if wetness.size else 0)
         shares = parallel.share_count(len(sums), self.device, _LEAST_ROWS)
-        inputs = [sums, self._rest, self._mean, self._alone, wetness]
-        parallel.launch_shares(_mean_motion, len(sums), inputs, [[fields]] * shares, self.device)
-        inputs = [self.grid, self._masses, self._regions, positions, fields]
-        inputs += [mixed, duration * pressure, 0.5 * self.cell_size / duration]
+        stiffness = 2.0 * max(pressure, 0.0) * (duration / self.cell_size) ** 2
+        inputs = [sums, self._rest, self._mean, self._alone, stiffness]
+        parallel.launch_shares(_mean_motion, len(sums), inputs, [[fields, missing]] * shares, self.device)
+        inputs = [self.grid, self._masses, self._regions, wetness, positions, fields, missing]
+        inputs += [mixed, duration, duration * pressure / self.cell_size, 0.5 * self.cell_size / duration]
         kernel_cache.load(self.device, _rub.module)
         shares = parallel.share_count(groups * points * lanes, self.device, _LEAST_ROWS // 8)
         parallel.launch_shares(_rub, groups * points * lanes, inputs, [[velocities]] * shares, self.device)
+
+    def _missing_of(self, cell_count):
+        """The array of s for as many cells."""
+        if self._missing is None or len(self._missing) != cell_count:
+            self._missing = wp.empty(cell_count, dtype=float, device=self.device)
+        return self._missing
 
     def _most_of_one(self, groom):
         """What a straight strand of mean mass has at most in a cell: a point, or all points of a cell's length."""
@@ -198,33 +207,10 @@ def _is_near(position: wp.vec3):
     return wp.isfinite(wp.length(position)) and wp.max(wp.abs(position)) < _FARTHEST
 
 
-@wp.func
-def _cell_of(grid: Grid, place: wp.vec3, region: int):
-    """The number of the cell before a place [cells], -1 outside of the grid."""
-    x = int(wp.floor(place[0])) - grid.low[0]
-    y = int(wp.floor(place[1])) - grid.low[1]
-    z = int(wp.floor(place[2])) - grid.low[2]
-    if wp.min(x, wp.min(y, z)) < 0:
-        return -1
-    if x + 1 >= grid.counts[0] or y + 1 >= grid.counts[1] or z + 1 >= grid.counts[2]:
-        return -1
-    return ((region * grid.counts[0] + x) * grid.counts[1] + y) * grid.counts[2] + z
-
-
-@wp.func
-def _part(place: wp.vec3):
-    """Where a place is between the cell before it and the next one, along each axis."""
-    return wp.vec3(place[0] - wp.floor(place[0]), place[1] - wp.floor(place[1]), place[2] - wp.floor(place[2]))
-
-
 @wp.func_native(native_code.body(__file__, "hair_sums.cpp"))
 def _add(
     row: int, across: int, along: int, part: wp.vec3, mass: float, velocity: wp.vec3, sums: wp.array2d[wp.int64]
 ): ...
-
-
-@wp.func_native(native_code.body(__file__, "hair_motion.cpp"))
-def _around(row: int, across: int, along: int, part: wp.vec3, fields: wp.array[wp.vec4]) -> wp.spatial_vector: ...
 
 
 @wp.kernel
@@ -266,10 +252,10 @@ def _scatter(
         return
     if with_momentum and not wp.length(velocity) < _FASTEST:
         return
-    cell = _cell_of(grid, place, regions[group, lane])
+    cell = cell_of(grid, place, regions[group, lane])
     if cell < 0:
         return
-    _add(cell, grid.counts[1] * grid.counts[2], grid.counts[2], _part(place), mass * _UNIT, velocity, out_sums)
+    _add(cell, grid.counts[1] * grid.counts[2], grid.counts[2], part_of(place), mass * _UNIT, velocity, out_sums)
 
 
 @wp.kernel
@@ -290,14 +276,18 @@ def _mean_motion(
     rest: wp.array2d[wp.int64],
     mean: wp.array[wp.int64],
     alone: float,
-    wetness: float,
+    stiffness: float,
     first: int,
     # outputs
     out_fields: wp.array[wp.vec4],
+    out_missing: wp.array[float],
 ):
     cell = first + wp.tid()
+    is_wet = out_missing.shape[0] > 0
     out_fields[cell] = wp.vec4()
-    if sums[cell, 0] == wp.int64(0) and (wetness == 0.0 or rest[cell, 0] == wp.int64(0)):
+    if is_wet:
+        out_missing[cell] = 0.0
+    if sums[cell, 0] == wp.int64(0):
         return
     scale = 1.0
     if mean[0] > wp.int64(0):
@@ -305,14 +295,13 @@ def _mean_motion(
     density = float(sums[cell, 0])
     at_rest = float(rest[cell, 0])
     excess = wp.max(density - _DENSE * wp.max(wp.max(at_rest, alone), 1.0 / scale), 0.0)
-    if density > _GONE * at_rest:
-        excess += wetness * wp.min(density - _THIN * at_rest, 0.0)
-    share = 0.0
-    if density > 0.0:
-        share = 1.0 / density
+    counted = scale / wp.max(stiffness * scale * density, 1.0)
+    share = 1.0 / density
     x = share * float(sums[cell, 1])
     y = share * float(sums[cell, 2])
-    out_fields[cell] = wp.vec4(x, y, share * float(sums[cell, 3]), excess * scale)
+    out_fields[cell] = wp.vec4(x, y, share * float(sums[cell, 3]), counted * excess)
+    if is_wet:
+        out_missing[cell] = counted * wp.max(wp.min(_THIN * at_rest - density, _LOOSE * density), 0.0)
 
 
 @wp.kernel
@@ -320,9 +309,12 @@ def _rub(
     grid: Grid,
     masses: wp.array3d[float],
     regions: wp.array2d[int],
+    wetness: wp.array3d[float],
     positions: wp.array3d[float],
     fields: wp.array[wp.vec4],
+    missing: wp.array[float],
     mixed: float,
+    duration: float,
     pressure: float,
     fastest: float,
     first: int,
@@ -340,15 +332,10 @@ def _rub(
         return
     if not wp.length(velocity) < _FASTEST:
         return
-    cell = _cell_of(grid, place, regions[group, lane])
-    if cell < 0:
-        return
-    found = _around(cell, grid.counts[1] * grid.counts[2], grid.counts[2], _part(place), fields)
-    around = wp.spatial_top(found)
-    change = pressure * grid.per_cell * wp.spatial_bottom(found)
-    size = wp.length(change)
-    if size > fastest:
-        change *= fastest / size
-    velocity = (1.0 - mixed) * velocity + mixed * around + change
+    wet = 0.0
+    if wetness.shape[0] > 0:
+        wet = wetness[group, 0, lane]
+    region = regions[group, lane]
+    velocity = rubbed(grid, region, place, velocity, wet, fields, missing, mixed, duration, pressure, fastest)
     for axis in range(3):
         velocities[group, 3 * point + axis, lane] = velocity[axis]

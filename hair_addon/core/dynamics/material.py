@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import HairError
+from ..kernels.checks import require_count
 from .settings import DynamicsSettings
 
 AIR_DENSITY = 1.2  # [kg/m³]
@@ -41,26 +42,27 @@ class Material:
     twist_ratio: float  # EI / GJ
     stretch_compliances: np.ndarray  # (S, M) 1 / (EA l) [1/(N m)]
     slow_drags: np.ndarray  # (S,) c_n / ρA of slow air [1/s]
-    drag_square: float  # c_n / ρA per speed [1/m]
-    drag_root: float  # and per its cube root
+    drag_squares: np.ndarray  # (S,) c_n / ρA per speed [1/m]
+    drag_roots: np.ndarray  # (S,) and per its cube root
     damping_time: float  # [s]
 
 
-def material_of(settings: DynamicsSettings, lengths: np.ndarray) -> Material:
+def material_of(settings: DynamicsSettings, lengths: np.ndarray, wetness: np.ndarray | None = None) -> Material:
     """The `Material` of strands with lengths (S, M) [m] of segments in the groom, root to tip.
 
-    Raises `HairError` for segments without length.
+    wetness: (S,) of each strand, from 0 to 1; that of the settings for None. Raises `HairError` for segments without
+    length.
     """
     lengths = np.asarray(lengths, np.float64)
     if not (np.isfinite(lengths).all() and (lengths > 0.0).all()):
         raise HairError("Simulated strands have segments without length.")
-    wet = settings.wetness
+    wet = np.full(len(lengths), settings.wetness) if wetness is None else np.asarray(wetness, np.float64)
+    require_count("wetness", len(wet), len(lengths))
     radius = settings.fibre_radius
     section = math.pi * radius**2
     softness = 1.0 - WET_SOFTNESS * wet
     bend = settings.bend_stiffness * softness * settings.youngs_modulus * 1e9 * math.pi * radius**4 / 4.0
-    twist = settings.bend_stiffness * settings.twist_stiffness * softness
-    twist *= settings.shear_modulus * 1e9 * math.pi * radius**4 / 2.0
+    twist_ratio = settings.youngs_modulus / (2.0 * settings.twist_stiffness * settings.shear_modulus)
     stretch = settings.stretch_stiffness * softness * settings.youngs_modulus * 1e9 * section
     line_mass = settings.weight * (1.0 + WET_WEIGHT * wet) * settings.density * section  # ρA [kg/m]
     joints = np.concatenate([lengths[:, :1] / 2.0, (lengths[:, :-1] + lengths[:, 1:]) / 2.0], axis=1)
@@ -70,11 +72,11 @@ def material_of(settings: DynamicsSettings, lengths: np.ndarray) -> Material:
     slow = 4.0 * math.pi * AIR_VISCOSITY / np.maximum(np.log(2.0 * whole / radius) + 0.5, 1.0)
     return Material(
         lengths,
-        line_mass * _point_lengths(lengths),
-        line_mass * lengths**3 / 12.0,
-        joints / (bend * _profile(lengths, settings.tip_stiffness)),
-        bend / twist,
-        1.0 / (stretch * lengths),
+        line_mass[:, None] * _point_lengths(lengths),
+        line_mass[:, None] * lengths**3 / 12.0,
+        joints / (bend[:, None] * _profile(lengths, settings.tip_stiffness)),
+        twist_ratio,
+        1.0 / (stretch[:, None] * lengths),
         drag * slow,
         drag * AIR_DENSITY * radius,
         drag * 10.0 * AIR_DENSITY * radius * (kinematic / (2.0 * radius)) ** (2.0 / 3.0),

@@ -16,7 +16,6 @@
 //     gravity                              [m/s²]
 //     damping_time                         Kelvin-Voigt time τ of bending and twisting [s]
 //     twist_ratio                          compliance of twisting, in that of bending
-//     drag_square, drag_root               of the rate of drag, times v [1/m] and ∛v [1/s ∛(s/m)]
 //     hold, hold_tip                       pull to the groom [1/s²], and its part at the tip
 //     most_stretch                         length of a segment by its rest length at which a strand is put back
 //   RodArrays strands                      arrays of strands:
@@ -30,7 +29,7 @@
 //     inverse_masses                       M + 1 rows
 //     inertias                             M rows
 //     grooms, groom_frames                 3 (M + 1), 4 M rows: the groom in the root's frame
-//     slow_drags                           1 row: the rate of drag of slow air [1/s]
+//     drag_rates                           3 rows: the rate of drag of slow air [1/s]; by v [1/m], by ∛v [1/s ∛(s/m)]
 //     roots                                14 rows: position, frame at the frame's start; position, frame at its end
 //     positions_before, predictions        3 (M + 1) rows each: between stages
 //     frames_before, mobilities            4 M, M + 1 rows: between stages
@@ -107,7 +106,7 @@ const auto rows_of = [&](const auto& array) { return array.data + size_t(group) 
 const int segment_count = strands.lengths.shape[1];
 const int count = step.count, pinned = step.pinned;
 const float h = step.h, damping_time = step.damping_time, twist_ratio = step.twist_ratio;
-const float drag_square = step.drag_square, drag_root = step.drag_root, hold = step.hold, hold_tip = step.hold_tip;
+const float hold = step.hold, hold_tip = step.hold_tip;
 const float most_stretch = step.most_stretch;
 const wp::vec3 gravity = step.gravity;
 float *const x = rows_of(strands.positions), *const v = rows_of(strands.velocities);
@@ -127,7 +126,8 @@ const float *const air_rows = rows_of(around.airs), *const drag_rows = rows_of(a
 const float *const acceleration_rows = rows_of(around.accelerations);
 const bool has_planes = around.planes.shape[0] > 0, has_air = around.airs.shape[0] > 0, has_drag = around.drags.shape[0] > 0;
 const bool has_acceleration = around.accelerations.shape[0] > 0;
-const lanes slow_drag = get(rows_of(strands.slow_drags), 0);
+const float* const drag_rate = rows_of(strands.drag_rates);
+const lanes slow_drag = get(drag_rate, 0), drag_square = get(drag_rate, 1), drag_root = get(drag_rate, 2);
 
 #if defined(__CUDA_ARCH__)
 float* const scratch = rows_of(scratches);

@@ -71,7 +71,7 @@ class RodArrays:
     inertias: wp.array3d[float]  # M
     grooms: wp.array3d[float]  # 3 (M + 1), in the root's frame [m]
     groom_frames: wp.array3d[float]  # 4 M, in the root's frame
-    slow_drags: wp.array3d[float]  # 1 [1/s]
+    drag_rates: wp.array3d[float]  # 3: of slow air [1/s], per speed across [1/m], and per its cube root
     # What the surface says.
     roots: wp.array3d[float]  # ROOT_ROWS
     # Between the stages of a substep.
@@ -99,7 +99,7 @@ ROWS = {
     "inertias": (1, 0),
     "grooms": (0, 3),
     "groom_frames": (4, 0),
-    "slow_drags": None,
+    "drag_rates": None,
     "roots": None,
     "positions_before": (0, 3),
     "predictions": (0, 3),
@@ -108,7 +108,7 @@ ROWS = {
     "resets": None,
     "solved_again": None,
 }
-_FIXED_ROWS = {"slow_drags": 1, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
+_FIXED_ROWS = {"drag_rates": 3, "roots": ROOT_ROWS, "resets": 1, "solved_again": 1}
 
 
 def row_count(name: str, segment_count: int) -> int:
@@ -139,8 +139,6 @@ _SHARED = (  # by a step and its `Numbers`
     "carried",
     "damping_time",
     "twist_ratio",
-    "drag_square",
-    "drag_root",
     "hold",
     "hold_tip",
     "most_stretch",
@@ -166,8 +164,6 @@ class Step:
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  # [m/s²]
     damping_time: float = 0.0  # [s]
     twist_ratio: float = 1.0  # compliance of twisting in that of bending
-    drag_square: float = 0.0  # rate of air drag for a speed across [1/m]
-    drag_root: float = 0.0  # and for its cube root
     hold: float = 0.0  # [1/s²]
     hold_tip: float = 1.0
     pinned: int = 0  # points from the root that follow the surface, beside the root itself
@@ -188,8 +184,6 @@ class Numbers:
     gravity: wp.vec3
     damping_time: float
     twist_ratio: float
-    drag_square: float
-    drag_root: float
     hold: float
     hold_tip: float
     most_stretch: float

@@ -61,8 +61,6 @@ def step_of(
         (settings.gravity * gravity[0], settings.gravity * gravity[1], settings.gravity * gravity[2]),
         material.damping_time,
         material.twist_ratio,
-        material.drag_square,
-        material.drag_root,
         settings.hold,
         settings.hold_tip,
         int(settings.pinned * material.lengths.shape[1]),
@@ -125,7 +123,8 @@ class Rods:
         self._put("stretch_compliances", material.stretch_compliances * unit)
         self._put("inverse_masses", unit / material.masses)
         self._put("inertias", material.inertias / unit)
-        self._put("slow_drags", material.slow_drags)
+        drags = material.slow_drags, material.drag_squares, material.drag_roots
+        self._put("drag_rates", np.stack(drags, axis=1))
         self._held = rest.multipliers
 
     def set_groom(self, groom: np.ndarray, rest: RestShape) -> None:

@@ -79,12 +79,13 @@ class Simulation:
         world: World,
         device: wp.DeviceLike = None,
         regions: np.ndarray | None = None,
+        wetness: np.ndarray | None = None,
     ) -> None:
         """groom: (G, P, 3) [m], combed guides before the surface turned them; pose: of their roots now.
 
         regions: (G,) whole numbers from 0, guides of two of which do not rub or press on each other; None for one.
-
-        Raises `HairError` where these are not finite, or of other guides.
+        wetness: (G,) of each guide, from 0 to 1; that of the settings for None. Raises `HairError` where these are not
+        finite, or of other guides.
         """
         self.settings, self.pose, self.world = settings, pose, world
         self.substeps = 0  # of the last frame
@@ -94,6 +95,7 @@ class Simulation:
         self._groom = self._checked(groom)
         self._regions = np.zeros(len(groom), np.int32) if regions is None else np.asarray(regions, np.int32)
         require_count("regions", self._regions.size, len(groom))
+        self._wetness = self._checked_wetness(wetness)
         combed = self._combed()
         vertices = detail.vertices_of(combed, settings.vertex_count)
         self._material, rest = self._shapes(vertices)
@@ -105,7 +107,7 @@ class Simulation:
         self._contacts = Contacts(self._rods.arrays.positions, self._colliders)
         self._touching = TouchingStrands(self._rods, self._contacts)
         self._air = Air(self._rods.arrays.slips.shape, self._device)
-        self._volume = self._new_volume()
+        self._volume, self._waters = self._new_volume(), self._new_waters()
         self._since_rubbed = 0.0  # [s]
 
     def _new_volume(self):
@@ -115,6 +117,12 @@ class Simulation:
         regions = to_lanes(self._regions, self._rods.lanes)[:, 0]
         return HairVolume(self._rods.in_lanes(masses, is_padded=False), regions, cell)
 
+    def _new_waters(self):
+        """(groups, 1, lanes) wetness of guides; None where all are dry."""
+        count = len(self._groom)
+        wetness = np.full(count, self.settings.wetness) if self._wetness is None else np.asarray(self._wetness)
+        return self._rods.in_lanes(wetness[:, None]) if wetness.any() else None
+
     def _checked(self, groom):
         groom = np.asarray(groom, np.float64)
         if groom.ndim != 3 or not len(groom) or not np.isfinite(groom).all():
@@ -122,26 +130,36 @@ class Simulation:
         require_count("roots", len(self._start.positions), len(groom))
         return groom - groom[:, :1]
 
+    def _checked_wetness(self, wetness):
+        if wetness is not None:
+            require_count("wetness", len(wetness), len(self._groom))
+            if not (np.isfinite(wetness).all() and np.min(wetness) >= 0.0 and np.max(wetness) <= 1.0):
+                raise HairError("The wetness of guides must be from 0 to 1.")
+        return wetness
+
     def _combed(self):
         """(G, P, 3): the groom where the surface had it in the first frame, from the origin, at its present scale."""
         return replace(self._start, scale=self._scale).carried(self._groom) - self._origin
 
     def _shapes(self, vertices):
         """(`Material`, `RestShape`) of vertices."""
-        material = material_of(self.settings, np.linalg.norm(np.diff(vertices, axis=1), axis=2))
+        material = material_of(self.settings, np.linalg.norm(np.diff(vertices, axis=1), axis=2), self._wetness)
         if not self.settings.sag_free:
             return material, combed_shape(vertices)
         x, y, z = (self.settings.gravity * component for component in self.world.gravity)
         return material, sag_free.sag_free(vertices, material, (x, y, z)).rest
 
-    def change(self, settings: DynamicsSettings, groom: np.ndarray | None = None) -> None:
-        """Go on with other settings, and with guides combed otherwise; the number of vertices stays.
+    def change(
+        self, settings: DynamicsSettings, groom: np.ndarray | None = None, wetness: np.ndarray | None = None
+    ) -> None:
+        """Go on with other settings and wetness, and with guides combed otherwise; the number of vertices stays.
 
-        Raises `HairError` where it does not.
+        groom: as it is for None; wetness: (G,), that of the settings for None. Raises `HairError` where it does not.
         """
+        wetness = self._checked_wetness(wetness)
         if settings.vertex_count != self.settings.vertex_count:
             raise HairError("Another number of points needs a new simulation: play from the start.")
-        self.settings = settings
+        self.settings, self._wetness = settings, wetness
         if groom is not None:
             require_count("guides", len(groom), len(self._groom))
             self._groom = self._checked(groom)
@@ -156,7 +174,7 @@ class Simulation:
         self._detail = detail.detail_of(combed, at_rest)
         self._rods.set_material(self._material, rest)
         self._rods.set_groom(vertices, rest)
-        self._volume = self._new_volume()
+        self._volume, self._waters = self._new_volume(), self._new_waters()
 
     def advance(self, pose: RootPose, world: World, seconds: float) -> None:
         """Simulate a frame that takes some seconds, at whose end roots have this pose and the world is this one.
@@ -212,7 +230,7 @@ class Simulation:
         self._since_rubbed += step.size
         if self._is_rubbing and self._since_rubbed >= _RUBBING - 1e-9:
             settings = self.settings
-            values = settings.hair_friction, settings.hair_pressure, settings.wetness
+            values = settings.hair_friction, settings.hair_pressure, self._waters
             self._volume.rub(*state, self._since_rubbed, *values)
             self._since_rubbed = 0.0
 

@@ -42,9 +42,12 @@ class Hair:
         return volume
 
     def rubbed(self, volume, friction=30.0, pressure=0.0, wetness=0.0, points=None):
+        """wetness: of all strands, or (S,) of each."""
         velocities = lay(self.velocities, self.device)
         points = lay(self.points if points is None else points, self.device)
-        volume.rub(points, velocities, STEP, friction, pressure, wetness)
+        wetness = np.broadcast_to(wetness, len(self.points))
+        waters = lay(wetness[:, None, None], self.device) if wetness.any() else None
+        volume.rub(points, velocities, STEP, friction, pressure, waters)
         return taken(velocities, self.count)
 
     def momentum(self, velocities):
@@ -103,6 +106,16 @@ def test_wet_hair_draws_together_where_it_has_thinned(hair):
     dry, wet = (hair.rubbed(volume, 0.0, 0.5, wetness, thinned) for wetness in (0.0, 1.0))
     drawn = np.einsum("spi,spi->sp", wet - dry, thinned)[:, 1:]
     assert drawn.any() and drawn.mean() < 0.0
+
+
+def test_cohesion_pulls_wet_strands_alone(rng, hair):
+    thinned = hair.points * np.float32(1.12)
+    volume = hair.volume(fitted=thinned)
+    is_wet = rng.random(len(hair.points)) < 0.5
+    some, none, all_of_them = (hair.rubbed(volume, 2.0, 0.5, wetness, thinned) for wetness in (is_wet, 0.0, 1.0))
+    np.testing.assert_array_equal(some[is_wet], all_of_them[is_wet])
+    np.testing.assert_array_equal(some[~is_wet], none[~is_wet])
+    assert np.abs(all_of_them - none).max() > 1e-3
 
 
 def test_sums_have_no_order(rng, hair, monkeypatch):

@@ -264,3 +264,21 @@ def test_pinned_points_only_follow_the_surface(rng, pinned):
     count = int(pinned * 38)  # the shape between points is that of the segments beside them
     assert away[:count].max() < 1e-4
     assert pinned == 1.0 or away[-1] > 0.01
+
+
+def test_each_guide_is_as_wet_as_it_is_said(rng):
+    """Guides that do not touch each other, half of them wet: bit by bit as if all were as they are."""
+    groom, pose = fur(rng)
+    alone = DynamicsSettings(hair_friction=0.0, hair_pressure=0.0, sag_free=False)
+    is_wet = rng.random(len(groom)) < 0.5
+
+    def end_of(settings, wetness=None):
+        return play(Simulation(groom, settings, pose, World(), DEVICE, wetness), pose, range(1, 9), is_colliding=False)
+
+    dry, wet, some = end_of(alone), end_of(replace(alone, wetness=1.0)), end_of(alone, is_wet.astype(np.float32))
+    np.testing.assert_array_equal(some[is_wet], wet[is_wet])
+    np.testing.assert_array_equal(some[~is_wet], dry[~is_wet])
+    assert np.abs(wet - dry).max() > 1e-3
+    for wrong in (np.zeros(3), np.full(len(groom), np.nan), np.full(len(groom), 1.5)):
+        with pytest.raises(HairError):
+            Simulation(groom, alone, pose, World(), DEVICE, wrong)
