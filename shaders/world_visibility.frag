@@ -18,13 +18,15 @@ void main()
     vec3 at;
     float depth;
     float seen = light.power.x;  // the direction's part of the sphere, six times
+    float behind = 0.0;
     if (shadow_place(light, position, at, depth)) {
       seen *= lit_part(at, depth) * exp(-view.seen_opacity * crossed_strands(at, depth));
+      behind = strands_behind(at, depth);
     }
     vec3 share = seen * light.axis.xyz * light.axis.xyz;
     vec3 plus = share * vec3(lessThan(light.axis.xyz, vec3(0.0)));  // lights shine along their axis
     vec3 minus = share * vec3(greaterThan(light.axis.xyz, vec3(0.0)));
     seen_x_y += vec4(plus.x, minus.x, plus.y, minus.y);
-    seen_z.xy += vec2(plus.z, minus.z);
+    seen_z.xyz += vec3(plus.z, minus.z, seen * exp(-view.seen_opacity * behind));
   }
 }

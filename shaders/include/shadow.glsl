@@ -7,6 +7,9 @@
 const float BOUNCE_REACH = 0.025;
 const float BOUNCE_DISTANCE = 0.25;
 
+// Range around a strand, as a part of the map, in which the strands behind it are counted.
+const float BEHIND_REACH = 0.01;
+
 // Depth bias of surfaces, as a part of the hair's extent.
 const float SURFACE_BIAS = 0.01;
 
@@ -42,6 +45,21 @@ float crossed_strands(vec3 at, float depth)
 {
   float behind = max(0.0, depth - textureLod(hair_front, at, 0.0).r);
   return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
+}
+
+// Mean number of strands behind a depth, as far as the surface there: the mean over points around, of which a strand at
+// this place covers none.
+float strands_behind(vec3 at, float depth)
+{
+  float total = 0.0;
+  for (int corner = 0; corner < 4; corner++) {
+    vec3 near = at + vec3(BEHIND_REACH * (2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0), 0.0);
+    float front = textureLod(hair_front, near, 0.0).r;
+    float surface = textureLod(surface_moments, near, 0.0).b;
+    vec4 counts = textureLod(hair_layers, near, 0.0);
+    total += max(0.0, strands_in_front(counts, surface - front) - strands_in_front(counts, depth - front));
+  }
+  return 0.25 * total;
 }
 
 // Part of the light stopped by a surface near enough to light a strand from below: the mean over points around it,

@@ -21,6 +21,21 @@ void world_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, out ma
   minus[2] = lights.world[5].rgb * seen_through(seen_z.y, opacity, forward);
 }
 
+// Mean number of strands behind the light that arrives: `world_visibility.frag` sums its exponential in seen_z.
+float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
+{
+  float seen = dot(seen_x_y, vec4(1.0)) + seen_z.x + seen_z.y;
+  return -log(clamp(seen_z.z / max(seen, 1e-6), 1e-4, 1.0)) / opacity;
+}
+
+// The moment `towards` of a strand with its share of what strands behind send back: the integral of
+// (1 - |phi| / pi) / pi × cos(phi). Held to half of all, so that light from one side never takes some away.
+vec3 with_back(vec3 towards, vec3 returned, vec3 back)
+{
+  vec3 most = 0.5 * (returned + back);
+  return clamp(towards + 4.0 / (PI * PI) * back, -most, most);
+}
+
 // Irradiance of a surface with the normal N.
 vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
 {

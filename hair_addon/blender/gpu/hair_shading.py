@@ -102,25 +102,27 @@ def marschner_shading(tables):
     """The Marschner model from baked `lookup_tables.Tables`, ready to draw."""
     file, names = _TABLES[tables.settings.mode]
     arrays = {f"{name}_table": getattr(tables, name) for name in names}
-    dual = None
+    forward, backward = albedo.mean_parts(tables.lobes, tables.settings)
     if tables.settings.mode == "energy":
         dual = dual_scattering.bake(tables)
         arrays |= {"dual_table": dual.theta, "n_g_table": dual.n_g, "n_g_trt_table": dual.n_g_trt}
-    arrays["return_table"] = albedo.azimuthal_moments(tables, dual)
-    return _shading(file, {"settings": tables.settings}, arrays, albedo.mean_forward(tables))
+        forward = 1.0 - albedo.mean_attenuation(forward, backward)
+    arrays["return_table"] = albedo.azimuthal_moments(tables)
+    return _shading(file, {"settings": tables.settings}, arrays, forward)
 
 
 def marschner_strand_shading(tables):
     """The Marschner model for strands that differ, from `strand_tables.StrandTables`."""
     slices = tables.slices
     blocks = {"settings": tables.settings, "variation": tables.variation, "slices": slices.range}
-    arrays = {"return_slices": tables.returned, "n_slices": slices.n}
+    arrays, forward = {"return_slices": tables.returned, "n_slices": slices.n}, tables.forward
     if tables.settings.mode == "energy":
         arrays |= {"n_g_slices": slices.n_g, "dual_table": tables.dual}
+        forward = 1.0 - albedo.mean_attenuation(tables.forward, tables.backward)
     file = _VARIED[tables.settings.mode]
     if slices.n_trt is not None:
         file, arrays["n_trt_slices"] = "marschner_elliptic.comp", slices.n_trt
-    return _shading(file, blocks, arrays, tables.forward, is_varied=True)
+    return _shading(file, blocks, arrays, forward, is_varied=True)
 
 
 def _shading(file, blocks, arrays, forward, is_varied=False):

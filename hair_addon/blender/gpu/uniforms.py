@@ -80,7 +80,6 @@ VIEW = Block(
         "object_scale": "float",
         "pixels_per_unit": "float",  # at distance one, in a perspective
         "least_half_width": "float",  # there as well
-        "back_gain": "float",  # of what comes back from behind a strand
         "light_index": "int",  # the light that a shadow pass looks from
         "coverage_turn": "float",  # by which a pass takes other samples of thin strands
         "first_column": "int",  # of the picture's samples, where what is drawn is a tile of it

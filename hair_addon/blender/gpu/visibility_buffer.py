@@ -11,7 +11,6 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from ...core.shading.tables import dual_scattering
 from . import drawing, shaders, uniforms
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
@@ -82,7 +81,6 @@ class VisibilityBuffer:
             record["seen_opacity"] = shading.opacity
             record["hair_forward"][:3] = shading.forward
             record["surface_color"][:3] = surface_color
-            record["back_gain"] = dual_scattering.BACK_GAIN
             self._hair.append(_Placed(strands, shading, record, samplers, first))
             first += self._hair[-1].segment_count
         if first > _NO_SEGMENT:
