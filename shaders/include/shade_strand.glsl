@@ -39,7 +39,11 @@ vec3 strand_light()
               view.hair_forward.rgb,
               plus,
               minus);
-  vec3 radiance = drawn_world * strand_radiance(plus, minus, T, V, returned + back, with_back(towards, returned, back));
+  vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, returned, back));
+  world *= cone_visibility(seen_x_y, seen_z, dot(T, V));
+  vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
+  world += view.surface_color.rgb * surface_radiance(plus, minus, hidden, T, V, returned, towards);
+  vec3 radiance = drawn_world * world;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
@@ -57,8 +61,10 @@ vec3 strand_light()
     if (shadow_place(light, drawn_position, at, depth)) {
       irradiance *= lit_part(at, depth);
       front = crossed_strands(at, depth);
-      behind = strands_behind(at, depth);
-      radiance += drawn_lobes.w * irradiance * surface_bounce(at, depth, front) * returned;
+      Beyond beyond = look_beyond(light, at, depth, L);
+      behind = beyond.strands;
+      vec2 below = light_from_below(T, V, beyond.normal);
+      radiance += drawn_lobes.w * irradiance * surface_bounce(beyond, L, front) * (below.x * returned + below.y * towards);
     }
     // Most strands are in the shadow of the others, with no light to scatter.
     vec3 arriving = irradiance * transmitted(front, view.hair_forward.rgb);

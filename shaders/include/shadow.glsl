@@ -3,12 +3,11 @@
 
 #include "include/opacity.glsl"
 
-// Range around a strand, as a part of the map, and behind it, as a part of the hair, in which surfaces light it.
-const float BOUNCE_REACH = 0.025;
-const float BOUNCE_DISTANCE = 0.25;
+// Range around a strand, as a part of the map, in which it is read what is behind it.
+const float BEYOND_REACH = 0.01;
 
-// Range around a strand, as a part of the map, in which the strands behind it are counted.
-const float BEHIND_REACH = 0.01;
+// Range behind a strand, as a part of the hair, in which surfaces light it.
+const float BOUNCE_DISTANCE = 0.25;
 
 // Depth bias of surfaces, as a part of the hair's extent.
 const float SURFACE_BIAS = 0.01;
@@ -47,43 +46,47 @@ float crossed_strands(vec3 at, float depth)
   return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
 }
 
-// Mean number of strands behind a depth, as far as the surface there: the mean over points around, of which a strand at
-// this place covers none.
-float strands_behind(vec3 at, float depth)
+// What is behind a strand along a light: means over places around it, of which a strand at this one covers none.
+struct Beyond {
+  float strands;  // as far as the surface
+  float surface;  // the part of places with a surface
+  float near;     // the same, the less the more distant it is
+  vec3 normal;    // of that surface
+};
+
+// L: towards the light.
+Beyond look_beyond(Light light, vec3 at, float depth, vec3 L)
 {
-  float total = 0.0;
+  Beyond beyond = Beyond(0.0, 0.0, 0.0, vec3(0.0));
+  vec2 slope = vec2(0.0);
   for (int corner = 0; corner < 4; corner++) {
-    vec3 near = at + vec3(BEHIND_REACH * (2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0), 0.0);
+    vec2 towards = 2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0;
+    vec3 near = at + vec3(BEYOND_REACH * towards, 0.0);
     float front = textureLod(hair_front, near, 0.0).r;
     float surface = textureLod(surface_moments, near, 0.0).b;
     vec4 counts = textureLod(hair_layers, near, 0.0);
-    total += max(0.0, strands_in_front(counts, surface - front) - strands_in_front(counts, depth - front));
+    beyond.strands += max(0.0, strands_in_front(counts, surface - front) - strands_in_front(counts, depth - front));
+    // Of a surface in front of the strand this side is in the shadow.
+    float is_there = step(depth, surface + SURFACE_BIAS) * step(surface, 0.75 * FAR);
+    beyond.surface += 0.25 * is_there;
+    beyond.near += 0.25 * is_there * (1.0 - smoothstep(0.0, BOUNCE_DISTANCE, surface - depth));
+    slope += towards * surface;
   }
-  return 0.25 * total;
+  beyond.strands *= 0.25;
+  slope *= 0.25 / BEYOND_REACH;
+  vec3 right = vec3(light.world_to_shadow[0][0], light.world_to_shadow[1][0], light.world_to_shadow[2][0]);
+  vec3 up = vec3(light.world_to_shadow[0][1], light.world_to_shadow[1][1], light.world_to_shadow[2][1]);
+  beyond.normal = normalize(slope.x * normalize(right) + slope.y * normalize(up) + L);
+  return beyond;
 }
 
-// Part of the light stopped by a surface near enough to light a strand from below: the mean over points around it,
-// which softens the surface's border.
-float surface_under(vec3 at, float depth)
+// Light that a surface reflects to a strand, as a part of even light around it, for unit irradiance of the light: through
+// the rest of the hair, off a diffuse surface, and through the hair again, along 1.66 times the shortest way [Elsasser42].
+vec3 surface_bounce(Beyond beyond, vec3 L, float front)
 {
-  float barred = 0.0;
-  for (int corner = 0; corner < 4; corner++) {
-    vec2 offset = BOUNCE_REACH * (2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0);
-    float distance_to = textureLod(surface_moments, at + vec3(offset, 0.0), 0.0).b - depth;
-    barred += 1.0 - smoothstep(0.0, BOUNCE_DISTANCE, distance_to);
-  }
-  return 0.25 * barred;
-}
-
-// Light reflected to a strand from the surface below, for unit irradiance of the light: through the rest
-// of the hair, off a diffuse surface, and through the hair again.
-vec3 surface_bounce(vec3 at, float depth, float count)
-{
-  float surface = min(textureLod(surface_moments, at, 0.0).b, depth + BOUNCE_DISTANCE);
-  float under = max(0.0, crossed_strands(at, surface) - count);
-  vec3 way = transmitted(count + 2.0 * under, view.hair_forward.rgb);
-  // The mean cosine of a surface that is lit is 2/3, and it fills half of what a strand sees.
-  return view.surface_color.rgb * way * surface_under(at, depth) * (2.0 / 3.0) * 0.5 / PI;
+  float cosine = max(dot(beyond.normal, L), 0.0);
+  vec3 way = transmitted(front + beyond.strands * (1.0 + 1.66 * cosine), view.hair_forward.rgb);
+  return view.surface_color.rgb * way * (beyond.near * cosine / PI);
 }
 
 // Visibility of a light from a surface: the mean over 3 × 3 texels. forward: the forward scattering of one strand.
