@@ -53,6 +53,7 @@ vec3 strand_light()
                                        light.power.rgb,
                                        light.cos_cone,
                                        light.blend,
+                                       light.radius,
                                        drawn_position);
     vec3 at;
     float depth;
