@@ -18,6 +18,8 @@ void main()
   vec3 position = place_of(strand, point, cell.y);
   vec3 along = place_of(strand, point + 1, cell.y) - place_of(strand, point - 1, cell.y);
   vec3 T = along * inversesqrt(max(dot(along, along), 1e-20));
+  vec3 root = place_of(strand, 1, cell.y) - place_of(strand, 0, cell.y);
+  vec3 R = root * inversesqrt(max(dot(root, root), 1e-20));
   seen_x_y = vec4(0.0);
   seen_z = vec4(0.0);
   seen_surface = vec4(0.0);
@@ -29,8 +31,9 @@ void main()
     float seen = weight;
     float seen_behind = weight;
     if (shadow_place(light, position, at, depth)) {
+      float bias = view.point_count > 1 ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
       Beyond beyond = look_beyond(light, at, depth, -light.axis.xyz);
-      seen *= lit_part(at, depth) * exp(-view.seen_opacity * crossed_strands(at, depth));
+      seen *= lit_part(at, depth, bias) * exp(-view.seen_opacity * crossed_strands(at, depth));
       float left = exp(-view.seen_opacity * beyond.strands);
       seen_behind = seen * left;
       // Through the hair to the surface, and back.

@@ -23,6 +23,7 @@ vec3 strand_light()
 {
   vec3 T = strand_tangent;
   vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
+  vec3 R = root_direction(strand_index);
   vec3 returned;
   vec3 towards;
   hair_return(dot(T, V), returned, towards);
@@ -60,12 +61,12 @@ vec3 strand_light()
     float front = 0.0;
     float behind = 0.0;
     if (shadow_place(light, drawn_position, at, depth)) {
-      irradiance *= lit_part(at, depth);
+      irradiance *= lit_part(at, depth, strand_bias(R, L));
       front = crossed_strands(at, depth);
       Beyond beyond = look_beyond(light, at, depth, L);
       behind = beyond.strands;
       vec2 below = light_from_below(T, V, beyond.normal);
-      radiance += drawn_lobes.w * irradiance * surface_bounce(beyond, L, front) * (below.x * returned + below.y * towards);
+      radiance += drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front) * (below.x * returned + below.y * towards);
     }
     // Most strands are in the shadow of the others, with no light to scatter.
     vec3 arriving = irradiance * transmitted(front, view.hair_forward.rgb);

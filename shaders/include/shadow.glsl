@@ -10,7 +10,13 @@ const float BEYOND_REACH = 0.01;
 const float BOUNCE_DISTANCE = 0.25;
 
 // Depth bias of surfaces, as a part of the hair's extent.
-const float SURFACE_BIAS = 0.01;
+const float SURFACE_BIAS = 0.002;
+
+// The bias of a strand that grows in a direction: against the light it grows on the far side of its surface.
+float strand_bias(vec3 root_direction, vec3 L)
+{
+  return SURFACE_BIAS * clamp(4.0 * dot(root_direction, L), -1.0, 1.0);
+}
 
 // Place of a point in a light's maps, and its depth; false where the maps do not reach: they hold the hair and what is
 // near it.
@@ -27,10 +33,10 @@ bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
 }
 
 // Visibility of the light past surfaces: the upper bound of the part with a greater depth [Donnelly06].
-float lit_part(vec3 at, float depth)
+float lit_part(vec3 at, float depth, float bias)
 {
   vec2 moments = textureLod(surface_moments, at, 0.0).rg;
-  float warped = warped_depth(depth - SURFACE_BIAS);
+  float warped = warped_depth(depth - bias);
   float behind = warped - moments.x;
   float rounding = 0.3 * SURFACE_BIAS * WARP * warped;
   float variance = max(moments.y - moments.x * moments.x, rounding * rounding);
@@ -82,10 +88,12 @@ Beyond look_beyond(Light light, vec3 at, float depth, vec3 L)
 
 // Light that a surface reflects to a strand, as a part of even light around it, for unit irradiance of the light: through
 // the rest of the hair, off a diffuse surface, and through the hair again, along 1.66 times the shortest way [Elsasser42].
-vec3 surface_bounce(Beyond beyond, vec3 L, float front)
+vec3 surface_bounce(Beyond beyond, vec3 L, vec3 T, float front)
 {
   float cosine = max(dot(beyond.normal, L), 0.0);
-  vec3 way = transmitted(front + beyond.strands * (1.0 + 1.66 * cosine), view.hair_forward.rgb);
+  // Strands are as wide as the sine between tangent and direction, pi / 4 in the mean over all directions.
+  float back = 1.66 * cosine * 0.25 * PI / max(sin_from_cos(dot(T, L)), 0.1);
+  vec3 way = transmitted(front + beyond.strands * (1.0 + back), view.hair_forward.rgb);
   return view.surface_color.rgb * way * (beyond.near * cosine / PI);
 }
 
@@ -102,7 +110,7 @@ vec3 surface_visibility(Light light, vec3 position, vec3 forward)
   for (int y = -1; y <= 1; y++) {
     for (int x = -1; x <= 1; x++) {
       vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
-      total += lit_part(near, depth) * transmitted(crossed_strands(near, depth), forward);
+      total += lit_part(near, depth, SURFACE_BIAS) * transmitted(crossed_strands(near, depth), forward);
     }
   }
   return total / 9.0;

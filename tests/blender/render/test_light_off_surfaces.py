@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light that a surface sends to the hair above it, against the integral over the directions below."""
+"""Light that a surface sends to hair above it, against the integral over the directions below, and light it stops."""
 
 from dataclasses import replace
 
@@ -18,8 +18,8 @@ SUN = 3.0  # [W/m²]
 BLACK = replace(presets.PRESETS["BLACK"][1], random_color=0.0, roughness=0.3)
 
 
-def strands_over_a_plane(scene, tangent, color):
-    """A few black strands far from each other, 6 cm above a plane, lit and seen from above; returns their Curves."""
+def strands_over_a_plane(scene, tangent, color, height=0.06):
+    """A few black strands of 8 cm far from each other, their middles this high above a plane; returns their Curves."""
     bpy.ops.mesh.primitive_grid_add(size=4.0)
     plane = bpy.context.object
     plane.is_holdout = True
@@ -27,7 +27,7 @@ def strands_over_a_plane(scene, tangent, color):
     material.node_tree.nodes.clear()
     material.diffuse_color = (*color, 1.0)
     plane.data.materials.append(material)
-    middles = np.array([(x, y, 0.06) for x in (-0.6, 0.0, 0.6) for y in (-0.6, 0.0, 0.6)])
+    middles = np.array([(x, y, height) for x in (-0.6, 0.0, 0.6) for y in (-0.6, 0.0, 0.6)])
     points = middles[:, None] + np.linspace(-0.04, 0.04, 9)[:, None] * np.array(tangent)
     curves = bpy.data.hair_curves.new("Hair")
     curves.add_curves([9] * len(points))
@@ -86,6 +86,18 @@ def test_a_plane_lights_a_strand_as_much_as_its_directions_say(scene, tilt, sour
     received = SUN / np.pi if source == "sun" else 1.0
     expected = 0.5 * received * light_from_below(tangent, towards)
     np.testing.assert_allclose(found, expected, rtol=0.2)
+
+
+def test_no_light_comes_through_a_plane_to_hair_behind_it(scene):
+    light = bpy.data.lights.new("Sun", "SUN")
+    light.energy, light.angle = SUN, 0.0
+    sun = bpy.data.objects.new("Sun", light)
+    scene.collection.objects.link(sun)
+    look(scene, (0.0, -0.6, -0.8))
+    curves = strands_over_a_plane(scene, (0.6, 0.0, -0.8), (0.0, 0.0, 0.0), height=-0.032)
+    behind = mean_color()
+    curves.surface.hide_render = True
+    assert (behind < 0.02 * mean_color()).all()
 
 
 def test_part_of_the_cone_below_a_plane(rng):
