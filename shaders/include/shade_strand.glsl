@@ -31,7 +31,8 @@ vec3 strand_light()
                  vec2(textureSize(visibility_x_y, 0));
   vec4 seen_x_y = textureLod(visibility_x_y, seen_at, 0.0);
   vec4 seen_z = textureLod(visibility_z, seen_at, 0.0);
-  vec3 back = returned_from_behind(dot(T, V), mean_strands_behind(seen_x_y, seen_z, view.seen_opacity));
+  float strands_behind = mean_strands_behind(seen_x_y, seen_z, view.seen_opacity);
+  vec3 back = returned_from_behind(dot(T, V), strands_behind);
   mat3 plus;
   mat3 minus;
   world_sides(seen_x_y,
@@ -43,7 +44,8 @@ vec3 strand_light()
   vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, returned, back));
   world *= cone_visibility(seen_x_y, seen_z, dot(T, V));
   vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
-  world += view.surface_color.rgb * surface_radiance(plus, minus, hidden, T, V, returned, towards);
+  vec3 surface_light = view.surface_color.rgb * between_hair_and_surface(strands_behind);
+  world += surface_light * surface_radiance(plus, minus, hidden, T, V, returned, towards);
   vec3 radiance = drawn_world * world;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
@@ -59,18 +61,22 @@ vec3 strand_light()
     vec3 at;
     float depth;
     float front = 0.0;
-    float behind = 0.0;
-    if (shadow_place(light, drawn_position, at, depth)) {
+    bool is_in_map = shadow_place(light, drawn_position, at, depth);
+    if (is_in_map) {
       irradiance *= lit_part(at, depth, strand_bias(R, L));
       front = crossed_strands(at, depth);
-      Beyond beyond = look_beyond(light, at, depth, L);
-      behind = beyond.strands;
-      vec2 below = light_from_below(T, V, beyond.normal);
-      radiance += drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front) * (below.x * returned + below.y * towards);
     }
     // Most strands are in the shadow of the others, with no light to scatter.
     vec3 arriving = irradiance * transmitted(front, view.hair_forward.rgb);
     if (max(arriving.r, max(arriving.g, arriving.b)) > LEAST_IRRADIANCE) {
+      float behind = 0.0;
+      if (is_in_map) {
+        Beyond beyond = look_beyond(light, at, depth, L);
+        behind = beyond.strands;
+        vec2 below = light_from_below(T, V, beyond.normal);
+        vec3 bounced = drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front);
+        radiance += bounced * (below.x * returned + below.y * towards);
+      }
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
       radiance += irradiance * hair_radiance(T, L, V, front, behind, blur);
     }

@@ -86,6 +86,16 @@ Beyond look_beyond(Light light, vec3 at, float depth, vec3 L)
   return beyond;
 }
 
+// Light of a surface, relative to that which it reflects at once: hair above it, of `count` strands, sends a part of it
+// back to the surface, again and again.
+vec3 between_hair_and_surface(float count)
+{
+  vec3 reflectance = view.hair_reflectance.rgb;
+  vec3 left = transmitted(2.0 * count, view.hair_forward.rgb);
+  vec3 reflected = reflectance * (vec3(1.0) - left) / (vec3(1.0) - reflectance * reflectance * left);
+  return vec3(1.0) / (vec3(1.0) - view.surface_color.rgb * reflected);
+}
+
 // Light that a surface reflects to a strand, as a part of even light around it, for unit irradiance of the light: through
 // the rest of the hair, off a diffuse surface, and through the hair again, along 1.66 times the shortest way [Elsasser42].
 vec3 surface_bounce(Beyond beyond, vec3 L, vec3 T, float front)
@@ -94,6 +104,7 @@ vec3 surface_bounce(Beyond beyond, vec3 L, vec3 T, float front)
   // Strands are as wide as the sine between tangent and direction, pi / 4 in the mean over all directions.
   float back = 1.66 * cosine * 0.25 * PI / max(sin_from_cos(dot(T, L)), 0.1);
   vec3 way = transmitted(front + beyond.strands * (1.0 + back), view.hair_forward.rgb);
+  way *= between_hair_and_surface(front + beyond.strands);
   return view.surface_color.rgb * way * (beyond.near * cosine / PI);
 }
 

@@ -26,11 +26,6 @@ def mean_parts(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> 
     return [np.average(part.sum(axis=0), axis=0, weights=np.cos(theta)) for part in parts]
 
 
-def mean_attenuation(forward: np.ndarray, backward: np.ndarray) -> np.ndarray:
-    """What one strand takes from even light in deep hair, (...), from its `mean_parts` (...)."""
-    return dual_scattering.deep_hair(forward, backward)[0]
-
-
 def azimuthal_moments(tables: lookup_tables.Tables) -> np.ndarray:
     """(2, K, 3) float32: of light from everywhere, the radiance that leaves towards theta_o, and its moment over phi.
 
