@@ -19,7 +19,7 @@ FibreLobes fibre_lobes(vec2 at)
   return FibreLobes(textureLod(n_table, at, 0.0), textureLod(n_trt_table, at, 0.0).rgb, fibre_residual(at));
 }
 
-FibreLobes half_circle_lobes(vec2 at)
+FibreLobes forward_lobes(vec2 at)
 {
   return FibreLobes(textureLod(n_g_table, at, 0.0), textureLod(n_g_trt_table, at, 0.0).rgb, fibre_residual(at));
 }

@@ -8,7 +8,7 @@ float fibre_roughness()
   return this_roughness();
 }
 
-vec4 half_circle_channel(vec2 at, float sigma_a)
+vec4 forward_channel(vec2 at, float sigma_a)
 {
   float slice_count = float(textureSize(n_g_slices, 0).z);
   vec2 place = slice_of(sigma_a, slices.low, slices.high, int(slice_count));
@@ -17,12 +17,12 @@ vec4 half_circle_channel(vec2 at, float sigma_a)
   return geometric_mix(below, above, place.y);
 }
 
-FibreLobes half_circle_lobes(vec2 at)
+FibreLobes forward_lobes(vec2 at)
 {
   vec3 sigma_a = this_sigma_a();
-  return side_by_side(half_circle_channel(at, sigma_a.r),
-                      half_circle_channel(at, sigma_a.g),
-                      half_circle_channel(at, sigma_a.b));
+  return side_by_side(forward_channel(at, sigma_a.r),
+                      forward_channel(at, sigma_a.g),
+                      forward_channel(at, sigma_a.b));
 }
 
 // Of the surrounding strands, at the same position along the gradient.
@@ -33,13 +33,10 @@ vec3 dual(int row, float theta_i)
   return textureLod(dual_table, at, 0.0).rgb;
 }
 
-// As `albedo.azimuthal_moments`: includes backscattering by the strands behind.
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
 {
   fibre_return(sin_theta_o, returned, towards);
-  vec3 back = view.back_gain * dual(6, atan(sin_theta_o, sin_from_cos(sin_theta_o)));
-  returned += back;
-  towards = clamp(towards + 4.0 / (PI * PI) * back, -0.5 * returned, 0.5 * returned);
+  towards = clamp(towards, -0.5 * returned, 0.5 * returned);
 }
 
 #include "include/dual_radiance.glsl"

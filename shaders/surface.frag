@@ -53,6 +53,7 @@ void main()
                                      light.power.rgb,
                                      light.cos_cone,
                                      light.blend,
+                                     light.radius,
                                      drawn_position);
       vec3 arriving = n_dot_l * facing * surface_visibility(light, drawn_position, view.hair_forward.rgb);
       irradiance += arriving;

@@ -4,27 +4,45 @@
 #include "include/shadow.glsl"
 #include "include/strand.glsl"
 
+vec3 place_of(int strand, int point, int row)
+{
+  point = clamp(point, 0, view.point_count - 1);
+  return (view.object_to_world * vec4(texelFetch(places, ivec2(strand * view.point_count + point, row), 0).xyz, 1.0)).xyz;
+}
+
 void main()
 {
   ivec2 cell = ivec2(gl_FragCoord.xy);
   int strand = cell.x / view.seen_points;
   int point = min((cell.x - strand * view.seen_points) * SEEN_STEP, view.point_count - 1);
-  vec4 place = texelFetch(places, ivec2(strand * view.point_count + point, cell.y), 0);
-  vec3 position = (view.object_to_world * vec4(place.xyz, 1.0)).xyz;
+  vec3 position = place_of(strand, point, cell.y);
+  vec3 along = place_of(strand, point + 1, cell.y) - place_of(strand, point - 1, cell.y);
+  vec3 T = along * inversesqrt(max(dot(along, along), 1e-20));
+  vec3 root = place_of(strand, 1, cell.y) - place_of(strand, 0, cell.y);
+  vec3 R = root * inversesqrt(max(dot(root, root), 1e-20));
   seen_x_y = vec4(0.0);
   seen_z = vec4(0.0);
+  seen_surface = vec4(0.0);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 at;
     float depth;
-    float seen = light.power.x;  // the direction's part of the sphere, six times
+    float weight = light.power.x;  // the direction's part of the sphere, six times
+    float seen = weight;
+    float seen_behind = weight;
     if (shadow_place(light, position, at, depth)) {
-      seen *= lit_part(at, depth) * exp(-view.seen_opacity * crossed_strands(at, depth));
+      float bias = view.point_count > 1 ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
+      Beyond beyond = look_beyond(light, at, depth, -light.axis.xyz);
+      seen *= lit_part(at, depth, bias) * exp(-view.seen_opacity * crossed_strands(at, depth));
+      float left = exp(-view.seen_opacity * beyond.strands);
+      seen_behind = seen * left;
+      // Through the hair to the surface, and back.
+      seen_surface += weight * beyond.surface * left * left * vec4(light.axis.xyz, 1.0);
     }
     vec3 share = seen * light.axis.xyz * light.axis.xyz;
     vec3 plus = share * vec3(lessThan(light.axis.xyz, vec3(0.0)));  // lights shine along their axis
     vec3 minus = share * vec3(greaterThan(light.axis.xyz, vec3(0.0)));
     seen_x_y += vec4(plus.x, minus.x, plus.y, minus.y);
-    seen_z.xy += vec2(plus.z, minus.z);
+    seen_z += vec4(plus.z, minus.z, seen_behind, -seen * dot(T, light.axis.xyz));
   }
 }

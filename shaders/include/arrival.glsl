@@ -6,7 +6,7 @@
 vec3 irradiance_of(Light light, vec3 position)
 {
   return light_irradiance(
-      light.kind, light.position.xyz, light.axis.xyz, light.power.rgb, light.cos_cone, light.blend, position);
+      light.kind, light.position.xyz, light.axis.xyz, light.power.rgb, light.cos_cone, light.blend, light.radius, position);
 }
 
 // Avoids 0 / 0.

@@ -3,7 +3,7 @@
 //
 // float fibre_roughness()               longitudinal
 // FibreLobes fibre_lobes(vec2 at)       N, for light from one direction, at coordinates of `n_coordinates`
-// FibreLobes half_circle_lobes(vec2 at) N, for light from a half circle
+// FibreLobes forward_lobes(vec2 at)     N, for light that strands in front have scattered
 // vec3 dual(int row, float theta_i)     what the strands around do, rows as in `dual_scattering.QUANTITIES`
 
 #include "include/drawn_light.glsl"
@@ -28,8 +28,8 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   return lobe_sum(drawn_lobes * fibre_m(dot(T, L), sin_o, blur), fibre_lobes(at));
 }
 
-// `dual_scattering.radiance`. Shifts and widths are the mean over the channels, which differ little in them.
-vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
+// `dual_scattering.radiance`. Widths are the mean over the channels, which differ little in them.
+vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur)
 {
   float sin_i = dot(T, L);
   float sin_o = dot(T, V);
@@ -38,19 +38,30 @@ vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
   float theta_i = atan(sin_i, cos_i);
   float phi = relative_azimuth(T, L, V);
 
-  float beta_f = mean(dual(4, theta_i));
-  vec3 back = drawn_lobes.w * dual(6, theta_i) * (view.back_gain / PI);
-  float back_shift = 2.0 * mean(dual(7, theta_i));
-  float back_width = mean(dual(8, theta_i));
+  vec3 onward, backward;
+  vec3 a_f = dual(0, theta_i);
+  vec3 a_b = dual(1, theta_i);
+  fluxes(front, behind, a_f, a_b, onward, backward);
+  vec3 direct = vec3(direct_part(front));
   // Variances of theta_h are quarters of those of theta_i + theta_o.
-  float back_v = 4.0 * back_width * back_width + blur;
-  float spread = 4.0 * count * beta_f * beta_f;
-  vec3 direct = hair_bsdf(T, L, V, blur) +
-                back * back_azimuth(phi) * shifted_lobe(sin_i, cos_i, sin_o, cos_o, back_shift, back_v);
-
+  float beta_f = mean(dual(4, theta_i));
+  float back_width = mean(dual(8, theta_i));
+  float spread = 4.0 * front * beta_f * beta_f + blur;
   vec2 at = n_coordinates(phi, cos_o, settings.axes);
-  vec3 through = drawn_lobes.w * lobe_sum(fibre_m(sin_i, sin_o, spread + blur), half_circle_lobes(at));
-  vec3 back_spread = back * spread_back_azimuth(phi) *
-                     shifted_lobe(sin_i, cos_i, sin_o, cos_o, back_shift, back_v + spread);
-  return direct_part(count) * direct + scattered_part(count, dual(0, theta_i)) * (through + back_spread);
+  vec3 through = lobe_sum(fibre_m(sin_i, sin_o, spread), forward_lobes(at));
+  // Light that has turned is so wide that the lobes of this strand hardly matter: sigma_b counts its passage.
+  float back_m = d_eon_lobe(sin_i, cos_i, sin_o, cos_o, 4.0 * back_width * back_width + spread);
+  vec3 returning = back_m / PI * mix(a_b, a_f, back_azimuth(phi));
+  return direct * hair_bsdf(T, L, V, blur) +
+         drawn_lobes.w * ((onward - direct) * through + backward * returning);
+}
+
+// Uniform light that strands behind send back through a strand: `albedo.returned_from_behind`.
+vec3 returned_from_behind(float sin_theta_o, float behind)
+{
+  float theta_o = atan(sin_theta_o, sin_from_cos(sin_theta_o));
+  vec3 attenuation, reflectance, beyond, returned;
+  deep_hair(dual(0, theta_o), dual(1, theta_o), attenuation, reflectance);
+  layer_parts(behind, attenuation, reflectance, beyond, returned);
+  return dual(0, theta_o) * returned;
 }

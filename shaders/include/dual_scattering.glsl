@@ -1,19 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Dual scattering [Zinke08]: forward scattering by strands in front, backscattering by strands behind.
+// Dual scattering [Zinke08]: forward scattering by strands in front, backscattering by strands behind; the fluxes between
+// both by [Kubelka31].
 
 #include "include/longitudinal.glsl"
 
-// Azimuthal distribution of backscattered light over |phi|, with the integral pi; for light from one direction,
-// and for light from a half circle, the mean of the first over it.
+// By a strand, and of deep hair: without any loss, fluxes would not fall exponentially.
+const float LEAST_ATTENUATION = 1e-3;
+const float MOST_REFLECTANCE = 0.995;
+
+// Part of the light from the half circle behind that goes to its front, over the azimuth |phi| of the front.
 float back_azimuth(float phi)
 {
   return 1.0 - phi / PI;
-}
-
-float spread_back_azimuth(float phi)
-{
-  float turn = phi / PI;
-  return (turn < 0.5) ? 0.75 - turn * turn : 0.25 + (1.0 - turn) * (1.0 - turn);
 }
 
 // Unscattered part of light behind a mean of `count` strands.
@@ -22,9 +20,32 @@ float direct_part(float count)
   return exp(-count);
 }
 
-// Part that arrives through at least one strand, each with the forward scattering a_f: the mean of a_f^k over a
-// Poisson-distributed k >= 1.
-vec3 scattered_part(float count, vec3 a_f)
+// Attenuation by each and reflectance by all of infinitely many strands.
+void deep_hair(vec3 a_f, vec3 a_b, out vec3 attenuation, out vec3 reflectance)
 {
-  return exp(-count * (vec3(1.0) - a_f)) - vec3(exp(-count));
+  vec3 lost = vec3(1.0) - a_f;
+  attenuation = sqrt(max(lost * lost - a_b * a_b, vec3(LEAST_ATTENUATION * LEAST_ATTENUATION)));
+  reflectance = min(a_b / (lost + attenuation), vec3(MOST_REFLECTANCE));
+}
+
+// Parts of light that a mean of `count` strands of `deep_hair` transmits and reflects.
+void layer_parts(float count, vec3 attenuation, vec3 reflectance, out vec3 transmitted_part, out vec3 reflected_part)
+{
+  vec3 left = exp(-attenuation * count);
+  vec3 turned = reflectance * reflectance;
+  vec3 kept = vec3(1.0) - turned * left * left;
+  transmitted_part = (vec3(1.0) - turned) * left / kept;
+  reflected_part = reflectance * (vec3(1.0) - left * left) / kept;
+}
+
+// Light at a strand between means of `front` and `behind` others, as parts of what arrives at the first: onward from the
+// front, backward from behind.
+void fluxes(float front, float behind, vec3 a_f, vec3 a_b, out vec3 onward, out vec3 backward)
+{
+  vec3 attenuation, reflectance, through, reflected, beyond, returned;
+  deep_hair(a_f, a_b, attenuation, reflectance);
+  layer_parts(front, attenuation, reflectance, through, reflected);
+  layer_parts(behind, attenuation, reflectance, beyond, returned);
+  onward = through / (vec3(1.0) - reflected * returned);
+  backward = onward * returned;
 }

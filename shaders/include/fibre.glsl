@@ -17,6 +17,20 @@ float cos_theta_d(float sin_theta_i, float sin_theta_o)
   return sqrt(max(0.0, 0.5 * (1.0 + cosines + sin_theta_i * sin_theta_o)));
 }
 
+// Even light from below a plane with the normal N, as seen by a fibre's mirror cone, sin(theta_i) = -sin(theta_o), softened
+// as by roughness: the part of the cone, and its moment with the cosine of phi, both as factors of what a fibre returns.
+vec2 light_from_below(vec3 T, vec3 V, vec3 N)
+{
+  const float SOFTNESS = 0.05;
+  float sin_o = dot(T, V);
+  float t_dot_n = dot(T, N);
+  float across = max((1.0 - sin_o * sin_o) * (1.0 - t_dot_n * t_dot_n), 0.0);
+  float cosine = clamp(-sin_o * t_dot_n * inversesqrt(across + SOFTNESS), -1.0, 1.0);
+  float sine = sin_from_cos(cosine);
+  float cos_phi = -(dot(V, N) - sin_o * t_dot_n) * inversesqrt(across + SOFTNESS);
+  return vec2(atan(sine, cosine), 2.0 * sine * cos_phi) / PI;
+}
+
 // |phi| in [0, pi]: the angle between L and V seen along the fibre. Zero where either is parallel to it.
 float relative_azimuth(vec3 T, vec3 L, vec3 V)
 {

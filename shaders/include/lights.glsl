@@ -43,9 +43,24 @@ float area_falloff(float cos_angle, float cos_cone)
   return max(0.0, tan_cone - tan_angle) / (tan_cone - atan(tan_cone));
 }
 
-// Irradiance [W/m²] of a plane at `position` that faces the light. power: RGB watts, or W/m² of a sun.
-vec3 light_irradiance(
-    int kind, vec3 light_position, vec3 axis, vec3 power, float cos_cone, float blend, vec3 position)
+// Light of a disk of radius r at the distance d, as a part of that of a point of the same power: by their solid angles,
+// 2 pi (1 - d / sqrt(d² + r²)) and pi r² / d². ratio: r² / d², of the disk as it is seen.
+float disk_part(float ratio)
+{
+  float root = sqrt(1.0 + ratio);
+  return 2.0 / (root * (root + 1.0));
+}
+
+// Irradiance [W/m²] of a small ball at `position`, per its cross section. power: RGB watts, or W/m² of a sun; radius: of an
+// area light's disk.
+vec3 light_irradiance(int kind,
+                      vec3 light_position,
+                      vec3 axis,
+                      vec3 power,
+                      float cos_cone,
+                      float blend,
+                      float radius,
+                      vec3 position)
 {
   if (kind == LIGHT_SUN) {
     return power;
@@ -55,7 +70,9 @@ vec3 light_irradiance(
   float cos_angle = dot(axis, offset) * inversesqrt(distance_squared);
   if (kind == LIGHT_AREA) {
     // A Lambertian emitter of flux P sends P/pi along its axis.
-    return power * max(cos_angle, 0.0) * area_falloff(cos_angle, cos_cone) / (PI * distance_squared);
+    float facing = max(cos_angle, 0.0);
+    float part = disk_part(radius * radius * facing / distance_squared);
+    return power * facing * part * area_falloff(cos_angle, cos_cone) / (PI * distance_squared);
   }
   vec3 irradiance = power / (4.0 * PI * distance_squared);
   return (kind == LIGHT_SPOT) ? irradiance * spot_falloff(cos_angle, cos_cone, blend) : irradiance;

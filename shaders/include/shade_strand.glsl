@@ -2,11 +2,13 @@
 // The main function of all shading models: the sum over the scene's lights plus the world's light, for each
 // sample of a picture in which a strand of this hair is nearest.
 //
-// vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
-//     light leaving the fibre towards V for unit irradiance from around L outside the hair, with a mean of `count` strands
-//     between; blur: variance of the light's direction along an axis [rad²]
+// vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur)
+//     light leaving the fibre towards V for unit irradiance from around L outside the hair, with a mean of `front` strands
+//     between and `behind` strands beyond; blur: variance of the light's direction along an axis [rad²]
 // void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
-//     response to uniform light: the integral over phi, and the same weighted with the cosine of phi
+//     the fibre's response to uniform light: the integral over phi, and the same weighted with the cosine of phi
+// vec3 returned_from_behind(float sin_theta_o, float behind)
+//     what `behind` strands beyond add to the first
 
 #include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
@@ -21,20 +23,30 @@ vec3 strand_light()
 {
   vec3 T = strand_tangent;
   vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
+  vec3 R = root_direction(strand_index);
   vec3 returned;
   vec3 towards;
   hair_return(dot(T, V), returned, towards);
   vec2 seen_at = seen_texel(strand_index, strand_position, view.point_count, view.seen_points, view.row_strands) /
                  vec2(textureSize(visibility_x_y, 0));
+  vec4 seen_x_y = textureLod(visibility_x_y, seen_at, 0.0);
+  vec4 seen_z = textureLod(visibility_z, seen_at, 0.0);
+  float strands_behind = mean_strands_behind(seen_x_y, seen_z, view.seen_opacity);
+  vec3 back = returned_from_behind(dot(T, V), strands_behind);
   mat3 plus;
   mat3 minus;
-  world_sides(textureLod(visibility_x_y, seen_at, 0.0),
-              textureLod(visibility_z, seen_at, 0.0).xy,
+  world_sides(seen_x_y,
+              seen_z.xy,
               view.seen_opacity,
               view.hair_forward.rgb,
               plus,
               minus);
-  vec3 radiance = drawn_world * strand_radiance(plus, minus, T, V, returned, towards);
+  vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, returned, back));
+  world *= cone_visibility(seen_x_y, seen_z, dot(T, V));
+  vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
+  vec3 surface_light = view.surface_color.rgb * between_hair_and_surface(strands_behind);
+  world += surface_light * surface_radiance(plus, minus, hidden, T, V, returned, towards);
+  vec3 radiance = drawn_world * world;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
@@ -44,20 +56,29 @@ vec3 strand_light()
                                        light.power.rgb,
                                        light.cos_cone,
                                        light.blend,
+                                       light.radius,
                                        drawn_position);
     vec3 at;
     float depth;
-    float count = 0.0;
-    if (shadow_place(light, drawn_position, at, depth)) {
-      irradiance *= lit_part(at, depth);
-      count = crossed_strands(at, depth);
-      radiance += drawn_lobes.w * irradiance * surface_bounce(at, depth, count) * returned;
+    float front = 0.0;
+    bool is_in_map = shadow_place(light, drawn_position, at, depth);
+    if (is_in_map) {
+      irradiance *= lit_part(at, depth, strand_bias(R, L));
+      front = crossed_strands(at, depth);
     }
     // Most strands are in the shadow of the others, with no light to scatter.
-    vec3 arriving = irradiance * transmitted(count, view.hair_forward.rgb);
+    vec3 arriving = irradiance * transmitted(front, view.hair_forward.rgb);
     if (max(arriving.r, max(arriving.g, arriving.b)) > LEAST_IRRADIANCE) {
+      float behind = 0.0;
+      if (is_in_map) {
+        Beyond beyond = look_beyond(light, at, depth, L);
+        behind = beyond.strands;
+        vec2 below = light_from_below(T, V, beyond.normal);
+        vec3 bounced = drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front);
+        radiance += bounced * (below.x * returned + below.y * towards);
+      }
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
-      radiance += irradiance * hair_radiance(T, L, V, count, blur);
+      radiance += irradiance * hair_radiance(T, L, V, front, behind, blur);
     }
   }
   return radiance;

@@ -3,12 +3,20 @@
 
 #include "include/opacity.glsl"
 
-// Range around a strand, as a part of the map, and behind it, as a part of the hair, in which surfaces light it.
-const float BOUNCE_REACH = 0.025;
+// Range around a strand, as a part of the map, in which it is read what is behind it.
+const float BEYOND_REACH = 0.01;
+
+// Range behind a strand, as a part of the hair, in which surfaces light it.
 const float BOUNCE_DISTANCE = 0.25;
 
 // Depth bias of surfaces, as a part of the hair's extent.
-const float SURFACE_BIAS = 0.01;
+const float SURFACE_BIAS = 0.002;
+
+// The bias of a strand that grows in a direction: against the light it grows on the far side of its surface.
+float strand_bias(vec3 root_direction, vec3 L)
+{
+  return SURFACE_BIAS * clamp(4.0 * dot(root_direction, L), -1.0, 1.0);
+}
 
 // Place of a point in a light's maps, and its depth; false where the maps do not reach: they hold the hair and what is
 // near it.
@@ -25,10 +33,10 @@ bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
 }
 
 // Visibility of the light past surfaces: the upper bound of the part with a greater depth [Donnelly06].
-float lit_part(vec3 at, float depth)
+float lit_part(vec3 at, float depth, float bias)
 {
   vec2 moments = textureLod(surface_moments, at, 0.0).rg;
-  float warped = warped_depth(depth - SURFACE_BIAS);
+  float warped = warped_depth(depth - bias);
   float behind = warped - moments.x;
   float rounding = 0.3 * SURFACE_BIAS * WARP * warped;
   float variance = max(moments.y - moments.x * moments.x, rounding * rounding);
@@ -44,28 +52,60 @@ float crossed_strands(vec3 at, float depth)
   return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
 }
 
-// Part of the light stopped by a surface near enough to light a strand from below: the mean over points around it,
-// which softens the surface's border.
-float surface_under(vec3 at, float depth)
+// What is behind a strand along a light: means over places around it, of which a strand at this one covers none.
+struct Beyond {
+  float strands;  // as far as the surface
+  float surface;  // the part of places with a surface
+  float near;     // the same, the less the more distant it is
+  vec3 normal;    // of that surface
+};
+
+// L: towards the light.
+Beyond look_beyond(Light light, vec3 at, float depth, vec3 L)
 {
-  float barred = 0.0;
+  Beyond beyond = Beyond(0.0, 0.0, 0.0, vec3(0.0));
+  vec2 slope = vec2(0.0);
   for (int corner = 0; corner < 4; corner++) {
-    vec2 offset = BOUNCE_REACH * (2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0);
-    float distance_to = textureLod(surface_moments, at + vec3(offset, 0.0), 0.0).b - depth;
-    barred += 1.0 - smoothstep(0.0, BOUNCE_DISTANCE, distance_to);
+    vec2 towards = 2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0;
+    vec3 near = at + vec3(BEYOND_REACH * towards, 0.0);
+    float front = textureLod(hair_front, near, 0.0).r;
+    float surface = textureLod(surface_moments, near, 0.0).b;
+    vec4 counts = textureLod(hair_layers, near, 0.0);
+    beyond.strands += max(0.0, strands_in_front(counts, surface - front) - strands_in_front(counts, depth - front));
+    // Of a surface in front of the strand this side is in the shadow.
+    float is_there = step(depth, surface + SURFACE_BIAS) * step(surface, 0.75 * FAR);
+    beyond.surface += 0.25 * is_there;
+    beyond.near += 0.25 * is_there * (1.0 - smoothstep(0.0, BOUNCE_DISTANCE, surface - depth));
+    slope += towards * surface;
   }
-  return 0.25 * barred;
+  beyond.strands *= 0.25;
+  slope *= 0.25 / BEYOND_REACH;
+  vec3 right = vec3(light.world_to_shadow[0][0], light.world_to_shadow[1][0], light.world_to_shadow[2][0]);
+  vec3 up = vec3(light.world_to_shadow[0][1], light.world_to_shadow[1][1], light.world_to_shadow[2][1]);
+  beyond.normal = normalize(slope.x * normalize(right) + slope.y * normalize(up) + L);
+  return beyond;
 }
 
-// Light reflected to a strand from the surface below, for unit irradiance of the light: through the rest
-// of the hair, off a diffuse surface, and through the hair again.
-vec3 surface_bounce(vec3 at, float depth, float count)
+// Light of a surface, relative to that which it reflects at once: hair above it, of `count` strands, sends a part of it
+// back to the surface, again and again.
+vec3 between_hair_and_surface(float count)
 {
-  float surface = min(textureLod(surface_moments, at, 0.0).b, depth + BOUNCE_DISTANCE);
-  float under = max(0.0, crossed_strands(at, surface) - count);
-  vec3 way = transmitted(count + 2.0 * under, view.hair_forward.rgb);
-  // The mean cosine of a surface that is lit is 2/3, and it fills half of what a strand sees.
-  return view.surface_color.rgb * way * surface_under(at, depth) * (2.0 / 3.0) * 0.5 / PI;
+  vec3 reflectance = view.hair_reflectance.rgb;
+  vec3 left = transmitted(2.0 * count, view.hair_forward.rgb);
+  vec3 reflected = reflectance * (vec3(1.0) - left) / (vec3(1.0) - reflectance * reflectance * left);
+  return vec3(1.0) / (vec3(1.0) - view.surface_color.rgb * reflected);
+}
+
+// Light that a surface reflects to a strand, as a part of even light around it, for unit irradiance of the light: through
+// the rest of the hair, off a diffuse surface, and through the hair again, along 1.66 times the shortest way [Elsasser42].
+vec3 surface_bounce(Beyond beyond, vec3 L, vec3 T, float front)
+{
+  float cosine = max(dot(beyond.normal, L), 0.0);
+  // Strands are as wide as the sine between tangent and direction, pi / 4 in the mean over all directions.
+  float back = 1.66 * cosine * 0.25 * PI / max(sin_from_cos(dot(T, L)), 0.1);
+  vec3 way = transmitted(front + beyond.strands * (1.0 + back), view.hair_forward.rgb);
+  way *= between_hair_and_surface(front + beyond.strands);
+  return view.surface_color.rgb * way * (beyond.near * cosine / PI);
 }
 
 // Visibility of a light from a surface: the mean over 3 × 3 texels. forward: the forward scattering of one strand.
@@ -81,7 +121,7 @@ vec3 surface_visibility(Light light, vec3 position, vec3 forward)
   for (int y = -1; y <= 1; y++) {
     for (int x = -1; x <= 1; x++) {
       vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
-      total += lit_part(near, depth) * transmitted(crossed_strands(near, depth), forward);
+      total += lit_part(near, depth, SURFACE_BIAS) * transmitted(crossed_strands(near, depth), forward);
     }
   }
   return total / 9.0;

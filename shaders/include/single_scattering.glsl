@@ -3,7 +3,12 @@
 
 #include "include/opacity.glsl"
 
-vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float count, float blur)
+vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur)
 {
-  return transmitted(count, view.hair_forward.rgb) * hair_bsdf(T, L, V, blur);
+  return transmitted(front, view.hair_forward.rgb) * hair_bsdf(T, L, V, blur);
+}
+
+vec3 returned_from_behind(float sin_theta_o, float behind)
+{
+  return vec3(0.0);
 }

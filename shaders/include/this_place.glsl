@@ -15,6 +15,13 @@ vec3 tangent_at(vec3 before, vec3 after)
   return (dot(along, along) > 0.0) ? along : vec3(0.0, 0.0, 1.0);
 }
 
+// Unit vector from the root of a strand, in the world.
+vec3 root_direction(int strand)
+{
+  vec3 along = strand_point(strand, 1).xyz - strand_point(strand, 0).xyz;
+  return normalize(mat3(view.object_to_world) * tangent_at(vec3(0.0), along));
+}
+
 // The place on segment `index` of the strands that a sample shows.
 void find_place(int index, vec2 at, vec2 size)
 {

@@ -21,6 +21,24 @@ void world_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, out ma
   minus[2] = lights.world[5].rgb * seen_through(seen_z.y, opacity, forward);
 }
 
+float all_seen(vec4 seen_x_y, vec4 seen_z)
+{
+  return dot(seen_x_y, vec4(1.0)) + seen_z.x + seen_z.y;
+}
+
+// Mean number of strands behind the light that arrives: `world_visibility.frag` sums its exponential in seen_z.
+float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
+{
+  return -log(clamp(seen_z.z / max(all_seen(seen_x_y, seen_z), 1e-6), 1e-4, 1.0)) / opacity;
+}
+
+// Visibility of the world from the mirror cone of a strand, sin(theta_i) = -sin(theta_o), relative to that from the
+// strand: linear in sin(theta_i), whose mean over what is seen is in seen_z.
+float cone_visibility(vec4 seen_x_y, vec4 seen_z, float sin_theta_o)
+{
+  return clamp(1.0 - 3.0 * sin_theta_o * seen_z.w / max(all_seen(seen_x_y, seen_z), 1e-6), 0.0, 2.0);
+}
+
 // Irradiance of a surface with the normal N.
 vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
 {
@@ -48,4 +66,24 @@ vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 
     radiance += plus[axis] * (even + uneven) + minus[axis] * (even - uneven);
   }
   return radiance / (2.0 * dot(sides, vec3(1.0)));
+}
+
+// Radiance of a strand towards V in the light of the world that white surfaces send to it. hidden: the sum of the directions
+// in which surfaces are seen, and their part of all directions.
+vec3 surface_radiance(mat3 plus, mat3 minus, vec4 hidden, vec3 T, vec3 V, vec3 returned, vec3 towards)
+{
+  if (hidden.w < 1e-3) {
+    return vec3(0.0);
+  }
+  vec3 N = -hidden.xyz * inversesqrt(max(dot(hidden.xyz, hidden.xyz), 1e-8));
+  vec2 below = light_from_below(T, V, N);
+  return surface_irradiance(plus, minus, N) / PI * min(2.0 * hidden.w, 1.0) * (below.x * returned + below.y * towards);
+}
+
+// The moment `towards` of a strand with its share of what strands behind send back: the integral of
+// (1 - |phi| / pi) / pi × cos(phi). Held to half of all, so that light from one side never takes some away.
+vec3 with_back(vec3 towards, vec3 returned, vec3 back)
+{
+  vec3 most = 0.5 * (returned + back);
+  return clamp(towards + 4.0 / (PI * PI) * back, -most, most);
 }

@@ -30,6 +30,7 @@ class Shading:
     blocks: dict = field(default_factory=dict)  # {instance: GPUUniformBuf}
     samplers: dict = field(default_factory=dict)
     forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # passed on to strands behind
+    reflectance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # of infinitely many strands
     is_varied: bool = False  # whether strands differ by their random numbers
 
     @property
@@ -64,6 +65,11 @@ class MixedShading:
     def forward(self):
         """As a `Shading` has it, the mean over the strands."""
         return (1.0 - self.mean_share) * self.driest.forward + self.mean_share * self.wettest.forward
+
+    @property
+    def reflectance(self):
+        """The same."""
+        return (1.0 - self.mean_share) * self.driest.reflectance + self.mean_share * self.wettest.reflectance
 
     @property
     def opacity(self):
@@ -102,12 +108,12 @@ def marschner_shading(tables):
     """The Marschner model from baked `lookup_tables.Tables`, ready to draw."""
     file, names = _TABLES[tables.settings.mode]
     arrays = {f"{name}_table": getattr(tables, name) for name in names}
-    dual = None
+    forward, backward = albedo.mean_parts(tables.lobes, tables.settings)
     if tables.settings.mode == "energy":
         dual = dual_scattering.bake(tables)
         arrays |= {"dual_table": dual.theta, "n_g_table": dual.n_g, "n_g_trt_table": dual.n_g_trt}
-    arrays["return_table"] = albedo.azimuthal_moments(tables, dual)
-    return _shading(file, {"settings": tables.settings}, arrays, albedo.mean_forward(tables))
+    arrays["return_table"] = albedo.azimuthal_moments(tables)
+    return _shading(file, {"settings": tables.settings}, arrays, *_deep(tables.settings, forward, backward))
 
 
 def marschner_strand_shading(tables):
@@ -120,10 +126,19 @@ def marschner_strand_shading(tables):
     file = _VARIED[tables.settings.mode]
     if slices.n_trt is not None:
         file, arrays["n_trt_slices"] = "marschner_elliptic.comp", slices.n_trt
-    return _shading(file, blocks, arrays, tables.forward, is_varied=True)
+    deep = _deep(tables.settings, tables.forward, tables.backward)
+    return _shading(file, blocks, arrays, *deep, is_varied=True)
 
 
-def _shading(file, blocks, arrays, forward, is_varied=False):
+def _deep(settings, forward, backward):
+    """(part passed on by one strand, reflectance) in deep hair whose strands scatter these parts, (3,) each."""
+    if settings.mode != "energy":
+        return forward, np.zeros(3)
+    attenuation, reflectance = dual_scattering.deep_hair(forward, backward)
+    return 1.0 - attenuation, reflectance
+
+
+def _shading(file, blocks, arrays, forward, reflectance=(0.0, 0.0, 0.0), is_varied=False):
     """`Shading` of a .comp with blocks {instance: settings} and tables {sampler: (H, W, C) or (D, H, W, C)}."""
     kinds = [(name, "FLOAT_2D" if array.ndim == 3 else "FLOAT_3D") for name, array in arrays.items()]
     if is_varied:
@@ -134,7 +149,7 @@ def _shading(file, blocks, arrays, forward, is_varied=False):
     variant = partial(shaders.shading_program, *wanted)
     buffers = {instance: uniforms.uniform_buffer(uniforms.fill(settings)) for instance, settings in blocks.items()}
     textures = {name: _table_texture(array) for name, array in arrays.items()}
-    return Shading(program, variant, buffers, textures, forward, is_varied)
+    return Shading(program, variant, buffers, textures, forward, np.array(reflectance), is_varied)
 
 
 def _table_texture(array):

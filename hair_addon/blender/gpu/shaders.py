@@ -49,8 +49,8 @@ program_cache = Cache()  # (function decorated by `kept`, its arguments) → pro
 kept = program_cache.keeping  # decorates what makes a program: it is compiled once, and kept until Python ends
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
-VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z")  # see shaders/world_visibility.frag
-VISIBILITY_TARGETS = ("seen_x_y", "seen_z")
+VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z", "visibility_surface")  # see shaders/world_visibility.frag
+VISIBILITY_TARGETS = ("seen_x_y", "seen_z", "seen_surface")
 
 
 def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):

@@ -64,6 +64,7 @@ VIEW = Block(
         "object_to_clip": "mat4",
         "eye": "vec4",  # the viewer's place, or in a parallel projection the unit direction towards the viewer
         "hair_forward": "vec4",  # what one strand passes on of the light that meets it
+        "hair_reflectance": "vec4",  # of infinitely many strands
         "surface_color": "vec4",  # of what the hair grows on
         "is_perspective": "int",
         "point_count": "int",
@@ -80,7 +81,6 @@ VIEW = Block(
         "object_scale": "float",
         "pixels_per_unit": "float",  # at distance one, in a perspective
         "least_half_width": "float",  # there as well
-        "back_gain": "float",  # of what comes back from behind a strand
         "light_index": "int",  # the light that a shadow pass looks from
         "coverage_turn": "float",  # by which a pass takes other samples of thin strands
         "first_column": "int",  # of the picture's samples, where what is drawn is a tile of it

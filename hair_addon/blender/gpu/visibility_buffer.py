@@ -11,7 +11,6 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from ...core.shading.tables import dual_scattering
 from . import drawing, shaders, uniforms
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
@@ -80,9 +79,8 @@ class VisibilityBuffer:
             record = drawing.strand_record(strands, view, to_world, steps)
             record["seen_points"] = seen_points(strands.point_count)
             record["seen_opacity"] = shading.opacity
-            record["hair_forward"][:3] = shading.forward
+            record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
             record["surface_color"][:3] = surface_color
-            record["back_gain"] = dual_scattering.BACK_GAIN
             self._hair.append(_Placed(strands, shading, record, samplers, first))
             first += self._hair[-1].segment_count
         if first > _NO_SEGMENT:
@@ -178,7 +176,7 @@ class VisibilityBuffer:
                 program.uniform_float("wetness_range", mix.wetness_range)
                 program.uniform_int("is_wet", int(mix.is_wet))
                 textures["strand_wetness"] = placed.strands.wetness
-                record["hair_forward"][:3] = shading.forward
+                record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
             self._fill(placed, program, picture, shading.blocks, textures, record)
 
     def _fill(self, placed, program, picture, blocks, textures, record=None):

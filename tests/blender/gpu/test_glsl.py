@@ -133,7 +133,6 @@ def shading_model(fragment, settings, expression, textures=None, more="", **inpu
     """A function of a .frag, or of more GLSL after it, with its settings in a uniform block as when hair is drawn."""
     structs = uniforms.VIEW.source + uniforms.settings_block(type(settings)).source
     view = uniforms.VIEW.record()
-    view["back_gain"] = dual_scattering.BACK_GAIN
     blocks = {"view": ("View", view), "settings": ("Settings", uniforms.fill(settings))}
     text = glsl.source(fragment) + more
     return glsl.evaluate(text, "vec3", expression, structs=structs, blocks=blocks, textures=textures, **inputs)
@@ -247,12 +246,15 @@ def test_dual_scattering_is_read_from_the_tables(fibres, rng):
     settings = lookup_tables.Settings(mode="energy", size=64, roughness=0.4, sigma_a=(0.1, 0.3, 0.8))
     tables = lookup_tables.bake(settings)
     textures = hair_shading.marschner_shading(tables).samplers
-    count = rng.uniform(0.0, 6.0, len(fibres["T"])).astype(np.float32)
-    expression = "hair_radiance(T, L, V, count, 0.0)"
-    shader = shading_model("energy_conserving.comp", settings, expression, textures=textures, count=count, **fibres)
+    front, behind = rng.uniform(0.0, 6.0, (2, len(fibres["T"]))).astype(np.float32)
+    expression = "hair_radiance(T, L, V, front, behind, 0.0)"
+    numbers = {"front": front, "behind": behind}
+    shader = shading_model("energy_conserving.comp", settings, expression, textures=textures, **numbers, **fibres)
     halves = lookup_tables.Tables(*map(texels, (tables.m, tables.n, tables.n_trt)), settings, texels(tables.n_res))
     at = angles.fibre_angles(*doubles(fibres))
-    python = dual_scattering.sample_radiance(halves, dual_scattering.bake(tables), at, count.astype(np.float64))
+    python = dual_scattering.sample_radiance(
+        halves, dual_scattering.bake(tables), at, *(n.astype(np.float64) for n in (front, behind))
+    )
     regular = np.minimum(np.cos(at.theta_i), np.cos(at.theta_o)) > 0.05
     np.testing.assert_allclose(shader[regular], python[regular], rtol=1e-2, atol=2e-4)
     assert np.isfinite(shader).all() and (shader >= 0.0).all()

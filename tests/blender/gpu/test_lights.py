@@ -79,7 +79,7 @@ def shader_irradiance(lights):
         "vec3 irradiance(Light light, vec3 at)\n"
         "{\n"
         "  vec3 facing = light_irradiance(light.kind, light.position.xyz, light.axis.xyz, light.power.rgb,\n"
-        "                                 light.cos_cone, light.blend, at);\n"
+        "                                 light.cos_cone, light.blend, light.radius, at);\n"
         "  return facing * max(to_light(light.kind, light.position.xyz, light.axis.xyz, at).z, 0.0);\n"
         "}\n"
     )
@@ -141,3 +141,17 @@ def test_irradiance_equals_cycles(wall, tmp_path, name):
 
 def test_a_scene_without_lights_is_dark(wall):
     assert len(door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)) == 0
+
+
+@pytest.mark.parametrize("size", [0.05, 1.0, 3.0])  # radius by distance
+def test_a_disk_lights_by_its_solid_angle(size):
+    """Against the integral over the disk of the light that a small ball on its axis receives."""
+    edges = np.linspace(0.0, size, 4001)
+    radii = 0.5 * (edges[1:] + edges[:-1])
+    squared = 1.0 + radii**2
+    received = np.sum(2.0 * np.pi * radii * np.diff(edges) / np.sqrt(squared) / squared) / (np.pi * size**2)
+    text = glsl.source("include/lights.glsl")
+    found = glsl.evaluate(
+        text, "float", "disk_part(ratio)", structs=uniforms.LIGHT.source, ratio=np.array([size**2], np.float32)
+    )
+    assert found[0] == pytest.approx(received, rel=1e-4)

@@ -11,7 +11,7 @@ from hair_addon.core.shading import appearance
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.fibre import angles, elliptic_section, kajiya_kay, marschner, pigment, strand_variation
 from hair_addon.core.shading.fibre.principled import varied_roughness
-from hair_addon.core.shading.tables import absorption_slices, dual_scattering, lookup_tables, strand_tables
+from hair_addon.core.shading.tables import absorption_slices, lookup_tables, strand_tables
 from tests.blender.gpu.test_glsl import doubles, fibres, unit  # noqa: F401 (a fixture)
 from tests.support import glsl
 
@@ -126,7 +126,6 @@ def model(fragment, expression, settings, textures, strands, **inputs):
     random, position = strands
     blocks = [(name, *block(name, values)) for name, values in settings.items()]
     view = uniforms.VIEW.record()
-    view["back_gain"] = dual_scattering.BACK_GAIN
     points = np.zeros((len(random), 2, 3), np.float32)
     uploaded = strand_textures.upload_strands(points, np.ones((len(random), 2), np.float32), random)
     view["row_strands"] = uploaded.row_strands
@@ -240,19 +239,23 @@ def test_dual_scattering_among_strands_that_differ(rng, strands):
     settings = appearance.table_settings(look, lookup_tables.Settings(size=64))
     tables = strand_tables.bake(settings, appearance.strand_settings(look))
     shading = hair_shading.marschner_strand_shading(tables)
-    count, inputs = rng.uniform(0.0, 6.0, COUNT).astype(np.float32), directions(rng)
+    front, behind = rng.uniform(0.0, 6.0, (2, COUNT)).astype(np.float32)
+    inputs = directions(rng)
     shader = model(
         "energy_conserving_varied.comp",
-        "hair_radiance(T, L, V, count, 0.0)",
+        "hair_radiance(T, L, V, front, behind, 0.0)",
         settings_of(tables),
         shading.samplers,
         strands,
-        count=count,
+        front=front,
+        behind=behind,
         **inputs,
     )
     at = angles.fibre_angles(*doubles(inputs))
     random, position = (values.astype(float) for values in strands)
-    python = strand_tables.sample_radiance(as_halves(tables), at, random, position, count.astype(float))
+    python = strand_tables.sample_radiance(
+        as_halves(tables), at, random, position, front.astype(float), behind.astype(float)
+    )
     np.testing.assert_allclose(shader[regular(at)], python[regular(at)], rtol=1e-2, atol=2e-4)
 
 

@@ -25,9 +25,19 @@ def roughening(edges: np.ndarray, scale: Values) -> np.ndarray:
     return _spreading(edges, lambda x: _logistic_antiderivative(x, scale))
 
 
-def half_circle_mean(edges: np.ndarray) -> np.ndarray:
-    """(W, W) matrix that averages N over the half circle around each phi: N^G of [Zinke08], light from all in front."""
-    return _spreading(edges, lambda x: np.where(x < 0.5 * np.pi, 0.5 * x * x, 0.5 * np.pi * (x - 0.25 * np.pi)) / np.pi)
+def forward_mean(edges: np.ndarray) -> np.ndarray:
+    """(W, W) matrix that averages N over light from around each phi that strands have scattered forward.
+
+    The weight at a distance x is cos²(x) up to pi / 2. Its mean cosine, 8 / 3 pi or 0.85, is about that of light that a
+    fibre scatters into the half circle ahead, 0.80 to 0.83 for brown to white hair; N^G of [Zinke08] weights the half
+    circle evenly (0.64), which such light comes to after three fibres.
+    """
+
+    def second_antiderivative(x):
+        inside = (0.5 * x * x + 0.25 * (1.0 - np.cos(2.0 * x))) / np.pi
+        return np.where(x < 0.5 * np.pi, inside, np.pi / 8.0 + 0.5 / np.pi + 0.5 * (x - 0.5 * np.pi))
+
+    return _spreading(edges, second_antiderivative)
 
 
 def _spreading(edges, second_antiderivative):

@@ -5,7 +5,7 @@ N depends on each channel's absorption alone. So a slice of one scalar sigma_a s
 looks up three times where `lookup_tables` has the three channels side by side.
 
     n    N_TT, N_TRT, N of the residual, N_R    over phi (columns), cos(theta) (rows) and sqrt(sigma_a) (slices)
-    n_g  the same, averaged over half circles as `dual_scattering` does it; of the energy-conserving mode
+    n_g  the same, averaged over directions as `dual_scattering` does it; of the energy-conserving mode
     n_trt  N_TRT of the four layers of `elliptic_section`; of the classic mode
 
 Columns and rows are those of `lookup_tables`. Slice k of K lies at sqrt(sigma_a) = low + (high - low) k / (K - 1): the
@@ -21,7 +21,7 @@ from ...params import Settings as _Settings
 from ...params import param
 from ..fibre import energy_conserving, marschner
 from ..fibre.angles import FibreAngles, Values, cos_theta_d
-from ..fibre.azimuthal import half_circle_mean
+from ..fibre.azimuthal import forward_mean
 from ..fibre.elliptic_section import layer_etas, layer_weights
 from . import lookup_tables
 from .cell_means import smooth_trt_means
@@ -68,7 +68,7 @@ def bake(
     if settings.mode == "classic":
         elliptic = _elliptic_trt(settings, sigma_a, device) if settings.is_elliptic else None
         return Slices(_texels(n_r, n_tt, n_trt, 0.0), None, covered, settings, elliptic)
-    mean = half_circle_mean(lookup_tables.phi_edges(settings)).astype(np.float32)
+    mean = forward_mean(lookup_tables.phi_edges(settings)).astype(np.float32)
     r_g, tt_g, trt_g = lookup_tables.spread_columns((n_r, n_tt, n_trt), mean)
     n, n_g = _texels(n_r, n_tt, n_trt, n_res), _texels(r_g, tt_g, trt_g, n_res)
     return Slices(n, n_g, covered, settings)

@@ -7,9 +7,6 @@ from . import dual_scattering, lookup_tables
 
 _INCLINATIONS = 181
 
-# First moment of backscattered light: the integral of (1 - |phi| / pi) / pi × cos(phi).
-BACK_TOWARDS = 4.0 / np.pi**2
-
 
 def mean_albedo(tables: lookup_tables.Tables) -> np.ndarray:
     """Radiance of a fibre in a uniform surrounding of radiance one, RGB (3,), the mean over all directions of view."""
@@ -29,17 +26,14 @@ def mean_parts(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> 
     return [np.average(part.sum(axis=0), axis=0, weights=np.cos(theta)) for part in parts]
 
 
-def azimuthal_moments(tables: lookup_tables.Tables, dual: dual_scattering.DualTables | None = None) -> np.ndarray:
+def azimuthal_moments(tables: lookup_tables.Tables) -> np.ndarray:
     """(2, K, 3) float32: of light from everywhere, the radiance that leaves towards theta_o, and its moment over phi.
 
     The second row is the same integral with the weight cos(phi), phi the light's azimuth from the viewer: positive if
     a strand sends light back. Held to half of the first, so that light from one side never takes some away. Columns are
-    those of `DualTables.theta`. dual: adds what the strands behind send back.
+    those of `DualTables.theta`.
     """
     moments = fibre_moments(tables.lobes, tables.settings)
-    if dual is not None:
-        back = dual_scattering.BACK_GAIN * dual.at("back", dual_scattering.light_inclinations())
-        moments += np.stack([back, BACK_TOWARDS * back])
     half = 0.5 * moments[0]
     moments[1] = np.clip(moments[1], -half, half)
     return moments.astype(np.float32)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Multiple scattering: the tables of dual scattering [Zinke08], from those of one fibre.
+"""Multiple scattering: the tables of dual scattering [Zinke08], from those of one fibre, and light among strands.
 
-Light that reaches a strand through n others is a_f^n of what it was, spread by n beta_f²; what the strands behind send
-back is A_b, shifted by Delta_b and spread by sigma_b. All are per colour channel, over the inclination of the light.
-Front and back are the two halves of the circle of phi; the light's azimuth may be anywhere in its half, so of light
-scattered by phi the share |phi| / pi goes forward.
+Of the light that meets a strand a_f goes on and a_b turns back, spread by beta_f² and beta_b². All are per colour
+channel, over the inclination of the light. Front and back are the two halves of the circle of phi; the light's azimuth
+may be anywhere in its half, so of light scattered by phi the share |phi| / pi goes forward. The two fluxes through a
+layer of strands follow from both parts [Kubelka31]: [Zinke08] neglects that light that has turned turns again, and
+takes the layer behind a strand to be infinitely deep.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import numpy as np
 
 from ..fibre import energy_conserving, marschner
 from ..fibre.angles import FibreAngles, Values
-from ..fibre.azimuthal import half_circle_mean
+from ..fibre.azimuthal import forward_mean
 from ..fibre.longitudinal import d_eon_lobe
 from . import lookup_tables
 
@@ -22,7 +23,8 @@ SAMPLE_COUNT = 128  # over theta
 # Rows of `DualTables.theta`, in order.
 QUANTITIES = ("a_f", "a_b", "alpha_f", "alpha_b", "beta_f", "beta_b", "back", "back_shift", "back_width")
 
-BACK_GAIN = 1.35  # gain of backscattered light: fitted to Cycles by blend_samples/calibrate.py
+# By a strand, and of deep hair: without any loss, fluxes would not fall exponentially.
+_LEAST_ATTENUATION, _MOST_REFLECTANCE = 1e-3, 0.995
 
 _WHITEST = 0.99  # the series over scattering events must end
 
@@ -32,7 +34,7 @@ class DualTables:
     """Float32 arrays, and the settings that they belong to.
 
     theta: rows as in `QUANTITIES`, column k of K at theta = ((k + 0.5) / K - 0.5) pi, the light's inclination; angles
-    are of theta_h. n_g, n_g_trt: means of N over the half circle around phi, with the axes and channels of n, n_trt.
+    are of theta_h. n_g, n_g_trt: means of N for light scattered forward, with the axes and channels of n, n_trt.
     """
 
     theta: np.ndarray  # (9, K, 3)
@@ -56,7 +58,7 @@ def bake(tables: lookup_tables.Tables) -> DualTables:
     """`lookup_tables.Tables` → `DualTables`."""
     forward, backward = scattered_parts(tables, light_inclinations())
     rows = quantities(forward, backward, tables.settings)
-    mean = half_circle_mean(lookup_tables.phi_edges(tables.settings)).astype(np.float32)
+    mean = forward_mean(lookup_tables.phi_edges(tables.settings)).astype(np.float32)
     n_g, n_g_trt = lookup_tables.spread_columns((tables.n, tables.n_trt), mean)
     return DualTables(rows, n_g, n_g_trt, tables.settings)
 
@@ -159,14 +161,8 @@ def back_scattering(
 
 
 def back_azimuth(phi: Values) -> np.ndarray:
-    """Azimuthal distribution of backscattered light over phi (...), 1 at the light, with the integral pi."""
+    """Part (...) of the light from the half circle behind that goes to its front, over the azimuth phi of the front."""
     return 1.0 - np.abs(phi) / np.pi
-
-
-def spread_back_azimuth(phi: Values) -> np.ndarray:
-    """The same for light from a half circle: the mean of `back_azimuth` over the half circle around phi (...)."""
-    phi = np.abs(phi)
-    return np.where(phi < 0.5 * np.pi, 0.75 - (phi / np.pi) ** 2, 0.25 + (1.0 - phi / np.pi) ** 2)
 
 
 def direct_part(count: Values) -> np.ndarray:
@@ -174,21 +170,40 @@ def direct_part(count: Values) -> np.ndarray:
     return np.exp(-np.asarray(count, float))
 
 
-def scattered_part(count: Values, a_f: np.ndarray) -> np.ndarray:
-    """Part (..., 3) that arrives through one strand or more, each passing on a_f (..., 3): the mean of a_f^k, k > 0."""
-    count = np.asarray(count, float)[..., None]
-    return np.exp(-count * (1.0 - a_f)) - np.exp(-count)
+def deep_hair(a_f: Values, a_b: Values) -> tuple[np.ndarray, np.ndarray]:
+    """(attenuation by one strand, reflectance) (...) of infinitely many strands: gamma and R of [Kubelka31]."""
+    attenuation = np.sqrt(np.maximum(np.square(1.0 - a_f) - np.square(a_b), _LEAST_ATTENUATION**2))
+    return attenuation, np.minimum(a_b / (1.0 - a_f + attenuation), _MOST_REFLECTANCE)
+
+
+def layer_parts(count: Values, attenuation: np.ndarray, reflectance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(transmitted, reflected) parts (..., 3) of light by a mean of `count` (...) strands of `deep_hair` (..., 3)."""
+    left = np.exp(-attenuation * np.asarray(count, float)[..., None])
+    turned = np.square(reflectance)
+    kept = 1.0 - turned * np.square(left)
+    return (1.0 - turned) * left / kept, reflectance * (1.0 - np.square(left)) / kept
+
+
+def fluxes(front: Values, behind: Values, a_f: np.ndarray, a_b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(onward, backward) light (..., 3) at a strand between means of `front` and `behind` (...) others.
+
+    Parts of what arrives at the first strand; nothing comes from behind the last.
+    """
+    deep = deep_hair(a_f, a_b)
+    transmitted, reflected = layer_parts(front, *deep)
+    _through, returned = layer_parts(behind, *deep)
+    onward = transmitted / (1.0 - reflected * returned)
+    return onward, onward * returned
 
 
 def sample_radiance(
     tables: lookup_tables.Tables,
     dual: DualTables,
     angles: FibreAngles,
-    strand_count: Values,
-    *,
-    gain: float = BACK_GAIN,
+    front: Values,
+    behind: Values,
 ) -> np.ndarray:
-    """Radiance per irradiance (..., 3) of a strand behind a mean of `strand_count` (...) others.
+    """Radiance per irradiance (..., 3) of a strand between means of `front` and `behind` (...) others.
 
     Energy-conserving mode; what the shader computes from the tables.
     """
@@ -201,7 +216,7 @@ def sample_radiance(
         lookup_tables.sample(table, u, v) for table in (tables.n, tables.n_trt, dual.n_g, dual.n_g_trt)
     )
     quantity = {name: dual.at(name, angles.theta_i) for name in QUANTITIES}
-    return radiance(angles, settings, quantity, (n, n_trt, n_res), (n_g, n_g_trt, n_res), strand_count, gain=gain)
+    return radiance(angles, settings, quantity, (n, n_trt, n_res), (n_g, n_g_trt, n_res), front, behind)
 
 
 def radiance(
@@ -210,35 +225,38 @@ def radiance(
     quantity: dict[str, np.ndarray],
     n: tuple[np.ndarray, ...],
     n_g: tuple[np.ndarray, ...],
-    strand_count: Values,
+    front: Values,
+    behind: Values,
     *,
     roughness: Values | None = None,
-    gain: float = BACK_GAIN,
 ) -> np.ndarray:
-    """Radiance per irradiance (..., 3) of a strand behind a mean of `strand_count` (...) others.
+    """Radiance per irradiance (..., 3) of a strand between means of `front` and `behind` (...) others.
 
     The irradiance is that outside the hair. quantity: {name: (..., 3)} of the strands around, at theta_i; n, n_g: what
-    `energy_conserving.lobe_sum` takes beside M, for light from one direction and from a half circle; roughness: (...)
-    of strands that differ in it; gain: of what comes back from behind. Shifts and widths are the mean over the
-    channels, which differ little in them.
+    `energy_conserving.lobe_sum` takes beside M, for light from one direction and scattered forward; roughness: (...) of
+    strands that differ in it. Widths are the mean over the channels, which differ little in them.
     """
-    back = quantity["back"] * gain / np.pi
-    beta_f, back_shift, back_width = (quantity[name].mean(axis=-1) for name in ("beta_f", "back_shift", "back_width"))
-    spread = np.asarray(strand_count, float) * np.square(beta_f)
-
-    def back_lobe(variance):
-        turned = angles.theta_o - 2.0 * back_shift
-        return d_eon_lobe(
-            np.sin(angles.theta_i), np.cos(angles.theta_i), np.sin(turned), np.abs(np.cos(turned)), variance
-        )
-
+    onward, backward = fluxes(front, behind, quantity["a_f"], quantity["a_b"])
+    direct = direct_part(front)[..., None]
+    beta_f, back_width = (quantity[name].mean(axis=-1) for name in ("beta_f", "back_width"))
     # Variances of theta_h are quarters of those of theta_i + theta_o.
+    spread = 4.0 * np.asarray(front, float) * np.square(beta_f)
     m = [
         energy_conserving.m_lobes(angles.theta_i, angles.theta_o, settings, roughness, widening)
-        for widening in (0.0, 4.0 * spread)
+        for widening in (0.0, spread)
     ]
-    back_direct = back_azimuth(angles.phi) * back_lobe(4.0 * back_width**2)
-    back_spread = spread_back_azimuth(angles.phi) * back_lobe(4.0 * (back_width**2 + spread))
-    direct = energy_conserving.lobe_sum(m[0], *n) + back * back_direct[..., None]
-    indirect = energy_conserving.lobe_sum(m[1], *n_g) + back * back_spread[..., None]
-    return direct_part(strand_count)[..., None] * direct + scattered_part(strand_count, quantity["a_f"]) * indirect
+    # Light that has turned is so wide that the lobes of this strand hardly matter: sigma_b counts its passage.
+    m_back = d_eon_lobe(
+        np.sin(angles.theta_i),
+        np.cos(angles.theta_i),
+        np.sin(angles.theta_o),
+        np.cos(angles.theta_o),
+        4.0 * np.square(back_width) + spread,
+    )
+    ahead = back_azimuth(angles.phi)[..., None]
+    returning = m_back[..., None] / np.pi * (quantity["a_f"] * ahead + quantity["a_b"] * (1.0 - ahead))
+    return (
+        direct * energy_conserving.lobe_sum(m[0], *n)
+        + (onward - direct) * energy_conserving.lobe_sum(m[1], *n_g)
+        + backward * returning
+    )

@@ -38,6 +38,7 @@ class StrandTables:
     dual: np.ndarray | None  # (G, 9, T, 3), of the energy-conserving mode
     returned: np.ndarray  # (32, T, 2)
     forward: np.ndarray  # (3,): passed on of even light, the mean over all strands
+    backward: np.ndarray  # (3,): sent back
 
     @property
     def settings(self) -> lookup_tables.Settings:
@@ -56,10 +57,12 @@ def bake(settings: lookup_tables.Settings, variation: strand_variation.Settings,
     gradient = np.linspace(0.0, 1.0, _GRADIENT_STEPS if variation.has_gradient else 1)
     around = strand_variation.sigma_a_along(variation, random, gradient[:, None])  # (G, R, 3)
     dual = _dual(slices, around) if settings.mode == "energy" else None
-    ahead, _behind = albedo.mean_parts(slices.lobes, settings)  # (K,)
     weights = _part_of_length(variation, gradient)
-    forward = np.einsum("grc,g->c", _at_absorptions(ahead, slices, around), weights) / len(random)
-    return StrandTables(slices, variation, dual, _returned(slices), forward)
+    forward, backward = (
+        np.einsum("grc,g->c", _at_absorptions(part, slices, around), weights) / len(random)
+        for part in albedo.mean_parts(slices.lobes, settings)  # (K,) each
+    )
+    return StrandTables(slices, variation, dual, _returned(slices), forward, backward)
 
 
 def _dual(slices, around):
@@ -108,10 +111,6 @@ def hair_return(
     v = (along * (_RETURN_STEPS - 1) + 0.5) / _RETURN_STEPS
     u = np.broadcast_to((np.asarray(theta_o) / np.pi + 0.5)[..., None], v.shape)
     returned, towards = np.moveaxis(lookup_tables.sample(tables.returned, u, v), -1, 0)
-    if tables.dual is not None:
-        gradient = strand_variation.tip_gradient(variation.gradient_start, variation.gradient_end, position)
-        back = dual_scattering.BACK_GAIN * _quantity(tables, "back", theta_o, gradient)
-        returned, towards = returned + back, towards + albedo.BACK_TOWARDS * back
     return returned, np.clip(towards, -0.5 * returned, 0.5 * returned)
 
 
@@ -120,11 +119,10 @@ def sample_radiance(
     angles: FibreAngles,
     random: Values,
     position: Values,
-    strand_count: Values,
-    *,
-    gain: float = dual_scattering.BACK_GAIN,
+    front: Values,
+    behind: Values,
 ) -> np.ndarray:
-    """Radiance per irradiance (..., 3) at `FibreAngles` (...) of strands behind a mean of `strand_count` (...).
+    """Radiance per irradiance (..., 3) at `FibreAngles` (...) of strands between means of `front` and `behind` (...).
 
     random, position (...): of the strands. Energy-conserving mode; what the shader computes from the tables.
     """
@@ -137,7 +135,7 @@ def sample_radiance(
     n, n_g = (absorption_slices.sample_lobes(texels, slices.range, *at, sigma_a) for texels in (slices.n, slices.n_g))
     gradient = strand_variation.tip_gradient(variation.gradient_start, variation.gradient_end, position)
     quantity = {name: _quantity(tables, name, angles.theta_i, gradient) for name in dual_scattering.QUANTITIES}
-    return dual_scattering.radiance(angles, settings, quantity, n, n_g, strand_count, roughness=roughness, gain=gain)
+    return dual_scattering.radiance(angles, settings, quantity, n, n_g, front, behind, roughness=roughness)
 
 
 def _quantity(tables, name, theta, gradient):

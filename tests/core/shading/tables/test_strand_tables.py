@@ -39,14 +39,14 @@ def test_dyed_hair_scatters_as_hair_of_that_colour(rng, position):
     sigma_a = strand_variation.strand_sigma_a(tables.variation, 0.5, position)
     of_one = exact(tables, sigma_a)
     dual = dual_scattering.bake(of_one)
-    at, strand_count = random_angles(rng), rng.uniform(0.0, 6.0, COUNT)
-    found = strand_tables.sample_radiance(tables, at, np.full(COUNT, 0.5), np.full(COUNT, position), strand_count)
-    expected = dual_scattering.sample_radiance(of_one, dual, at, strand_count)
+    at, (front, behind) = random_angles(rng), rng.uniform(0.0, 6.0, (2, COUNT))
+    found = strand_tables.sample_radiance(tables, at, np.full(COUNT, 0.5), np.full(COUNT, position), front, behind)
+    expected = dual_scattering.sample_radiance(of_one, dual, at, front, behind)
     np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-4)
     theta = dual_scattering.light_inclinations()
     returned = strand_tables.hair_return(tables, theta, np.full(len(theta), 0.5), np.full(len(theta), position))
     # The second is a small difference of large parts.
-    np.testing.assert_allclose(returned, albedo.azimuthal_moments(of_one, dual), rtol=5e-3, atol=2e-3)
+    np.testing.assert_allclose(returned, albedo.azimuthal_moments(of_one), rtol=5e-3, atol=2e-3)
 
 
 def test_smaller_slices_than_tables_leave_three_parts_in_a_thousand(rng):
@@ -54,7 +54,7 @@ def test_smaller_slices_than_tables_leave_three_parts_in_a_thousand(rng):
     assert tables.settings.size == strand_tables.GREATEST_SIZE < 256
     of_one = lookup_tables.bake(replace(tables.settings, size=256, sigma_a=appearance.sigma_a(DYED)))
     at, still = random_angles(rng), np.zeros(COUNT)
-    found = strand_tables.sample_radiance(tables, at, still, still, still, gain=0.0)
+    found = strand_tables.sample_radiance(tables, at, still, still, still, still)
     expected = lookup_tables.sample_radiance(of_one, at)
     assert np.abs(found - expected).max() < 3e-3 * expected.max()
 
@@ -100,7 +100,7 @@ def test_strands_that_let_no_blue_through_keep_their_red(rng):
     look = Appearance(parametrization="ABSORPTION", absorption=(0.3, 1.0, 900.0), random_color=1.0, tip_absorption=10.0)
     tables = bake(look)
     at, still = random_angles(rng), np.zeros(COUNT)
-    found = strand_tables.sample_radiance(tables, at, still + 0.5, still, still, gain=0.0)
+    found = strand_tables.sample_radiance(tables, at, still + 0.5, still, still, still)
     of_one = exact(tables, strand_variation.strand_sigma_a(tables.variation, 0.5, 0.0))
     expected = lookup_tables.sample_radiance(of_one, at)
     np.testing.assert_allclose(found, expected, rtol=0.02, atol=2e-4)
@@ -121,3 +121,4 @@ def test_devices_bake_the_same_tables(mode, device):
     np.testing.assert_allclose(found.slices.n, expected.slices.n, rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(found.returned, expected.returned, rtol=1e-4, atol=1e-5)
     np.testing.assert_allclose(found.forward, expected.forward, rtol=1e-4)
+    np.testing.assert_allclose(found.backward, expected.backward, rtol=1e-4)
