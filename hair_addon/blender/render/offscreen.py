@@ -5,7 +5,6 @@ from pathlib import Path
 
 import bpy
 import gpu
-import numpy as np
 
 from ...core.errors import HairError
 from ...core.files.whole_file import whole_file

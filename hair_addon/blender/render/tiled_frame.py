@@ -32,7 +32,8 @@ class Frame:
     def expose(self, drawn, world_to_view, view_to_clip, motion=None, lens=None):
         """Draw a moment: a generator that yields after each pass, so that whoever draws may stop.
 
-        drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector"; lens: `Lens`, None: all in focus.
+        drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector"; lens: `Lens`, None: all
+        in focus.
         """
         for tile in self._tiles:
             if self._film is None or self._film.size != tile[2:]:

@@ -54,7 +54,7 @@ def _radical_inverse(index: int, base: int) -> float:
 
 
 def _disk_point(square):
-    """(2,) in the unit square → (2,) in the unit disk: the same share of the area, squares become rings (Shirley, Chiu 1997)."""
+    """(2,) in the unit square → (2,) in the unit disk: areas in proportion (Shirley, Chiu 1997)."""
     a, b = 2.0 * square - 1.0
     if a == 0.0 and b == 0.0:
         return np.zeros(2)
