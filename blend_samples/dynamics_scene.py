@@ -33,7 +33,6 @@ STIFFNESS = 20.0  # of bending: softer guides of this length that rise at the pa
 def build(strand_count=STRAND_COUNT):
     """The head with hair that simulates, seen from behind; returns the objects of head, guides and hair."""
     skull = head.build()
-    skull.modifiers["Subdivision"].levels = skull.modifiers["Subdivision"].render_levels = 1
     guides, hair = head.grow(skull, guide_count=GUIDE_COUNT, strand_count=strand_count)
     api.change_guides(guides, "LENGTH", factor=LONGER)
     head.light()

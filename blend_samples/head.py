@@ -53,7 +53,9 @@ def build():
     head.data.materials.append(skin())
     _add_scalp(head)
     subdivision = head.modifiers.new("Subdivision", "SUBSURF")
-    subdivision.levels = subdivision.render_levels = 2
+    subdivision.levels = subdivision.render_levels = 1
+    # Applied, as strands turn with their roots where a modifier moves these: locks would fan out.
+    bpy.ops.object.modifier_apply(modifier=subdivision.name)
     bpy.context.view_layer.update()
     return head
 

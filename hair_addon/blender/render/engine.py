@@ -10,7 +10,7 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.imaging import pixel_sampling
 from ...core.long_work import Stopped, no_progress
-from ..data import scene
+from ..data import camera_lens, scene
 from ..gpu import drawing, world_texture
 from ..groom import frame_folders
 from ..host import scene_time
@@ -86,7 +86,10 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         sample_count = view_layer.samples or blender_scene.vellus.sample_count
         passes = _passes(view_layer, blender_scene.render.use_motion_blur)
         film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
-        frame = Frame(size, window, -(-sample_count // len(offsets)), *film_settings)
+        camera_object = self.camera_override
+        has_lens = camera_lens.read_lens(blender_scene, depsgraph, camera_object) is not None
+        lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
+        frame = Frame(size, window, -(-sample_count // len(offsets)), *film_settings, lens_passes)
         others = self._others(depsgraph, size) if "Vector" in passes else []
         world_texture.check_image()
         known, refused, done, in_all = {}, {}, 0, frame.pass_count * len(offsets)
@@ -95,13 +98,14 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             self.update_stats("", said)
             with drawing.ALONE:
                 drawn = drawn_scene.read_render(depsgraph, known, refused.__setitem__)
-                camera = scene.read_camera(blender_scene, depsgraph, *size, self.camera_override)
+                camera = scene.read_camera(blender_scene, depsgraph, *size, camera_object)
+                lens = camera_lens.read_lens(blender_scene, depsgraph, camera_object)
                 moving = (
                     motion_vectors.Motion(others[0], motion_vectors.places(drawn, *camera), others[1], size)
                     if others
                     else None
                 )
-            for _pass in frame.expose(drawn, *camera, moving):
+            for _pass in frame.expose(drawn, *camera, moving, lens):
                 done += 1
                 if not bpy.app.background:
                     time.sleep(_TURN)

@@ -65,12 +65,15 @@ class Film:
         if self._depth is not None:
             self._depth.clear(format="FLOAT", value=(0.0, FAR, 0.0, 0.0))
 
-    def add_pass(self, drawn, world_to_view, view_to_clip, size, turn, place=(0, 0)):
+    def add_pass(self, drawn, world_to_view, view_to_clip, size, turn, place=(0, 0), lens=None):
         """Draw a `DrawnScene` once.
 
         world_to_view, view_to_clip: (4, 4); size: (width, height) of the whole picture [pixels]; turn: which of all
-        passes over it this is; place: (left, bottom) of the tile in it [pixels].
+        passes over it this is; place: (left, bottom) of the tile in it [pixels]; lens: a `Lens`, through another point
+        of which each pass looks, None: all in focus.
         """
+        if lens is not None:
+            world_to_view = lens.world_to_view(world_to_view, turn)
         whole = tuple(length * self._per_side for length in size)
         corner = (length * self._per_side - self._margin for length in place)
         view = drawing.pass_record(world_to_view, view_to_clip, whole, turn, (*corner, *self._samples.size))

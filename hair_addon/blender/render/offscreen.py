@@ -5,15 +5,14 @@ from pathlib import Path
 
 import bpy
 import gpu
-import numpy as np
 
 from ...core.errors import HairError
 from ...core.files.whole_file import whole_file
 from ...core.imaging.pixel_sampling import MOST_DRAWN
 from ...core.long_work import Stage, run_now
-from ..data import scene
-from ..gpu import drawing, visibility_buffer, world_texture
-from . import drawn_scene
+from ..data import camera_lens, scene
+from ..gpu import drawing, world_texture
+from . import drawn_scene, film
 
 
 def draw_picture(settings):
@@ -31,34 +30,27 @@ def drawing_picture(settings):
             f"{settings.width} × {settings.height} pixels exceed {MOST_DRAWN} a side: use fewer, or render a frame."
         )
     _start_gpu()
-    samples = settings.samples_per_side
-    width, height = settings.width * samples, settings.height * samples
-    largest = gpu.capabilities.max_texture_size_get()
-    if max(width, height) > largest:
-        raise HairError(f"{width} × {height} samples exceed the graphics driver's {largest} a side: use fewer.")
-    yield Stage("Drawing shadows", 0.0)
-    world_texture.check_image()
     context = bpy.context
     depsgraph = context.evaluated_depsgraph_get()
-    world_to_view, view_to_clip = scene.read_camera(context.scene, depsgraph, settings.width, settings.height)
-    view = drawing.pass_record(world_to_view, view_to_clip, (width, height))
+    lens = camera_lens.read_lens(context.scene, depsgraph)
+    per_side, pass_count = settings.samples_per_side, 1
+    if lens is not None:  # a pass for each of its points
+        per_side, pass_count = 1, per_side**2
+    width, height = size = settings.width, settings.height
+    largest = gpu.capabilities.max_texture_size_get()
+    if max(size) * per_side > largest:
+        sentence = f"{width * per_side} × {height * per_side} samples exceed the graphics driver's {largest} a side"
+        raise HairError(f"{sentence}: use fewer.")
+    yield Stage("Drawing shadows", 0.0)
+    world_texture.check_image()
+    camera = scene.read_camera(context.scene, depsgraph, width, height)
     drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
-    buffer = visibility_buffer.VisibilityBuffer(width, height)
-    yield Stage("Drawing surfaces", 0.4)
-    drawn_scene.draw_behind_hair(drawn, view, buffer, settings.is_transparent)
-    yield Stage("Drawing hair", 0.5)
-    drawn_scene.draw_hair(drawn, view, buffer)
-    return _resolved(buffer, settings)
-
-
-def _resolved(buffer, settings):
-    """The means of a buffer's samples over pixels, as an array."""
-    resolved = gpu.types.GPUTexture((settings.width, settings.height), format="RGBA32F")
-    target = gpu.types.GPUFrameBuffer(color_slots=resolved)
-    with target.bind():
-        drawing.resolve(buffer.color, settings.samples_per_side)
-        pixels = target.read_color(0, 0, settings.width, settings.height, 4, 0, "FLOAT")
-    return np.array(pixels, np.float32).reshape(settings.height, settings.width, 4)
+    picture = film.Film(size, per_side, ("Combined",), settings.is_transparent)
+    for turn in range(pass_count):
+        yield Stage("Drawing", 0.4 + 0.6 * turn / pass_count)
+        with drawing.ALONE:
+            picture.add_pass(drawn, *camera, size, turn, lens=lens)
+    return picture.read()["Combined"]
 
 
 def _start_gpu():

@@ -12,12 +12,13 @@ class Frame:
     """Arrays {pass: (height, width, channels) float32} of a window of a picture, first row at the bottom.
 
     size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of what is rendered;
-    sample_count: of a pixel in each moment; passes, is_transparent, filter_width: of `film.Film`.
+    sample_count: of a pixel in each moment; passes, is_transparent, filter_width: of `film.Film`; lens_passes: how many
+    passes a moment has at least, for depth of field.
     """
 
-    def __init__(self, size, window, sample_count, passes, is_transparent, filter_width=0.0):
+    def __init__(self, size, window, sample_count, passes, is_transparent, filter_width=0.0, lens_passes=1):
         self._size, self._window = size, window
-        self._per_side = pixel_sampling.samples_per_side(sample_count)
+        self._per_side = pixel_sampling.samples_per_side(sample_count, lens_passes)
         self._turns = sample_count // self._per_side**2
         self._tiles = pixel_sampling.tiles(window, film.largest_tile(self._per_side, filter_width))
         self._new_film = lambda tile: film.Film(tile[2:], self._per_side, passes, is_transparent, filter_width)
@@ -28,10 +29,11 @@ class Frame:
         """Number of passes per motion sample."""
         return len(self._tiles) * self._turns
 
-    def expose(self, drawn, world_to_view, view_to_clip, motion=None):
+    def expose(self, drawn, world_to_view, view_to_clip, motion=None, lens=None):
         """Draw a moment: a generator that yields after each pass, so that whoever draws may stop.
 
-        drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector".
+        drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector"; lens: `Lens`, None: all
+        in focus.
         """
         for tile in self._tiles:
             if self._film is None or self._film.size != tile[2:]:
@@ -41,8 +43,9 @@ class Frame:
             for turn in range(self._turns):
                 with drawing.ALONE:
                     turns_before = self._moment_count * self._turns
-                    camera = world_to_view, view_to_clip
-                    self._film.add_pass(drawn, *camera, self._size, turns_before + turn, tile[:2])
+                    self._film.add_pass(
+                        drawn, world_to_view, view_to_clip, self._size, turns_before + turn, tile[:2], lens
+                    )
                 yield
             with drawing.ALONE:
                 self._add(tile, self._film.read())

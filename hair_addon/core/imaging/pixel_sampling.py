@@ -11,6 +11,7 @@ from ..params import Settings, param
 FIRST_FRAME, LAST_FRAME = -1_048_574, 1_048_574  # Blender's MINAFRAME and MAXFRAME
 
 _MOST_PER_SIDE = 4
+LENS_PASSES = 32  # of a picture with depth of field, at least: each looks through one point of the lens
 
 
 @dataclass(frozen=True)
@@ -68,9 +69,13 @@ class PassSettings(Settings):
     )
 
 
-def samples_per_side(sample_count: int) -> int:
-    """Along each side of a pixel in each pass over a picture: as many as make up the samples in whole passes."""
-    return next(side for side in range(_MOST_PER_SIDE, 0, -1) if sample_count % side**2 == 0)
+def samples_per_side(sample_count: int, least_passes: int = 1) -> int:
+    """Along each side of a pixel in each pass over a picture: as many as make up the samples in whole passes.
+
+    least_passes: how many passes there are at least, if there are that many samples.
+    """
+    sides = range(_MOST_PER_SIDE, 1, -1)
+    return next((n for n in sides if sample_count % n**2 == 0 and sample_count >= least_passes * n**2), 1)
 
 
 def filter_margin(side: int, width: float) -> int:
