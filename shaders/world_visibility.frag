@@ -18,9 +18,14 @@ void main()
     vec3 at;
     float depth;
     float seen = light.power.x;  // the direction's part of the sphere, six times
+    float past_hair = 1.0;
     if (shadow_place(light, position, at, depth)) {
-      seen *= lit_part(at, depth) * exp(-view.seen_opacity * crossed_strands(at, depth));
+      seen *= lit_part(at, depth);
+      past_hair = exp(-view.seen_opacity * crossed_strands(at, depth));
     }
+    // Over all directions: without hair, and with it.
+    seen_z.zw += seen * vec2(1.0, past_hair);
+    seen *= past_hair;
     vec3 share = seen * light.axis.xyz * light.axis.xyz;
     vec3 plus = share * vec3(lessThan(light.axis.xyz, vec3(0.0)));  // lights shine along their axis
     vec3 minus = share * vec3(greaterThan(light.axis.xyz, vec3(0.0)));

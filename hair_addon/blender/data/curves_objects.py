@@ -36,6 +36,27 @@ def render(curves_object, is_rendered):
         setattr(curves_object, f"visible_{ray}", is_rendered)
 
 
+_RAYS_BEFORE = "vellus_rays"  # custom property: which kinds of rays saw an object before it was hidden
+
+
+def hide_from_engines(curves_object, is_seen_by_rays):
+    """Hide an object from the cameras of Cycles and EEVEE, and from all their rays unless `is_seen_by_rays`."""
+    if _RAYS_BEFORE not in curves_object:
+        curves_object[_RAYS_BEFORE] = [int(getattr(curves_object, f"visible_{ray}")) for ray in _RAYS]
+    for ray, was_seen in zip(_RAYS, curves_object[_RAYS_BEFORE], strict=True):
+        is_seen = bool(was_seen) and is_seen_by_rays and ray != "camera"
+        if getattr(curves_object, f"visible_{ray}") != is_seen:
+            setattr(curves_object, f"visible_{ray}", is_seen)
+
+
+def show_again(curves_object):
+    """Undo `hide_from_engines`."""
+    if _RAYS_BEFORE in curves_object:
+        for ray, was_seen in zip(_RAYS, curves_object[_RAYS_BEFORE], strict=True):
+            setattr(curves_object, f"visible_{ray}", bool(was_seen))
+        del curves_object[_RAYS_BEFORE]
+
+
 def keep_rest(surface_object):
     """Let Blender store the rest positions of a surface's vertices, on which strands are rooted."""
     if not surface_object.add_rest_position_attribute:
