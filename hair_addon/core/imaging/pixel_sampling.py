@@ -40,7 +40,7 @@ class RenderSettings(Settings):
     composite_shadow: str = param(
         "PASS",
         "How hair darkens surfaces that another engine renders",
-        label="Shadow on Surfaces",
+        label="Surface Shadow",
         choices=(
             ("PASS", "Pass", "Multiply the surfaces by the light that Vellus finds hair to leave on them"),
             ("ENGINE", "Render Engine", "Cycles or EEVEE renders the shadows, reflections and light of its own hair"),
