@@ -5,7 +5,7 @@ void main()
 {
   ivec2 texel = ivec2(gl_VertexID % view.row_strands, gl_VertexID / view.row_strands);
   corner_seen_x_y = texelFetch(visibility_x_y, texel, 0);
-  corner_seen_z = texelFetch(visibility_z, texel, 0).xy;
+  corner_seen_z = texelFetch(visibility_z, texel, 0);
   surface_normal = normal;
   surface_uv = uv;
   drawn_position = position;

@@ -39,7 +39,7 @@ void main()
 
   mat3 plus;
   mat3 minus;
-  world_sides(corner_seen_x_y, corner_seen_z, view.seen_opacity, view.hair_forward.rgb, plus, minus);
+  world_sides(corner_seen_x_y, corner_seen_z.xy, view.seen_opacity, view.hair_forward.rgb, plus, minus);
   vec3 irradiance = surface_irradiance(plus, minus, N);
   vec3 highlight = reflected * surface_irradiance(plus, minus, reflect(-V, N)) / PI;
   for (int index = 0; index < lights.count; index++) {

@@ -17,6 +17,7 @@ void main()
   int point = min((cell.x - strand * view.seen_points) * SEEN_STEP, view.point_count - 1);
   vec3 position = place_of(strand, point, cell.y);
   vec3 along = place_of(strand, point + 1, cell.y) - place_of(strand, point - 1, cell.y);
+  bool is_strand = view.point_count > 1;
   vec3 T = along * inversesqrt(max(dot(along, along), 1e-20));
   vec3 root = place_of(strand, 1, cell.y) - place_of(strand, 0, cell.y);
   vec3 R = root * inversesqrt(max(dot(root, root), 1e-20));
@@ -28,21 +29,26 @@ void main()
     vec3 at;
     float depth;
     float weight = light.power.x;  // the direction's part of the sphere, six times
-    float seen = weight;
-    float seen_behind = weight;
+    float open = weight;  // past surfaces
+    float past_hair = 1.0;
+    float left = 1.0;
     if (shadow_place(light, position, at, depth)) {
-      float bias = view.point_count > 1 ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
+      float bias = is_strand ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
       Beyond beyond = look_beyond(light, at, depth, -light.axis.xyz);
-      seen *= lit_part(at, depth, bias) * exp(-view.seen_opacity * crossed_strands(at, depth));
-      float left = exp(-view.seen_opacity * beyond.strands);
-      seen_behind = seen * left;
+      open *= lit_part(at, depth, bias);
+      past_hair = exp(-view.seen_opacity * crossed_strands(at, depth));
+      left = exp(-view.seen_opacity * beyond.strands);
       // Through the hair to the surface, and back.
       seen_surface += weight * beyond.surface * left * left * vec4(light.axis.xyz, 1.0);
     }
+    float seen = open * past_hair;
     vec3 share = seen * light.axis.xyz * light.axis.xyz;
     vec3 plus = share * vec3(lessThan(light.axis.xyz, vec3(0.0)));  // lights shine along their axis
     vec3 minus = share * vec3(greaterThan(light.axis.xyz, vec3(0.0)));
     seen_x_y += vec4(plus.x, minus.x, plus.y, minus.y);
-    seen_z += vec4(plus.z, minus.z, seen_behind, -seen * dot(T, light.axis.xyz));
+    // Strands: through the hair behind them, and along them. Points of surfaces: over all directions without hair, and
+    // with it.
+    vec2 others = is_strand ? seen * vec2(left, -dot(T, light.axis.xyz)) : open * vec2(1.0, past_hair);
+    seen_z += vec4(plus.z, minus.z, others);
   }
 }

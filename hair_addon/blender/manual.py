@@ -56,6 +56,7 @@ _OPERATORS = {
     "lookup_tables": ("bake_tables",),
     "systems": ("delete_system",),
     "use_as_guides": ("use_as_guides",),
+    "rendering": ("toggle_composite",),
     "output": ("render_picture", "save_groom_settings", "load_groom_settings"),
 }
 

@@ -24,16 +24,45 @@ def link_object(name, curves, surface_object, is_rendered=True):
     curves_object = bpy.data.objects.new(name, curves)
     curves_object.parent = surface_object
     render(curves_object, is_rendered)
+    if is_rendered:
+        _draw_thin(bpy.context.scene)
     collections = surface_object.users_collection or (bpy.context.scene.collection,)
     collections[0].objects.link(curves_object)
     follow_nodes.add_modifier(curves_object)
     return curves_object
 
 
+def _draw_thin(blender_scene):
+    """Let EEVEE draw strands as thin as they are: by Blender's default it draws lines a pixel wide or wider."""
+    if blender_scene.render.hair_type == "STRAND":
+        blender_scene.render.hair_type = "STRIP"
+
+
 def render(curves_object, is_rendered):
     """Show or hide an object in Cycles and EEVEE by ray visibility: objects disabled in renders are not exported."""
     for ray in _RAYS:
         setattr(curves_object, f"visible_{ray}", is_rendered)
+
+
+_RAYS_BEFORE = "vellus_rays"  # custom property: which kinds of rays saw an object before it was hidden
+
+
+def hide_from_engines(curves_object, is_seen_by_rays):
+    """Hide an object from the cameras of Cycles and EEVEE, and from all their rays unless `is_seen_by_rays`."""
+    if _RAYS_BEFORE not in curves_object:
+        curves_object[_RAYS_BEFORE] = [int(getattr(curves_object, f"visible_{ray}")) for ray in _RAYS]
+    for ray, was_seen in zip(_RAYS, curves_object[_RAYS_BEFORE], strict=True):
+        is_seen = bool(was_seen) and is_seen_by_rays and ray != "camera"
+        if getattr(curves_object, f"visible_{ray}") != is_seen:
+            setattr(curves_object, f"visible_{ray}", is_seen)
+
+
+def show_again(curves_object):
+    """Undo `hide_from_engines`."""
+    if _RAYS_BEFORE in curves_object:
+        for ray, was_seen in zip(_RAYS, curves_object[_RAYS_BEFORE], strict=True):
+            setattr(curves_object, f"visible_{ray}", bool(was_seen))
+        del curves_object[_RAYS_BEFORE]
 
 
 def keep_rest(surface_object):

@@ -42,6 +42,11 @@ def read_drawn_meshes(depsgraph, viewport=None):
     return [mesh for mesh in meshes if len(mesh.positions)]
 
 
+def held_out(meshes):
+    """The same meshes as holdouts, without those that are clear, which hide nothing."""
+    return [replace(mesh, parts=None) for mesh in meshes if not mesh.is_clear]
+
+
 def owner_of(instance):
     """A key of a depsgraph instance, the same in every frame."""
     parent = instance.parent.original.session_uid if instance.is_instance else 0

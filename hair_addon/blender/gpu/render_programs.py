@@ -47,6 +47,19 @@ def surface_arrival_program():
     return shaders.compile_drawing(info, "surface.vert", "surface_arrival.frag")
 
 
+@shaders.kept
+def hair_shadow_program(fragment="hair_shadow.frag"):
+    """The program of the light that hair leaves on surfaces: attributes position, normal, uv; see hair_shadow.frag."""
+    info, varying = shaders.surface_info()
+    shaders.declare_scene(info)
+    info.vertex_in(2, "VEC2", "uv")
+    varying.smooth("VEC4", "corner_seen_x_y")
+    varying.smooth("VEC4", "corner_seen_z")
+    varying.smooth("VEC2", "surface_uv")
+    info.vertex_out(varying)
+    return shaders.compile_drawing(info, "lit_surface.vert", fragment)
+
+
 MOTION_FORMAT = "RGBA32F"  # of how far things move
 
 

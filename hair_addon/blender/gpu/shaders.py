@@ -204,7 +204,7 @@ def surface_program():
     for slot, name in enumerate(names, start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
     varying.smooth("VEC4", "corner_seen_x_y")
-    varying.smooth("VEC2", "corner_seen_z")
+    varying.smooth("VEC4", "corner_seen_z")
     varying.smooth("VEC2", "surface_uv")
     info.vertex_out(varying)
     return compile_drawing(info, "lit_surface.vert", "surface.frag")

@@ -94,15 +94,19 @@ class VisibilityBuffer:
         """[(first, count)] of the segments of each hair that was found last."""
         return [(placed.first, placed.segment_count) for placed in self._hair]
 
-    def surfaces_of_part(self, texture_format=shaders.PICTURE_FORMAT):
-        """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`."""
+    def surfaces_of_part(self, texture_format=shaders.PICTURE_FORMAT, background=_NOTHING):
+        """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`, `part`."""
         if texture_format not in self._parts:
             # A framebuffer does not own its textures.
             texture = gpu.types.GPUTexture(self.size, format=texture_format)
             depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
             framebuffer = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
             self._parts[texture_format] = framebuffer, texture, depth
-        return drawing.cleared(self._parts[texture_format][0], _NOTHING)
+        return drawing.cleared(self._parts[texture_format][0], background)
+
+    def part(self, texture_format=shaders.PICTURE_FORMAT):
+        """The texture of `surfaces_of_part`."""
+        return self._parts[texture_format][1]
 
     def part_by(self, program, texture_format=shaders.PICTURE_FORMAT, inputs=None):
         """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.

@@ -9,6 +9,7 @@ from ..groom import bindings, pipeline
 from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
+from ..render import composite
 from ..settings import animated
 from . import every_frame, invalidation, live_hair, reported, simulated_hair, unlocked_renders
 
@@ -28,6 +29,7 @@ def after_depsgraph_update(scene, depsgraph):
     invalidation.scene_changed(is_hair_only=_is_hair_only(depsgraph))
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
+        composite.follow(scene)
     if _is_opening:
         _is_opening = False
         return
@@ -181,8 +183,9 @@ def after_frame_change(scene, depsgraph):
 
 @persistent
 def before_reading(*_args):
-    """Write hair before its Curves are read by a save or a render."""
+    """Write hair before its Curves are read by a save or a render, and what a render reads of hair's own scene."""
     live_hair.write_all()
+    composite.follow_all()
 
 
 @persistent

@@ -134,6 +134,8 @@ def read_unlit(depsgraph, known, refused):
     """The same without lighting, for motion vectors."""
     found = list(_read_rendered_hair(depsgraph, known, refused))
     meshes = drawn_meshes.read_drawn_meshes(depsgraph)
+    if depsgraph.scene.vellus.is_hair_only:
+        meshes = drawn_meshes.held_out(meshes)
     hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)
     surface_owners = tuple(mesh.owner for mesh in meshes if not mesh.is_clear)
     surfaces, clear = _upload(meshes, is_shaded=True)
@@ -293,6 +295,24 @@ def draw_arrival(drawn, view, buffer):
             program = render_programs.surface_arrival_program()
             drawing.draw_triangles(surface.batch, program, view, drawn.lights, drawn.shadow_maps.samplers)
     return buffer.part_by(render_programs.strand_arrival_program())
+
+
+def draw_hair_shadow(drawn, view, buffer):
+    """Return a texture of the part of the light on surfaces that hair lets through; 1 where there is no surface."""
+    with buffer.surfaces_of_part(background=(1.0, 1.0, 1.0, 1.0)), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        draw_shaded_by_hair(drawn, view)
+    return buffer.part()
+
+
+def draw_shaded_by_hair(drawn, view, program=None):
+    """Draw all surfaces with what hair leaves of their light, by a program of `render_programs.hair_shadow_program`."""
+    _see_through_hair(drawn, view)
+    program = program or render_programs.hair_shadow_program()
+    for (surface, _parts), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=False):
+        placed = view.copy()
+        placed["row_strands"] = surface.row_corners
+        samplers = drawn.shadow_maps.samplers | seen
+        drawing.draw_triangles(surface.batch, program, placed, drawn.lights, samplers)
 
 
 def _see_through_hair(drawn, view):

@@ -164,6 +164,8 @@ def _passes(view_layer, is_blurred):
         names.append("Hair Mask")
     if wanted.has_lobes:
         names += film.LOBES
+    if wanted.has_hair_shadow:
+        names.append("Hair Shadow")
     return names
 
 

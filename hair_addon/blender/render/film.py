@@ -40,7 +40,7 @@ def channels_of(name):
 class Film:
     """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
 
-    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Shadow", "Vector" or of `LOBES`;
+    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Hair Shadow", "Shadow", "Vector" or of `LOBES`;
     is_transparent: whether the background is left empty; filter_width: of `picture.filter_weights` [pixels]. motion:
     `motion.Motion` of a film with the pass "Vector".
     """
@@ -110,6 +110,8 @@ class Film:
             return motion_vectors.draw(drawn, self.motion, view, self._samples)
         if name == "Shadow":
             return drawn_scene.draw_arrival(drawn, view, self._samples)
+        if name == "Hair Shadow":
+            return drawn_scene.draw_hair_shadow(drawn, view, self._samples)
         return self._samples.part_of_light(*LOBES[name])
 
     def _add(self, program, samplers, sums):

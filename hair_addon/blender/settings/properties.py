@@ -96,6 +96,10 @@ def _renew_passes(_group, context):
     context.view_layer.update_render_passes()
 
 
+def _tag_scene(group, _context):
+    group.id_data.update_tag()
+
+
 def _all_but_wetness(settings_class):
     return set(setting_properties.names_of(settings_class)) - {"wetness"}
 
@@ -262,7 +266,12 @@ class VellusCurves(bpy.types.PropertyGroup):
 class VellusRenderSettings(bpy.types.PropertyGroup):
     """Render settings of Vellus"""
 
-    __annotations__ = setting_properties.annotations(RenderSettings)
+    __annotations__ = {
+        **setting_properties.annotations(RenderSettings, _tag_scene),
+        "hair_scene": bpy.props.PointerProperty(
+            description="Scene that renders the hair", type=bpy.types.Scene, options={"HIDDEN"}
+        ),
+    }
 
 
 class VellusPassSettings(bpy.types.PropertyGroup):

@@ -33,6 +33,21 @@ class RenderSettings(Settings):
         high=1024,
         soft_high=64,
     )
+    is_hair_only: bool = param(
+        False,
+        "Render hair without surfaces: they hide it and cast shadows on it, and leave the picture empty",
+        label="Hair Only",
+    )
+    composite_shadow: str = param(
+        "PASS",
+        "How hair darkens surfaces that another engine renders",
+        label="Surface Shadow",
+        choices=(
+            ("PASS", "Pass", "Multiply the surfaces by the light that Vellus finds hair to leave on them"),
+            ("ENGINE", "Render Engine", "Cycles or EEVEE renders the shadows, reflections and light of its own hair"),
+            ("NONE", "None", "Hair casts no shadow on surfaces"),
+        ),
+    )
 
 
 @dataclass(frozen=True)
@@ -66,6 +81,11 @@ class PassSettings(Settings):
         "Lighting of hair as passes that add up to it: reflection (R), transmission (TT), internal reflection (TRT), "
         "multiple scattering, and world light",
         label="Hair Lobes",
+    )
+    has_hair_shadow: bool = param(
+        False,
+        "Part of the light on surfaces that hair lets through: they are multiplied by it",
+        label="Hair Shadow",
     )
 
 

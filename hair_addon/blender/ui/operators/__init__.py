@@ -23,6 +23,7 @@ from .save_groom_settings import VELLUS_OT_save_groom_settings
 from .save_look import VELLUS_OT_save_look
 from .select_guides import VELLUS_OT_select_guides
 from .select_hair import VELLUS_OT_select_hair
+from .toggle_composite import VELLUS_OT_toggle_composite
 from .toggle_drawing import VELLUS_OT_toggle_drawing
 from .use_as_guides import VELLUS_OT_use_as_guides
 from .use_uv_map import VELLUS_OT_use_uv_map
@@ -51,6 +52,7 @@ CLASSES = (
     VELLUS_OT_remove_look,
     VELLUS_OT_bake_tables,
     VELLUS_OT_render_picture,
+    VELLUS_OT_toggle_composite,
     VELLUS_OT_save_groom_settings,
     VELLUS_OT_load_groom_settings,
 )

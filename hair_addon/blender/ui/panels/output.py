@@ -3,9 +3,11 @@
 
 import bpy
 
+from ....core.imaging.pixel_sampling import RenderSettings
 from ...groom.selection import hair_of
 from ...settings import animated
 from ...settings.translations import interface_text
+from .. import setting_rows
 from .tab import HairTab, write
 
 
@@ -20,6 +22,11 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         layout = self.layout
         layout.operator("vellus.render_picture", icon="IMAGE_DATA")
         layout.operator("vellus.toggle_drawing", icon="SHADING_RENDERED")
+        state = context.scene.vellus
+        is_on = state.hair_scene is not None
+        layout.operator("vellus.toggle_composite", icon="NODE_COMPOSITING", depress=is_on)
+        if is_on:
+            setting_rows.rows(layout, state, RenderSettings, ("composite_shadow", "sample_count"))
         row = layout.row(align=True)
         row.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
         row.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")

@@ -43,6 +43,7 @@ class VELLUS_PT_film(_OfEngine, bpy.types.Panel):
         layout, render = split(self.layout), context.scene.render
         layout.prop(render, "filter_size")
         layout.prop(render, "film_transparent", text="Transparent")
+        layout.prop(context.scene.vellus, "is_hair_only")
 
 
 class VELLUS_PT_motion_blur(_OfEngine, bpy.types.Panel):

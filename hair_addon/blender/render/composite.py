@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair by Vellus in the pictures that Cycles or EEVEE renders of a scene.
+
+A scene has one render engine, so hair is rendered by another scene, which has the first as its background set: it sees
+all of its objects in the same frames. The compositor lays its picture over the other. Hair is hidden from the first
+scene's engine for as long.
+"""
+
+import bpy
+
+from ...core.errors import HairError
+from ...core.imaging.pixel_sampling import RenderSettings
+from ..data import composite_nodes, curves_objects
+from ..settings import setting_properties
+from . import viewport
+
+_OF_SCENE = ("camera", "world", "frame_start", "frame_end", "frame_step")
+_OF_RENDER = (
+    *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
+    *("use_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y", "use_crop_to_border"),
+    *("fps", "fps_base", "filter_size", "use_multiview", "use_lock_interface"),
+    *("use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
+    *("use_simplify", "simplify_subdivision_render"),
+)
+_OWN = {"is_hair_only", "composite_shadow"}  # of the scene's settings of ours
+
+_COMPOSITED = "vellus_use_compositing"  # custom property of the hair's scene: what the render settings had
+
+
+def is_on(blender_scene):
+    """Whether hair is composited into a scene's pictures."""
+    return blender_scene.vellus.hair_scene is not None or composite_nodes.has_nodes(blender_scene)
+
+
+def turn_on(blender_scene):
+    """Composite hair into a scene's pictures. Raises `HairError`."""
+    if blender_scene.library is not None:
+        raise HairError("The scene is linked from another file and cannot be changed.")
+    if blender_scene.render.engine == viewport.ENGINE:
+        raise HairError("The render engine Vellus renders hair with its surfaces: choose Cycles or EEVEE.")
+    hair_scene = bpy.data.scenes.new(f"{blender_scene.name} Hair")
+    try:
+        _prepare(hair_scene, blender_scene)
+        composite_nodes.insert(blender_scene, hair_scene)
+    except HairError:
+        bpy.data.scenes.remove(hair_scene)
+        raise
+    hair_scene[_COMPOSITED] = blender_scene.render.use_compositing
+    blender_scene.render.use_compositing = True
+    blender_scene.vellus.hair_scene = hair_scene
+    follow(blender_scene)
+
+
+def turn_off(blender_scene):
+    """Leave everything as it was before `turn_on`, but for what the artist has changed since."""
+    hair_scene = blender_scene.vellus.hair_scene
+    composite_nodes.remove(blender_scene)
+    blender_scene.vellus.hair_scene = None
+    for hair_object in _hair_objects(blender_scene):
+        curves_objects.show_again(hair_object)
+    if hair_scene is None:
+        return
+    blender_scene.render.use_compositing = bool(hair_scene.get(_COMPOSITED, True))
+    if not any(other.vellus.hair_scene == hair_scene for other in bpy.data.scenes):
+        bpy.data.scenes.remove(hair_scene)
+
+
+def follow_all():
+    """`follow` every scene of the file."""
+    for blender_scene in bpy.data.scenes:
+        follow(blender_scene)
+
+
+def follow(blender_scene):
+    """Bring the scene of the hair, the compositor and the hair's visibility up to date with a scene.
+
+    What is up to date is not written.
+    """
+    state = blender_scene.vellus
+    hair_scene = state.hair_scene
+    if hair_scene is None or hair_scene == blender_scene:
+        return
+    is_ours = blender_scene.render.engine == viewport.ENGINE
+    _copy(blender_scene, hair_scene, _OF_SCENE)
+    _copy(blender_scene.render, hair_scene.render, _OF_RENDER)
+    _copy(state, hair_scene.vellus, [n for n in setting_properties.names_of(RenderSettings) if n not in _OWN])
+    _copy_cameras(blender_scene, hair_scene)
+    composite_nodes.adjust(blender_scene, state.composite_shadow == "PASS", not is_ours)
+    for hair_object in _hair_objects(blender_scene):
+        curves_objects.hide_from_engines(hair_object, is_seen_by_rays=state.composite_shadow == "ENGINE")
+
+
+def _prepare(hair_scene, blender_scene):
+    hair_scene.background_set = blender_scene
+    hair_scene.render.engine, hair_scene.render.film_transparent = viewport.ENGINE, True
+    hair_scene.vellus.is_hair_only = True
+    view_layer = hair_scene.view_layers[0]
+    view_layer.use_pass_z = view_layer.vellus.has_hair_shadow = True
+
+
+def _copy(source, target, names):
+    for name in names:
+        value = getattr(source, name)
+        if getattr(target, name) != value:
+            setattr(target, name, value)
+
+
+def _copy_cameras(blender_scene, hair_scene):
+    """Markers that change the camera."""
+    wanted = [(marker.frame, marker.camera) for marker in blender_scene.timeline_markers if marker.camera is not None]
+    if [(marker.frame, marker.camera) for marker in hair_scene.timeline_markers] != wanted:
+        hair_scene.timeline_markers.clear()
+        for frame, camera in wanted:
+            hair_scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+
+
+def _hair_objects(blender_scene):
+    """Objects of hair in a scene, and in collections that it has instances of."""
+    objects = {*blender_scene.objects}
+    objects |= {o for other in blender_scene.objects if other.instance_collection for o in _instanced(other)}
+    return [o for o in objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]
+
+
+def _instanced(instancer):
+    return instancer.instance_collection.all_objects
