@@ -56,7 +56,7 @@ _OPERATORS = {
     "lookup_tables": ("bake_tables",),
     "systems": ("delete_system",),
     "use_as_guides": ("use_as_guides",),
-    "output": ("render_picture", "save_groom_settings", "load_groom_settings"),
+    "output": ("render_picture", "export_groom", "save_groom_settings", "load_groom_settings"),
 }
 
 

@@ -12,13 +12,13 @@ objects, and in the end the archive.
 Headers are bits that say which type a property has and how many samples; `_property_header` packs them.
 """
 
-import math
 import struct
 from collections.abc import Buffer, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import BinaryIO
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from . import ogawa
 
@@ -89,20 +89,24 @@ class AlembicWriter:
         self._most_samples.append(0)
         return len(self._samplings) - 1
 
-    def scalar(self, name: str, type: str, value: object, metadata: Metadata | None = None) -> Property:
-        """Write a property of one value: a number or a sequence of numbers, or a str."""
-        values = [value] if isinstance(value, str) else np.atleast_1d(np.asarray(value, TYPES[type][2]))
-        made = Property(name, type, 1 if isinstance(value, str) else len(values), serialized(metadata))
-        self.add_sample(made, [_encoded(values)])
+    def scalar(self, name: str, type: str, value: ArrayLike, metadata: Metadata | None = None) -> Property:
+        """Write a property of one value: a number or a sequence of numbers."""
+        elements = np.atleast_1d(np.asarray(value, TYPES[type][2]))
+        made = Property(name, type, len(elements), serialized(metadata))
+        self.add_sample(made, [elements])
         return made
 
-    def array(self, name: str, type: str, values: object, metadata: Metadata | None = None) -> Property:
-        """Write an array property of one sample: (N,) or (N, extent) numbers, or a list of str."""
-        extent = 1 if type == "string" or np.ndim(values) == 1 else np.shape(values)[1]
-        made = Property(name, type, extent, serialized(metadata), is_array=True)
-        self.add_sample(
-            made, [_encoded(values if type == "string" else np.asarray(values, TYPES[type][2]))], len(values)
-        )
+    def array(self, name: str, type: str, values: ArrayLike, metadata: Metadata | None = None) -> Property:
+        """Write an array property of one sample: (N,) or (N, extent) numbers."""
+        elements = np.asarray(values, TYPES[type][2])
+        made = Property(name, type, 1 if elements.ndim == 1 else elements.shape[1], serialized(metadata), is_array=True)
+        self.add_sample(made, [elements])
+        return made
+
+    def strings(self, name: str, texts: Sequence[str], metadata: Metadata | None = None) -> Property:
+        """Write an array property of one sample of str, which have no null characters."""
+        made = Property(name, "string", 1, serialized(metadata), is_array=True)
+        self.add_sample(made, [_encoded(texts)], len(texts))
         return made
 
     def add_sample(self, target: Property, parts: Iterable[Buffer], count: int | None = None) -> None:
@@ -210,18 +214,16 @@ def _property_header(header, index):
 
 def serialized(metadata: Metadata | None) -> str:
     """Return metadata as the file has it: key=value, in order, with semicolons between."""
-    return ";".join(f"{key}={metadata[key]}" for key in sorted(metadata or {}))
+    return ";".join(f"{key}={value}" for key, value in sorted((metadata or {}).items()))
 
 
-def _encoded(values):
-    """The bytes of numbers, or of str that each end with a null."""
-    if isinstance(values, np.ndarray):
-        return np.ascontiguousarray(values)
-    return b"".join(text.encode() + b"\0" for text in values)
+def _encoded(texts):
+    """The bytes of str, which each end with a null."""
+    return b"".join(text.encode() + b"\0" for text in texts)
 
 
 def _bytes(parts: Iterable[Buffer]) -> Iterator[memoryview]:
     for part in parts:
-        view = memoryview(part)
-        if math.prod(view.shape):  # an empty view cannot be cast
+        view = memoryview(np.ascontiguousarray(part) if isinstance(part, np.ndarray) else part)
+        if view.nbytes:  # an empty view cannot be cast
             yield view.cast("B")

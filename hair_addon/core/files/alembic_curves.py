@@ -5,6 +5,7 @@ from collections.abc import Buffer, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from .alembic import TYPES, AlembicWriter, Object, Property, serialized
 
@@ -26,7 +27,7 @@ class Parameter:
     name: str
     type: str
     scope: str
-    parts: Iterable[np.ndarray | Sequence[str]]
+    parts: Iterable[ArrayLike]
     extent: int = 1
     meaning: str = ""
 
@@ -101,7 +102,7 @@ class CurvesWriter:
         }
         if parameter.type == "string":
             (texts,) = parameter.parts
-            return self._archive.array(parameter.name, "string", texts, metadata)
+            return self._archive.strings(parameter.name, texts, metadata)
         made = Property(parameter.name, parameter.type, parameter.extent, serialized(metadata), is_array=True)
         kind = TYPES[parameter.type][2]
         self._archive.add_sample(made, (np.ascontiguousarray(part, kind) for part in parameter.parts))

@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guides and strands as other programs take them: what each has, in parts, and what an importer makes of it."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..errors import HairError
+from ..shading.appearance import Appearance
 
 AT_ONCE = 16_384  # curves in a part: arrays of all of them would take several times their memory
 
@@ -20,9 +21,6 @@ MOST_CURVES_OF_GROUP = 2**22 - 1
 # Values of some curves: those of a slice of all.
 type Rows = Callable[[slice], np.ndarray]
 
-# A sentence with its values, which the interface translates.
-type Note = tuple[str, dict[str, object]]
-
 
 @dataclass(frozen=True)
 class GroomCurves:
@@ -30,7 +28,7 @@ class GroomCurves:
 
     first_id: identity of the first, the others' follow; widths: diameters (n, P), in the units of points; root_uvs:
     (S, 2), None without a UV map; guide_ids and guide_weights: (S, 3) as `closest_guides` gives them, None of guides;
-    colors: linear RGB (n, P, 3), and roughness (n, P), None if they are not exported.
+    colors: linear RGB (n, P, 3), and roughness (n, P), None if they are not exported; look: of strands.
     """
 
     group_id: int
@@ -45,6 +43,12 @@ class GroomCurves:
     guide_weights: np.ndarray | None = None
     colors: Rows | None = None
     roughness: Rows | None = None
+    look: Appearance | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of their object in a file."""
+        return guides_name(self.group_name) if self.is_guide else self.group_name
 
     @property
     def ids(self) -> np.ndarray:
@@ -101,60 +105,68 @@ class Check:
             self.no_length.update((chosen.start + np.flatnonzero(is_short)).tolist())
             yield part
 
-    def notes(self) -> Iterator[Note]:
-        """What an importer will do with these curves."""
+    def notes(self) -> Iterator[HairError]:
+        """What an importer will do with these curves, as sentences."""
         curves, name = self.curves, self.curves.group_name
         if self.no_length:
-            yield (
-                '"{name}": {count} strands have no length: importers leave them out, or warn.',
-                {"name": name, "count": len(self.no_length)},
+            count = len(self.no_length)
+            yield HairError(
+                '"{name}": {count} strands have no length: importers warn, or leave them out.', name=name, count=count
             )
         if curves.root_uvs is None:
-            yield (
-                '"{name}" has no UV coordinates of roots: Unreal computes some on a sphere. Give the surface a UV map.',
-                {"name": name},
+            yield HairError(
+                '"{name}" has no UV coordinates of roots: Unreal computes some. Give the surface a UV map.',
+                name=name,
             )
+        if curves.guide_weights is not None and not curves.guide_weights.any(axis=1).all():
+            count = int((~curves.guide_weights.any(axis=1)).sum())
+            yield HairError('"{name}": {count} strands follow no guide, and none moves them.', name=name, count=count)
         yield from limit_notes(name, curves.curve_count, curves.point_count)
-        if curves.guide_weights is not None:
-            alone = int((~curves.guide_weights.any(axis=1)).sum())
-            if alone:
-                yield (
-                    '"{name}": {count} strands follow no guide: Unreal does not move them.',
-                    {
-                        "name": name,
-                        "count": alone,
-                    },
-                )
 
 
-def limit_notes(name: str, curve_count: int, point_count: int) -> Iterator[Note]:
+def limit_notes(name: str, curve_count: int, point_count: int) -> Iterator[HairError]:
     """What Unreal will not hold of a group's guides or strands: that many curves, each of that many points."""
     if point_count > MOST_POINTS_OF_CURVE:
-        yield (
+        yield HairError(
             '"{name}" has {count} points a strand: Unreal keeps the first {most}.',
-            {"name": name, "count": point_count, "most": MOST_POINTS_OF_CURVE},
+            name=name,
+            count=point_count,
+            most=MOST_POINTS_OF_CURVE,
         )
     if curve_count > MOST_CURVES_OF_GROUP:
-        yield (
-            '"{name}" has {count} strands, and Unreal holds {most} in a group: use fewer.',
-            {"name": name, "count": curve_count, "most": MOST_CURVES_OF_GROUP},
+        yield HairError(
+            '"{name}" has {count} strands, but Unreal holds {most} in a group: divide the hair.',
+            name=name,
+            count=curve_count,
+            most=MOST_CURVES_OF_GROUP,
         )
     if curve_count * point_count > MOST_POINTS_OF_GROUP:
-        yield (
-            '"{name}" has {count} points, and Unreal holds {most} in a group: use fewer strands.',
-            {"name": name, "count": curve_count * point_count, "most": MOST_POINTS_OF_GROUP},
+        yield HairError(
+            '"{name}" has {count} points, but Unreal holds {most} in a group: use fewer strands or divide the hair.',
+            name=name,
+            count=curve_count * point_count,
+            most=MOST_POINTS_OF_GROUP,
         )
 
 
-def group_names(names: list[str]) -> list[str]:
-    """Return names of groups that differ, of letters, digits and underscores, as object names and Unreal take them."""
-    made = []
+def group_names(names: Sequence[str], reserved: Collection[str] = ()) -> list[str]:
+    """Return names of groups that differ, of letters, digits and underscores, as all programs take them.
+
+    With `guides_name` no two objects of a file are called the same. reserved: names that no group has.
+    """
+    made, taken = [], set(reserved)
     for name in names:
         kept = "".join(letter if letter.isascii() and letter.isalnum() else "_" for letter in name).strip("_") or "hair"
         kept = f"_{kept}" if kept[0].isdigit() else kept
         unique, number = kept, 1
-        while unique in made:
+        while not taken.isdisjoint({unique, guides_name(unique)}):
             number += 1
             unique = f"{kept}_{number}"
         made.append(unique)
+        taken |= {unique, guides_name(unique)}
     return made
+
+
+def guides_name(group_name: str) -> str:
+    """The name of the object of a group's guides; that of its strands is the group's."""
+    return f"{group_name}_guides"

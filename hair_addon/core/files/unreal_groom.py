@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from ..errors import HairError
 from . import groom_curves
 from .alembic import AlembicWriter
 from .alembic_curves import Curves, CurvesWriter, Parameter
@@ -36,9 +37,10 @@ class UnrealGroomWriter:
     def add(self, curves: GroomCurves, moves: bool = False) -> int:
         """Write all of some curves but their points; returns their number. moves: whether points of each time come."""
         writer = self._moving if moves else self._still
-        name = f"{curves.group_name}_guides" if curves.is_guide else curves.group_name
         width = Parameter("width", "float32", "vertex", _of_points(curves, curves.widths))
-        self._added.append((writer.add(name, curves.point_counts, width, _parameters(curves)), writer, Check(curves)))
+        self._added.append(
+            (writer.add(curves.name, curves.point_counts, width, _parameters(curves)), writer, Check(curves))
+        )
         return len(self._added) - 1
 
     def write_points(self, number: int, points: Rows) -> None:
@@ -46,7 +48,7 @@ class UnrealGroomWriter:
         curves, writer, check = self._added[number]
         writer.write_points(curves, check.parts(points))
 
-    def notes(self) -> list[groom_curves.Note]:
+    def notes(self) -> list[HairError]:
         """What Unreal's importer will do with what was written."""
         return [note for _curves, _writer, check in self._added for note in check.notes()]
 

@@ -59,9 +59,8 @@ def test_arrays_and_scalars_of_every_type_come_back(rng, tmp_path, kind):
 
 def test_strings_come_back(tmp_path):
     archive, texts = Archive(), ["", "hair", "Schläfe", "a b\n"]
-    found = archive.read(
-        [archive.writer.array("many", "string", texts), archive.writer.scalar("one", "string", "x" * 300)], tmp_path
-    )
+    written = [archive.writer.strings("many", texts), archive.writer.strings("one", ["x" * 300])]
+    found = archive.read(written, tmp_path)
     assert found["many"].only == texts and found["one"].only == ["x" * 300]
 
 

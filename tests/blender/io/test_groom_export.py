@@ -1,0 +1,354 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Exported grooms: hair is where it was seen, in Alembic and in USD, as Blender and independent readers find it."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import curves, guide_poses, scene
+from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.io import groom_export
+from hair_addon.core.errors import HairError
+from hair_addon.core.files.export_settings import ExportSettings
+from hair_addon.core.long_work import run_now
+from tests.support import alembic_reader
+from tests.support.following import update
+from tests.support.reading import attribute, evaluated_points, write_points
+from tests.support.swung import simulate, swing
+
+LAST = 4
+
+
+def export(path, **settings):
+    return run_now(groom_export.exporting(path, groom_export.all_hair(), ExportSettings(**settings), bpy.context.scene))
+
+
+def world(curves_object):
+    """(S, P, 3) [m] where Blender renders strands."""
+    matrix = np.array(curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).matrix_world)
+    return evaluated_points(curves_object) @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def widths(curves_object):
+    """(N,) [m] diameters as Blender renders them."""
+    scale = abs(np.linalg.det(np.array(curves_object.matrix_world)[:3, :3])) ** (1.0 / 3.0)
+    return 2.0 * scale * attribute(curves_object, "radius")
+
+
+def shape(archive, name):
+    """The geometry of an object of the archive: {name: Property}, with its parameters."""
+    (path,) = (p for p in alembic_reader.objects(archive) if p.endswith(f"/{name}Shape"))
+    found = alembic_reader.objects(archive)[path].properties[".geom"].children
+    return found | found[".arbGeomParams"].children
+
+
+@pytest.fixture
+def twisted(hair):
+    """Hair of a sphere that is turned, moved, scaled and twisted; its object, and that of its guides."""
+    sphere = bpy.data.objects["Sphere"]
+    sphere.location, sphere.rotation_euler, sphere.scale = (1.0, 2.0, 3.0), (0.3, 0.2, 0.5), (2.0, 2.0, 2.0)
+    twist = sphere.modifiers.new("Twist", "SIMPLE_DEFORM")
+    twist.deform_method, twist.angle = "TWIST", 1.0
+    update()
+    return hair, bpy.data.objects["Guides"]
+
+
+@pytest.fixture
+def baked(hair, tmp_path):
+    """Guides that simulate on a sphere that swings, with their frames baked."""
+    swing(bpy.data.objects["Sphere"])
+    guides = bpy.data.objects["Guides"]
+    simulate(guides, tmp_path / "frames", collides_with_surface=False, automatic_substeps=False, substeps=2)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, LAST
+    run_now(guide_baking.baking([guides.data], LAST, bpy.context.scene))
+    update()
+    return guides
+
+
+# Unreal's Alembic.
+
+
+def test_curves_are_in_centimetres_where_they_are_seen(twisted, tmp_path):
+    hair, guides = twisted
+    made = export(tmp_path / "groom.abc")
+    assert (made.groups, made.guides, made.strands, made.notes) == (1, 60, 500, [])
+    archive = alembic_reader.read(tmp_path / "groom.abc")
+    for name, shown in (("Hair", hair), ("Hair_guides", guides)):
+        found = shape(archive, name)
+        np.testing.assert_allclose(found["P"].only, 100.0 * world(shown).reshape(-1, 3), atol=1e-3)
+        np.testing.assert_allclose(found["groom_width"].only, 100.0 * widths(shown), rtol=1e-5)
+        np.testing.assert_array_equal(found["groom_width"].only, found["width"].only)
+        np.testing.assert_array_equal(found["groom_root_uv"].only, attribute(shown, "surface_uv_coordinate", 2))
+        assert found["groom_guide"].only[0] == (shown == guides)
+
+
+def test_blender_takes_the_curves_back(twisted, tmp_path):
+    """Blender takes Alembic as Y up and in metres: its axes turn, and its unit is the file's."""
+    wanted = {len(o.data.curves): (100.0 * world(o), 100.0 * widths(o)) for o in twisted}
+    export(tmp_path / "groom.abc")
+    before = set(bpy.data.objects)
+    bpy.ops.wm.alembic_import(filepath=str(tmp_path / "groom.abc"), as_background_job=False)
+    update()
+    came = [o for o in set(bpy.data.objects) - before if o.type == "CURVES"]
+    assert sorted(o.name.split(".")[0] for o in came) == ["Hair", "Hair_guides"]
+    for shown in came:
+        points, diameters = wanted[len(shown.data.curves)]
+        np.testing.assert_allclose(world(shown)[..., [0, 2, 1]] * (1.0, 1.0, -1.0), points, atol=2e-3)
+        np.testing.assert_allclose(widths(shown), diameters, rtol=1e-5)
+
+
+def test_strands_are_given_the_guides_that_weigh_most(hair, tmp_path):
+    export(tmp_path / "groom.abc")
+    archive = alembic_reader.read(tmp_path / "groom.abc")
+    found, of_guides = shape(archive, "Hair"), shape(archive, "Hair_guides")["groom_id"].only
+    ids, shares = found["groom_closest_guides"].only, found["groom_guide_weights"].only
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=1e-6)
+    assert (np.diff(shares, axis=1) <= 0.0).all()
+    slots = sum(name.startswith("guide_index_") for name in hair.data.attributes.keys())
+    indices = np.stack([attribute(hair, f"guide_index_{slot}") for slot in range(slots)], axis=1)
+    weights = np.stack([attribute(hair, f"guide_weight_{slot}") for slot in range(slots)], axis=1)
+    for strand in range(len(ids)):
+        of_strand = dict(zip(indices[strand], weights[strand], strict=True))
+        named = [int(np.flatnonzero(of_guides == i)[0]) for i in ids[strand][shares[strand] > 0.0]]
+        largest = sorted((w for i, w in of_strand.items() if i >= 0), reverse=True)[: len(named)]
+        np.testing.assert_allclose([of_strand[i] for i in named], largest, rtol=1e-6)
+
+
+def test_each_hair_is_a_group_with_its_guides(hair, tmp_path):
+    bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
+    bpy.ops.vellus.add_hair(guide_count=20, strand_count=70, length=0.2)
+    second = bpy.context.object
+    second.data.name = "Flaum 1"
+    made = export(tmp_path / "groom.abc")
+    assert (made.groups, made.guides, made.strands) == (2, 80, 570)
+    assert [str(note) for note in made.notes] == ['"Flaum 1" is called Flaum_1 in the file.']
+    archive = alembic_reader.read(tmp_path / "groom.abc")
+    groups = {name: shape(archive, name) for name in ("Hair", "Hair_guides", "Flaum_1", "Flaum_1_guides")}
+    assert {name: int(found["groom_group_id"].only[0]) for name, found in groups.items()} == {
+        "Hair": 0,
+        "Hair_guides": 0,
+        "Flaum_1": 1,
+        "Flaum_1_guides": 1,
+    }
+    assert {name: found["groom_group_name"].only[0] for name, found in groups.items()} == {
+        name: name.removesuffix("_guides") for name in groups
+    }
+    ids = np.concatenate([found["groom_id"].only for found in groups.values()])
+    assert len(np.unique(ids)) == len(ids) == 650
+    for name in ("Hair", "Flaum_1"):
+        named = groups[name]["groom_closest_guides"].only
+        assert np.isin(named, groups[f"{name}_guides"]["groom_id"].only).all()
+
+
+def test_colors_are_those_of_the_look_from_root_to_tip(hair, tmp_path):
+    look = hair.data.vellus.appearance
+    look.tip_absorption, look.random_color, look.random_roughness = 0.2, 0.5, 0.4
+    update()
+    export(tmp_path / "groom.abc")
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
+    colors = found["groom_color"].only.reshape(500, -1, 3)
+    assert (colors > 0.0).all() and (colors < 1.0).all()
+    assert (colors[:, -1] > colors[:, 0]).all(), "tips are bleached"
+    darker = np.argsort(attribute(hair, "strand_random"))
+    assert (np.diff(colors[darker, 0], axis=0) <= 1e-7).all(), "more pigment, less light"
+    roughness = found["groom_roughness"].only.reshape(500, -1)
+    assert (roughness == roughness[:, :1]).all() and 0.1 < np.ptp(roughness) < 0.5
+    export(tmp_path / "groom.abc", has_color=False)
+    assert "groom_color" not in shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
+
+
+def test_baked_guides_move_in_the_file(baked, tmp_path):
+    bpy.context.scene.frame_set(3)
+    made = export(tmp_path / "groom.abc", animation="GUIDES")
+    assert made.frames == LAST and bpy.context.scene.frame_current == 3
+    archive = alembic_reader.read(tmp_path / "groom.abc")
+    moving, rate = shape(archive, "Hair_guides")["P"], bpy.context.scene.render.fps
+    np.testing.assert_allclose(moving.times, [frame / rate for frame in range(1, LAST + 1)])
+    cache, found = frame_folders.frames_of(baked.data), []
+    for frame, sample in zip(range(1, LAST + 1), moving.samples, strict=True):
+        bpy.context.scene.frame_set(frame)
+        pose = guide_poses.read(baked.data, scene.present_depsgraph(), 1.0)
+        wanted = 100.0 * pose.to_world(cache.read_frame(frame).points)
+        np.testing.assert_allclose(sample, wanted.reshape(-1, 3), atol=1e-3)
+        found.append(wanted)
+        if frame == 1:
+            strands = shape(archive, "Hair")["P"]
+            np.testing.assert_allclose(strands.only, 100.0 * world(bpy.data.objects["Hair"]).reshape(-1, 3), atol=1e-3)
+    assert abs(found[-1] - found[0]).max() > 1.0
+
+
+def test_guides_alone_are_a_cache_of_the_same_guides(baked, tmp_path):
+    export(tmp_path / "groom.abc")
+    export(tmp_path / "cache.abc", animation="GUIDES", has_hair=False)
+    groom, cache = (alembic_reader.read(tmp_path / f"{name}.abc") for name in ("groom", "cache"))
+    assert set(alembic_reader.objects(cache)) == {
+        "/groom",
+        "/groom/Hair_guides",
+        "/groom/Hair_guides/Hair_guidesShape",
+    }
+    for name in ("groom_id", "nVertices", "groom_group_id"):
+        np.testing.assert_array_equal(shape(groom, "Hair_guides")[name].only, shape(cache, "Hair_guides")[name].only)
+
+
+# What is refused, and what is said.
+
+
+def test_frames_that_are_not_baked_are_asked_for(baked, tmp_path):
+    bpy.context.scene.frame_end = LAST + 9
+    with pytest.raises(HairError, match="is not baked"):
+        export(tmp_path / "groom.abc", animation="GUIDES")
+    assert not (tmp_path / "groom.abc").exists()
+
+
+@pytest.mark.parametrize("ending", [".abc", ".usdc"])
+def test_points_that_are_not_finite_leave_the_file_that_was_there(hair, tmp_path, ending):
+    path = tmp_path / f"groom{ending}"
+    path.write_bytes(b"before")
+    bpy.data.objects["Hair"].data.vellus.is_live = False
+    points = evaluated_points(hair)
+    points[7, 3, 1] = np.nan
+    write_points(hair, points)
+    with pytest.raises(HairError, match="non-finite"):
+        export(path)
+    assert path.read_bytes() == b"before" and [*tmp_path.iterdir()] == [path]
+
+
+def test_what_cannot_be_exported_is_one_sentence(hair, tmp_path):
+    with pytest.raises(HairError, match=r"exported as \.abc"):
+        export(tmp_path / "groom.fbx")
+    with pytest.raises(HairError, match="choose one"):
+        export(tmp_path / "groom.abc", has_hair=False, has_guides=False)
+    with pytest.raises(HairError, match="no hair"):
+        run_now(groom_export.exporting(tmp_path / "groom.abc", [], ExportSettings(), bpy.context.scene))
+
+
+def test_what_importers_do_is_said(hair, tmp_path):
+    sphere = bpy.data.objects["Sphere"]
+    sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
+    hair.data.vellus.hair.guide_map = False
+    update()
+    notes = [str(note) for note in export(tmp_path / "groom.abc").notes]
+    assert sum("no UV coordinates" in note for note in notes) == 2
+    assert any("stores no guide weights" in note for note in notes)
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
+    assert not {"groom_root_uv", "groom_closest_guides", "groom_guide_weights"} & set(found)
+
+
+# USD.
+
+
+def stage_of(path):
+    bpy.utils.expose_bundled_modules()
+    from pxr import Usd
+
+    return Usd.Stage.Open(str(path))
+
+
+def primvars(prim):
+    from pxr import UsdGeom
+
+    return {p.GetPrimvarName(): p for p in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithAuthoredValues()}
+
+
+@pytest.mark.parametrize("ending", [".usdc", ".usda"])
+def test_usd_has_curves_with_primvars_in_their_scopes(twisted, tmp_path, ending):
+    hair, guides = twisted
+    export(tmp_path / f"groom{ending}")
+    stage = stage_of(tmp_path / f"groom{ending}")
+    from pxr import UsdGeom, UsdShade
+
+    assert UsdGeom.GetStageUpAxis(stage) == "Z" and UsdGeom.GetStageMetersPerUnit(stage) == 1.0
+    root = stage.GetDefaultPrim()
+    assert root.GetPath() == "/groom" and "GroomAPI" in root.GetMetadata("apiSchemas").GetAddedOrExplicitItems()
+    scopes = {
+        **dict.fromkeys(("groom_guide", "groom_group_id", "groom_group_name"), ("constant", None)),
+        "groom_id": ("uniform", "int[]"),
+        "groom_root_uv": ("uniform", "float2[]"),
+        "st": ("uniform", "texCoord2f[]"),
+        "groom_closest_guides": ("uniform", "int3[]"),
+        "groom_guide_weights": ("uniform", "float3[]"),
+        "groom_color": ("vertex", "color3f[]"),
+        "displayColor": ("vertex", "color3f[]"),
+        "groom_roughness": ("vertex", "float[]"),
+        "widths": ("vertex", "float[]"),
+    }
+    for name, shown in (("Hair", hair), ("Hair_guides", guides)):
+        prim = UsdGeom.BasisCurves(stage.GetPrimAtPath(f"/groom/{name}"))
+        counts = prim.GetCurveVertexCountsAttr().Get()
+        np.testing.assert_array_equal(counts, curves.point_counts(shown.data))
+        assert prim.GetTypeAttr().Get() == "linear" and prim.GetWrapAttr().Get() == "nonperiodic"
+        points = np.array(prim.GetPointsAttr().Get())
+        np.testing.assert_allclose(points, world(shown).reshape(-1, 3), atol=1e-5)
+        np.testing.assert_allclose(prim.GetWidthsAttr().Get(), widths(shown), rtol=1e-5)
+        assert prim.GetWidthsInterpolation() == "vertex"
+        low, high = np.array(prim.GetExtentAttr().Get())
+        assert (low <= points.min(axis=0)).all() and (high >= points.max(axis=0)).all()
+        for primvar_name, primvar in primvars(prim.GetPrim()).items():
+            scope, kind = scopes[primvar_name]
+            assert primvar.GetInterpolation() == scope, primvar_name
+            assert kind is None or str(primvar.GetTypeName()) == kind
+            if scope != "constant":
+                assert len(primvar.Get()) == (len(counts) if scope == "uniform" else sum(counts)), primvar_name
+    strands = stage.GetPrimAtPath("/groom/Hair")
+    assert set(scopes) - set(primvars(strands)) == {"widths"}
+    assert UsdGeom.Imageable(stage.GetPrimAtPath("/groom/Hair_guides")).GetPurposeAttr().Get() == "guide"
+    material, _relationship = UsdShade.MaterialBindingAPI(strands).ComputeBoundMaterial()
+    assert material.GetInput("melanin").Get() == pytest.approx(hair.data.vellus.appearance.melanin)
+    surface, _name, _kind = material.ComputeSurfaceSource()
+    assert surface.GetIdAttr().Get() == "UsdPreviewSurface"
+
+
+def test_usd_and_alembic_have_the_same_arrays(hair, tmp_path):
+    export(tmp_path / "groom.abc")
+    export(tmp_path / "groom.usdc")
+    archive, stage = alembic_reader.read(tmp_path / "groom.abc"), stage_of(tmp_path / "groom.usdc")
+    for name in ("Hair", "Hair_guides"):
+        found, prim = shape(archive, name), stage.GetPrimAtPath(f"/groom/{name}")
+        shared = set(found) & set(primvars(prim))
+        assert len(shared) >= 4
+        for parameter in shared:
+            values = primvars(prim)[parameter].Get()
+            if found[parameter].kind == "string":
+                assert [values] == found[parameter].only
+            else:
+                np.testing.assert_array_equal(np.ravel(values), found[parameter].only.ravel())
+
+
+def test_all_moves_in_usd_as_in_alembic(baked, tmp_path):
+    export(tmp_path / "groom.abc", animation="ALL")
+    export(tmp_path / "groom.usdc", animation="ALL")
+    archive, stage = alembic_reader.read(tmp_path / "groom.abc"), stage_of(tmp_path / "groom.usdc")
+    assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (1.0, LAST)
+    assert stage.GetTimeCodesPerSecond() == bpy.context.scene.render.fps
+    for name in ("Hair", "Hair_guides"):
+        points = stage.GetPrimAtPath(f"/groom/{name}").GetAttribute("points")
+        assert points.GetTimeSamples() == [1.0, 2.0, 3.0, 4.0]
+        for frame, sample in enumerate(shape(archive, name)["P"].samples, 1):
+            np.testing.assert_allclose(100.0 * np.array(points.Get(frame)), sample, atol=1e-3)
+    bpy.context.scene.frame_set(3)
+    shown = 100.0 * world(bpy.data.objects["Hair"]).reshape(-1, 3)
+    np.testing.assert_allclose(shape(archive, "Hair")["P"].samples[2], shown, atol=1e-3)
+
+
+def test_blender_takes_usd_back(hair, tmp_path):
+    wanted = world(hair)
+    export(tmp_path / "groom.usdc")
+    before = set(bpy.data.objects)
+    bpy.ops.wm.usd_import(filepath=str(tmp_path / "groom.usdc"), import_guide=True)
+    update()
+    came = {len(o.data.curves): o for o in set(bpy.data.objects) - before if o.type == "CURVES"}
+    assert sorted(came) == [60, 500]
+    np.testing.assert_allclose(world(came[500]), wanted, atol=1e-5)
+
+
+# The operator.
+
+
+def test_the_operator_writes_and_changes_nothing(hair, tmp_path):
+    names = sorted(o.name for o in bpy.data.objects)
+    for path in ("groom.abc", "groom.usda", "bare"):
+        assert bpy.ops.vellus.export_groom(filepath=str(tmp_path / path), has_color=False) == {"FINISHED"}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bare.abc", "groom.abc", "groom.usda"]
+    assert sorted(o.name for o in bpy.data.objects) == names
+    with pytest.raises(RuntimeError, match=r"exported as \.abc"):
+        bpy.ops.vellus.export_groom(filepath=str(tmp_path / "groom.obj"))
