@@ -92,6 +92,7 @@ def exporting(path, chosen, settings, blender_scene):
             stack.callback(delivery.go_to, blender_scene, scene_time.time_of(blender_scene))
             delivery.go_to(blender_scene, frames[0])
         yield Stage("Exporting", 0.0)
+        strand_arrays.bring_up_to_date()
         sources = _sources(chosen, settings, per_metre)
         if not sources:
             raise HairError("Neither hair nor guides would be exported: choose one of them.")

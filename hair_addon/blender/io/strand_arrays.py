@@ -36,8 +36,7 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
 
     local: (S, P, 3) float32 that is taken for the points at rest, None for those of the datablock.
     """
-    live_hair.write_all()
-    bpy.context.view_layer.update()  # new objects may not be evaluated yet
+    bring_up_to_date()
     shown = selection.object_of(datablock, bpy.context.view_layer)
     if shown is None:
         raise HairError('"{name}" has no object in this view layer.', name=name_of(datablock))
@@ -52,6 +51,12 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
         return (carried @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
 
     return rows
+
+
+def bring_up_to_date():
+    """Let strands follow what was changed, and objects that are new be evaluated."""
+    live_hair.write_all()
+    bpy.context.view_layer.update()
 
 
 def shape_of(datablock):

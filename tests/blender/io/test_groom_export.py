@@ -114,6 +114,13 @@ def test_strands_are_given_the_guides_that_weigh_most(hair, tmp_path):
         np.testing.assert_allclose([of_strand[i] for i in named], largest, rtol=1e-6)
 
 
+def test_hair_whose_settings_have_just_changed_is_exported_as_they_are(hair, tmp_path):
+    hair.data.vellus.hair.strand_count = 321
+    made = export(tmp_path / "groom.abc")
+    assert made.strands == 321
+    assert len(shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")["P"].only) == 321 * 41
+
+
 def test_each_hair_is_a_group_with_its_guides(hair, tmp_path):
     bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
     bpy.ops.vellus.add_hair(guide_count=20, strand_count=70, length=0.2)
