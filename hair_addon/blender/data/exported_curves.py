@@ -33,9 +33,14 @@ def read_root_uvs(datablock):
 
 
 def read_radii(datablock, point_count):
-    """(S, P) float32 in local units: along each curve its own radii, or their mean where it has other points."""
-    radii, counts = curves.read_radii(datablock), curves.point_counts(datablock)
-    if len(radii) == len(counts) * point_count:
-        return radii.reshape(-1, point_count)
-    means = np.add.reduceat(radii, curves.curve_offsets(datablock)[:-1]) / np.maximum(counts, 1)
-    return np.broadcast_to(means.astype(np.float32)[:, None], (len(counts), point_count))
+    """A function of a slice of curves that gives radii (n, P) float32 in local units, at least zero.
+
+    Curves of other point counts have the mean of theirs all along.
+    """
+    stored, counts = attributes.read(datablock, "radius", "FLOAT", "POINT"), curves.point_counts(datablock)
+    if stored is None or len(stored) != len(counts) * point_count:
+        radii = curves.read_radii(datablock)
+        means = np.add.reduceat(radii, curves.curve_offsets(datablock)[:-1]) / np.maximum(counts, 1)
+        stored = np.broadcast_to(means.astype(np.float32)[:, None], (len(counts), point_count))
+    rows = stored.reshape(len(counts), point_count)
+    return lambda some: attributes.valid_radii(rows[some])

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ...core.errors import HairError
 from ...core.files import export_settings, groom_curves, settings_file, unreal_groom
@@ -190,7 +191,7 @@ def _widths(datablock, point_count, per_metre):
     """Diameters of some strands, in the file's units."""
     radii = exported_curves.read_radii(datablock, point_count)
     factor = 2.0 * strand_arrays.world_scale(datablock) * per_metre
-    return lambda some: radii[some] * factor
+    return lambda some: radii(some) * np.float32(factor)
 
 
 def _read(sources, numbers, per_metre, is_first):

@@ -72,17 +72,24 @@ def closest_guides(indices: np.ndarray, weights: np.ndarray, first_id: int) -> t
     indices and weights: (S, k) of guides, -1 for none; first_id: identity of guide 0. Where a strand has fewer than
     three, its first is repeated with weight 0; one without guides has weights of 0.
     """
-    strand_count, slot_count = indices.shape
+    ids = np.empty((len(indices), GUIDE_SLOTS), np.int32)
+    shares = np.empty((len(indices), GUIDE_SLOTS), np.float32)
+    for some in slices(len(indices)):
+        ids[some], shares[some] = _closest(indices[some], weights[some])
+    return ids + np.int32(first_id), shares
+
+
+def _closest(indices, weights):
+    """The same of some strands, as indices of guides."""
     kept_weights = np.where(indices >= 0, np.maximum(weights, 0.0), 0.0).astype(np.float64)
     order = np.argsort(-kept_weights, axis=1, kind="stable")[:, :GUIDE_SLOTS]
-    rows = np.arange(strand_count)[:, None]
-    ids = np.zeros((strand_count, GUIDE_SLOTS), np.int64)
-    shares = np.zeros((strand_count, GUIDE_SLOTS))
-    kept = min(slot_count, GUIDE_SLOTS)
-    ids[:, :kept], shares[:, :kept] = indices[rows, order], kept_weights[rows, order]
-    ids = np.where(shares > 0.0, ids, np.maximum(ids[:, :1], 0)) + first_id
+    ids, shares = np.zeros((len(indices), GUIDE_SLOTS), np.int32), np.zeros((len(indices), GUIDE_SLOTS))
+    kept = order.shape[1]
+    ids[:, :kept] = np.take_along_axis(indices, order, axis=1)
+    shares[:, :kept] = np.take_along_axis(kept_weights, order, axis=1)
+    ids = np.where(shares > 0.0, ids, np.maximum(ids[:, :1], 0))
     total = shares.sum(axis=1, keepdims=True)
-    return ids.astype(np.int32), (shares / np.where(total > 0.0, total, 1.0)).astype(np.float32)
+    return ids, shares / np.where(total > 0.0, total, 1.0)
 
 
 @dataclass
