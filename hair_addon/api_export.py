@@ -36,12 +36,11 @@ def export_groom(
     []
     """
     wanted, target = changed(ExportSettings, settings, changes), path_of(path)
-    export = blender.io.groom_export
     if hair is None:
-        chosen = export.all_hair()
+        chosen = blender.io.groom_sources.all_hair()
     elif isinstance(hair, Iterable) and not isinstance(hair, str):
         chosen = list(dict.fromkeys(blender.data.arguments.curves_of(one, "HAIR") for one in hair))
     else:
         raise HairError("hair must be a list of hair Curves, or None for all.")
-    work = export.exporting(target, chosen, wanted, blender.host.scene_time.present_scene())
+    work = blender.io.groom_export.exporting(target, chosen, wanted, blender.host.scene_time.present_scene())
     return [str(note) for note in run_now(work, heard(progress)).notes]

@@ -51,7 +51,7 @@ def run(given, console):
 
 def _chosen(given):
     """The hair Curves to export. Raises `HairError` for a name that no hair has."""
-    every = blender.io.groom_export.all_hair()
+    every = blender.io.groom_sources.all_hair()
     if not given.hair:
         return every
     named = {blender.host.notices.name_of(hair): hair for hair in every}

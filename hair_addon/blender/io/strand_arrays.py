@@ -53,6 +53,17 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
     return rows
 
 
+def other_places(datablock):
+    """(4, 4) float64 each: from where `world_points` are [m] to where other objects of a view layer show them."""
+    shown = selection.object_of(datablock, bpy.context.view_layer)
+    back = np.linalg.inv(np.array(shown.matrix_world, np.float64))
+    for other in bpy.context.view_layer.objects:
+        if other != shown and other.type == "CURVES" and other.data == datablock:
+            matrix = np.array(other.matrix_world, np.float64) @ back
+            matrix[:3, 3] *= metres_per_unit(bpy.context.scene)
+            yield matrix
+
+
 def bring_up_to_date():
     """Let strands follow what was changed, and objects that are new be evaluated."""
     live_hair.write_all()

@@ -2,8 +2,10 @@
 """Grooms as USD: polylines with primvars, in metres with Z up, which Unreal, Houdini and Omniverse read.
 
     /groom                     Xform with the API schema GroomAPI, by which Unreal knows a groom
-    /groom/<group>             BasisCurves: strands
-    /groom/<group>_guides      BasisCurves with the purpose guide
+    /groom/<group>             Xform
+    /groom/<group>/strands     BasisCurves
+    /groom/<group>/guides      BasisCurves with the purpose guide
+    /groom/<group>_instance    Xform, an instance of the group: where another object shows the same hair
     /groom/materials/<group>   Material: a preview surface, and the settings of the look as inputs
 
 Primvars with the prefix groom_ are those of [UnrealGroom], whose width is that of the curves; st and displayColor are
@@ -59,7 +61,9 @@ class UsdGroomWriter:
         """Write all of `GroomCurves` but points; returns their number. moves: whether points of each time come."""
         from pxr import UsdGeom
 
-        made = hair_file.define_curves(self._stage, f"{_ROOT}/{curves.name}", curves.point_counts)
+        group = UsdGeom.Xform.Define(self._stage, f"{_ROOT}/{curves.group_name}").GetPath()
+        path = group.AppendChild("guides" if curves.is_guide else "strands")
+        made = hair_file.define_curves(self._stage, path, curves.point_counts)
         widths = np.float32(_all(curves.widths, curves)).ravel()
         made.CreateWidthsAttr(_array("FloatArray", widths))
         _write_primvars(made.GetPrim(), curves)
@@ -84,6 +88,19 @@ class UsdGroomWriter:
             self._stage.SetStartTimeCode(self._first_frame)
             self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), time.GetValue()))
             self._stage.GetRootLayer().Save()  # frees what is written
+
+    def add_instance(self, group_name, matrix):
+        """Show a group again; matrix: (4, 4), from where the group is [m]."""
+        from pxr import Gf, UsdGeom
+
+        path, number = f"{_ROOT}/{group_name}_instance", 1
+        while self._stage.GetPrimAtPath(path):
+            number += 1
+            path = f"{_ROOT}/{group_name}_instance_{number}"
+        made = UsdGeom.Xform.Define(self._stage, path)
+        made.GetPrim().GetReferences().AddInternalReference(f"{_ROOT}/{group_name}")
+        made.GetPrim().SetInstanceable(True)
+        made.AddTransformOp().Set(Gf.Matrix4d(np.asarray(matrix, np.float64).T.tolist()))  # rows of vectors
 
     def notes(self):
         """What importers will do with what was written."""

@@ -4,10 +4,12 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
+from hair_addon import api
 from hair_addon.blender.data import curves, guide_poses, scene
 from hair_addon.blender.groom import frame_folders, guide_baking
-from hair_addon.blender.io import groom_export
+from hair_addon.blender.io import groom_export, groom_sources
 from hair_addon.core.errors import HairError
 from hair_addon.core.files.export_settings import ExportSettings
 from hair_addon.core.long_work import run_now
@@ -17,10 +19,13 @@ from tests.support.reading import attribute, evaluated_points, write_points
 from tests.support.swung import simulate, swing
 
 LAST = 4
+PLACES = {"Hair": "/groom/Hair/strands", "Hair_guides": "/groom/Hair/guides"}  # in Alembic → in USD
 
 
 def export(path, **settings):
-    return run_now(groom_export.exporting(path, groom_export.all_hair(), ExportSettings(**settings), bpy.context.scene))
+    return run_now(
+        groom_export.exporting(path, groom_sources.all_hair(), ExportSettings(**settings), bpy.context.scene)
+    )
 
 
 def world(curves_object):
@@ -121,6 +126,36 @@ def test_hair_whose_settings_have_just_changed_is_exported_as_they_are(hair, tmp
     assert len(shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")["P"].only) == 321 * 41
 
 
+def test_guides_of_any_number_of_points_are_exported(imported, tmp_path):
+    """With their ends where they are, and as many points as the longest."""
+    guides = api.use_as_guides(imported, bpy.data.objects["Sphere"])
+    api.interpolate_hair(guides, strand_count=50)
+    update()
+    ends = world_ends(bpy.data.objects[imported.name])
+    export(tmp_path / "groom.abc")
+    (name,) = (n for n in alembic_reader.read(tmp_path / "groom.abc").objects["groom"].children if "_guides" in n)
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), name)
+    points = found["P"].only.reshape(len(ends), -1, 3)
+    assert (found["nVertices"].only == points.shape[1]).all() and points.shape[1] == 12
+    np.testing.assert_allclose(points[:, [0, -1]], 100.0 * ends, atol=1e-2)
+    assert (found["groom_width"].only > 0.0).all()
+
+
+def world_ends(curves_object):
+    """(S, 2, 3) [m]: the first and the last point of each curve."""
+    offsets, matrix = curves.curve_offsets(curves_object.data), np.array(curves_object.matrix_world)
+    ends = curves.read_points(curves_object.data)[np.stack([offsets[:-1], offsets[1:] - 1], axis=1)]
+    return ends @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def test_hair_that_lost_its_guides_is_exported_alone(hair, tmp_path):
+    bpy.data.hair_curves.remove(bpy.data.hair_curves["Guides"])
+    made = export(tmp_path / "groom.abc")
+    assert (made.guides, made.strands) == (0, 500) and "has no guides" in str(made.notes[0])
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
+    assert "groom_closest_guides" not in found and found["groom_id"].only[0] == 0
+
+
 def test_each_hair_is_a_group_with_its_guides(hair, tmp_path):
     bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
     bpy.ops.vellus.add_hair(guide_count=20, strand_count=70, length=0.2)
@@ -182,6 +217,21 @@ def test_baked_guides_move_in_the_file(baked, tmp_path):
             strands = shape(archive, "Hair")["P"]
             np.testing.assert_allclose(strands.only, 100.0 * world(bpy.data.objects["Hair"]).reshape(-1, 3), atol=1e-3)
     assert abs(found[-1] - found[0]).max() > 1.0
+
+
+def test_blender_plays_the_file(baked, tmp_path):
+    export(tmp_path / "groom.abc", animation="ALL")
+    blender_scene, wanted = bpy.context.scene, {}
+    for frame in range(1, LAST + 1):
+        blender_scene.frame_set(frame)
+        wanted[frame] = 100.0 * world(bpy.data.objects["Hair"])
+    before = set(bpy.data.objects)
+    bpy.ops.wm.alembic_import(filepath=str(tmp_path / "groom.abc"), set_frame_range=True, as_background_job=False)
+    assert (blender_scene.frame_start, blender_scene.frame_end) == (1, LAST)
+    (came,) = (o for o in set(bpy.data.objects) - before if o.type == "CURVES" and len(o.data.curves) == 500)
+    for frame in (3, 1, 4, 2):
+        blender_scene.frame_set(frame)
+        np.testing.assert_allclose(world(came)[..., [0, 2, 1]] * (1.0, 1.0, -1.0), wanted[frame], atol=2e-3)
 
 
 def test_guides_alone_are_a_cache_of_the_same_guides(baked, tmp_path):
@@ -279,8 +329,8 @@ def test_usd_has_curves_with_primvars_in_their_scopes(twisted, tmp_path, ending)
         "groom_roughness": ("vertex", "float[]"),
         "widths": ("vertex", "float[]"),
     }
-    for name, shown in (("Hair", hair), ("Hair_guides", guides)):
-        prim = UsdGeom.BasisCurves(stage.GetPrimAtPath(f"/groom/{name}"))
+    for name, shown in (("strands", hair), ("guides", guides)):
+        prim = UsdGeom.BasisCurves(stage.GetPrimAtPath(f"/groom/Hair/{name}"))
         counts = prim.GetCurveVertexCountsAttr().Get()
         np.testing.assert_array_equal(counts, curves.point_counts(shown.data))
         assert prim.GetTypeAttr().Get() == "linear" and prim.GetWrapAttr().Get() == "nonperiodic"
@@ -296,9 +346,9 @@ def test_usd_has_curves_with_primvars_in_their_scopes(twisted, tmp_path, ending)
             assert kind is None or str(primvar.GetTypeName()) == kind
             if scope != "constant":
                 assert len(primvar.Get()) == (len(counts) if scope == "uniform" else sum(counts)), primvar_name
-    strands = stage.GetPrimAtPath("/groom/Hair")
+    strands = stage.GetPrimAtPath("/groom/Hair/strands")
     assert set(scopes) - set(primvars(strands)) == {"widths"}
-    assert UsdGeom.Imageable(stage.GetPrimAtPath("/groom/Hair_guides")).GetPurposeAttr().Get() == "guide"
+    assert UsdGeom.Imageable(stage.GetPrimAtPath("/groom/Hair/guides")).GetPurposeAttr().Get() == "guide"
     material, _relationship = UsdShade.MaterialBindingAPI(strands).ComputeBoundMaterial()
     assert material.GetInput("melanin").Get() == pytest.approx(hair.data.vellus.appearance.melanin)
     surface, _name, _kind = material.ComputeSurfaceSource()
@@ -309,8 +359,8 @@ def test_usd_and_alembic_have_the_same_arrays(hair, tmp_path):
     export(tmp_path / "groom.abc")
     export(tmp_path / "groom.usdc")
     archive, stage = alembic_reader.read(tmp_path / "groom.abc"), stage_of(tmp_path / "groom.usdc")
-    for name in ("Hair", "Hair_guides"):
-        found, prim = shape(archive, name), stage.GetPrimAtPath(f"/groom/{name}")
+    for name, place in PLACES.items():
+        found, prim = shape(archive, name), stage.GetPrimAtPath(place)
         shared = set(found) & set(primvars(prim))
         assert len(shared) >= 4
         for parameter in shared:
@@ -321,14 +371,35 @@ def test_usd_and_alembic_have_the_same_arrays(hair, tmp_path):
                 np.testing.assert_array_equal(np.ravel(values), found[parameter].only.ravel())
 
 
+def test_hair_of_several_objects_is_instanced(twisted, tmp_path):
+    hair, _guides = twisted
+    bpy.context.scene.unit_settings.scale_length = 0.5
+    again = bpy.data.objects.new("Again", hair.data)
+    bpy.context.scene.collection.objects.link(again)
+    again.matrix_world = Matrix.Translation((5.0, 1.0, 0.0)) @ Matrix.Rotation(0.7, 4, "Y") @ hair.matrix_world
+    update()
+    export(tmp_path / "groom.usdc")
+    stage = stage_of(tmp_path / "groom.usdc")
+    from pxr import UsdGeom
+
+    prim = stage.GetPrimAtPath("/groom/Hair_instance")
+    assert prim.IsInstance() and not stage.GetPrimAtPath("/groom/Hair_instance_2")
+    strands = stage.GetPrimAtPath("/groom/Hair_instance/strands")
+    to_world = np.array(UsdGeom.XformCache().GetLocalToWorldTransform(strands))
+    points = np.array(UsdGeom.BasisCurves(strands).GetPointsAttr().Get())
+    matrix = np.array(again.matrix_world)
+    wanted = evaluated_points(hair).reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3]
+    np.testing.assert_allclose(points @ to_world[:3, :3] + to_world[3, :3], 0.5 * wanted, atol=1e-5)
+
+
 def test_all_moves_in_usd_as_in_alembic(baked, tmp_path):
     export(tmp_path / "groom.abc", animation="ALL")
     export(tmp_path / "groom.usdc", animation="ALL")
     archive, stage = alembic_reader.read(tmp_path / "groom.abc"), stage_of(tmp_path / "groom.usdc")
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode()) == (1.0, LAST)
     assert stage.GetTimeCodesPerSecond() == bpy.context.scene.render.fps
-    for name in ("Hair", "Hair_guides"):
-        points = stage.GetPrimAtPath(f"/groom/{name}").GetAttribute("points")
+    for name, place in PLACES.items():
+        points = stage.GetPrimAtPath(place).GetAttribute("points")
         assert points.GetTimeSamples() == [1.0, 2.0, 3.0, 4.0]
         for frame, sample in enumerate(shape(archive, name)["P"].samples, 1):
             np.testing.assert_allclose(100.0 * np.array(points.Get(frame)), sample, atol=1e-3)

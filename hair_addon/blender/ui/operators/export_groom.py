@@ -6,7 +6,7 @@ import bpy
 from ....core.files.export_settings import ExportSettings
 from ...groom.selection import hair_of
 from ...host import paths
-from ...io import groom_export
+from ...io import groom_export, groom_sources
 from ...settings import properties, setting_properties
 from ...settings.translations import error_text
 from .file_browser import BrowsedOperator
@@ -37,7 +37,7 @@ class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
         path = paths.resolve(self.filepath)
         path = path if path.suffix else path.with_suffix(".abc")
         settings = setting_properties.to_settings(self, ExportSettings)
-        return groom_export.exporting(path, groom_export.hair_on(context.object), settings, context.scene)
+        return groom_export.exporting(path, groom_sources.hair_on(context.object), settings, context.scene)
 
     def after(self, context, made):
         for note in made.notes:
