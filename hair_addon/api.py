@@ -40,6 +40,7 @@ from .api_dynamics import (
     set_dynamics,
     simulate,
 )
+from .api_export import ExportSettings, export_groom
 from .api_guide_tools import change_guides
 from .api_styles import (
     Bend,
@@ -86,6 +87,7 @@ __all__ = [
     "Clump",
     "Curl",
     "DynamicsSettings",
+    "ExportSettings",
     "Frizz",
     "GroomSettings",
     "GuideSettings",
@@ -106,6 +108,7 @@ __all__ = [
     "distribute_guides",
     "draw",
     "dynamics_of",
+    "export_groom",
     "interpolate_hair",
     "load_settings",
     "points",
@@ -121,9 +124,6 @@ __all__ = [
     "table_settings",
     "use_as_guides",
 ]
-
-
-_ANY = Param("")
 _FRAMES = Param("")  # availability in this Blender is checked later
 
 

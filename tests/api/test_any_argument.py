@@ -182,6 +182,11 @@ CALLS = {
         simulates=anything(d, None, True),
         **changes(d, api.DynamicsSettings, ()),
     ),
+    "export_groom": lambda d: api.export_groom(
+        anything(d, "a.abc", "a.usdc"),
+        anything(d, None, [target(d, "HAIR")]),
+        **changes(d, api.ExportSettings, (), ("animation",)),
+    ),
     "apply_settings": lambda d: api.apply_settings(target(d, "HAIR"), settings(d)),
 }
 

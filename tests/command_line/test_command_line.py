@@ -345,7 +345,7 @@ def test_statuses_are_those_of_the_process():
 
 
 def test_every_verb_explains_itself(capsys):
-    for verb in ("groom", "bake-tables", "render", "info", "settings"):
+    for verb in ("groom", "bake-tables", "render", "export", "info", "settings"):
         assert run_here(verb, "--help").status == 0
         assert "--json" in capsys.readouterr().out
 

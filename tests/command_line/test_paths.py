@@ -59,6 +59,7 @@ def test_settings_and_grooms_are_beside_the_blend(shot):
     [
         ("render", "//shot.blend", "--out", "f_#.png"),
         ("info", "//groom.json"),
+        ("export", "//shot.blend", "--out", "hair.abc"),
         ("groom", HEAD, "--out", f"//{FOLDER}/hair.npz"),
         ("groom", HEAD, "--settings", f"//{FOLDER}/a.json", "--out", "hair.npz"),
         ("bake-tables", "--out", f"//{FOLDER}"),

@@ -21,6 +21,8 @@ LAYOUTS = {
     "FLOAT4X4": ("value", 16, np.float32),
 }
 
+RADIUS = 0.005  # of Curves without one, as Blender has it
+
 CATMULL_ROM, POLY = 0, 1  # of Blender's types of curves; the others are above
 
 
@@ -90,6 +92,11 @@ def read(curves, name, data_type, domain):
     values = np.empty((len(attribute.data), width), scalar)
     attribute.data.foreach_get(value_name, values.ravel())
     return values[:, 0] if width == 1 else values
+
+
+def valid_radii(radii):
+    """Radii as they are, Blender's own default in place of negative and non-finite ones."""
+    return np.where((radii >= 0.0) & (radii < np.inf), radii, np.float32(RADIUS))
 
 
 def curve_types(curves):

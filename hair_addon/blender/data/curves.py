@@ -22,8 +22,6 @@ _GUIDE_MAP = ("guide_index", "guide_weight")
 
 _WETNESS = "wetness"  # a strand's, where a mask or a variation of the style Wet makes strands differ
 
-_RADIUS = 0.005  # of Curves without one, as Blender has it
-
 # A stored root further than this part of the surface's size from the curve's first point is out of date.
 _ROOT_TOLERANCE = 1e-4
 
@@ -251,8 +249,8 @@ def read_radii(curves):
     """(all points,) float32 in local units, at least zero; Blender's own default where curves carry no radius."""
     radii = attributes.read(curves, "radius", "FLOAT", "POINT")
     if radii is None:
-        return np.full(len(curves.points), _RADIUS, np.float32)
-    return np.where((radii >= 0.0) & (radii < np.inf), radii, _RADIUS)
+        return np.full(len(curves.points), attributes.RADIUS, np.float32)
+    return attributes.valid_radii(radii)
 
 
 def read_randoms(curves):

@@ -30,12 +30,19 @@ class Pose:
         """
         if self.motion is None:
             return points[chosen]
-        vertices, barycentric = self._places(topology, places, points[:, 0])
-        return carried(points[chosen], self.motion, (vertices[chosen], barycentric[chosen]))
+        return self.carry_rooted(points, self.rooted(topology, places, points[:, 0]), chosen)
 
-    def _places(self, topology, places, firsts):
-        """Root places on this surface; firsts: (S, 3) local first points."""
+    def carry_rooted(self, points, places, chosen):
+        """The same of strands whose places `rooted` gave: for parts of many strands."""
+        if self.motion is None:
+            return points[chosen]
+        return carried(points[chosen], self.motion, (places[0][chosen], places[1][chosen]))
+
+    def rooted(self, topology, places, firsts):
+        """Root places on this surface, as `carry` takes them; firsts: (S, 3) local first points."""
         surface = self.surface
+        if self.motion is None:
+            return places
         if places is None or topology != surface.topology or len(places[0]) != len(firsts):
             places = np.zeros((len(firsts), 3), np.int32), np.zeros((len(firsts), 3), np.float32)
         vertices, barycentric = places

@@ -65,7 +65,7 @@ def delivering(guides, path, blender_scene):
     times = _times(blender_scene, frames, chosen)
     present = scene_time.time_of(blender_scene)
     with contextlib.ExitStack() as stack:
-        stack.callback(_go_to, blender_scene, present)
+        stack.callback(go_to, blender_scene, present)
         tasks = [_begin(hair, stack) for hair in chosen]
         units = scene_time.frame_rate(blender_scene), strand_arrays.metres_per_unit(blender_scene)
         yield Stage("Delivering", 0.0)
@@ -74,8 +74,8 @@ def delivering(guides, path, blender_scene):
                 for task in tasks:
                     task.path = file.add(name_of(task.hair.find()), task.counts)
                 for index, time in enumerate(times):
-                    _go_to(blender_scene, time)
-                    _require_shown(guides, time)
+                    go_to(blender_scene, time)
+                    require_shown(guides, time)
                     read = [_read(task, time) for task in tasks]
                     yield _writing(file, tasks, read, time, index / len(times))
             byte_count = partial.stat().st_size
@@ -142,7 +142,7 @@ def _remove(remembered):
         bpy.data.objects.remove(remembered.find())
 
 
-def _go_to(blender_scene, time):
+def go_to(blender_scene, time):
     """Change the time, and let hair follow as it does without a long operation."""
     with running.set_aside():
         scene_time.go_to_time(blender_scene, time)
@@ -150,7 +150,7 @@ def _go_to(blender_scene, time):
         bpy.context.view_layer.update()
 
 
-def _require_shown(guides, time):
+def require_shown(guides, time):
     """Raise `HairError` where a baked frame could not be read: guides would be as combed."""
     if time > guides.vellus.dynamics.start_frame and not simulated_guides.is_shown(guides):
         raise HairError(

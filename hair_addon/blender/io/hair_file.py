@@ -20,7 +20,7 @@ def require_ours(path):
 
     Also where this build of Blender lacks USD.
     """
-    _require_usd()
+    require_usd()
     if not path.exists():
         return
     from pxr import Sdf, Tf
@@ -35,19 +35,38 @@ def require_ours(path):
         )
 
 
-def _require_usd():
+def require_usd():
     """Raise `HairError` where this build of Blender has no USD."""
     if not paths.has_operator("wm.usd_export"):
         raise HairError("Hair cannot be delivered: this build of Blender lacks USD.")
     bpy.utils.expose_bundled_modules()
 
 
-def _failed(path, error):
+def failed(path, error):
     """A `HairError` with the cause that USD gives, among much else."""
     cause = re.search(r"Error occurred writing file: ([^']*)", str(error))
     return HairError(
         "{path} cannot be written: {cause}.", path=path, cause=cause[1] if cause else "the disk may be full"
     )
+
+
+def define_curves(stage, path, counts):
+    """New polylines of (S,) points each: a `UsdGeom.BasisCurves` whose widths are per point."""
+    from pxr import UsdGeom, Vt
+
+    curves = UsdGeom.BasisCurves.Define(stage, path)
+    curves.CreateTypeAttr(UsdGeom.Tokens.linear)
+    curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
+    curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(counts, np.int32)))
+    curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+    return curves
+
+
+def extent(points, reach):
+    """The box around points (N, 3) with a radius, as USD has it."""
+    from pxr import Vt
+
+    return Vt.Vec3fArray.FromNumpy(np.float32([points.min(axis=0) - reach, points.max(axis=0) + reach]))
 
 
 class HairFile:
@@ -57,14 +76,14 @@ class HairFile:
     """
 
     def __init__(self, path: Path, final_path: Path, frame_rate: float, metres_per_unit: float) -> None:
-        _require_usd()
+        require_usd()
         from pxr import Tf, Usd, UsdGeom
 
         self._path = final_path
         try:
             self._stage = Usd.Stage.CreateNew(str(path))
         except Tf.ErrorException as error:
-            raise _failed(final_path, error) from error
+            raise failed(final_path, error) from error
         self._stage.GetRootLayer().customLayerData = {_CREATOR: _PROGRAM, "version": paths.addon_version()}
         UsdGeom.SetStageUpAxis(self._stage, UsdGeom.Tokens.z)
         UsdGeom.SetStageMetersPerUnit(self._stage, metres_per_unit)
@@ -105,20 +124,14 @@ class HairFile:
             self._stage.SetEndTimeCode(max(self._times))
             self._stage.GetRootLayer().Save()
         except Tf.ErrorException as error:
-            raise _failed(self._path, error) from error
+            raise failed(self._path, error) from error
 
 
 class _Hair:
     """The prim of one hair object."""
 
     def __init__(self, stage, path, counts):
-        from pxr import UsdGeom, Vt
-
-        curves = UsdGeom.BasisCurves.Define(stage, path)
-        curves.CreateTypeAttr(UsdGeom.Tokens.linear)
-        curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
-        curves.CreateCurveVertexCountsAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(counts, np.int32)))
-        curves.SetWidthsInterpolation(UsdGeom.Tokens.vertex)
+        curves = define_curves(stage, path, counts)
         self._points, self._extent, self._widths = (
             curves.CreatePointsAttr(),
             curves.CreateExtentAttr(),
@@ -131,10 +144,8 @@ class _Hair:
         from pxr import Gf, Vt
 
         points = np.ascontiguousarray(points, np.float32)
-        reach = radii.max(initial=0.0)
-        bounds = np.stack([points.min(axis=0) - reach, points.max(axis=0) + reach])
         self._points.Set(Vt.Vec3fArray.FromNumpy(points), time)
-        self._extent.Set(Vt.Vec3fArray.FromNumpy(np.float32(bounds)), time)
+        self._extent.Set(extent(points, radii.max(initial=0.0)), time)
         self._transform.Set(Gf.Matrix4d(np.asarray(matrix, np.float64).T.tolist()), time)  # rows of vectors
         self._write_widths(time, 2.0 * radii)
 

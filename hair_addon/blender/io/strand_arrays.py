@@ -5,13 +5,12 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
+from ...core.files.groom_curves import Rows, slices
 from ...core.geometry import strands
 from ..data import curves, posed_strands
 from ..groom import selection
 from ..host.notices import name_of
 from ..live import live_hair
-
-_AT_ONCE = 16_384  # strands, in double precision: all of them would take four times their memory
 
 
 def metres_per_unit(blender_scene):
@@ -25,26 +24,70 @@ def world_points(datablock):
 
     Without other modifiers than ours. Curves of different point counts are resampled to the largest.
     """
-    live_hair.write_all()
-    bpy.context.view_layer.update()  # new objects may not be evaluated yet
+    rows = world_rows(datablock)
+    world = np.empty(shape_of(datablock), np.float32)
+    for some in slices(len(world)):
+        world[some] = rows(some)
+    return world
+
+
+def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
+    """A function of a slice of curves that gives what `world_points` does for them, times `per_metre`.
+
+    local: (S, P, 3) float32 that is taken for the points at rest, None for those of the datablock.
+    """
+    bring_up_to_date()
     shown = selection.object_of(datablock, bpy.context.view_layer)
     if shown is None:
         raise HairError('"{name}" has no object in this view layer.', name=name_of(datablock))
     pose = posed_strands.read_pose(datablock.surface, bpy.context.evaluated_depsgraph_get())
-    local = pose.carry(_at_rest(datablock), datablock.vellus.topology, curves.read_root_places(datablock, np.inf))
-    to_world = np.array(shown.matrix_world, np.float64) * metres_per_unit(bpy.context.scene)
-    world = np.empty_like(local)
-    for start in range(0, len(local), _AT_ONCE):
-        some = slice(start, start + _AT_ONCE)
-        world[some] = local[some].astype(np.float64) @ to_world[:3, :3].T + to_world[:3, 3]
-    return world
+    at_rest = _at_rest(datablock) if local is None else local
+    stored = curves.read_root_places(datablock, np.inf)
+    places = pose.rooted(datablock.vellus.topology, stored, at_rest[:, 0])
+    to_world = np.array(shown.matrix_world, np.float64) * (metres_per_unit(bpy.context.scene) * per_metre)
+
+    def rows(some):
+        carried = pose.carry_rooted(at_rest, places, some).astype(np.float64)
+        return (carried @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
+
+    return rows
 
 
-def _at_rest(datablock):
+def other_places(datablock):
+    """(4, 4) float64 each: from where `world_points` are [m] to where other objects of a view layer show them."""
+    shown = selection.object_of(datablock, bpy.context.view_layer)
+    back = np.linalg.inv(np.array(shown.matrix_world, np.float64))
+    for other in bpy.context.view_layer.objects:
+        if other != shown and other.type == "CURVES" and other.data == datablock:
+            matrix = np.array(other.matrix_world, np.float64) @ back
+            matrix[:3, 3] *= metres_per_unit(bpy.context.scene)
+            yield matrix
+
+
+def bring_up_to_date():
+    """Let strands follow what was changed, and objects that are new be evaluated."""
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+
+
+def shape_of(datablock):
+    """(S, P, 3): the shape of `world_points`. Raises `HairError` for Curves without strands."""
     counts = curves.point_counts(datablock)
     if not len(counts):
         raise HairError('"{name}" has no strands.', name=name_of(datablock))
-    points, most = curves.read_points(datablock), int(counts.max())
-    if (counts == most).all():
+    return len(counts), int(counts.max()), 3
+
+
+def world_scale(datablock):
+    """Metres in a unit of a Curves datablock's local coordinates, the mean."""
+    shown = selection.object_of(datablock, bpy.context.view_layer)
+    matrix = np.array(shown.matrix_world, np.float64)[:3, :3]
+    return float(abs(np.linalg.det(matrix))) ** (1.0 / 3.0) * metres_per_unit(bpy.context.scene)
+
+
+def _at_rest(datablock):
+    strand_count, most, _ = shape_of(datablock)
+    points = curves.read_points(datablock)
+    if len(points) == strand_count * most:
         return points.reshape(-1, most, 3)
     return strands.resample(points, curves.curve_offsets(datablock), most)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Menu entries: Add ▸ Curve, and the Object menu."""
+"""Menu entries: Add ▸ Curve, File ▸ Export, and the Object menu."""
 
 import bpy
 
@@ -112,7 +112,13 @@ def _in_curves_menu(menu, context):
         menu.layout.menu("VELLUS_MT_guide_tools", icon="OUTLINER_OB_CURVES")
 
 
+def _in_export_menu(menu, context):
+    if hair_of(context.object) is not None:
+        menu.layout.operator("vellus.export_groom", text="Hair for Unreal, USD (.abc/.usd*)")
+
+
 _ENTRIES = (
+    ("TOPBAR_MT_file_export", _in_export_menu),
     ("VIEW3D_MT_curve_add", _in_add_menu),
     ("VIEW3D_MT_object", _in_object_menu),
     ("VIEW3D_MT_sculpt_curves", _in_curves_menu),

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Files of settings and tables, and file locks between processes."""
+"""Files of settings, tables and grooms, and file locks between processes."""
 
 from typing import TYPE_CHECKING
 
@@ -7,15 +7,20 @@ from ..lazy import submodules
 
 if TYPE_CHECKING:
     from . import (
+        alembic,
+        alembic_curves,
         array_file,
         file_lock,
         frame_cache,
         frame_manifest,
+        groom_curves,
+        ogawa,
         plain_file,
         settings_file,
         style_presets,
         table_cache,
         table_exr,
+        unreal_groom,
         whole_file,
     )
 else:

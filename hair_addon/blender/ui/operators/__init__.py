@@ -12,6 +12,7 @@ from .comb_guides import VELLUS_OT_comb_guides
 from .delete_hair import VELLUS_OT_delete_hair
 from .delete_system import VELLUS_OT_delete_system
 from .distribute_guides import VELLUS_OT_distribute_guides
+from .export_groom import VELLUS_OT_export_groom
 from .interpolate_hair import VELLUS_OT_interpolate_hair
 from .load_groom_settings import VELLUS_OT_load_groom_settings
 from .make_uv_map import VELLUS_OT_make_uv_map
@@ -55,4 +56,5 @@ CLASSES = (
     VELLUS_OT_toggle_composite,
     VELLUS_OT_save_groom_settings,
     VELLUS_OT_load_groom_settings,
+    VELLUS_OT_export_groom,
 )

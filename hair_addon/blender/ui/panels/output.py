@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Output panel: pictures and settings files."""
+"""Output panel: pictures, grooms for other programs and settings files."""
 
 import bpy
 
@@ -12,7 +12,7 @@ from .tab import HairTab, write
 
 
 class VELLUS_PT_output(HairTab, bpy.types.Panel):
-    """Pictures of the hair and files of its settings"""
+    """Pictures of the hair, and files of it and its settings"""
 
     bl_label = "Output"
     bl_idname = "VELLUS_PT_output"
@@ -27,6 +27,7 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         layout.operator("vellus.toggle_composite", icon="NODE_COMPOSITING", depress=is_on)
         if is_on:
             setting_rows.rows(layout, state, RenderSettings, ("composite_shadow", "sample_count"))
+        layout.operator("vellus.export_groom", icon="FILE_3D", text="Export Groom…")
         row = layout.row(align=True)
         row.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
         row.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")

@@ -1,0 +1,46 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python interface's function of exports; api.py offers it."""
+
+import os
+from collections.abc import Iterable
+from typing import Any
+
+from .api_arguments import changed, heard, path_of
+from .core import lazy
+from .core.errors import HairError
+from .core.files.export_settings import ExportSettings
+from .core.long_work import Progress, no_progress, run_now
+
+blender = lazy.Package(".blender", __package__)
+
+Curves = Any
+
+__all__ = ["ExportSettings", "export_groom"]
+
+
+def export_groom(
+    path: str | os.PathLike,
+    hair: Iterable[Curves] | None = None,
+    settings: ExportSettings | None = None,
+    *,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> list[str]:
+    """Write hair and its guides for engines and other programs; returns what their importers will do with it.
+
+    path: .abc is written as Unreal imports grooms, .usd, .usdc and .usda for Unreal, Houdini and Omniverse; hair: hair
+    Curves, a group each in the file, None for all; settings: `ExportSettings`; changes: its fields by name. The
+    sentences that come back tell of strands without length, of missing UV coordinates, and of other things to know.
+
+    >>> api.export_groom("hair.abc", [bpy.data.objects["Hair"]], has_color=False)
+    []
+    """
+    wanted, target = changed(ExportSettings, settings, changes), path_of(path)
+    if hair is None:
+        chosen = blender.io.groom_sources.all_hair()
+    elif isinstance(hair, Iterable) and not isinstance(hair, str):
+        chosen = list(dict.fromkeys(blender.data.arguments.curves_of(one, "HAIR") for one in hair))
+    else:
+        raise HairError("hair must be a list of hair Curves, or None for all.")
+    work = blender.io.groom_export.exporting(target, chosen, wanted, blender.host.scene_time.present_scene())
+    return [str(note) for note in run_now(work, heard(progress)).notes]

@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair and guides → files for engines and other programs: Unreal's Alembic, USD."""
+
+import contextlib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from ...core.errors import HairError
+from ...core.files import export_settings, settings_file, unreal_groom
+from ...core.files.whole_file import require_place, whole_file
+from ...core.long_work import Stage
+from ..groom import frame_folders, groom_settings
+from ..host import paths, scene_time
+from ..host.datablocks import Remembered
+from ..host.notices import name_of
+from . import delivery, groom_sources, strand_arrays, usd_groom
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A file that was written: its groups, guides, strands, frames and bytes, and what importers will do with it."""
+
+    path: Path
+    groups: int
+    guides: int
+    strands: int
+    frames: int
+    byte_count: int
+    notes: list[HairError]
+
+
+def require_writable(path):
+    """Raise `HairError` unless a groom could be written to a path."""
+    ending = path.suffix.lower()
+    if ending not in export_settings.ENDINGS:
+        raise HairError(
+            "Hair is exported as {endings}, not as {ending}.",
+            endings=", ".join(export_settings.ENDINGS),
+            ending=ending or "a file without an extension",
+        )
+    require_place(path)
+
+
+def exporting(path, chosen, settings, blender_scene):
+    """Write hair Curves and their guides to a file, as work in steps; returns an `Exported`.
+
+    settings: `ExportSettings`. The file appears whole or not at all; the scene is at the time where it was, on every
+    way out. Raises `HairError`.
+    """
+    require_writable(path)
+    if not chosen:
+        raise HairError("There is no hair to export: add hair to the mesh.")
+    frames = [None] if settings.animation == "NONE" else list(scene_time.scene_frames())
+    simulated = _simulated(chosen, frames)
+    per_metre = usd_groom.PER_METRE if _is_usd(path) else unreal_groom.PER_METRE
+    with contextlib.ExitStack() as stack:
+        stack.callback(_go_to, blender_scene, None if frames == [None] else scene_time.time_of(blender_scene))
+        _go_to(blender_scene, frames[0])
+        yield Stage("Exporting", 0.0)
+        strand_arrays.bring_up_to_date()
+        sources = groom_sources.sources_of(chosen, settings, per_metre)
+        if not sources:
+            raise HairError("Neither hair nor guides would be exported: choose one of them.")
+        with whole_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:
+            numbers = yield _adding(writer, sources)
+            if _is_usd(path):
+                _add_instances(writer, chosen)
+            for index, frame in enumerate(frames):
+                _go_to(blender_scene, frame if index else None)
+                for guides in simulated:
+                    delivery.require_shown(guides.find(), frame)
+                read = _read(sources, numbers, per_metre, is_first=index == 0)
+                yield _writing(writer, read, frame, index / len(frames))
+    guide_count, strand_count = groom_sources.counts_of(sources)
+    notes = [*groom_sources.notes_of(chosen, settings), *writer.notes()]
+    return Exported(path, len(chosen), guide_count, strand_count, len(frames), path.stat().st_size, notes)
+
+
+def _is_usd(path):
+    return path.suffix.lower() != ".abc"
+
+
+def _go_to(blender_scene, time):
+    """Change the time, None: stay there."""
+    if time is not None:
+        delivery.go_to(blender_scene, time)
+
+
+def _opened(partial, path, chosen, first_frame, blender_scene):
+    """The context of a writer; first_frame: None where nothing moves."""
+    told = f"Vellus {paths.addon_version()}", _properties(chosen)
+    rate = scene_time.frame_rate(blender_scene)
+    if _is_usd(path):
+        return usd_groom.writing(partial, path, *told, rate, first_frame or 0)
+    return unreal_groom.writing(partial, *told, None if first_frame is None else rate, first_frame or 0)
+
+
+def _simulated(chosen, frames):
+    """The guides of hair that simulate, where time passes; they have to be baked."""
+    if frames == [None]:
+        return []
+    guides = {hair.vellus.guide_curves for hair in chosen} - {None}
+    simulated = [one for one in guides if frame_folders.is_simulated(one)]
+    for one in simulated:
+        frame_folders.require_frames(one, frames)
+    return [Remembered(one) for one in simulated]
+
+
+def _add_instances(writer, chosen):
+    """Show hair again that several objects have."""
+    for hair, name in zip(chosen, groom_sources.group_names(chosen), strict=True):
+        for matrix in strand_arrays.other_places(hair):
+            writer.add_instance(name, matrix)
+
+
+def _read(sources, numbers, per_metre, is_first):
+    """[(number, points)] of what is written at this time."""
+    read = []
+    for source, number in zip(sources, numbers, strict=True):
+        if is_first or source.moves:
+            read.append((number, groom_sources.points_of(source, per_metre)))
+    return read
+
+
+def _adding(writer, sources):
+    """A function of (progress) that writes all but points, and returns the numbers of the curves."""
+
+    def write(progress):
+        numbers = []
+        for source in sources:
+            progress("Exporting", 0.0)
+            numbers.append(writer.add(source.curves, source.moves))
+        return numbers
+
+    return write
+
+
+def _writing(writer, read, frame, part):
+    """A function of (progress) that writes the points of one time, which can be stopped between parts of them."""
+    step = "Exporting" if frame is None else f"Frame {frame}"
+
+    def watched(points, progress):
+        def rows(some):
+            progress(step, part)
+            return points(some)
+
+        return rows
+
+    def write(progress):
+        for number, points in read:
+            writer.write_points(number, watched(points, progress))
+
+    return write
+
+
+def _properties(chosen):
+    """The settings of each hair that has guides, as JSON."""
+    with_guides = [hair for hair in chosen if hair.vellus.guide_curves is not None]
+    settings = {name_of(hair): settings_file.to_object(groom_settings.settings_of(hair)) for hair in with_guides}
+    return json.dumps(settings, ensure_ascii=True, separators=(",", ":"))

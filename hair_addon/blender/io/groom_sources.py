@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair and guides of the scene as `GroomCurves`, to be exported."""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ...core.files import groom_curves
+from ...core.files.groom_curves import GroomCurves
+from ...core.shading import strand_colors
+from ..data import attributes, curves, exported_curves, simulated_guides
+from ..groom import frame_folders, hair_systems, selection
+from ..host.datablocks import Remembered
+from ..host.notices import name_of
+from ..settings import properties
+from . import strand_arrays
+
+_RESERVED = ("groom", "materials")  # names of other objects in files
+
+
+@dataclass(frozen=True)
+class Source:
+    """Guides or strands to export."""
+
+    datablock: Remembered
+    curves: GroomCurves
+    moves: bool
+
+
+def hair_on(active):
+    """The hair that is exported with an active object: that on its surface that the view layer has objects of."""
+    layer = bpy.context.view_layer
+    layer.update()  # new objects may not be in it yet
+    systems = hair_systems.systems_of(selection.surface_of(active), layer)
+    hair = selection.hair_of(active)
+    return [system for system in systems if system.vellus.kind == "HAIR"] or ([] if hair is None else [hair])
+
+
+def all_hair():
+    """All hair that the view layer has objects of, oldest first."""
+    layer = bpy.context.view_layer
+    layer.update()
+    found = {o.data for o in layer.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"}
+    return sorted(found, key=lambda hair: hair.session_uid)
+
+
+def sources_of(chosen, settings, per_metre):
+    """A `Source` for the guides and the strands of each hair; identities differ in all of the file."""
+    names, sources, first_id = group_names(chosen), [], 0
+    for group, (hair, name) in enumerate(zip(chosen, names, strict=True)):
+        guides = hair.vellus.guide_curves
+        if settings.has_guides and guides is not None:
+            made = _guide_curves(guides, group, name, first_id, per_metre)
+            sources.append(Source(Remembered(guides), made, settings.moves(True)))
+        if settings.has_hair:
+            made = _strand_curves(hair, group, name, first_id, per_metre, settings)
+            sources.append(Source(Remembered(hair), made, settings.moves(False)))
+        first_id += (len(guides.curves) if guides is not None else 0) + len(hair.curves)
+    return sources
+
+
+def group_names(chosen):
+    """Names of the groups of some hair in a file."""
+    return groom_curves.group_names([name_of(hair) for hair in chosen], _RESERVED)
+
+
+def _guide_curves(guides, group, name, first_id, per_metre):
+    local = _guides_at_rest(guides)
+    curve_count, point_count, _ = strand_arrays.shape_of(guides) if local is None else local.shape
+    return GroomCurves(
+        group_id=group,
+        group_name=name,
+        is_guide=True,
+        curve_count=curve_count,
+        point_count=point_count,
+        first_id=first_id,
+        widths=_widths(guides, point_count, per_metre),
+        root_uvs=exported_curves.read_root_uvs(guides),
+    )
+
+
+def _strand_curves(hair, group, name, first_id, per_metre, settings):
+    guides = hair.vellus.guide_curves
+    guide_count = 0 if guides is None else len(guides.curves)
+    # Without guides in the file there are none to name.
+    guide_map = exported_curves.read_guide_map(hair, guide_count) if guide_count and settings.has_guides else None
+    ids, weights = (None, None) if guide_map is None else groom_curves.closest_guides(*guide_map, first_id)
+    curve_count, point_count, _ = strand_arrays.shape_of(hair)
+    look, randoms = properties.look_of(hair.vellus), curves.read_randoms(hair)
+
+    def colors(some):
+        return strand_colors.colors(look, randoms[some], point_count)
+
+    def roughness(some):
+        return strand_colors.roughness(look, randoms[some], point_count)
+
+    return GroomCurves(
+        group_id=group,
+        group_name=name,
+        is_guide=False,
+        curve_count=curve_count,
+        point_count=point_count,
+        first_id=first_id + guide_count,
+        widths=_widths(hair, point_count, per_metre),
+        root_uvs=exported_curves.read_root_uvs(hair),
+        guide_ids=ids,
+        guide_weights=weights,
+        colors=colors if settings.has_color else None,
+        roughness=roughness if settings.has_color else None,
+        look=look,
+    )
+
+
+def _widths(datablock, point_count, per_metre):
+    """Diameters of some strands, in the file's units."""
+    radii = exported_curves.read_radii(datablock, point_count)
+    factor = 2.0 * strand_arrays.world_scale(datablock) * per_metre
+    return lambda some: radii(some) * np.float32(factor)
+
+
+def _guides_at_rest(guides):
+    """(G, P, 3) float32 in local coordinates of guides that simulate, in each frame as many; None of others."""
+    shown = simulated_guides.point_cache.get(guides.session_uid)
+    if shown is not None or not frame_folders.is_simulated(guides):
+        return shown
+    offsets = curves.curve_offsets(guides)
+    return curves.even_points(curves.read_points(guides), offsets, lambda: attributes.are_smooth(guides))
+
+
+def points_of(source, per_metre):
+    """The points of a `Source` now, as `strand_arrays.world_rows` gives them. Raises `HairError`."""
+    datablock, exported = source.datablock.find(), source.curves
+    local = _guides_at_rest(datablock) if exported.is_guide else None
+    shape = (strand_arrays.shape_of(datablock) if local is None else local.shape)[:2]
+    if shape != (exported.curve_count, exported.point_count):
+        raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
+    return strand_arrays.world_rows(datablock, per_metre, local)
+
+
+def counts_of(sources):
+    """How many (guides, strands) there are."""
+    every = [source.curves for source in sources]
+    return tuple(sum(c.curve_count for c in every if c.is_guide == is_guide) for is_guide in (True, False))
+
+
+def notes_of(chosen, settings):
+    """What importers do with hair that has less than it could."""
+    for hair, name in zip(chosen, group_names(chosen), strict=True):
+        if name_of(hair) != name:
+            yield HairError('"{name}" is called {group} in the file.', name=name_of(hair), group=name)
+        if not (settings.has_hair and settings.has_guides):
+            continue
+        guides = hair.vellus.guide_curves
+        if guides is None:
+            yield HairError('"{name}" has no guides: Unreal makes some of its strands.', name=name)
+        elif exported_curves.read_guide_map(hair, len(guides.curves)) is None:
+            yield HairError(
+                '"{name}" stores no guide weights: Unreal computes its own. Switch on Store Guide Weights.', name=name
+            )

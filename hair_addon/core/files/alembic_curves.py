@@ -1,0 +1,123 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Transforms and curves as AbcGeom of [Alembic] has them: objects of its schemas, and geometry parameters."""
+
+from collections.abc import Buffer, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .alembic import TYPES, AlembicWriter, Object, Property, serialized
+
+# How many values a parameter has: one, one for each curve, one for each point.
+SCOPES = {"constant": "con", "uniform": "uni", "vertex": "vtx"}
+
+_CURVES = {"schema": "AbcGeom_Curve_v2", "schemaBaseType": "AbcGeom_GeomBase_v1"}
+_TRANSFORM = {"schema": "AbcGeom_Xform_v3"}
+_LINEAR = (1, 0, 0, 0)  # type, periodicity, and twice the basis
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A geometry parameter, with its values in parts: arrays of (n,) or (n, extent) numbers, or lists of str.
+
+    meaning: of vectors, as in metadata: vector, point, rgb.
+    """
+
+    name: str
+    type: str
+    scope: str
+    parts: Iterable[ArrayLike]
+    extent: int = 1
+    meaning: str = ""
+
+
+@dataclass
+class Curves:
+    """Polylines that are being written: `CurvesWriter.add` made them, `CurvesWriter.write_points` gives them points."""
+
+    name: str
+    properties: list[Property]
+    points: Property
+    bounds: Property
+    parameters: list[Property]
+    children: list[Object] = field(default_factory=list)
+
+
+class CurvesWriter:
+    """Writes curves and transforms to an `AlembicWriter`; sampling: index of the times of points, 0 for a file of one.
+
+    An object takes the samples of its points from `write_points`, one for each time, before `close`.
+    """
+
+    def __init__(self, archive: AlembicWriter, sampling: int = 0) -> None:
+        self._archive, self._sampling = archive, sampling
+
+    def add(self, name: str, counts: np.ndarray, widths: Parameter | None, parameters: Iterable[Parameter]) -> Curves:
+        """Write all of some polylines but their points; counts: (S,) points of each."""
+        archive = self._archive
+        properties = [
+            archive.array("nVertices", "int32", counts),
+            archive.scalar("curveBasisAndType", "uint8", _LINEAR),
+        ]
+        if widths is not None:
+            properties.append(self._parameter(widths))
+        place = serialized({"geoScope": SCOPES["vertex"], "interpretation": "point"})
+        points = Property("P", "float32", 3, place, is_array=True, sampling=self._sampling)
+        bounds = Property(".selfBnds", "float64", 6, serialized({"interpretation": "box"}), sampling=self._sampling)
+        return Curves(name, properties, points, bounds, [self._parameter(one) for one in parameters])
+
+    def write_points(self, curves: Curves, parts: Iterable[np.ndarray]) -> None:
+        """Write the points at the next time: arrays of (n, 3) numbers, of all curves one after another."""
+        bounds = np.array([np.full(3, np.inf), np.full(3, -np.inf)])
+        self._archive.add_sample(curves.points, _measured(parts, bounds))
+        self._archive.add_sample(curves.bounds, [bounds])
+
+    def close(self, curves: Curves) -> Object:
+        """Write the object of curves whose points are written."""
+        archive = self._archive
+        parameters = [archive.compound(".arbGeomParams", curves.parameters)] if curves.parameters else []
+        every = [curves.bounds, curves.points, *curves.properties, *parameters]
+        schema = archive.compound(".geom", every, _CURVES)
+        return archive.object(curves.name, _object_metadata(_CURVES, ".geom"), [schema])
+
+    def transform(self, name: str, children: Sequence[Object], parameters: Iterable[Parameter] = ()) -> Object:
+        """Write a transform that leaves its children where they are."""
+        archive = self._archive
+        written = [self._parameter(one) for one in parameters]
+        properties = [archive.scalar(".inherits", "bool", True)]
+        properties += [archive.compound(".arbGeomParams", written)] if written else []
+        schema = archive.compound(".xform", properties, _TRANSFORM)
+        return archive.object(name, _object_metadata(_TRANSFORM, ".xform"), [schema], children)
+
+    def _parameter(self, parameter):
+        """The property of a geometry parameter."""
+        metadata = {
+            "isGeomParam": "true",
+            "geoScope": SCOPES[parameter.scope],
+            "podName": TYPES[parameter.type][1],
+            "podExtent": str(parameter.extent),
+            "arrayExtent": "1",
+            "interpretation": parameter.meaning,
+        }
+        if parameter.type == "string":
+            (texts,) = parameter.parts
+            return self._archive.strings(parameter.name, texts, metadata)
+        made = Property(parameter.name, parameter.type, parameter.extent, serialized(metadata), is_array=True)
+        kind = TYPES[parameter.type][2]
+        self._archive.add_sample(made, (np.ascontiguousarray(part, kind) for part in parameter.parts))
+        return made
+
+
+def _measured(parts, bounds) -> Iterator[Buffer]:
+    """Points in parts as the file has them; bounds: (2, 3) float64 that grow around them."""
+    for part in parts:
+        points = np.ascontiguousarray(part, np.float32)
+        if len(points):
+            bounds[0] = np.minimum(bounds[0], points.reshape(-1, 3).min(axis=0))
+            bounds[1] = np.maximum(bounds[1], points.reshape(-1, 3).max(axis=0))
+        yield points
+
+
+def _object_metadata(schema, place):
+    return {**schema, "schemaObjTitle": f"{schema['schema']}:{place}"}

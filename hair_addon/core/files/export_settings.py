@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What of a groom is exported."""
+
+from dataclasses import dataclass
+
+from ..params import Settings, param
+
+ENDINGS = (".abc", ".usd", ".usdc", ".usda")
+
+
+@dataclass(frozen=True)
+class ExportSettings(Settings):
+    """What a file for other programs has of hair and its guides."""
+
+    has_hair: bool = param(True, "Write the strands; a file of guides alone can be a groom cache", label="Hair")
+    has_guides: bool = param(True, "Write the guides, which engines simulate and move strands by", label="Guides")
+    has_color: bool = param(True, "Write the color and roughness of each point of the strands", label="Color")
+    animation: str = param(
+        "NONE",
+        "What moves in the file, with a sample for each frame of the scene",
+        choices=(
+            ("NONE", "Nothing", "Write the current frame"),
+            ("GUIDES", "Guides", "Write guides in every frame and hair in the first"),
+            ("ALL", "Guides and Hair", "Write guides and hair in every frame; files become large"),
+        ),
+    )
+
+    def moves(self, is_guide: bool) -> bool:
+        """Whether guides move in the file, or strands."""
+        return self.animation == "ALL" or (self.animation == "GUIDES" and is_guide)

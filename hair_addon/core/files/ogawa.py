@@ -1,0 +1,91 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Ogawa container of [Alembic] files: a tree of groups, whose leaves are data.
+
+Children are written before their group, and large data in parts: a file of any size takes the memory of one part.
+
+    header   "Ogawa", 0xff when the file is complete, version 1 (16 bits, big-endian), position of the root group
+    data     number of bytes, the bytes
+    group    number of children, the address of each: its position, with the highest bit set for data
+
+All other numbers are little-endian and have 64 bits.
+"""
+
+import hashlib
+import struct
+from collections.abc import Buffer, Iterable, Sequence
+from typing import BinaryIO
+
+EMPTY_GROUP = 0
+EMPTY_DATA = 1 << 63
+
+DIGEST_SIZE = 16  # [bytes], before the content of each sample; readers take samples of one digest and size as equal
+
+_HEADER = struct.Struct("<5sB2sQ")
+_NUMBER = struct.Struct("<Q")
+
+
+def digest_of(*parts: Buffer) -> bytes:
+    """Return the digest of the bytes of all parts: any good hash will do, as readers only compare them."""
+    digest = hashlib.blake2b(digest_size=DIGEST_SIZE)
+    for part in parts:
+        digest.update(part)
+    return digest.digest()
+
+
+class OgawaWriter:
+    """Writes a file, empty so far and seekable; what is never finished is refused by every reader."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = file
+        self._samples: dict[tuple[int, bytes], int] = {}  # (size, digest) → address
+        self._write_header(False, 0)
+        self._end = _HEADER.size
+
+    def data(self, content: bytes) -> int:
+        """Write bytes; returns their address."""
+        if not content:
+            return EMPTY_DATA
+        address = self._end | EMPTY_DATA
+        self._append(_NUMBER.pack(len(content)), content)
+        return address
+
+    def sample(self, parts: Iterable[Buffer]) -> tuple[int, int, bytes]:
+        """Write a sample, its digest and then its content in parts; returns its (address, bytes of content, digest).
+
+        One that the file has is not kept again.
+        """
+        start, digest = self._end, hashlib.blake2b(digest_size=DIGEST_SIZE)
+        self._append(bytes(_NUMBER.size + DIGEST_SIZE))
+        for part in parts:
+            digest.update(part)
+            self._append(part)
+        size, made = self._end - start - _NUMBER.size, digest.digest()
+        address = self._samples.setdefault((size, made), start | EMPTY_DATA)
+        self._file.seek(start)
+        if address != start | EMPTY_DATA:
+            self._end = start
+        else:
+            self._file.write(_NUMBER.pack(size) + made)
+            self._file.seek(self._end)
+        return address, size - DIGEST_SIZE, made
+
+    def group(self, children: Sequence[int]) -> int:
+        """Write a group of addresses; returns its own."""
+        if not children:
+            return EMPTY_GROUP
+        address = self._end
+        self._append(struct.pack(f"<{1 + len(children)}Q", len(children), *children))
+        return address
+
+    def finish(self, root: int) -> None:
+        """Say that the file is complete, and which group is its root."""
+        self._file.truncate(self._end)
+        self._write_header(True, root)
+
+    def _append(self, *parts):
+        for part in parts:
+            self._end += self._file.write(part)
+
+    def _write_header(self, is_complete, root):
+        self._file.seek(0)
+        self._file.write(_HEADER.pack(b"Ogawa", 0xFF if is_complete else 0, b"\x00\x01", root))

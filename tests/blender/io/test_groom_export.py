@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Alembic for Unreal: hair is where it was seen, as Blender and an independent reader find it; refusals and notes."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon import api
+from hair_addon.blender.data import curves, guide_poses, scene
+from hair_addon.blender.groom import frame_folders
+from hair_addon.blender.io import groom_export
+from hair_addon.core.errors import HairError
+from hair_addon.core.files.export_settings import ExportSettings
+from hair_addon.core.long_work import run_now
+from tests.support import alembic_reader
+from tests.support.exported import LAST, bake, export, shape, twist, widths, world
+from tests.support.following import update
+from tests.support.reading import attribute, evaluated_points, write_points
+
+
+@pytest.fixture
+def twisted(hair):
+    """Hair of a sphere that is turned, moved, scaled and twisted, and its guides."""
+    return twist(hair)
+
+
+@pytest.fixture
+def baked(hair, tmp_path):
+    """Guides that simulate on a sphere that swings, with their frames baked."""
+    return bake(tmp_path)
+
+
+# What is written.
+
+
+def test_curves_are_in_centimetres_where_they_are_seen(twisted, tmp_path):
+    hair, guides = twisted
+    made = export(tmp_path / "groom.abc")
+    assert (made.groups, made.guides, made.strands, made.notes) == (1, 60, 500, [])
+    archive = alembic_reader.read(tmp_path / "groom.abc")
+    for name, shown in (("Hair", hair), ("Hair_guides", guides)):
+        found = shape(archive, name)
+        np.testing.assert_allclose(found["P"].only, 100.0 * world(shown).reshape(-1, 3), atol=1e-3)
+        np.testing.assert_allclose(found["groom_width"].only, 100.0 * widths(shown), rtol=1e-5)
+        np.testing.assert_array_equal(found["groom_width"].only, found["width"].only)
+        np.testing.assert_array_equal(found["groom_root_uv"].only, attribute(shown, "surface_uv_coordinate", 2))
+        assert found["groom_guide"].only[0] == (shown == guides)
+
+
+def test_blender_takes_the_curves_back(twisted, tmp_path):
+    """Blender takes Alembic as Y up and in metres: its axes turn, and its unit is the file's."""
+    wanted = {len(o.data.curves): (100.0 * world(o), 100.0 * widths(o)) for o in twisted}
+    export(tmp_path / "groom.abc")
+    before = set(bpy.data.objects)
+    bpy.ops.wm.alembic_import(filepath=str(tmp_path / "groom.abc"), as_background_job=False)
+    update()
+    came = [o for o in set(bpy.data.objects) - before if o.type == "CURVES"]
+    assert sorted(o.name.split(".")[0] for o in came) == ["Hair", "Hair_guides"]
+    for shown in came:
+        points, diameters = wanted[len(shown.data.curves)]
+        np.testing.assert_allclose(world(shown)[..., [0, 2, 1]] * (1.0, 1.0, -1.0), points, atol=2e-3)
+        np.testing.assert_allclose(widths(shown), diameters, rtol=1e-5)
+
+
+def test_strands_are_given_the_guides_that_weigh_most(hair, tmp_path):
+    export(tmp_path / "groom.abc")
+    archive = alembic_reader.read(tmp_path / "groom.abc")
+    found, of_guides = shape(archive, "Hair"), shape(archive, "Hair_guides")["groom_id"].only
+    ids, shares = found["groom_closest_guides"].only, found["groom_guide_weights"].only
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0, atol=1e-6)
+    assert (np.diff(shares, axis=1) <= 0.0).all()
+    slots = sum(name.startswith("guide_index_") for name in hair.data.attributes.keys())
+    indices = np.stack([attribute(hair, f"guide_index_{slot}") for slot in range(slots)], axis=1)
+    weights = np.stack([attribute(hair, f"guide_weight_{slot}") for slot in range(slots)], axis=1)
+    for strand in range(len(ids)):
+        of_strand = dict(zip(indices[strand], weights[strand], strict=True))
+        named = [int(np.flatnonzero(of_guides == i)[0]) for i in ids[strand][shares[strand] > 0.0]]
+        largest = sorted((w for i, w in of_strand.items() if i >= 0), reverse=True)[: len(named)]
+        np.testing.assert_allclose([of_strand[i] for i in named], largest, rtol=1e-6)
+
+
+def test_hair_whose_settings_have_just_changed_is_exported_as_they_are(hair, tmp_path):
+    hair.data.vellus.hair.strand_count = 321
+    made = export(tmp_path / "groom.abc")
+    assert made.strands == 321
+    assert len(shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")["P"].only) == 321 * 41
+
+
+def test_guides_of_any_number_of_points_are_exported(imported, tmp_path):
+    """With their ends where they are, and as many points as the longest."""
+    guides = api.use_as_guides(imported, bpy.data.objects["Sphere"])
+    api.interpolate_hair(guides, strand_count=50)
+    update()
+    ends = world_ends(bpy.data.objects[imported.name])
+    export(tmp_path / "groom.abc")
+    (name,) = (n for n in alembic_reader.read(tmp_path / "groom.abc").objects["groom"].children if "_guides" in n)
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), name)
+    points = found["P"].only.reshape(len(ends), -1, 3)
+    assert (found["nVertices"].only == points.shape[1]).all() and points.shape[1] == 12
+    np.testing.assert_allclose(points[:, [0, -1]], 100.0 * ends, atol=1e-2)
+    assert (found["groom_width"].only > 0.0).all()
+
+
+def world_ends(curves_object):
+    """(S, 2, 3) [m]: the first and the last point of each curve."""
+    offsets, matrix = curves.curve_offsets(curves_object.data), np.array(curves_object.matrix_world)
+    ends = curves.read_points(curves_object.data)[np.stack([offsets[:-1], offsets[1:] - 1], axis=1)]
+    return ends @ matrix[:3, :3].T + matrix[:3, 3]
+
+
+def test_hair_that_lost_its_guides_is_exported_alone(hair, tmp_path):
+    bpy.data.hair_curves.remove(bpy.data.hair_curves["Guides"])
+    made = export(tmp_path / "groom.abc")
+    assert (made.guides, made.strands) == (0, 500) and "has no guides" in str(made.notes[0])
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
+    assert "groom_closest_guides" not in found and found["groom_id"].only[0] == 0
+
+
+def test_each_hair_is_a_group_with_its_guides(hair, tmp_path):
+    bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
+    bpy.ops.vellus.add_hair(guide_count=20, strand_count=70, length=0.2)
+    second = bpy.context.object
+    second.data.name = "Flaum 1"
+    made = export(tmp_path / "groom.abc")
+    assert (made.groups, made.guides, made.strands) == (2, 80, 570)
+    assert [str(note) for note in made.notes] == ['"Flaum 1" is called Flaum_1 in the file.']
+    archive = alembic_reader.read(tmp_path / "groom.abc")
+    groups = {name: shape(archive, name) for name in ("Hair", "Hair_guides", "Flaum_1", "Flaum_1_guides")}
+    assert {name: int(found["groom_group_id"].only[0]) for name, found in groups.items()} == {
+        "Hair": 0,
+        "Hair_guides": 0,
+        "Flaum_1": 1,
+        "Flaum_1_guides": 1,
+    }
+    assert {name: found["groom_group_name"].only[0] for name, found in groups.items()} == {
+        name: name.removesuffix("_guides") for name in groups
+    }
+    ids = np.concatenate([found["groom_id"].only for found in groups.values()])
+    assert len(np.unique(ids)) == len(ids) == 650
+    for name in ("Hair", "Flaum_1"):
+        named = groups[name]["groom_closest_guides"].only
+        assert np.isin(named, groups[f"{name}_guides"]["groom_id"].only).all()
+
+
+def test_colors_are_those_of_the_look_from_root_to_tip(hair, tmp_path):
+    look = hair.data.vellus.appearance
+    look.tip_absorption, look.random_color, look.random_roughness = 0.2, 0.5, 0.4
+    update()
+    export(tmp_path / "groom.abc")
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
+    colors = found["groom_color"].only.reshape(500, -1, 3)
+    assert (colors > 0.0).all() and (colors < 1.0).all()
+    assert (colors[:, -1] > colors[:, 0]).all(), "tips are bleached"
+    darker = np.argsort(attribute(hair, "strand_random"))
+    assert (np.diff(colors[darker, 0], axis=0) <= 1e-7).all(), "more pigment, less light"
+    roughness = found["groom_roughness"].only.reshape(500, -1)
+    assert (roughness == roughness[:, :1]).all() and 0.1 < np.ptp(roughness) < 0.5
+    export(tmp_path / "groom.abc", has_color=False)
+    assert "groom_color" not in shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
+
+
+def test_baked_guides_move_in_the_file(baked, tmp_path):
+    bpy.context.scene.frame_set(3)
+    made = export(tmp_path / "groom.abc", animation="GUIDES")
+    assert made.frames == LAST and bpy.context.scene.frame_current == 3
+    archive = alembic_reader.read(tmp_path / "groom.abc")
+    moving, rate = shape(archive, "Hair_guides")["P"], bpy.context.scene.render.fps
+    np.testing.assert_allclose(moving.times, [frame / rate for frame in range(1, LAST + 1)])
+    cache, found = frame_folders.frames_of(baked.data), []
+    for frame, sample in zip(range(1, LAST + 1), moving.samples, strict=True):
+        bpy.context.scene.frame_set(frame)
+        pose = guide_poses.read(baked.data, scene.present_depsgraph(), 1.0)
+        wanted = 100.0 * pose.to_world(cache.read_frame(frame).points)
+        np.testing.assert_allclose(sample, wanted.reshape(-1, 3), atol=1e-3)
+        found.append(wanted)
+        if frame == 1:
+            strands = shape(archive, "Hair")["P"]
+            np.testing.assert_allclose(strands.only, 100.0 * world(bpy.data.objects["Hair"]).reshape(-1, 3), atol=1e-3)
+    assert abs(found[-1] - found[0]).max() > 1.0
+
+
+def test_blender_plays_the_file(baked, tmp_path):
+    export(tmp_path / "groom.abc", animation="ALL")
+    blender_scene, wanted = bpy.context.scene, {}
+    for frame in range(1, LAST + 1):
+        blender_scene.frame_set(frame)
+        wanted[frame] = 100.0 * world(bpy.data.objects["Hair"])
+    before = set(bpy.data.objects)
+    bpy.ops.wm.alembic_import(filepath=str(tmp_path / "groom.abc"), set_frame_range=True, as_background_job=False)
+    assert (blender_scene.frame_start, blender_scene.frame_end) == (1, LAST)
+    (came,) = (o for o in set(bpy.data.objects) - before if o.type == "CURVES" and len(o.data.curves) == 500)
+    for frame in (3, 1, 4, 2):
+        blender_scene.frame_set(frame)
+        np.testing.assert_allclose(world(came)[..., [0, 2, 1]] * (1.0, 1.0, -1.0), wanted[frame], atol=2e-3)
+
+
+def test_guides_alone_are_a_cache_of_the_same_guides(baked, tmp_path):
+    export(tmp_path / "groom.abc")
+    export(tmp_path / "cache.abc", animation="GUIDES", has_hair=False)
+    groom, cache = (alembic_reader.read(tmp_path / f"{name}.abc") for name in ("groom", "cache"))
+    assert set(alembic_reader.objects(cache)) == {
+        "/groom",
+        "/groom/Hair_guides",
+        "/groom/Hair_guides/Hair_guidesShape",
+    }
+    for name in ("groom_id", "nVertices", "groom_group_id"):
+        np.testing.assert_array_equal(shape(groom, "Hair_guides")[name].only, shape(cache, "Hair_guides")[name].only)
+
+
+# What is refused, and what is said.
+
+
+def test_frames_that_are_not_baked_are_asked_for(baked, tmp_path):
+    bpy.context.scene.frame_end = LAST + 9
+    with pytest.raises(HairError, match="is not baked"):
+        export(tmp_path / "groom.abc", animation="GUIDES")
+    assert not (tmp_path / "groom.abc").exists()
+
+
+@pytest.mark.parametrize("ending", [".abc", ".usdc"])
+def test_points_that_are_not_finite_leave_the_file_that_was_there(hair, tmp_path, ending):
+    path = tmp_path / f"groom{ending}"
+    path.write_bytes(b"before")
+    bpy.data.objects["Hair"].data.vellus.is_live = False
+    points = evaluated_points(hair)
+    points[7, 3, 1] = np.nan
+    write_points(hair, points)
+    with pytest.raises(HairError, match="non-finite"):
+        export(path)
+    assert path.read_bytes() == b"before" and [*tmp_path.iterdir()] == [path]
+
+
+def test_what_cannot_be_exported_is_one_sentence(hair, tmp_path):
+    with pytest.raises(HairError, match=r"exported as \.abc"):
+        export(tmp_path / "groom.fbx")
+    with pytest.raises(HairError, match="choose one"):
+        export(tmp_path / "groom.abc", has_hair=False, has_guides=False)
+    with pytest.raises(HairError, match="no hair"):
+        run_now(groom_export.exporting(tmp_path / "groom.abc", [], ExportSettings(), bpy.context.scene))
+
+
+def test_what_importers_do_is_said(hair, tmp_path):
+    sphere = bpy.data.objects["Sphere"]
+    sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
+    hair.data.vellus.hair.guide_map = False
+    update()
+    notes = [str(note) for note in export(tmp_path / "groom.abc").notes]
+    assert sum("no UV coordinates" in note for note in notes) == 2
+    assert any("stores no guide weights" in note for note in notes)
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
+    assert not {"groom_root_uv", "groom_closest_guides", "groom_guide_weights"} & set(found)
+
+
+# The operator.
+
+
+def test_the_operator_writes_and_changes_nothing(hair, tmp_path):
+    names = sorted(o.name for o in bpy.data.objects)
+    for path in ("groom.abc", "groom.usda", "bare"):
+        assert bpy.ops.vellus.export_groom(filepath=str(tmp_path / path), has_color=False) == {"FINISHED"}
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bare.abc", "groom.abc", "groom.usda"]
+    assert sorted(o.name for o in bpy.data.objects) == names
+    with pytest.raises(RuntimeError, match=r"exported as \.abc"):
+        bpy.ops.vellus.export_groom(filepath=str(tmp_path / "groom.obj"))
