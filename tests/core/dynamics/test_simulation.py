@@ -273,7 +273,8 @@ def test_each_guide_is_as_wet_as_it_is_said(rng):
     is_wet = rng.random(len(groom)) < 0.5
 
     def end_of(settings, wetness=None):
-        return play(Simulation(groom, settings, pose, World(), DEVICE, wetness=wetness), pose, range(1, 9), is_colliding=False)
+        simulation = Simulation(groom, settings, pose, World(), DEVICE, wetness=wetness)
+        return play(simulation, pose, range(1, 9), is_colliding=False)
 
     dry, wet, some = end_of(alone), end_of(replace(alone, wetness=1.0)), end_of(alone, is_wet.astype(np.float32))
     np.testing.assert_array_equal(some[is_wet], wet[is_wet])
