@@ -104,7 +104,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
         pose.root_pose(pose),
         frame.world,
         preferences.device(),
-        guide_regions.regions_of(guides, depsgraph),
+        regions=guide_regions.regions_of(guides, depsgraph),
     )
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)

@@ -12,14 +12,19 @@ import numpy as np
 import warp as wp
 
 from ..errors import HairError
+from ..kernels import kernel_cache
 from ..kernels.checks import require_count
 from . import rod_solver, rotations
 from .material import Material
 from .rod_solver import RodArrays, Step, Surroundings
 from .settings import DynamicsSettings
 
+# Nothing differentiates this kernel, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
 # What a substep reads and the groom, material and roots do not say.
 STATE = ("positions", "velocities", "frames", "spins", "multipliers", "slips", "roots", "resets")
+_ROOT_END = wp.constant(rod_solver.ROOT_ROWS // 2)  # the row of a root's place at the end of the frame
 MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom; more where hair is made to stretch
 
 
@@ -171,9 +176,11 @@ class Rods:
 
     def carried_groom(self) -> wp.array:
         """(groups, 3 (M + 1), lanes) float32 [m]: the groom where the surface has it at the end of the frame."""
-        grooms = self.read("grooms").reshape(self.strand_count, -1, 3)
-        roots = self.read("roots")[:, None, rod_solver.ROOT_ROWS // 2 :]
-        return self.in_lanes(roots[..., :3] + rotations.rotated(roots[..., 3:], grooms))
+        grooms, roots = self.arrays.grooms, self.arrays.roots
+        carried = wp.empty_like(grooms)
+        shape = len(grooms), grooms.shape[1] // 3, self.lanes
+        kernel_cache.launch(_carry_points, shape, inputs=[grooms, roots], outputs=[carried], device=self.device)
+        return carried
 
     def carry(self, chosen: np.ndarray, turns: np.ndarray, pivots: np.ndarray, places: np.ndarray) -> None:
         """Take some strands along rigidly, as after a jump of the surface: x becomes place + turn (x - pivot).
@@ -284,3 +291,26 @@ class Rods:
         if not np.isfinite(rows).all():
             raise HairError("Roots of simulated strands have non-finite coordinates.")
         return rows
+
+
+@wp.kernel
+def _carry_points(
+    grooms: wp.array3d[float],
+    roots: wp.array3d[float],
+    # outputs
+    carried: wp.array3d[float],
+):
+    group, point, lane = wp.tid()
+    at = 3 * point
+    end = _ROOT_END
+    place = wp.vec3(roots[group, end, lane], roots[group, end + 1, lane], roots[group, end + 2, lane])
+    turn = wp.quat(
+        roots[group, end + 3, lane],
+        roots[group, end + 4, lane],
+        roots[group, end + 5, lane],
+        roots[group, end + 6, lane],
+    )
+    groom = wp.vec3(grooms[group, at, lane], grooms[group, at + 1, lane], grooms[group, at + 2, lane])
+    there = place + wp.quat_rotate(turn, groom)
+    for k in range(3):
+        carried[group, at + k, lane] = there[k]

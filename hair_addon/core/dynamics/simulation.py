@@ -78,6 +78,7 @@ class Simulation:
         pose: RootPose,
         world: World,
         device: wp.DeviceLike = None,
+        *,
         regions: np.ndarray | None = None,
         wetness: np.ndarray | None = None,
     ) -> None:

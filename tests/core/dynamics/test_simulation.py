@@ -282,4 +282,4 @@ def test_each_guide_is_as_wet_as_it_is_said(rng):
     assert np.abs(wet - dry).max() > 1e-3
     for wrong in (np.zeros(3), np.full(len(groom), np.nan), np.full(len(groom), 1.5)):
         with pytest.raises(HairError):
-            Simulation(groom, alone, pose, World(), DEVICE, wrong)
+            Simulation(groom, alone, pose, World(), DEVICE, wetness=wrong)
