@@ -241,7 +241,7 @@ def test_hair_of_another_region_is_not_felt(rng):
     def ends(chosen, regions=None):
         own = replace(pose, positions=pose.positions[chosen], turns=pose.turns[chosen])
         kicked = replace(own, positions=own.positions + kicks[chosen])
-        simulation = Simulation(groom[chosen], settings, own, NONE, DEVICE, regions)
+        simulation = Simulation(groom[chosen], settings, own, NONE, DEVICE, regions=regions)
         for _ in range(6):
             simulation.advance(kicked, NONE, FRAME)
         return simulation.points()
