@@ -84,6 +84,8 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
 
 def _regions(guides):
     """Regions of guides, None for one; why they cannot be read, as then frames that are baked still play."""
+    if not guide_regions.is_parted(guides):
+        return None
     try:
         return guide_regions.regions_of(guides, scenes.present_depsgraph())
     except HairError as error:

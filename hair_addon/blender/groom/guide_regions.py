@@ -8,12 +8,13 @@ from ...core import interpolation
 from ...core.grooming import groom
 from ..data import curves, partings, scene
 from ..settings import preferences, setting_properties
+from . import bindings
 
 
 def regions_of(guides: Curves, depsgraph: Depsgraph) -> np.ndarray | None:
     """(G,) int32 from 0: alike where no hair between the guides is parted; None where none is. Raises `HairError`."""
-    parted = [hair for hair in curves.followers(guides) if partings.is_wanted(hair.vellus.hair)]
-    if not parted:
+    parted = _parted_hair(guides)
+    if not parted or guides.surface is None:
         return None
     device = preferences.device()
     surface = scene.read_surface(guides.surface, depsgraph)
@@ -29,6 +30,20 @@ def regions_of(guides: Curves, depsgraph: Depsgraph) -> np.ndarray | None:
     return regions if regions.any() else None
 
 
+def is_parted(guides: Curves) -> bool:
+    """Whether `regions_of` has anything to read."""
+    return bool(_parted_hair(guides))
+
+
+def _parted_hair(guides):
+    return [hair for hair in curves.followers(guides) if partings.is_wanted(hair.vellus.hair)]
+
+
 def parting_keys(guides: Curves) -> tuple[str, ...]:
     """What parted the hair between guides when it was grown: changes where `regions_of` may."""
-    return tuple(sorted(hair.vellus.parting_key for hair in curves.followers(guides)))
+    followers = curves.followers(guides)
+    bound = [bindings.of(hair) for hair in followers]  # newer than what is written
+    keys = [
+        hair.vellus.parting_key if own is None else own.parting_key for hair, own in zip(followers, bound, strict=True)
+    ]
+    return tuple(sorted(keys))

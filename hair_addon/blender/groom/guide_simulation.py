@@ -53,6 +53,7 @@ class GuideSimulation:
     simulation: "dynamics.simulation.Simulation"
     metres: float  # in a unit of the world
     obstacles: dict[str, "dynamics.simulation.Obstacle"] = field(default_factory=dict)
+    parted_by: tuple[str, ...] = ()  # `guide_regions.parting_keys` when regions were read
     errors: tuple[HairError, ...] = ()  # of colliders, in the last frame
 
     def see(self, frame: FrameInput) -> FrameInput:
@@ -77,6 +78,15 @@ class GuideSimulation:
         """Go on with other settings, from the next frame on."""
         self.simulation.change(in_metres(settings, self.metres))
         self.settings = settings
+
+    def follow_parting(self, guides: Curves, depsgraph: Depsgraph) -> bool:
+        """Divide guides as their hair is parted now; returns whether that is otherwise. Raises `HairError`."""
+        keys = guide_regions.parting_keys(guides)
+        if keys == self.parted_by:
+            return False
+        is_other = self.simulation.divide(guide_regions.regions_of(guides, depsgraph))
+        self.parted_by = keys
+        return is_other
 
     def go_on(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
         """Go on from a state that the simulation's `save` gave in a frame, as `see` returned it. Raises `HairError`."""
@@ -111,6 +121,7 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
     digest, topology = staleness.guides_digest(guides), guides.vellus.topology
     _keep_stiffness(guides, settings, pose, local, frame.world.gravity)
     begun = GuideSimulation(digest, topology, settings, pose, local[:, 0].copy(), simulation, metres)
+    begun.parted_by = guide_regions.parting_keys(guides)
     begun.see(frame)
     return begun
 

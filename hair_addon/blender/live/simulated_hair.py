@@ -193,6 +193,8 @@ def _advance(played, guides, blender_scene, depsgraph, settings):
         played.simulated.change(settings)
         if guide_simulation.unkeyed(guides, settings) != guide_simulation.unkeyed(guides, before):
             played.outdated = played.frame
+    if played.simulated.follow_parting(guides, depsgraph):
+        played.outdated = played.frame
     read = guide_simulation.read(guides, blender_scene, depsgraph, settings)
     points = played.simulated.advance(read)
     played.frame += 1

@@ -94,8 +94,7 @@ class Simulation:
         self._start, self._origin = pose, np.round(pose.positions.mean(axis=0) / _GRID) * _GRID
         self._scale = pose.scale
         self._groom = self._checked(groom)
-        self._regions = np.zeros(len(groom), np.int32) if regions is None else np.asarray(regions, np.int32)
-        require_count("regions", self._regions.size, len(groom))
+        self._regions = self._checked_regions(regions)
         self._wetness = self._checked_wetness(wetness)
         combed = self._combed()
         vertices = detail.vertices_of(combed, settings.vertex_count)
@@ -138,6 +137,12 @@ class Simulation:
                 raise HairError("The wetness of guides must be from 0 to 1.")
         return wetness
 
+    def _checked_regions(self, regions):
+        count = len(self._groom)
+        regions = np.zeros(count, np.int32) if regions is None else np.asarray(regions, np.int32)
+        require_count("regions", regions.size, count)
+        return regions
+
     def _combed(self):
         """(G, P, 3): the groom where the surface had it in the first frame, from the origin, at its present scale."""
         return replace(self._start, scale=self._scale).carried(self._groom) - self._origin
@@ -165,6 +170,15 @@ class Simulation:
             require_count("guides", len(groom), len(self._groom))
             self._groom = self._checked(groom)
         self._renew()
+
+    def divide(self, regions: np.ndarray | None) -> bool:
+        """Go on with other regions of guides, as in `__init__`; returns whether they are others."""
+        regions = self._checked_regions(regions)
+        is_other = not np.array_equal(regions, self._regions)
+        if is_other:
+            self._regions = regions
+            self._volume = self._new_volume()
+        return is_other
 
     def _renew(self):
         """Give the strands the material and shape that follow from settings, groom and scale."""

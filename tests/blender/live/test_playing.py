@@ -16,6 +16,7 @@ from hair_addon.blender.live import (
     unlocked_renders,
 )
 from hair_addon.core.long_work import run_now
+from tests.blender.data.test_partings import draw_line
 from tests.support.layout import draw
 from tests.support.reading import points, write_points
 from tests.support.swung import simulate, swing
@@ -132,6 +133,28 @@ def test_a_setting_takes_effect_with_the_next_frame(swung):
     other = shown(guides).copy()
     play(2, 9)
     assert not np.array_equal(shown(guides), other)
+
+
+def test_a_part_line_takes_effect_with_the_next_frame(swung):
+    """Frames before it count as outdated; one that divides the guides as before changes nothing."""
+    guides, hair = swung
+    guides.data.vellus.dynamics.hair_friction = 50.0
+    draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
+    bpy.context.view_layer.update()
+    play(1, 9)
+    unparted = shown(guides).copy()
+    play(1, 6)
+    hair.data.vellus.hair.part_lines = "Line"
+    bpy.context.view_layer.update()
+    play(7, 9)
+    sentence, values = dynamics_state.state_of(guides.data)
+    assert "other settings" in sentence and values["frame"] == 6
+    assert not np.array_equal(shown(guides), unparted)
+    play(1, 6)
+    hair.data.vellus.hair.seed += 1
+    bpy.context.view_layer.update()
+    play(7, 9)
+    assert dynamics_state.state_of(guides.data)[0].startswith("Simulated up to frame")
 
 
 def test_switched_off_guides_are_as_combed(swung):
