@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...core.errors import HairError
+from ...core.errors import HairError, cause_of
 from ...core.files import export_settings, settings_file, unreal_groom
 from ...core.files.whole_file import require_place, whole_file
 from ...core.long_work import Stage
@@ -14,7 +14,7 @@ from ..groom import frame_folders, groom_settings
 from ..host import paths, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
-from . import delivery, groom_sources, strand_arrays, usd_groom
+from . import delivery, groom_sources, hair_file, strand_arrays, usd_groom
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Exported:
 
 
 def require_writable(path):
-    """Raise `HairError` unless a groom could be written to a path."""
+    """Raise `HairError` unless a groom could be written to a path, by its ending, with what Blender has."""
     ending = path.suffix.lower()
     if ending not in export_settings.ENDINGS:
         raise HairError(
@@ -39,6 +39,8 @@ def require_writable(path):
             endings=", ".join(export_settings.ENDINGS),
             ending=ending or "a file without an extension",
         )
+    if _is_usd(path):
+        hair_file.require_usd()
     require_place(path)
 
 
@@ -63,7 +65,7 @@ def exporting(path, chosen, settings, blender_scene):
         if not sources:
             raise HairError("Neither hair nor guides would be exported: choose one of them.")
         with whole_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:
-            numbers = yield _adding(writer, sources)
+            numbers = yield _adding(writer, sources, path)
             if _is_usd(path):
                 _add_instances(writer, chosen)
             for index, frame in enumerate(frames):
@@ -71,7 +73,7 @@ def exporting(path, chosen, settings, blender_scene):
                 for guides in simulated:
                     delivery.require_shown(guides.find(), frame)
                 read = _read(sources, numbers, per_metre, is_first=index == 0)
-                yield _writing(writer, read, frame, index / len(frames))
+                yield _writing(writer, read, path, frame, index / len(frames))
     guide_count, strand_count = groom_sources.counts_of(sources)
     notes = [*groom_sources.notes_of(chosen, settings), *writer.notes()]
     return Exported(path, len(chosen), guide_count, strand_count, len(frames), path.stat().st_size, notes)
@@ -123,20 +125,21 @@ def _read(sources, numbers, per_metre, is_first):
     return read
 
 
-def _adding(writer, sources):
+def _adding(writer, sources, path):
     """A function of (progress) that writes all but points, and returns the numbers of the curves."""
 
     def write(progress):
         numbers = []
         for source in sources:
             progress("Exporting", 0.0)
-            numbers.append(writer.add(source.curves, source.moves))
+            with _told(path):
+                numbers.append(writer.add(source.curves, source.moves))
         return numbers
 
     return write
 
 
-def _writing(writer, read, frame, part):
+def _writing(writer, read, path, frame, part):
     """A function of (progress) that writes the points of one time, which can be stopped between parts of them."""
     step = "Exporting" if frame is None else f"Frame {frame}"
 
@@ -149,9 +152,19 @@ def _writing(writer, read, frame, part):
 
     def write(progress):
         for number, points in read:
-            writer.write_points(number, watched(points, progress))
+            with _told(path):
+                writer.write_points(number, watched(points, progress))
 
     return write
+
+
+@contextlib.contextmanager
+def _told(path):
+    """Raise `HairError` for a disk that is full: a computation runs outside of what tells of other errors."""
+    try:
+        yield
+    except OSError as error:
+        raise HairError("{path} cannot be written: {cause}.", path=path, cause=cause_of(error)) from error
 
 
 def _properties(chosen):
