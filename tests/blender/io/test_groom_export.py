@@ -19,6 +19,8 @@ from tests.support.exported import LAST, bake, export, shape, twist, widths, wor
 from tests.support.following import update
 from tests.support.reading import attribute, evaluated_points, write_points
 
+NAMES = ("P", "nVertices", "curveBasisAndType", "width", ".selfBnds")  # of curves in any Alembic file
+
 
 @pytest.fixture
 def twisted(hair):
@@ -47,6 +49,25 @@ def test_curves_are_in_centimetres_where_they_are_seen(twisted, tmp_path):
         np.testing.assert_array_equal(found["groom_width"].only, found["width"].only)
         np.testing.assert_array_equal(found["groom_root_uv"].only, attribute(shown, "surface_uv_coordinate", 2))
         assert found["groom_guide"].only[0] == (shown == guides)
+
+
+def test_properties_are_as_blender_writes_them(hair, tmp_path):
+    """Blender writes with Alembic's own library: types and metadata of what both write are the same."""
+    bpy.ops.wm.alembic_export(filepath=str(tmp_path / "blender.abc"), start=1, end=1, as_background_job=False)
+    export(tmp_path / "groom.abc")
+    theirs, ours = (alembic_reader.read(tmp_path / f"{name}.abc") for name in ("blender", "groom"))
+    (name,) = (path for path in alembic_reader.objects(theirs) if path.endswith("Hair/Hair"))
+    written, made = alembic_reader.objects(theirs)[name], alembic_reader.objects(ours)["/groom/Hair/HairShape"]
+    assert written.metadata == made.metadata
+    pairs = {".geom": (written.properties[".geom"], made.properties[".geom"])}
+    pairs |= {
+        name: (p, pairs[".geom"][1].children[name]) for name, p in pairs[".geom"][0].children.items() if name in NAMES
+    }
+    assert set(pairs) == {".geom", *NAMES}
+    for name, (wanted, found) in pairs.items():
+        assert (wanted.form, wanted.kind, wanted.extent) == (found.form, found.kind, found.extent), name
+        assert wanted.metadata.items() <= found.metadata.items(), name
+    assert ours.samplings[0][1:] == theirs.samplings[0][1:]
 
 
 def test_blender_takes_the_curves_back(twisted, tmp_path):
