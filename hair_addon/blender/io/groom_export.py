@@ -56,18 +56,21 @@ def exporting(path, chosen, settings, blender_scene):
     frames = [None] if settings.animation == "NONE" else list(scene_time.scene_frames())
     simulated = _simulated(chosen, frames)
     per_metre = usd_groom.PER_METRE if _is_usd(path) else unreal_groom.PER_METRE
+    remembered = [Remembered(hair) for hair in chosen]
     with contextlib.ExitStack() as stack:
         stack.callback(_go_to, blender_scene, None if frames == [None] else scene_time.time_of(blender_scene))
         _go_to(blender_scene, frames[0])
         yield Stage("Exporting", 0.0)
         strand_arrays.bring_up_to_date()
+        chosen = [one.find() for one in remembered]
         sources = groom_sources.sources_of(chosen, settings, per_metre)
+        notes, instances = list(groom_sources.notes_of(chosen, settings)), groom_sources.instances_of(chosen)
         if not sources:
             raise HairError("Neither hair nor guides would be exported: choose one of them.")
         with whole_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:
             numbers = yield _adding(writer, sources, path)
-            if _is_usd(path):
-                _add_instances(writer, chosen)
+            for name, matrix in instances if _is_usd(path) else ():
+                writer.add_instance(name, matrix)
             for index, frame in enumerate(frames):
                 _go_to(blender_scene, frame if index else None)
                 for guides in simulated:
@@ -75,8 +78,8 @@ def exporting(path, chosen, settings, blender_scene):
                 read = _read(sources, numbers, per_metre, is_first=index == 0)
                 yield _writing(writer, read, path, frame, index / len(frames))
     guide_count, strand_count = groom_sources.counts_of(sources)
-    notes = [*groom_sources.notes_of(chosen, settings), *writer.notes()]
-    return Exported(path, len(chosen), guide_count, strand_count, len(frames), path.stat().st_size, notes)
+    counts = len(remembered), guide_count, strand_count, len(frames)
+    return Exported(path, *counts, path.stat().st_size, [*notes, *writer.notes()])
 
 
 def _is_usd(path):
@@ -107,13 +110,6 @@ def _simulated(chosen, frames):
     for one in simulated:
         frame_folders.require_frames(one, frames)
     return [Remembered(one) for one in simulated]
-
-
-def _add_instances(writer, chosen):
-    """Show hair again that several objects have."""
-    for hair, name in zip(chosen, groom_sources.group_names(chosen), strict=True):
-        for matrix in strand_arrays.other_places(hair):
-            writer.add_instance(name, matrix)
 
 
 def _read(sources, numbers, per_metre, is_first):
