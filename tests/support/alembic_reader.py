@@ -12,7 +12,10 @@ import numpy as np
 KINDS = {
     0: ("bool_t", "?"),
     1: ("uint8_t", "u1"),
+    2: ("int8_t", "i1"),
+    3: ("uint16_t", "<u2"),
     4: ("int16_t", "<i2"),
+    5: ("uint32_t", "<u4"),
     6: ("int32_t", "<i4"),
     10: ("float32_t", "<f4"),
     11: ("float64_t", "<f8"),
@@ -96,7 +99,6 @@ class _Reader:
         self.samplings = self.read_samplings(self.content(children[4]))
         self.table = [{}, *self.read_table(self.content(children[5]))]
         top = self.object(children[2], {})
-        assert not top.properties
         return Archive(metadata(self.content(children[3])), top.children, self.samplings)
 
     def group(self, address):
@@ -172,10 +174,11 @@ class _Reader:
                 return value
 
             count = sampling = 0
+            changes = None  # first and last sample that is another than the one before
             if bits & 3:
                 count = take()
-                assert not bits & 0x200, "repeated samples are not written"
-                assert (count <= 1) == bool(bits & 0x800)
+                changes = (take(), take()) if bits & 0x200 else (0, 0) if bits & 0x800 else (1, count - 1)
+                assert 0 <= changes[0] <= changes[1] < max(count, 1)
                 sampling = take() if bits & 0x100 else 0
             size = take()
             name = headers[place : place + size].decode()
@@ -188,41 +191,43 @@ class _Reader:
             else:
                 found_metadata = self.table[index]
             assert name and name not in found
-            found[name] = self.property(child, bits, count, sampling, found_metadata)
+            found[name] = self.property(child, bits, count, changes, sampling, found_metadata)
         assert place == len(headers)
         return found
 
-    def property(self, address, bits, count, sampling, found_metadata):
+    def property(self, address, bits, count, changes, sampling, found_metadata):
         form = ("compound", "scalar", "array", "array")[bits & 3]
         if form == "compound":
             return Property(form, found_metadata, children=self.compound(address))
         kind, dtype = KINDS[bits >> 4 & 0xF]
         extent = bits >> 12 & 0xFF
         children = self.group(address)
-        assert len(children) == count * (2 if form == "array" else 1)
+        first, last = changes
+        held = [0 if n < first or last == 0 else min(n, last) - first + 1 for n in range(count)]
+        assert len(children) == len({*held}) * (2 if form == "array" else 1)
         contents = children[::2] if form == "array" else children
-        samples = [self.sample(child, dtype, extent) for child in contents]
-        sizes = {len(sample) for sample in samples}
-        assert (len(sizes) <= 1) == bool(bits & 0x400)
+        written = [self.sample(child, dtype, extent) for child in contents]
+        sizes = {len(sample) for sample in written}
         if form == "array":
             assert (bits & 3 == 3) == (sizes == {1})
-            for sample, dimensions in zip(samples, children[1::2], strict=True):
+            for sample, dimensions in zip(written, children[1::2], strict=True):
                 wanted = struct.pack("<Q", len(sample)) if dtype is None else b""
                 assert self.content(dimensions) == wanted
         else:
             assert sizes == {1}
+        samples = [written[index] for index in held]
         most, step, times = self.samplings[sampling]
-        assert count <= most
+        assert len({*held}) <= most
         return Property(form, found_metadata, kind, extent, samples, [times[0] + step * n for n in range(count)])
 
     def sample(self, address, dtype, extent):
         """An array (N,) or (N, extent), or a list of str."""
         content = self.content(address)
-        assert len(content) >= 16 and any(content[:16]), "no digest"
+        assert not content or (len(content) > 16 and any(content[:16])), "no digest"
         content = content[16:]
         if dtype is None:
-            assert content.endswith(b"\0")
-            return content[:-1].decode().split("\0")
+            assert not content or content.endswith(b"\0")
+            return content[:-1].decode().split("\0") if content else []
         values = np.frombuffer(content, dtype)
         assert len(values) % extent == 0
         return values if extent == 1 else values.reshape(-1, extent)

@@ -6,7 +6,7 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
-from ...core.errors import HairError
+from ...core.errors import HairError, cause_of
 from ...core.files import export_settings, settings_file, unreal_groom
 from ...core.files.whole_file import require_place, whole_file
 from ...core.long_work import Stage
@@ -14,7 +14,7 @@ from ..groom import frame_folders, groom_settings
 from ..host import paths, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
-from . import delivery, groom_sources, strand_arrays, usd_groom
+from . import delivery, groom_sources, hair_file, strand_arrays, usd_groom
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Exported:
 
 
 def require_writable(path):
-    """Raise `HairError` unless a groom could be written to a path."""
+    """Raise `HairError` unless a groom could be written to a path, by its ending, with what Blender has."""
     ending = path.suffix.lower()
     if ending not in export_settings.ENDINGS:
         raise HairError(
@@ -39,6 +39,8 @@ def require_writable(path):
             endings=", ".join(export_settings.ENDINGS),
             ending=ending or "a file without an extension",
         )
+    if _is_usd(path):
+        hair_file.require_usd()
     require_place(path)
 
 
@@ -54,27 +56,30 @@ def exporting(path, chosen, settings, blender_scene):
     frames = [None] if settings.animation == "NONE" else list(scene_time.scene_frames())
     simulated = _simulated(chosen, frames)
     per_metre = usd_groom.PER_METRE if _is_usd(path) else unreal_groom.PER_METRE
+    remembered = [Remembered(hair) for hair in chosen]
     with contextlib.ExitStack() as stack:
         stack.callback(_go_to, blender_scene, None if frames == [None] else scene_time.time_of(blender_scene))
         _go_to(blender_scene, frames[0])
         yield Stage("Exporting", 0.0)
         strand_arrays.bring_up_to_date()
+        chosen = [one.find() for one in remembered]
         sources = groom_sources.sources_of(chosen, settings, per_metre)
+        notes, instances = list(groom_sources.notes_of(chosen, settings)), groom_sources.instances_of(chosen)
         if not sources:
             raise HairError("Neither hair nor guides would be exported: choose one of them.")
         with whole_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:
-            numbers = yield _adding(writer, sources)
-            if _is_usd(path):
-                _add_instances(writer, chosen)
+            numbers = yield _adding(writer, sources, path)
+            for name, matrix in instances if _is_usd(path) else ():
+                writer.add_instance(name, matrix)
             for index, frame in enumerate(frames):
                 _go_to(blender_scene, frame if index else None)
                 for guides in simulated:
                     delivery.require_shown(guides.find(), frame)
                 read = _read(sources, numbers, per_metre, is_first=index == 0)
-                yield _writing(writer, read, frame, index / len(frames))
+                yield _writing(writer, read, path, frame, index / len(frames))
     guide_count, strand_count = groom_sources.counts_of(sources)
-    notes = [*groom_sources.notes_of(chosen, settings), *writer.notes()]
-    return Exported(path, len(chosen), guide_count, strand_count, len(frames), path.stat().st_size, notes)
+    counts = len(remembered), guide_count, strand_count, len(frames)
+    return Exported(path, *counts, path.stat().st_size, [*notes, *writer.notes()])
 
 
 def _is_usd(path):
@@ -107,13 +112,6 @@ def _simulated(chosen, frames):
     return [Remembered(one) for one in simulated]
 
 
-def _add_instances(writer, chosen):
-    """Show hair again that several objects have."""
-    for hair, name in zip(chosen, groom_sources.group_names(chosen), strict=True):
-        for matrix in strand_arrays.other_places(hair):
-            writer.add_instance(name, matrix)
-
-
 def _read(sources, numbers, per_metre, is_first):
     """[(number, points)] of what is written at this time."""
     read = []
@@ -123,20 +121,21 @@ def _read(sources, numbers, per_metre, is_first):
     return read
 
 
-def _adding(writer, sources):
+def _adding(writer, sources, path):
     """A function of (progress) that writes all but points, and returns the numbers of the curves."""
 
     def write(progress):
         numbers = []
         for source in sources:
             progress("Exporting", 0.0)
-            numbers.append(writer.add(source.curves, source.moves))
+            with _told(path):
+                numbers.append(writer.add(source.curves, source.moves))
         return numbers
 
     return write
 
 
-def _writing(writer, read, frame, part):
+def _writing(writer, read, path, frame, part):
     """A function of (progress) that writes the points of one time, which can be stopped between parts of them."""
     step = "Exporting" if frame is None else f"Frame {frame}"
 
@@ -149,9 +148,19 @@ def _writing(writer, read, frame, part):
 
     def write(progress):
         for number, points in read:
-            writer.write_points(number, watched(points, progress))
+            with _told(path):
+                writer.write_points(number, watched(points, progress))
 
     return write
+
+
+@contextlib.contextmanager
+def _told(path):
+    """Raise `HairError` for a disk that is full: a computation runs outside of what tells of other errors."""
+    try:
+        yield
+    except OSError as error:
+        raise HairError("{path} cannot be written: {cause}.", path=path, cause=cause_of(error)) from error
 
 
 def _properties(chosen):

@@ -139,6 +139,12 @@ def points_of(source, per_metre):
     return strand_arrays.world_rows(datablock, per_metre, local)
 
 
+def instances_of(chosen):
+    """[(group, (4, 4) matrix)] of hair that other objects show too, as `strand_arrays.other_places` gives them."""
+    pairs = zip(chosen, group_names(chosen), strict=True)
+    return [(name, matrix) for hair, name in pairs for matrix in strand_arrays.other_places(hair)]
+
+
 def counts_of(sources):
     """How many (guides, strands) there are."""
     every = [source.curves for source in sources]

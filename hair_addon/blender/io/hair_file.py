@@ -38,7 +38,7 @@ def require_ours(path):
 def require_usd():
     """Raise `HairError` where this build of Blender has no USD."""
     if not paths.has_operator("wm.usd_export"):
-        raise HairError("Hair cannot be delivered: this build of Blender lacks USD.")
+        raise HairError("Hair cannot be written: this build of Blender lacks USD.")
     bpy.utils.expose_bundled_modules()
 
 

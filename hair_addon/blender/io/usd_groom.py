@@ -47,8 +47,8 @@ _HAIR_INPUTS = {
 class UsdGroomWriter:
     """Writes a groom to a stage; `writing` makes it. Guides and strands are added, and then get their points."""
 
-    def __init__(self, stage, tool, properties, first_frame):
-        self._stage, self._first_frame = stage, first_frame
+    def __init__(self, stage, path, tool, properties, first_frame):
+        self._stage, self._path, self._first_frame = stage, path, first_frame
         self._added = []
         root = stage.GetPrimAtPath(_ROOT)
         root.AddAppliedSchema("GroomAPI")
@@ -87,7 +87,16 @@ class UsdGroomWriter:
         if moves:
             self._stage.SetStartTimeCode(self._first_frame)
             self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), time.GetValue()))
-            self._stage.GetRootLayer().Save()  # frees what is written
+            self._save()
+
+    def _save(self):
+        """Write what was added to the disk, which frees its memory."""
+        from pxr import Tf
+
+        try:
+            self._stage.GetRootLayer().Save()
+        except Tf.ErrorException as error:
+            raise hair_file.failed(self._path, error) from error
 
     def add_instance(self, group_name, matrix):
         """Show a group again; matrix: (4, 4), from where the group is [m]."""
@@ -124,7 +133,7 @@ def writing(path: Path, final_path: Path, tool, properties, rate=24.0, first_fra
         stage.SetTimeCodesPerSecond(rate)
         stage.SetFramesPerSecond(rate)
         stage.SetDefaultPrim(UsdGeom.Xform.Define(stage, _ROOT).GetPrim())
-        yield UsdGroomWriter(stage, tool, properties, first_frame)
+        yield UsdGroomWriter(stage, final_path, tool, properties, first_frame)
         stage.GetRootLayer().Save()
     except Tf.ErrorException as error:
         raise hair_file.failed(final_path, error) from error

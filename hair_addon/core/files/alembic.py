@@ -71,14 +71,17 @@ class Object:
 
 
 class AlembicWriter:
-    """Writes an archive to an empty, seekable file; application: the program that it names.
+    """Writes an archive to an empty, seekable file.
+
+    application: the program that it names; frame_rate: frames a second of its scene, None if there are none.
 
     Methods raise OSError where the disk is full.
     """
 
-    def __init__(self, file: BinaryIO, application: str) -> None:
+    def __init__(self, file: BinaryIO, application: str, frame_rate: float | None = None) -> None:
         self._container = ogawa.OgawaWriter(file)
-        self._application = application
+        rate = "" if frame_rate is None else f"{frame_rate:.6f}"
+        self._metadata = {"_ai_Application": application, "FramesPerTimeUnit": rate}
         self._indices = {"": 0}  # of the table of metadata
         self._samplings = [(1.0, 0.0)]  # (seconds between samples, time of the first [s])
         self._most_samples = [0]  # of each sampling
@@ -141,7 +144,7 @@ class AlembicWriter:
         """Write the archive around its topmost objects."""
         root, _digest = self._write_object([], children)
         version = f"Alembic {_LIBRARY_VERSION // 10000}.{_LIBRARY_VERSION // 100 % 100}.{_LIBRARY_VERSION % 100}"
-        metadata = serialized({"_ai_AlembicVersion": version, "_ai_Application": self._application})
+        metadata = serialized({"_ai_AlembicVersion": version, **self._metadata})
         parts = [
             self._container.data(struct.pack("<i", _LAYOUT_VERSION)),
             self._container.data(struct.pack("<i", _LIBRARY_VERSION)),
@@ -213,8 +216,8 @@ def _property_header(header, index):
 
 
 def serialized(metadata: Metadata | None) -> str:
-    """Return metadata as the file has it: key=value, in order, with semicolons between."""
-    return ";".join(f"{key}={value}" for key, value in sorted((metadata or {}).items()))
+    """Return metadata as the file has it: key=value, in order, with semicolons between; empty values are left out."""
+    return ";".join(f"{key}={value}" for key, value in sorted((metadata or {}).items()) if value)
 
 
 def _encoded(texts):

@@ -52,7 +52,7 @@ class OgawaWriter:
     def sample(self, parts: Iterable[Buffer]) -> tuple[int, int, bytes]:
         """Write a sample, its digest and then its content in parts; returns its (address, bytes of content, digest).
 
-        One that the file has is not kept again.
+        One that the file has is not kept again, and one without content has no place.
         """
         start, digest = self._end, hashlib.blake2b(digest_size=DIGEST_SIZE)
         self._append(bytes(_NUMBER.size + DIGEST_SIZE))
@@ -60,7 +60,8 @@ class OgawaWriter:
             digest.update(part)
             self._append(part)
         size, made = self._end - start - _NUMBER.size, digest.digest()
-        address = self._samples.setdefault((size, made), start | EMPTY_DATA)
+        place = EMPTY_DATA if size == DIGEST_SIZE else start | EMPTY_DATA
+        address = self._samples.setdefault((size, made), place)
         self._file.seek(start)
         if address != start | EMPTY_DATA:
             self._end = start

@@ -78,7 +78,7 @@ def writing(
     from `first_frame` on; None where none do. Raises OSError where the disk is full.
     """
     with open(path, "wb") as file:
-        archive = AlembicWriter(file, tool)
+        archive = AlembicWriter(file, tool, rate)
         sampling = 0 if rate is None else archive.add_sampling(1.0 / rate, first_frame / rate)
         writer = UnrealGroomWriter(archive, sampling, tool, properties)
         yield writer

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Alembic for Unreal: hair is where it was seen, as Blender and an independent reader find it; refusals and notes."""
 
+import resource
+
 import bpy
 import numpy as np
 import pytest
@@ -8,14 +10,16 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.data import curves, guide_poses, scene
 from hair_addon.blender.groom import frame_folders
-from hair_addon.blender.io import groom_export
+from hair_addon.blender.io import groom_export, groom_sources
 from hair_addon.core.errors import HairError
 from hair_addon.core.files.export_settings import ExportSettings
-from hair_addon.core.long_work import run_now
+from hair_addon.core.long_work import Stopped, run_now
 from tests.support import alembic_reader
 from tests.support.exported import LAST, bake, export, shape, twist, widths, world
 from tests.support.following import update
 from tests.support.reading import attribute, evaluated_points, write_points
+
+NAMES = ("P", "nVertices", "curveBasisAndType", "width", ".selfBnds")  # of curves in any Alembic file
 
 
 @pytest.fixture
@@ -45,6 +49,25 @@ def test_curves_are_in_centimetres_where_they_are_seen(twisted, tmp_path):
         np.testing.assert_array_equal(found["groom_width"].only, found["width"].only)
         np.testing.assert_array_equal(found["groom_root_uv"].only, attribute(shown, "surface_uv_coordinate", 2))
         assert found["groom_guide"].only[0] == (shown == guides)
+
+
+def test_properties_are_as_blender_writes_them(hair, tmp_path):
+    """Blender writes with Alembic's own library: types and metadata of what both write are the same."""
+    bpy.ops.wm.alembic_export(filepath=str(tmp_path / "blender.abc"), start=1, end=1, as_background_job=False)
+    export(tmp_path / "groom.abc")
+    theirs, ours = (alembic_reader.read(tmp_path / f"{name}.abc") for name in ("blender", "groom"))
+    (name,) = (path for path in alembic_reader.objects(theirs) if path.endswith("Hair/Hair"))
+    written, made = alembic_reader.objects(theirs)[name], alembic_reader.objects(ours)["/groom/Hair/HairShape"]
+    assert written.metadata == made.metadata
+    pairs = {".geom": (written.properties[".geom"], made.properties[".geom"])}
+    pairs |= {
+        name: (p, pairs[".geom"][1].children[name]) for name, p in pairs[".geom"][0].children.items() if name in NAMES
+    }
+    assert set(pairs) == {".geom", *NAMES}
+    for name, (wanted, found) in pairs.items():
+        assert (wanted.form, wanted.kind, wanted.extent) == (found.form, found.kind, found.extent), name
+        assert wanted.metadata.items() <= found.metadata.items(), name
+    assert ours.samplings[0][1:] == theirs.samplings[0][1:]
 
 
 def test_blender_takes_the_curves_back(twisted, tmp_path):
@@ -228,6 +251,40 @@ def test_points_that_are_not_finite_leave_the_file_that_was_there(hair, tmp_path
     with pytest.raises(HairError, match="non-finite"):
         export(path)
     assert path.read_bytes() == b"before" and [*tmp_path.iterdir()] == [path]
+
+
+@pytest.mark.parametrize("ending", [".abc", ".usdc"])
+@pytest.mark.parametrize("animation", ["NONE", "ALL"])
+def test_a_full_disk_leaves_the_file_that_was_there(hair, tmp_path, ending, animation):
+    bpy.context.scene.frame_end = 3
+    path = tmp_path / f"groom{ending}"
+    export(path, animation=animation)
+    before = path.read_bytes()
+    _, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for part in (0.0, 0.5, 0.95):
+        resource.setrlimit(resource.RLIMIT_FSIZE, (int(part * len(before)), hard))
+        try:
+            with pytest.raises(HairError, match="cannot be written"):
+                export(path, animation=animation)
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
+        assert path.read_bytes() == before and [*tmp_path.iterdir()] == [path]
+
+
+@pytest.mark.parametrize("ending", [".abc", ".usdc"])
+def test_a_stopped_export_leaves_nothing_and_the_frame_where_it_was(baked, tmp_path, ending):
+    bpy.context.scene.frame_set(2)
+
+    def stop(_step, part):
+        if part > 0.5:
+            raise Stopped
+
+    work = groom_export.exporting(
+        tmp_path / f"groom{ending}", groom_sources.all_hair(), ExportSettings(animation="ALL"), bpy.context.scene
+    )
+    with pytest.raises(Stopped):
+        run_now(work, stop)
+    assert bpy.context.scene.frame_current == 2 and not [*tmp_path.glob("*groom*")]
 
 
 def test_what_cannot_be_exported_is_one_sentence(hair, tmp_path):

@@ -198,7 +198,7 @@ def test_long_work_is_announced_and_short_work_is_not(hair):
     assert any(text.startswith("Takes about") for text in draw(named("guides")).texts)
 
 
-@pytest.mark.parametrize("menu", ["VIEW3D_MT_curve_add", "VIEW3D_MT_object"])
+@pytest.mark.parametrize("menu", ["VIEW3D_MT_curve_add", "VIEW3D_MT_object", "TOPBAR_MT_file_export"])
 def test_menus_are_extended_once(menu):
     ours = [f for f in getattr(bpy.types, menu).draw._draw_funcs if f.__module__ == menus.__name__]
     assert len(ours) == 1

@@ -51,7 +51,7 @@ def test_arrays_and_scalars_of_every_type_come_back(rng, tmp_path, kind):
     np.testing.assert_array_equal(found["single"].only, one[:1])
     np.testing.assert_array_equal(found["vector"].only[0], many[0])
     assert len(found["none"].only) == 0
-    assert found["one"].metadata == {"a": "b", "c": ""} and not found["many"].metadata
+    assert found["one"].metadata == {"a": "b"} and not found["many"].metadata
     assert {p.kind for p in found.values()} == {TYPES[kind][1]}
     assert [p.extent for p in found.values()] == [1, 3, 1, 1, 3]
     assert [p.form for p in found.values()] == ["array"] * 4 + ["scalar"]
