@@ -18,6 +18,7 @@ from ...core.files.frame_manifest import Manifest
 from ...core.grooming import cost
 from ...core.long_work import Stage, Work
 from ..data import scene as scenes
+from ..data import wet_guides
 from ..host import memory, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -70,16 +71,16 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
     Raises `HairError`.
     """
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
-    return frame_manifest.digests_of(
-        {
-            "solver": SOLVER_VERSION,
-            "settings": guide_simulation.unkeyed(guides, settings),
-            "guides": guide_simulation.combed_points(guides),
-            "surface": guides.vellus.topology,
-            "frame rate": scene.render.fps / scene.render.fps_base,
-            "units": scene.unit_settings.scale_length,
-        }
-    )
+    parts = {
+        "solver": SOLVER_VERSION,
+        "settings": guide_simulation.unkeyed(guides, settings),
+        "guides": guide_simulation.combed_points(guides),
+        "surface": guides.vellus.topology,
+        "frame rate": scene.render.fps / scene.render.fps_base,
+        "units": scene.unit_settings.scale_length,
+    }
+    wetness = wet_guides.unkeyed(guides, scenes.present_depsgraph())
+    return frame_manifest.digests_of(parts if wetness is None else {**parts, "wet places": wetness})
 
 
 def baking(
@@ -175,9 +176,7 @@ def _read(task, scene, depsgraph):
     """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
     guides = task.guides.find()
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
-    if settings != task.simulated.settings:  # keyed
-        task.simulated.change(settings)
-    read = guide_simulation.read(guides, scene, depsgraph, settings)
+    read = guide_simulation.read(guides, scene, depsgraph, settings, task.simulated.masks)
     return read, bake_resuming.digest_of(guides, scene, settings)
 
 

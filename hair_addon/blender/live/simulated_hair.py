@@ -189,11 +189,9 @@ def _advance(played, guides, blender_scene, depsgraph, settings):
     """Simulate one frame more, with the settings as they are now."""
     settings = simulated(settings)
     before = played.simulated.settings
-    if settings != before:
-        played.simulated.change(settings)
-        if guide_simulation.unkeyed(guides, settings) != guide_simulation.unkeyed(guides, before):
-            played.outdated = played.frame
-    read = guide_simulation.read(guides, blender_scene, depsgraph, settings)
+    if guide_simulation.unkeyed(guides, settings) != guide_simulation.unkeyed(guides, before):
+        played.outdated = played.frame
+    read = guide_simulation.read(guides, blender_scene, depsgraph, settings, played.simulated.masks)
     points = played.simulated.advance(read)
     played.frame += 1
     played.notes = played.simulated.errors
