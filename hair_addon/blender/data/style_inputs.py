@@ -23,7 +23,7 @@ _NUMBERS = {"FLOAT": ("value", 1), "FLOAT_COLOR": ("color", 4), "BYTE_COLOR": ("
 def read(surface_object, surface, guide_curves, styles: Sequence[StyleSettings], depsgraph) -> Inputs:
     """The `Inputs` of styles on a `Surface`; guide_curves: None if there are none yet. Raises `HairError`."""
     active = [settings for settings in styles if has_effect(settings)]
-    masks = {key: _mask(surface_object, surface, guide_curves, key, depsgraph) for key in mask_keys(active)}
+    masks = {key: read_mask(surface_object, surface, guide_curves, key, depsgraph) for key in mask_keys(active)}
     origin = np.array(surface_object.matrix_world.translation, np.float64)
     cutters, targets = {}, {}
     for settings in active:
@@ -52,7 +52,11 @@ def _z_axis(matrix, name):
     return axis / size
 
 
-def _mask(surface_object, surface, guide_curves, key, depsgraph):
+def read_mask(surface_object, surface, guide_curves, key, depsgraph):
+    """The `Mask` of a `mask_key` on the `Surface` of an object; guide_curves: None if there are none yet.
+
+    Raises `HairError`.
+    """
     name, image, is_inverted = key
     texture = scene.read_texture(surface, image, may_be_black=True)
     if not name:

@@ -83,7 +83,9 @@ def _may_stay(task, frame, scene):
     settings = properties.dynamics_of(guides.vellus)
     if found.digest != digest_of(guides, scene, settings):
         return False
-    seen = task.simulated.see(guide_simulation.read(guides, scene, scenes.present_depsgraph(), settings))
+    settings = guide_simulation.simulated(settings)
+    read = guide_simulation.read(guides, scene, scenes.present_depsgraph(), settings, task.simulated.masks)
+    seen = task.simulated.see(read)
     if frame in task.numbers:
         arrays = task.there.read_state(frame)
         if arrays is not None:

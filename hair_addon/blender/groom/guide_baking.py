@@ -18,6 +18,7 @@ from ...core.files.frame_manifest import Manifest
 from ...core.grooming import cost
 from ...core.long_work import Stage, Work
 from ..data import scene as scenes
+from ..data import wet_guides
 from ..host import memory, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -78,8 +79,9 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
         "frame rate": scene.render.fps / scene.render.fps_base,
         "units": scene.unit_settings.scale_length,
     }
-    regions = _regions(guides)
-    return frame_manifest.digests_of(parts if regions is None else parts | {"parting": regions})
+    regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.present_depsgraph())
+    found = {"parting": regions, "wet places": wetness}
+    return frame_manifest.digests_of(parts | {name: part for name, part in found.items() if part is not None})
 
 
 def _regions(guides):
@@ -185,9 +187,7 @@ def _read(task, scene, depsgraph):
     """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
     guides = task.guides.find()
     settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
-    if settings != task.simulated.settings:  # keyed
-        task.simulated.change(settings)
-    read = guide_simulation.read(guides, scene, depsgraph, settings)
+    read = guide_simulation.read(guides, scene, depsgraph, settings, task.simulated.masks)
     return read, bake_resuming.digest_of(guides, scene, settings)
 
 

@@ -15,7 +15,7 @@ from ...core import dynamics
 from ...core.dynamics.settings import DynamicsSettings
 from ...core.errors import HairError
 from ...core.params import given
-from ..data import attributes, curves, guide_poses, simulated_world
+from ..data import attributes, curves, guide_poses, simulated_world, wet_guides
 from ..data.guide_poses import GuidePose
 from ..host import scene_time
 from ..host.caches import Cache
@@ -28,12 +28,17 @@ stiffness_cache = Cache()
 
 @dataclass(frozen=True)
 class FrameInput:
-    """What guides follow in one frame, as read. errors: of colliders that were left out, or stay where they were."""
+    """What guides follow in one frame, as read. errors: of colliders that were left out, or stay where they were.
+
+    wetness: (G,) of each guide, None where they do not differ.
+    """
 
     frame: int
+    settings: DynamicsSettings
     pose: GuidePose
     world: "dynamics.simulation.World"
     seconds: float
+    wetness: np.ndarray | None = None
     errors: tuple[HairError, ...] = ()
 
 
@@ -42,7 +47,7 @@ class GuideSimulation:
     """Guides that are simulated, and the frame they have come to.
 
     digest, topology: of guides and surface; start: their pose in the first frame; obstacles: {name: as hair last
-    collided with it}.
+    collided with it}; masks: {mask of wetness: (G,) its weights}; wetness: of the last frame, as in `FrameInput`.
     """
 
     digest: str
@@ -54,6 +59,8 @@ class GuideSimulation:
     metres: float  # in a unit of the world
     obstacles: dict[str, "dynamics.simulation.Obstacle"] = field(default_factory=dict)
     parted_by: tuple[str, ...] = ()  # `guide_regions.parting_keys` when regions were read
+    masks: dict[tuple[str, str, bool], np.ndarray] = field(default_factory=dict)
+    wetness: np.ndarray | None = None
     errors: tuple[HairError, ...] = ()  # of colliders, in the last frame
 
     def see(self, frame: FrameInput) -> FrameInput:
@@ -68,16 +75,19 @@ class GuideSimulation:
     def advance(self, frame: FrameInput) -> np.ndarray:
         """Simulate the next frame: (G, P, 3) float32 points at rest, in local coordinates."""
         frame = self.see(frame)
+        self._change(frame)
         self.simulation.advance(frame.pose.root_pose(self.start), frame.world, frame.seconds)
         self.errors = (*frame.errors, *self.simulation.notes)
         points = frame.pose.to_rest(self.simulation.points())
         points[:, 0] = self.roots  # to the last bit, as what follows compares roots
         return points
 
-    def change(self, settings: DynamicsSettings) -> None:
-        """Go on with other settings, from the next frame on."""
-        self.simulation.change(in_metres(settings, self.metres))
-        self.settings = settings
+    def _change(self, frame):
+        """Go on with the settings and the wetness of a frame."""
+        is_as_wet = frame.wetness is self.wetness is None or np.array_equal(frame.wetness, self.wetness)
+        if frame.settings != self.settings or not is_as_wet:
+            self.simulation.change(in_metres(frame.settings, self.metres), wetness=frame.wetness)
+            self.settings, self.wetness = frame.settings, frame.wetness
 
     def follow_parting(self, guides: Curves, depsgraph: Depsgraph) -> bool:
         """Divide guides as their hair is parted now; returns whether that is otherwise. Raises `HairError`."""
@@ -91,6 +101,7 @@ class GuideSimulation:
     def go_on(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
         """Go on from a state that the simulation's `save` gave in a frame, as `see` returned it. Raises `HairError`."""
         self.obstacles = {obstacle.name: obstacle for obstacle in frame.world.obstacles}
+        self._change(frame)
         self.simulation.load(state, frame.pose.root_pose(self.start), frame.world)
 
     def is_of(self, guides: Curves, settings: DynamicsSettings) -> bool:
@@ -105,7 +116,8 @@ class GuideSimulation:
 def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:
     """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
     settings = simulated(properties.dynamics_of(guides.vellus))
-    frame = read(guides, scene, depsgraph, settings)
+    masks: dict[tuple[str, str, bool], np.ndarray] = {}
+    frame = read(guides, scene, depsgraph, settings, masks)
     pose, metres = frame.pose, simulated_world.metres_of(scene, settings)
     local = combed_points(guides)
     simulation = dynamics.simulation.Simulation(
@@ -115,24 +127,36 @@ def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation
         frame.world,
         preferences.device(),
         regions=guide_regions.regions_of(guides, depsgraph),
+        wetness=frame.wetness,
     )
     for _ in range(settings.preroll):
         simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
     digest, topology = staleness.guides_digest(guides), guides.vellus.topology
-    _keep_stiffness(guides, settings, pose, local, frame.world.gravity)
+    _keep_stiffness(guides, frame, local)
     begun = GuideSimulation(digest, topology, settings, pose, local[:, 0].copy(), simulation, metres)
     begun.parted_by = guide_regions.parting_keys(guides)
+    begun.masks, begun.wetness = masks, frame.wetness
     begun.see(frame)
     return begun
 
 
-def read(guides: Curves, scene: Scene, depsgraph: Depsgraph, settings: DynamicsSettings) -> FrameInput:
-    """What guides follow in the frame that a depsgraph was evaluated for. Raises `HairError`."""
+def read(
+    guides: Curves,
+    scene: Scene,
+    depsgraph: Depsgraph,
+    settings: DynamicsSettings,
+    masks: dict[tuple[str, str, bool], np.ndarray],
+) -> FrameInput:
+    """What guides follow in the frame that a depsgraph was evaluated for. Raises `HairError`.
+
+    masks: as in `GuideSimulation`; those that are missing are read and added.
+    """
     pose = guide_poses.read(guides, depsgraph, simulated_world.metres_of(scene, settings))
     world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface)
     rate = scene.render.fps / scene.render.fps_base
     seconds = settings.time_scale / rate
-    return FrameInput(scene_time.frame_of(scene), pose, world, seconds, tuple(errors))
+    wetness = wet_guides.of_guides(guides, pose.pose.surface, depsgraph, masks)
+    return FrameInput(scene_time.frame_of(scene), settings, pose, world, seconds, wetness, tuple(errors))
 
 
 def simulated(settings: DynamicsSettings) -> DynamicsSettings:
@@ -149,8 +173,7 @@ def unkeyed(guides: Curves, settings: DynamicsSettings) -> dict[str, Any]:
 def needed_stiffness(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> np.ndarray:
     """(G,) bend stiffness with which each guide can hold its shape, 0 of those that hang. Raises `HairError`."""
     settings = properties.dynamics_of(guides.vellus)
-    frame = read(guides, scene, depsgraph, settings)
-    return _keep_stiffness(guides, settings, frame.pose, combed_points(guides), frame.world.gravity)
+    return _keep_stiffness(guides, read(guides, scene, depsgraph, settings, {}), combed_points(guides))
 
 
 def known_stiffness(guides: Curves, settings: DynamicsSettings) -> np.ndarray | None:
@@ -162,13 +185,15 @@ def known_stiffness(guides: Curves, settings: DynamicsSettings) -> np.ndarray | 
     return stiffness * (_load(settings) / ratio)
 
 
-def _keep_stiffness(guides, settings, pose, local, gravity):
-    """Keep and return (G,) bend stiffnesses; local: `combed_points`; gravity: of the world [m/s²]."""
+def _keep_stiffness(guides, frame, local):
+    """Keep and return (G,) bend stiffnesses; frame: `FrameInput`; local: `combed_points`."""
+    settings, pose = frame.settings, frame.pose
     groom = pose.groom(local)
     standing = pose.root_pose(pose).carried(groom - groom[:, :1])
     vertices = dynamics.detail.vertices_of(standing, settings.vertex_count)
-    material = dynamics.material.material_of(settings, np.linalg.norm(np.diff(vertices, axis=1), axis=2))
-    x, y, z = (settings.gravity * component for component in gravity)
+    lengths = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
+    material = dynamics.material.material_of(settings, lengths, frame.wetness)
+    x, y, z = (settings.gravity * component for component in frame.world.gravity)
     factors = dynamics.sag_free.least_stiffnesses(vertices, material, (x, y, z))
     needed = factors * settings.bend_stiffness
     stiffness_cache.keep(guides.session_uid, (needed, _load(settings)))

@@ -9,7 +9,7 @@ from ..data import frame_animation
 from ..groom import frame_folders, guide_baking, guide_regions, staleness
 from ..host import notices, scene_time
 from ..host.caches import Cache
-from ..settings import properties
+from ..settings import properties, shared_wetness
 from . import live_hair
 
 _OTHER = {
@@ -90,7 +90,9 @@ def _inputs(guides, blender_scene):
     state, rate = guides.vellus, blender_scene.render.fps / blender_scene.render.fps_base
     units = blender_scene.unit_settings.scale_length
     parted = guide_regions.parting_keys(guides)
-    return properties.dynamics_of(state), staleness.guides_digest(guides), state.topology, rate, units, parted
+    wet_places = () if shared_wetness.is_keyed(state) else tuple(shared_wetness.masked_styles(state))
+    digest = staleness.guides_digest(guides)
+    return properties.dynamics_of(state), digest, state.topology, rate, units, parted, wet_places
 
 
 def _unknown():

@@ -189,13 +189,11 @@ def _advance(played, guides, blender_scene, depsgraph, settings):
     """Simulate one frame more, with the settings as they are now."""
     settings = simulated(settings)
     before = played.simulated.settings
-    if settings != before:
-        played.simulated.change(settings)
-        if guide_simulation.unkeyed(guides, settings) != guide_simulation.unkeyed(guides, before):
-            played.outdated = played.frame
+    if guide_simulation.unkeyed(guides, settings) != guide_simulation.unkeyed(guides, before):
+        played.outdated = played.frame
     if played.simulated.follow_parting(guides, depsgraph):
         played.outdated = played.frame
-    read = guide_simulation.read(guides, blender_scene, depsgraph, settings)
+    read = guide_simulation.read(guides, blender_scene, depsgraph, settings, played.simulated.masks)
     points = played.simulated.advance(read)
     played.frame += 1
     played.notes = played.simulated.errors

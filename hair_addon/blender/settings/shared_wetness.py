@@ -7,6 +7,8 @@ moves; the Wet style also gives it the shape of wet hair.
 
 import bpy
 
+from ...core.styling.base import has_effect
+from ...core.styling.program import mask_key
 from . import setting_properties, style_items, style_keys
 
 
@@ -21,6 +23,26 @@ def of_hair(state):
 def of_guides(state):
     """The wetness that guides move with: that of their wettest hair, or their own where that is more."""
     return max([_value(state.dynamics), *(of_hair(hair.vellus)[1] for hair in _followers(state))])
+
+
+def evenly_of_guides(state):
+    """The wetness that all guides have at least: what masks do not keep from them."""
+    styles = [style for style in _wet_styles(state) if mask_key(style) is None and has_effect(style)]
+    looks = [_value(hair.vellus.appearance) for hair in _followers(state)]
+    return max([_value(state.dynamics), *looks, *(style.amount for style in styles)])
+
+
+def masked_styles(state):
+    """The settings of the Wet styles with a mask of the hair of some guides, disabled ones too: it counts for guides.
+
+    Variation does not: it is between the strands around a guide. Raises `HairError`.
+    """
+    return [style for style in _wet_styles(state) if mask_key(style) is not None]
+
+
+def _wet_styles(state):
+    items = (item for hair in _followers(state) for item in hair.vellus.styles if item.kind == "WET")
+    return [style_items.settings_of(item) for item in items]
 
 
 def slider_of(state):
