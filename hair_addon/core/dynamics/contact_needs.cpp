@@ -68,6 +68,7 @@ const auto turned = [](const wp::mat33& m, const vector& v) {
       m.data[1][0] * v.x + m.data[1][1] * v.y + m.data[1][2] * v.z,
       m.data[2][0] * v.x + m.data[2][1] * v.y + m.data[2][2] * v.z};
 };
+#include "distance_grid.h"
 const auto where = [](int condition) { return condition ? ints(-1) : ints(0); };  // in all lanes
 const auto is_some = [](const vector& v) { return (v.x != 0.0f) | (v.y != 0.0f) | (v.z != 0.0f); };
 
@@ -109,24 +110,9 @@ const auto is_number = length - length == 0.0f;
 const auto is_short = (segment <= 2.0f * most) & where(is_middle);
 auto is_asking = is_number & !is_spared & !is_short & !is_kept;
 if (asking.is_skipping && any_of(is_asking) && surface.grid.distances.shape[0] > 0) {
-  const auto& grid = surface.grid;
   // So far from any surface that neither the nearest one matters, nor any was passed on the way.
-  const lanes limit = higher_of(needed, length + 2.0f * (deformation + BACK)) + SLACK + grid.drift;
-  const auto to_grid = [&](lanes place, int axis) {
-    const lanes most = lanes(grid.size * static_cast<float>(grid.last[axis]));
-    return higher_of(lower_of(place - grid.low[axis], most), lanes(0.0f));
-  };
-  const vector inside{to_grid(place.x, 0), to_grid(place.y, 1), to_grid(place.z, 2)};
-  const vector outside = minus(vector{place.x - grid.low[0], place.y - grid.low[1], place.z - grid.low[2]}, inside);
-  const auto beside = [&](lanes along) { return to_ints(along * (1.0f / grid.size) + 0.5f); };
-  const ints i = beside(inside.x), j = beside(inside.y), k = beside(inside.z);
-  const vector vertex{to_lanes(i) * grid.size, to_lanes(j) * grid.size, to_lanes(k) * grid.size};
-  const ints index = (i * grid.distances.shape[1] + j) * grid.distances.shape[2] + k;
-  lanes distance = lanes(0.0f);
-  for (int l = 0; l < LANES; ++l) set_lane(distance, l, grid.distances.data[get_lane(index, l)]);
-  const lanes nearest = higher_of(distance - length_of(minus(inside, vertex)), lanes(0.0f));
-  const lanes beyond = length_of(outside);
-  is_asking = is_asking & !(exact_sqrt_of(nearest * nearest + beyond * beyond) > limit);
+  const lanes limit = higher_of(needed, length + 2.0f * (deformation + BACK)) + SLACK;
+  is_asking = is_asking & !(least_distance(surface.grid, place.x, place.y, place.z) > limit);
 }
 ints is_any = is_asking ? ints(1) : ints(0);
 if (is_again && !any_of(is_any)) return 0;

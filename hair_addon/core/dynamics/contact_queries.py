@@ -157,13 +157,17 @@ def _look(
     entry = Hit()
     entry.collider = -1
     radius = needed + wp.min(0.5 * needed, _AHEAD)
+    hit = nearest(surface, point, last, radius, samples.sides[group, sample, lane])
     if surface.deformation <= BACK and at_rest >= 0.0:
         start = surface.carry * last + surface.carry_shift
-        entry = crossed(surface, point, start, largest)
-        if entry.collider >= 0:
-            needed = wp.max(needed, wp.abs(largest) + wp.min(wp.length(point - start), MOST_MOTION) + MARGIN)
-            radius = wp.max(radius, needed)
-    hit = nearest(surface, point, last, radius, samples.sides[group, sample, lane])
+        way = wp.length(point - start)
+        # Nothing was passed if no surface is as near as the way is long.
+        if hit.gap <= way + 2.0 * BACK:
+            entry = crossed(surface, point, start, largest)
+            if entry.collider >= 0:
+                needed = wp.max(needed, wp.abs(largest) + wp.min(way, MOST_MOTION) + MARGIN)
+                if needed > radius and hit.collider < 0:
+                    hit = nearest(surface, point, last, needed, samples.sides[group, sample, lane])
     if surface.deformation > BACK and at_rest >= 0.0 and hit.collider >= 0:
         entry = crossed(surface, point, last + hit.displacement, largest)
     samples.sides[group, sample, lane] = 0

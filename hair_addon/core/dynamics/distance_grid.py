@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from ..kernels import native_code
+
 _FARTHEST = 15  # cells that are looked at: farther vertices know that they are as far as that
 _MOST_CELLS_ALONG = 64
 _SLACK = 1e-3  # of a cell, that triangles are larger
@@ -26,6 +28,12 @@ class DistanceGrid:
     size: float  # of a cell [m]
     drift: float  # that triangles have moved since, at most [m]
     distances: wp.array3d[float]  # [m]
+
+
+@wp.func_native(native_code.body(__file__, "distance_grid.cpp", WIDTH=1))
+def least_distance(grid: DistanceGrid, point: wp.vec3) -> float:
+    """The least distance that a point may have from any surface [m]: zero near one."""
+    ...
 
 
 def cell_size(extent: np.ndarray, cell_count: int) -> float:

@@ -15,6 +15,7 @@ from ..errors import HairError
 from ..kernels import parallel
 from ..kernels.parallel import Rows
 from .colliders import Colliders
+from .distance_grid import distance_grid, least_distance
 from .nearest_surface import Surface, nearest
 from .simulation import Obstacle
 
@@ -25,6 +26,7 @@ _RETURN = wp.constant(0.15)  # of the way back, that a strand takes on the lengt
 _ROUNDS = wp.constant(3)  # of moving a point out, and back to its distance from the one before
 _PUSHES = wp.constant(4)  # afterwards, where one is not enough: in the notches of a mesh
 _AHEAD = wp.constant(1.0)  # segments that a surface is looked for beyond the next point, to spare later queries
+_PER_CELL = 16  # points for each cell of the grid of distances
 _NEAR = wp.constant(1e-6)  # [m] less than the distance that counts as that distance
 
 
@@ -40,7 +42,7 @@ def kept_outside(
     if not np.isfinite(points).all():
         raise HairError("Strands to keep outside need points with finite coordinates.")
     colliders = Colliders(wp.get_device(device))
-    origin = points.reshape(-1, 3).mean(axis=0) if points.size else np.zeros(3)
+    origin = points[:, :1].reshape(-1, 3).mean(axis=0) if points.size else np.zeros(3)
     colliders.read([obstacle.seen_from(origin) for obstacle in obstacles])
     is_moved = np.zeros(len(points), bool)
     if colliders.mesh is None or not points.size:
@@ -48,14 +50,23 @@ def kept_outside(
     given = wp.array((points - origin).astype(np.float32), dtype=wp.vec3, device=colliders.device)
     out = wp.empty_like(given)
     moved = wp.zeros(len(points), dtype=int, device=colliders.device)
-    shared = [_surface_of(colliders)]
-    parallel.launch(_keep_outside, len(points), [Rows(given), *shared], [out, moved], colliders.device, least_rows=256)
-    is_same = out.numpy() == given.numpy()
-    return np.where(is_same.all(axis=2)[..., None], points, out.numpy() + origin), moved.numpy() != 0
+    surface = _surface_of(colliders, points.size // 3)
+    parallel.launch(_keep_outside, len(points), [Rows(given), surface], [out, moved], colliders.device, least_rows=256)
+    is_moved = moved.numpy() != 0
+    if not is_moved.any():
+        return points, is_moved
+    before, after = given.numpy()[is_moved], out.numpy()[is_moved]
+    is_same = (after == before).all(axis=2)[..., None]
+    kept = points.copy()
+    kept[is_moved] = np.where(is_same, points[is_moved], after + origin)
+    return kept, is_moved
 
 
-def _surface_of(colliders):
-    surface = Surface()
+def _surface_of(colliders, point_count):
+    """The colliders as points ask them, with a grid that is worth its time for so many."""
+    surface, mesh = Surface(), colliders.mesh
+    triangles = mesh.indices.numpy().reshape(-1, 3)
+    surface.grid = distance_grid(mesh.points.numpy(), triangles, point_count // _PER_CELL + 1, colliders.device)
     surface.mesh, surface.points, surface.indices = colliders.mesh.id, colliders.mesh.points, colliders.mesh.indices
     surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
     surface.rims, surface.settings = colliders.rims, colliders.settings
@@ -93,12 +104,18 @@ def _keep_outside(
         place = points[strand, i]
         if is_moved == 1:
             place = last + size * wp.normalize(way + _RETURN * (before - last))
-        clear -= wp.length(place - last)
+        step_size = wp.length(place - last)
+        clear -= step_size
         if clear <= 0.0:
+            clear = least_distance(surface.grid, place) - surface.largest_distance
+            if clear > step_size:  # outside, as the point before: there is no surface between the two
+                out_points[strand, i] = place
+                last = place
+                continue
             lack = float(1.0)
             gap = float(0.0)
             # The point before is outside, so a surface between the two is not farther than they are apart.
-            radius = _AHEAD * size + wp.length(place - last) + surface.largest_distance
+            radius = _AHEAD * size + step_size + surface.largest_distance
             for step in range(_ROUNDS + _PUSHES):
                 if lack > _NEAR:
                     out, lack, gap = _lack(surface, place, radius)

@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// The body of `least_distance` in distance_grid.py: of one point on either kind of device. Parameters:
+//
+//   DistanceGrid grid
+//   vec3 point
+
+{
+#include "lanes.h"
+#include "distance_grid.h"
+
+return get_lane(least_distance(grid, lanes(point[0]), lanes(point[1]), lanes(point[2])), 0);
+}
