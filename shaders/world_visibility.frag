@@ -20,6 +20,8 @@ void main()
   vec3 T = along * inversesqrt(max(dot(along, along), 1e-20));
   vec3 root = place_of(strand, 1, cell.y) - place_of(strand, 0, cell.y);
   vec3 R = root * inversesqrt(max(dot(root, root), 1e-20));
+  // Of surfaces there is something else, or nothing.
+  float radius = view.point_count > 1 ? texelFetch(places, ivec2(strand * view.point_count + point, cell.y), 0).w * view.object_scale : 0.0;
   seen_x_y = vec4(0.0);
   seen_z = vec4(0.0);
   seen_surface = vec4(0.0);
@@ -33,8 +35,10 @@ void main()
     if (shadow_place(light, position, at, depth)) {
       float bias = view.point_count > 1 ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
       Beyond beyond = look_beyond(light, at, depth, -light.axis.xyz);
-      seen *= lit_part(at, depth, bias) * exp(-view.seen_opacity * crossed_strands(at, depth));
-      float left = exp(-view.seen_opacity * beyond.strands);
+      float behind;
+      float front = crossed_strands(at, depth, own_count(light, position, radius), behind);
+      seen *= lit_part(at, depth, bias) * exp(-view.seen_opacity * front);
+      float left = exp(-view.seen_opacity * behind);
       seen_behind = seen * left;
       // Through the hair to the surface, and back.
       seen_surface += weight * beyond.surface * left * left * vec4(light.axis.xyz, 1.0);
