@@ -7,6 +7,8 @@ void main()
 {
   Light light = lights.light[view.light_index];
   float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, drawn_position);
-  float front = texelFetch(hair_front, ivec3(ivec2(gl_FragCoord.xy), light.shadow_layer), 0).r;
-  color = layers_behind(depth - front) * strand_coverage;
+  ivec2 here = ivec2(gl_FragCoord.xy);
+  vec2 ends = texelFetch(hair_front, ivec3(here, light.shadow_layer), 0).rg;
+  int layer = layer_among(depth, ends, texelFetch(hidden_depth, here, 0).r);
+  color = vec4(greaterThanEqual(ivec4(0, 1, 2, 3), ivec4(layer))) * strand_coverage;
 }

@@ -16,7 +16,10 @@ vec4 sample_value()
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
     vec3 part = vec3(1.0);
     if (shadow_place(light, drawn_position, at, depth)) {
-      part = lit_part(at, depth, strand_bias(root_direction(strand_index), L)) * transmitted(crossed_strands(at, depth), view.hair_forward.rgb);
+      float behind;
+      float own = own_count(light, drawn_position, drawn_radius);
+      part = lit_part(at, depth, strand_bias(root_direction(strand_index), L)) * 
+             transmitted(crossed_strands(at, depth, own, behind), view.hair_forward.rgb);
     }
     sent += irradiance;
     arriving += irradiance * part;

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strands in a deep opacity map: first the depth of the nearest, then the opacity of each layer behind it.
+// Strands in a deep opacity map: first the depths of the nearest and of the last, then the opacity of each layer between.
 
 #include "include/opacity.glsl"
 #include "include/walk_segment.glsl"
@@ -21,15 +21,25 @@ void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
 void meet(ivec2 place, float along, float coverage)
 {
   float depth = mix(end_depths.x, end_depths.y, along);
+  float hidden = texelFetch(hidden_depth, place, 0).r;
   if (is_front != 0) {
+    if (depth > hidden) {
+      return;
+    }
     uint bits = front_bits(depth);
     if (bits < imageLoad(fronts, place).r) {
       imageAtomicMin(fronts, place, bits);
     }
+    if (bits > imageLoad(backs, place).r) {
+      imageAtomicMax(backs, place, bits);
+    }
   }
   else {
-    float front = texelFetch(hair_front, ivec3(place, lights.light[view.light_index].shadow_layer), 0).r;
-    int layer = layer_of(depth - front);
+    vec2 ends = texelFetch(hair_front, ivec3(place, lights.light[view.light_index].shadow_layer), 0).rg;
+    int layer = layer_among(depth, ends, hidden);
+    if (layer > 3) {
+      return;
+    }
     imageAtomicAdd(counts, ivec2(place.x * 4 + layer, place.y), uint(coverage * COUNT_UNIT + 0.5));
   }
 }

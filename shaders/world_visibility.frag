@@ -21,6 +21,9 @@ void main()
   vec3 T = along * inversesqrt(max(dot(along, along), 1e-20));
   vec3 root = place_of(strand, 1, cell.y) - place_of(strand, 0, cell.y);
   vec3 R = root * inversesqrt(max(dot(root, root), 1e-20));
+  // Of surfaces there is something else, or nothing.
+  ivec2 texel = ivec2(strand * view.point_count + point, cell.y);
+  float radius = is_strand ? texelFetch(places, texel, 0).w * view.object_scale : 0.0;
   seen_x_y = vec4(0.0);
   seen_z = vec4(0.0);
   seen_surface = vec4(0.0);
@@ -35,9 +38,11 @@ void main()
     if (shadow_place(light, position, at, depth)) {
       float bias = is_strand ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
       Beyond beyond = look_beyond(light, at, depth, -light.axis.xyz);
+      float behind;
+      float front = crossed_strands(at, depth, own_count(light, position, radius), behind);
       open *= lit_part(at, depth, bias);
-      past_hair = exp(-view.seen_opacity * crossed_strands(at, depth));
-      left = exp(-view.seen_opacity * beyond.strands);
+      past_hair = exp(-view.seen_opacity * front);
+      left = exp(-view.seen_opacity * behind);
       // Through the hair to the surface, and back.
       seen_surface += weight * beyond.surface * left * left * vec4(light.axis.xyz, 1.0);
     }

@@ -15,6 +15,9 @@ float warped_depth(float depth)
 // Depths of the four layers' far sides behind the first strand, as parts of the hair's extent: thin where light fades.
 const vec4 LAYER_ENDS = vec4(0.007, 0.058, 0.205, 0.5);
 
+// Least depth of a layer with strands, for interpolation.
+const float LEAST_LAYER = 1e-4;
+
 // Depth of unlit texels.
 const float FAR = 2.0;
 
@@ -26,17 +29,23 @@ float light_depth(int kind, vec3 light_position, vec3 axis, float near, float ex
   return clamp((way - near) / extent, -1.0, FAR);
 }
 
-// Opacity of the layers by a strand at this depth, as parts of the extent: its own and all deeper ones.
-vec4 layers_behind(float depth)
-{
-  return vec4(lessThanEqual(vec4(depth), LAYER_ENDS)) + vec4(0.0, 0.0, 0.0, float(depth > LAYER_ENDS.w));
-}
-
 // The layer that a strand at this depth darkens first.
 int layer_of(float depth)
 {
   vec4 ends = vec4(greaterThan(vec4(depth), LAYER_ENDS));
   return min(int(dot(ends, vec4(1.0))), 3);
+}
+
+// Depth bias of surfaces, as a part of the hair's extent.
+const float SURFACE_BIAS = 0.002;
+
+// The layer that a strand at this depth is counted in, 4 for none. ends: front and back depth of the strands that no surface
+// hides; hidden: depth behind which one does. Hidden strands are counted behind all others: where shadows of surfaces leak,
+// theirs remain.
+int layer_among(float depth, vec2 ends, float hidden)
+{
+  int layer = layer_of(depth - ends.x);
+  return (depth > hidden) ? max(layer, layer_of(ends.y - ends.x) + 1) : layer;
 }
 
 // Strands are counted in integer multiples of this fraction: sums do not depend on the order.
@@ -53,12 +62,16 @@ float front_of_bits(uint bits)
   return uintBitsToFloat(bits) - 1.0;
 }
 
-// Strands in front of a depth: linear between the layers' ends, constant beyond the last.
-float strands_in_front(vec4 counts, float depth)
+// Strands in front of a depth: linear between the layers' ends, of which none is behind the last strand. back: depth of
+// that; own: what a strand at this depth adds to its layer.
+float strands_in_front(vec4 counts, float depth, float back, float own)
 {
   vec4 starts = vec4(0.0, LAYER_ENDS.xyz);
-  vec4 part = clamp((vec4(depth) - starts) / (LAYER_ENDS - starts), 0.0, 1.0);
-  return dot(part, counts - vec4(0.0, counts.xyz));
+  vec4 ends = vec4(LAYER_ENDS.xyz, 2.0 * FAR);
+  vec4 part = clamp((vec4(depth) - starts) / max(min(ends, vec4(back)) - starts, vec4(LEAST_LAYER)), 0.0, 1.0);
+  vec4 in_layers = counts - vec4(0.0, counts.xyz);
+  in_layers[layer_of(depth)] -= min(own, in_layers[layer_of(depth)]);
+  return dot(part, in_layers);
 }
 
 // Light left after a mean of `count` strands, each of which passes on the part `forward`: the mean of

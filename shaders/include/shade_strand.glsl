@@ -61,20 +61,19 @@ vec3 strand_light()
     vec3 at;
     float depth;
     float front = 0.0;
+    float behind = 0.0;
     bool is_in_map = shadow_place(light, drawn_position, at, depth);
     if (is_in_map) {
       irradiance *= lit_part(at, depth, strand_bias(R, L));
-      front = crossed_strands(at, depth);
+      front = crossed_strands(at, depth, own_count(light, drawn_position, drawn_radius), behind);
     }
     // Most strands are in the shadow of the others, with no light to scatter.
     vec3 arriving = irradiance * transmitted(front, view.hair_forward.rgb);
     if (max(arriving.r, max(arriving.g, arriving.b)) > LEAST_IRRADIANCE) {
-      float behind = 0.0;
       if (is_in_map) {
         Beyond beyond = look_beyond(light, at, depth, L);
-        behind = beyond.strands;
         vec2 below = light_from_below(T, V, beyond.normal);
-        vec3 bounced = drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front);
+        vec3 bounced = drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front, behind);
         radiance += bounced * (below.x * returned + below.y * towards);
       }
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);

@@ -9,9 +9,6 @@ const float BEYOND_REACH = 0.01;
 // Range behind a strand, as a part of the hair, in which surfaces light it.
 const float BOUNCE_DISTANCE = 0.25;
 
-// Depth bias of surfaces, as a part of the hair's extent.
-const float SURFACE_BIAS = 0.002;
-
 // The bias of a strand that grows in a direction: against the light it grows on the far side of its surface.
 float strand_bias(vec3 root_direction, vec3 L)
 {
@@ -45,16 +42,30 @@ float lit_part(vec3 at, float depth, float bias)
   return (behind <= 0.0) ? 1.0 : part;
 }
 
-// Mean number of strands that the light has crossed.
-float crossed_strands(vec3 at, float depth)
+// What a strand adds to the counts of a map at its own place: it covers a part of a texel's width, and interpolation finds
+// three quarters of that in the mean over the places within a texel.
+float own_count(Light light, vec3 position, float radius)
 {
-  float behind = max(0.0, depth - textureLod(hair_front, at, 0.0).r);
-  return strands_in_front(textureLod(hair_layers, at, 0.0), behind);
+  mat4 m = light.world_to_shadow;
+  float across = length(vec3(m[0][0], m[1][0], m[2][0])) / dot(vec4(m[0][3], m[1][3], m[2][3], m[3][3]), vec4(position, 1.0));
+  float covered = radius * across * float(textureSize(hair_layers, 0).x);
+  return (covered < 1.0) ? 0.75 * covered : 1.0 - 0.25 / covered;
 }
 
-// What is behind a strand along a light: means over places around it, of which a strand at this one covers none.
+// Mean number of strands that the light has crossed; behind: and of those that are left to it, as far as the surface. own:
+// what is to be left out.
+float crossed_strands(vec3 at, float depth, float own, out float behind)
+{
+  vec2 ends = textureLod(hair_front, at, 0.0).rg;
+  vec4 counts = textureLod(hair_layers, at, 0.0);
+  float front = strands_in_front(counts, max(0.0, depth - ends.x), ends.y - ends.x, own);
+  behind = max(0.0, counts[layer_of(ends.y - ends.x)] - own - front);
+  // Where surfaces hide all strands there is no front.
+  return mix(front, max(0.0, counts.w - own), smoothstep(1.0, 1.5, ends.x));
+}
+
+// The surface behind a strand along a light: means over places around it.
 struct Beyond {
-  float strands;  // as far as the surface
   float surface;  // the part of places with a surface
   float near;     // the same, the less the more distant it is
   vec3 normal;    // of that surface
@@ -63,22 +74,18 @@ struct Beyond {
 // L: towards the light.
 Beyond look_beyond(Light light, vec3 at, float depth, vec3 L)
 {
-  Beyond beyond = Beyond(0.0, 0.0, 0.0, vec3(0.0));
+  Beyond beyond = Beyond(0.0, 0.0, vec3(0.0));
   vec2 slope = vec2(0.0);
   for (int corner = 0; corner < 4; corner++) {
     vec2 towards = 2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0;
     vec3 near = at + vec3(BEYOND_REACH * towards, 0.0);
-    float front = textureLod(hair_front, near, 0.0).r;
     float surface = textureLod(surface_moments, near, 0.0).b;
-    vec4 counts = textureLod(hair_layers, near, 0.0);
-    beyond.strands += max(0.0, strands_in_front(counts, surface - front) - strands_in_front(counts, depth - front));
     // Of a surface in front of the strand this side is in the shadow.
     float is_there = step(depth, surface + SURFACE_BIAS) * step(surface, 0.75 * FAR);
     beyond.surface += 0.25 * is_there;
     beyond.near += 0.25 * is_there * (1.0 - smoothstep(0.0, BOUNCE_DISTANCE, surface - depth));
     slope += towards * surface;
   }
-  beyond.strands *= 0.25;
   slope *= 0.25 / BEYOND_REACH;
   vec3 right = vec3(light.world_to_shadow[0][0], light.world_to_shadow[1][0], light.world_to_shadow[2][0]);
   vec3 up = vec3(light.world_to_shadow[0][1], light.world_to_shadow[1][1], light.world_to_shadow[2][1]);
@@ -98,13 +105,13 @@ vec3 between_hair_and_surface(float count)
 
 // Light that a surface reflects to a strand, as a part of even light around it, for unit irradiance of the light: through
 // the rest of the hair, off a diffuse surface, and through the hair again, along 1.66 times the shortest way [Elsasser42].
-vec3 surface_bounce(Beyond beyond, vec3 L, vec3 T, float front)
+vec3 surface_bounce(Beyond beyond, vec3 L, vec3 T, float front, float behind)
 {
   float cosine = max(dot(beyond.normal, L), 0.0);
   // Strands are as wide as the sine between tangent and direction, pi / 4 in the mean over all directions.
   float back = 1.66 * cosine * 0.25 * PI / max(sin_from_cos(dot(T, L)), 0.1);
-  vec3 way = transmitted(front + beyond.strands * (1.0 + back), view.hair_forward.rgb);
-  way *= between_hair_and_surface(front + beyond.strands);
+  vec3 way = transmitted(front + behind * (1.0 + back), view.hair_forward.rgb);
+  way *= between_hair_and_surface(front + behind);
   return view.surface_color.rgb * way * (beyond.near * cosine / PI);
 }
 
@@ -121,7 +128,8 @@ vec3 surface_visibility(Light light, vec3 position, vec3 forward)
   for (int y = -1; y <= 1; y++) {
     for (int x = -1; x <= 1; x++) {
       vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
-      total += lit_part(near, depth, SURFACE_BIAS) * transmitted(crossed_strands(near, depth), forward);
+      float behind;
+      total += lit_part(near, depth, SURFACE_BIAS) * transmitted(crossed_strands(near, depth, 0.0, behind), forward);
     }
   }
   return total / 9.0;

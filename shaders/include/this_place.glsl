@@ -7,6 +7,7 @@ int strand_index;
 float strand_position;  // root 0 to tip 1
 vec3 strand_tangent;
 vec3 drawn_position;
+float drawn_radius;
 
 // Direction of a strand at a point, of any length; arbitrary where the strand folds back on itself.
 vec3 tangent_at(vec3 before, vec3 after)
@@ -42,5 +43,6 @@ void find_place(int index, vec2 at, vec2 size)
   vec3 tangent = mix(tangent_at(before, near_start), tangent_at(near_end, after), t);
   strand_position = mix(float(start), float(end), t) / float(view.point_count - 1);
   strand_tangent = normalize(mat3(view.object_to_world) * tangent);
+  drawn_radius = mix(first.w, second.w, t) * view.object_scale;
   drawn_position = (view.object_to_world * vec4(mix(first.xyz, second.xyz, t), 1.0)).xyz;
 }

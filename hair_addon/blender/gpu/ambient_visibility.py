@@ -63,6 +63,7 @@ def _view_of_strands(strands, to_world):
     view = uniforms.VIEW.record()
     view["object_to_world"] = to_world.T
     view["point_count"], view["row_strands"] = strands.point_count, strands.row_strands
+    view["object_scale"] = drawing.scale_of(to_world)
     view["seen_points"] = seen_points(strands.point_count)
     return view
 

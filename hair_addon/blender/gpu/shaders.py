@@ -74,10 +74,15 @@ _COLOR = (("color", "VEC4"),)
 
 
 @kept
-def strip_program(fragment, shadow_samplers=(), targets=_COLOR):
-    """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it."""
+def strip_program(fragment, shadow_samplers=(), targets=_COLOR, samplers=()):
+    """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it.
+
+    samplers: of other textures that it reads.
+    """
     info = gpu.types.GPUShaderCreateInfo()
     _strip(info, shadow_samplers)
+    for slot, name in enumerate(samplers, start=len(SHADOW_SAMPLERS) + 1):
+        info.sampler(slot, "FLOAT_2D", name)
     return compile_drawing(info, "strand.vert", fragment, targets)
 
 
@@ -114,14 +119,15 @@ def segments_program():
 @kept
 def strand_shadow_program():
     """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
-    return _walk("strand_shadow.comp", ("fronts", "counts"), ("is_front",), shadow_samplers=("hair_front",))
+    return _walk("strand_shadow.comp", ("fronts", "backs", "counts"), ("is_front",), ("hair_front",), ("hidden_depth",))
 
 
-def _walk(file, images, constants, shadow_samplers=()):
+def _walk(file, images, constants, shadow_samplers=(), samplers=()):
     info = gpu.types.GPUShaderCreateInfo()
     declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
     info.local_group_size(RUN_GROUP_SIZE)
-    info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "strands")
+    for slot, name in enumerate(("strands", *samplers), start=len(SHADOW_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
     for slot, name in enumerate(images):
         info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
     for name in constants:
@@ -241,29 +247,36 @@ def visibility_program():
 
 @kept
 def shadow_fill_program():
-    """The program that fills gaps of `fronts`, a deep opacity map's first pass."""
-    return _shadow_filter("shadow_fill.frag", "UINT_2D", "fronts")
+    """The program that fills gaps of `fronts` and `backs`, a deep opacity map's first pass."""
+    return _shadow_filter("shadow_fill.frag", "UINT_2D", ("fronts", "backs"))
 
 
 @kept
 def shadow_counts_program():
     """The program that makes layers of `counts`, a deep opacity map's second pass where it is computed."""
-    return _shadow_filter("shadow_counts.frag", "UINT_2D", "counts")
+    return _shadow_filter("shadow_counts.frag", "UINT_2D", ("counts",))
+
+
+@kept
+def shadow_hidden_program():
+    """The program that finds the depth behind which strands are hidden by the surfaces of `surface_depth`."""
+    return _shadow_filter("shadow_hidden.frag", "FLOAT_2D", ("surface_depth",))
 
 
 @kept
 def shadow_moments_program():
     """The program that blurs `surface_depth` along an axis: depths if is_depth, else its first result."""
     constants = (("IVEC2", "along"), ("INT", "taps"), ("INT", "is_depth"), ("FLOAT", "deviation"))
-    return _shadow_filter("shadow_moments.frag", "FLOAT_2D", "surface_depth", constants)
+    return _shadow_filter("shadow_moments.frag", "FLOAT_2D", ("surface_depth",), constants)
 
 
-def _shadow_filter(fragment, kind, sampler, constants=()):
+def _shadow_filter(fragment, kind, samplers, constants=()):
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.LIGHT.source)
     for constant in constants:
         info.push_constant(*constant)
-    info.sampler(0, kind, sampler)
+    for slot, sampler in enumerate(samplers):
+        info.sampler(slot, kind, sampler)
     return compile_drawing(info, "cover.vert", fragment)
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Deep opacity maps [Yuksel08]: for each light, the front depth of hair, its layers, and the depth of surfaces."""
+"""Deep opacity maps [Yuksel08]: for each light, front and back depth of hair, its layers, and the depth of surfaces."""
 
 import gpu
 import numpy as np
@@ -10,7 +10,7 @@ SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 
 _NEAREST = 0.01  # minimum distance of a light, as a part of the hair's diameter
 _FAR = 2.0  # FAR of shaders/include/opacity.glsl
-_NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it
+_NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it; of a back that is nowhere, 0
 
 # Texels by which shadows of surfaces are blurred, at least and as a part of a map at most; and how far, as a part of
 # the hair's diameter, a surface is taken to be from the hair that it shades.
@@ -28,14 +28,14 @@ class ShadowMaps:
 
     def __init__(self, size, layer_count, in_compute=None):
         self._size, self._layer_count = size, layer_count
-        self._hair_front = _array(size, layer_count, "R32F")
+        self._hair_front = _array(size, layer_count, "RG32F")
         self._hair_layers = _array(size, layer_count, "RGBA16F")
         self._surface_moments = _array(size, layer_count, "RGBA32F")
         self._in_compute = shaders.has_image_atomics() if in_compute is None else in_compute
         # Target of the drawing before it is filtered into a map.
         self._surface_depth = gpu.types.GPUTexture((size, size), format="R32F")
         self._half_blurred = gpu.types.GPUTexture((size, size), format="RGBA32F")
-        self._fronts = gpu.types.GPUTexture((size, size), format="R32UI")
+        self._fronts, self._backs = (gpu.types.GPUTexture((size, size), format="R32UI") for _ in range(2))
         self._counts = gpu.types.GPUTexture((4 * size, size), format="R32UI") if self._in_compute else None
         self._depth = gpu.types.GPUTexture((size, size), format="DEPTH_COMPONENT32F")
 
@@ -67,7 +67,10 @@ class ShadowMaps:
             for surface in surfaces:
                 drawing.draw_surface_depth(surface, view, lights)
         self._blur(layer, _blur_of(lights["light"][layer], self._size))
+        with self._target(self._half_blurred):  # which is free again
+            self._filter(shaders.shadow_hidden_program(), {"surface_depth": self._surface_depth})
         self._fronts.clear(format="UINT", value=(_NOTHING,))
+        self._backs.clear(format="UINT", value=(0,))
         light_block = uniforms.uniform_buffer(lights)
         placed = [(strands, drawing.strand_record(strands, view, to_world, steps)) for strands, to_world in hair]
         if self._in_compute:
@@ -77,8 +80,9 @@ class ShadowMaps:
 
     def _walk(self, layer, placed, lights):
         """Draw a map of strands by compute programs: integer sums are independent of the order."""
-        program, samplers = shaders.strand_shadow_program(), {"hair_front": self._hair_front}
-        images = {"fronts": self._fronts, "counts": self._counts}
+        program = shaders.strand_shadow_program()
+        samplers = {"hair_front": self._hair_front, "hidden_depth": self._half_blurred}
+        images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
         for strands, record in placed:
             drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 1})
         self._fill_fronts(layer)
@@ -86,28 +90,30 @@ class ShadowMaps:
         for strands, record in placed:
             drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 0})
         with self._target(self._hair_layers, layer):
-            self._filter(shaders.shadow_counts_program(), "counts", self._counts)
+            self._filter(shaders.shadow_counts_program(), {"counts": self._counts})
 
     def _draw_strips(self, layer, placed, lights):
         """Draw the same map with triangle strips."""
-        front = shaders.strip_program("shadow_front.frag", targets=(("front", "UINT"),))
-        layers = shaders.strip_program("shadow_layers.frag", shadow_samplers=("hair_front",))
-        nearest = gpu.types.GPUFrameBuffer(color_slots=self._fronts, depth_slot=self._depth)
-        with nearest.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-            nearest.clear(depth=1.0)
-            for strands, record in placed:
-                drawing.draw_strip(strands, front, record, lights)
+        hidden = {"hidden_depth": self._half_blurred}
+        end = shaders.strip_program("shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden))
+        layers = shaders.strip_program("shadow_layers.frag", ("hair_front",), samplers=tuple(hidden))
+        for texture, depth, test in ((self._fronts, 1.0, "LESS_EQUAL"), (self._backs, 0.0, "GREATER_EQUAL")):
+            target = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=self._depth)
+            with target.bind(), drawing.gpu_state(test, depth_writes=True):
+                target.clear(depth=depth)
+                for strands, record in placed:
+                    drawing.draw_strip(strands, end, record, lights, hidden)
         self._fill_fronts(layer)
         with (
             self._target(self._hair_layers, layer, value=0.0),
             drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"),
         ):
             for strands, record in placed:
-                drawing.draw_strip(strands, layers, record, lights, {"hair_front": self._hair_front})
+                drawing.draw_strip(strands, layers, record, lights, {"hair_front": self._hair_front, **hidden})
 
     def _fill_fronts(self, layer):
         with self._target(self._hair_front, layer):
-            self._filter(shaders.shadow_fill_program(), "fronts", self._fronts)
+            self._filter(shaders.shadow_fill_program(), {"fronts": self._fronts, "backs": self._backs})
 
     def _blur(self, layer, deviation):
         """Fill a layer of the surfaces' moments from their raw depth, blurred by a deviation in texels."""
@@ -123,11 +129,11 @@ class ShadowMaps:
                 program.uniform_int("taps", int(np.ceil(2.0 * deviation)))
                 program.uniform_int("is_depth", int(source is self._surface_depth))
                 program.uniform_float("deviation", deviation)
-                self._filter(program, "surface_depth", source)
+                self._filter(program, {"surface_depth": source})
 
-    def _filter(self, program, sampler, source):
+    def _filter(self, program, sources):
         with drawing.gpu_state("NONE", depth_writes=False):
-            drawing.draw_cover(program, {}, {sampler: source})
+            drawing.draw_cover(program, {}, sources)
 
     def _target(self, texture, layer=None, value=_FAR):
         slot = texture if layer is None else {"texture": texture, "layer": layer}

@@ -1,0 +1,17 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Depth behind which strands are hidden by surfaces: the greatest around a texel, in which a surface may be inclined.
+
+#include "include/opacity.glsl"
+
+void main()
+{
+  ivec2 here = ivec2(gl_FragCoord.xy);
+  ivec2 last = textureSize(surface_depth, 0) - 1;
+  float hidden = -1.0;
+  for (int y = -1; y <= 1; y++) {
+    for (int x = -1; x <= 1; x++) {
+      hidden = max(hidden, texelFetch(surface_depth, clamp(here + ivec2(x, y), ivec2(0), last), 0).r);
+    }
+  }
+  color = vec4(hidden + SURFACE_BIAS);
+}
