@@ -27,7 +27,7 @@ LENGTH = 0.34  # [m] of guides on the crown
 _HAIRLINE_LENGTH = 0.45  # of those at the border, as a part of it
 _HAIRLINE_REACH = 0.030  # [m] over which lengths grow from the border
 _STEPS = 41  # points of a guide
-_EAR = Vector((0.080, -0.042, 0.712)), Vector((0.024, 0.040, 0.046))  # [m]: middle and radii of what hair goes behind
+_EAR = Vector((0.080, -0.042, 0.712)), Vector((0.030, 0.052, 0.054))  # [m]: middle and radii of what hair goes behind
 
 
 def dress(head_object, target=GAZE):
