@@ -17,14 +17,17 @@ from hair_addon import api
 from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 
 SIZE = 760, 760  # pixels of a picture
-CAMERA, LOOK_AT, LENS = (0.70, -1.28, 0.73), Vector((0.012, -0.02, 0.694)), 112.0  # [m], [m], [mm]
+CAMERA, LOOK_AT, LENS = (0.70, -1.28, 0.73), Vector((-0.010, -0.033, 0.683)), 126.0  # [m], [m], [mm]
+NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
 AUBURN = (0.27, 0.54, 1.10)  # absorption per fibre radius
-GAZE = (0.36, -1.2, 0.735)  # [m]: what the eyes look at, beside the camera
+GAZE = (0.45, -1.24, 0.73)  # [m]: what the eyes look at, close to the camera
+FSTOP = 5.6
 
 LENGTH = 0.34  # [m] of guides on the crown
 _HAIRLINE_LENGTH = 0.45  # of those at the border, as a part of it
 _HAIRLINE_REACH = 0.030  # [m] over which lengths grow from the border
 _STEPS = 41  # points of a guide
+_EAR = Vector((0.080, -0.042, 0.712)), Vector((0.030, 0.052, 0.054))  # [m]: middle and radii of what hair goes behind
 
 
 def dress(head_object, target=GAZE):
@@ -121,11 +124,11 @@ def _combed(root, length, surfaces):
     side = math.copysign(1.0, root[0] - head.PARTING)
     front = _part(-root[1], 0.0, 0.12)
     crown = _part(root[2], 0.79, 0.84)
-    sweep = Vector((side * (0.35 + 0.45 * front), 0.15 + 0.30 * front**4, -0.45 + 0.45 * front))
-    around = Vector((side * 0.12, 0.05 + 0.36 * front**4, -0.95))
+    sweep = Vector((side * (0.35 + 0.45 * front), 0.15 + 0.16 * front**4, -0.45 + 0.45 * front))
+    around = Vector((side * 0.12, 0.05 + 0.16 * front**4, -0.95))
     fall = Vector((-side * 0.22, -0.12 * _part(abs(root[0]), 0.02, 0.07), -1.0))
-    direction = ((0.55 + 0.45 * crown) * normal + sweep.normalized()).normalized()
-    volume = 0.007 + 0.013 * crown
+    direction = (0.55 * normal + sweep.normalized()).normalized()
+    volume = 0.007 + 0.003 * crown
     combed = [position.copy()]
     for i in range(1, _STEPS):
         gone = i * step
@@ -133,6 +136,7 @@ def _combed(root, length, surfaces):
         direction = (direction + 0.42 * aim).normalized()
         ahead = position + step * direction
         ahead = _clear_of(surfaces[0], ahead, 0.003 + volume * _part(gone, 0.0, 0.05), Vector())
+        ahead = _clear_of_ear(ahead)
         # On the shoulders hair slides to the chest or to the back, not along the arms.
         ahead = _clear_of(surfaces[1], ahead, 0.008, Vector((0.0, 0.4 if root[1] > -0.02 else -0.4, 0.0)), sideways=0.5)
         direction = (ahead - position).normalized()
@@ -146,6 +150,16 @@ def _clear_of(surface, position, clearance, slide, sideways=1.0):
     near, normal, _face, _distance = surface.find_nearest(position)
     push = max(0.0, clearance - (position - near).dot(normal))
     return position + push * (Vector((sideways * normal.x, normal.y, normal.z)) + slide)
+
+
+def _clear_of_ear(position):
+    """A place behind an ear or above it, where it would be on it."""
+    center = Vector((math.copysign(_EAR[0].x, position.x), _EAR[0].y, _EAR[0].z))
+    part = Vector((position - center)[axis] / _EAR[1][axis] for axis in range(3))
+    inside = 1.0 - part.length
+    if inside <= 0.0:
+        return position
+    return position + inside * Vector((math.copysign(0.3 * _EAR[1].x, position.x), _EAR[1].y, 0.0))
 
 
 def _smoothed(points, passes=3):
@@ -168,13 +182,22 @@ def light():
     camera = scene.camera
     camera.location, camera.data.lens = CAMERA, LENS
     _point_at(camera)
-    _place("Key", (0.55, -1.15, 1.30), 22.0, 0.30)
-    _place("Rim", (-0.55, 0.95, 1.25), 30.0, 0.4)
-    _place("Fill", (-1.0, -1.0, 0.72), 4.5, 0.9)
+    lens = camera.data.dof
+    lens.use_dof, lens.aperture_fstop, lens.aperture_blades = True, FSTOP, 7
+    lens.focus_distance = _distance_to(camera, NEAR_EYE)
+    _place("Key", (-0.30, -1.20, 1.38), 24.0, 0.30)
+    _place("Rim", (-0.75, 0.75, 1.15), 34.0, 0.4)
+    _place("Fill", (1.1, -1.0, 0.75), 6.5, 0.9)
     second = bpy.data.objects.new("Rim 2", bpy.data.objects["Rim"].data.copy())
     scene.collection.objects.link(second)
-    _place("Rim 2", (1.05, 0.75, 1.05), 22.0, 0.4)
+    _place("Rim 2", (1.2, 0.55, 1.05), 36.0, 0.4)
     bpy.context.view_layer.update()
+
+
+def _distance_to(camera, place):
+    """[m] along the view."""
+    forward = camera.rotation_euler.to_matrix() @ Vector((0.0, 0.0, -1.0))
+    return forward.dot(place - camera.location)
 
 
 def _place(name, location, watts, size):
