@@ -1,6 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Adds a pass, with several samples per pixel, to the sum of passes: mean light, and the depth of the nearest sample.
 
+// By which the shadow on a surface is nearer than the surface, as a part of its distance.
+const float SHADOW_BIAS = 1e-3;
+
+// Depth of a sample; hair covers all of it, and the shadow of hair, which is black, a part.
+float depth_of(ivec2 sample_place, float alpha)
+{
+  if (alpha == 1.0) {
+    return uintBitsToFloat(texelFetch(depths, sample_place, 0).r);
+  }
+  float depth = texelFetch(surface_depth, sample_place, 0).r;
+  return depth - SHADOW_BIAS * (1.0 - depth);
+}
+
 void main()
 {
   ivec2 corner = ivec2(gl_FragCoord.xy) * samples_per_side;
@@ -11,7 +24,7 @@ void main()
       vec4 hair = texelFetch(picture, corner + ivec2(x, y), 0);
       total += hair;
       if (hair.a > 0.0) {
-        nearest = min(nearest, uintBitsToFloat(texelFetch(depths, corner + ivec2(x, y), 0).r));
+        nearest = min(nearest, depth_of(corner + ivec2(x, y), hair.a));
       }
     }
   }

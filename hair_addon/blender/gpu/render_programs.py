@@ -48,8 +48,8 @@ def surface_arrival_program():
 
 
 @shaders.kept
-def hair_shadow_program(fragment="hair_shadow.frag"):
-    """The program of the light that hair leaves on surfaces: attributes position, normal, uv; see hair_shadow.frag."""
+def hair_shadow_program(fragment):
+    """The program of the light that hair leaves on surfaces: attributes position, normal, uv; see hair_shadow.glsl."""
     info, varying = shaders.surface_info()
     shaders.declare_scene(info)
     info.vertex_in(2, "VEC2", "uv")

@@ -307,6 +307,7 @@ def accumulate_program():
     info.push_constant("FLOAT", "weight")
     info.sampler(0, "FLOAT_2D", "picture")
     info.sampler(1, "UINT_2D", "depths")
+    info.sampler(2, "FLOAT_2D", "surface_depth")
     info.depth_write("ANY")
     return compile_drawing(info, "cover.vert", "accumulate.frag")
 

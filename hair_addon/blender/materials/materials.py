@@ -7,7 +7,7 @@ from ...core.shading import appearance
 from ..data import curves as curves_door
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, shared_wetness
-from . import strand_nodes, wet_nodes
+from . import eevee_nodes, strand_nodes, wet_nodes
 
 HAIR_NODE = "ShaderNodeBsdfHairPrincipled"
 
@@ -95,13 +95,13 @@ def _fill(node, material, look):
     color = (*appearance.mean_color(look), 1.0)
     # By identifier: a socket that the node's parametrization disables cannot be looked up by name.
     sockets = {socket.identifier: socket for socket in node.inputs}
-    # EEVEE does not support hair: it shows the colour.
+    # Shown by what does not support hair, as Blender's own viewport shading.
     for name, value in {**appearance.principled_sockets(look), "Color": color}.items():
         sockets[name].default_value = value
     material.diffuse_color = color
-    variation = appearance.strand_settings(look)
+    variation, varied_color = appearance.strand_settings(look), None
     if variation.is_even:
         strand_nodes.remove(material.node_tree)
     else:
-        falloff = appearance.kajiya_kay_strand_settings(look).falloff
-        strand_nodes.write(material.node_tree, node, variation, falloff)
+        varied_color = strand_nodes.write(material.node_tree, node, variation, eevee_nodes.falloff_of(look))
+    eevee_nodes.write(material.node_tree, node, look, varied_color)

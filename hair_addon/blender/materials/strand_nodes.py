@@ -29,10 +29,7 @@ _NODES = {
     "Absorption": ("ShaderNodeVectorMath", {"operation": "ADD"}, (8, 0)),
     "Square Root": ("ShaderNodeVectorMath", {"operation": "POWER"}, (9, 1)),
     "Falloff": ("ShaderNodeVectorMath", {"operation": "SCALE"}, (10, 1)),
-    "Color": ("ShaderNodeVectorMath", {"operation": "POWER"}, (11, 1)),
-    # EEVEE does not support hair, nor colours linked from other nodes.
-    "Diffuse": ("ShaderNodeBsdfDiffuse", {}, (12, 1)),
-    "EEVEE": ("ShaderNodeOutputMaterial", {"target": "EEVEE"}, (13, 1)),
+    "Color": ("ShaderNodeVectorMath", {"operation": "POWER"}, (11, 1)),  # for EEVEE
 }
 _SPACING = (180.0, -190.0)
 
@@ -53,13 +50,11 @@ _LINKS = (
     ("Absorption", 0, "Square Root", 0),
     ("Square Root", 0, "Falloff", 0),
     ("Falloff", 0, "Color", 1),
-    ("Color", 0, "Diffuse", "Color"),
-    ("Diffuse", 0, "EEVEE", "Surface"),
 )
 
 
 def write(tree, hair_node, variation, falloff):
-    """Let the absorption of a Principled Hair node vary; falloff: of the colour that EEVEE shows."""
+    """Let the absorption of a Principled Hair node vary; returns the output of a colour of this falloff, for EEVEE."""
     nodes = _ours(tree)
     if set(nodes) != set(_NODES):
         remove(tree)
@@ -72,6 +67,7 @@ def write(tree, hair_node, variation, falloff):
     _link(tree, nodes["Concentration" if variation.melanin >= 1e-4 else "Factor"].outputs[0], nodes["Pigment"], "Scale")
     _link(tree, nodes["Absorption"].outputs[0], hair_node, "Absorption Coefficient")
     _link(tree, _output(nodes["Random"], "Fac"), hair_node, "Random")
+    return nodes["Color"].outputs[0]
 
 
 def remove(tree):

@@ -22,7 +22,7 @@ _OF_RENDER = (
     *("use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
     *("use_simplify", "simplify_subdivision_render"),
 )
-_OWN = {"is_hair_only", "composite_shadow"}  # of the scene's settings of ours
+_OWN = {"is_hair_only", "composite_shadow", "has_preview_shadow"}  # of the scene's settings of ours
 
 _COMPOSITED = "vellus_use_compositing"  # custom property of the hair's scene: what the render settings had
 

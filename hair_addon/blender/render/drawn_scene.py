@@ -300,14 +300,19 @@ def draw_arrival(drawn, view, buffer):
 def draw_hair_shadow(drawn, view, buffer):
     """Return a texture of the part of the light on surfaces that hair lets through; 1 where there is no surface."""
     with buffer.surfaces_of_part(background=(1.0, 1.0, 1.0, 1.0)), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        draw_shaded_by_hair(drawn, view)
+        _draw_shaded_by_hair(drawn, view, "hair_shadow.frag")
     return buffer.part()
 
 
-def draw_shaded_by_hair(drawn, view, program=None):
-    """Draw all surfaces with what hair leaves of their light, by a program of `render_programs.hair_shadow_program`."""
+def draw_viewport_shadow(drawn, view):
+    """As `draw_hiding`, and as black over what Blender draws, whose alpha is the part of the light that hair stops."""
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        _draw_shaded_by_hair(drawn, view, "hair_shadow_view.frag")
+
+
+def _draw_shaded_by_hair(drawn, view, fragment):
     _see_through_hair(drawn, view)
-    program = program or render_programs.hair_shadow_program()
+    program = render_programs.hair_shadow_program(fragment)
     for (surface, _parts), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=False):
         placed = view.copy()
         placed["row_strands"] = surface.row_corners

@@ -42,18 +42,20 @@ class HairPicture:
         """Start another picture."""
         self.pass_count = 0
 
-    def add_pass(self, drawn, world_to_view, view_to_clip, is_see_through=False, outline=None):
+    def add_pass(self, drawn, world_to_view, view_to_clip, is_see_through=False, outline=None, is_shadowed=False):
         """Draw a `DrawnScene` once more.
 
         world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not hide hair; outline: a `HairOutline` that
-        takes part in it until it is fine.
+        takes part in it until it is fine; is_shadowed: whether it darkens surfaces by the shadow of hair.
         """
         view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, self.pass_count)
         is_outlined = outline is not None and not outline.is_fine
         if is_outlined:
             outline.add_pass(drawn, view, self._pass)
         with self._pass.surfaces():
-            if not is_see_through:
+            if is_shadowed and not is_see_through:
+                drawn_scene.draw_viewport_shadow(drawn, view)
+            elif not is_see_through:
                 drawn_scene.draw_hiding(drawn, view)
         drawn_scene.draw_hair(drawn, view, self._pass, is_viewport=True)
         if is_outlined:
@@ -70,6 +72,7 @@ class HairPicture:
         program.uniform_int("samples_per_side", self.per_side)
         program.uniform_sampler("picture", self._pass.color)
         program.uniform_sampler("depths", self._pass.depths)
+        program.uniform_sampler("surface_depth", self._pass.surface_depth)
         # Light is additive; of depths the nearest is kept.
         for weight, depth_test in ((1.0, "NONE"), (0.0, "LESS_EQUAL")):
             program.uniform_float("weight", weight)

@@ -92,7 +92,8 @@ def _draw_hair(context):
         return
     xray = _xray(viewport.shading)
     outlined = selected_hair.outlined(context, drawn, is_see_through=xray is not None)
-    kept = _picture(drawn, context.region_data, region, xray is not None, outlined)
+    is_shadowed = viewport.shading.type == "MATERIAL" and context.scene.vellus.has_preview_shadow
+    kept = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed)
     kept.picture.show(
         _display_table(DisplayTransform.of(context.scene)),
         2.0**context.scene.view_settings.exposure,
@@ -183,13 +184,13 @@ def _xray(shading):
     return shading.xray_alpha if shading.type == "SOLID" and shading.show_xray else None
 
 
-def _picture(drawn, view, region, is_see_through, outlined=None):
+def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=False):
     """The `RegionPicture` of a region, of this scene and view: restarted, with another pass, or unchanged.
 
-    outlined: as `selected_hair.outlined` returns it.
+    outlined: as `selected_hair.outlined` returns it; is_shadowed: as for `HairPicture.add_pass`.
     """
     kept = region_pictures.picture_of(region, hair_picture.HairPicture)
-    seen = (is_see_through, outlined, *map(tuple, view.view_matrix), *map(tuple, view.window_matrix))
+    seen = (is_see_through, is_shadowed, outlined, *map(tuple, view.view_matrix), *map(tuple, view.window_matrix))
     if kept.turn_to(drawn, seen):
         kept.picture.restart()
         if outlined is None:
@@ -198,7 +199,7 @@ def _picture(drawn, view, region, is_see_through, outlined=None):
             kept.outline = kept.outline or HairOutline(kept.picture.size, kept.picture.per_side)
             kept.outline.restart(dict(outlined[0]), outlined[1])
     if not kept.picture.is_fine:
-        kept.picture.add_pass(drawn, *matrices_of(view), is_see_through, kept.outline)
+        kept.picture.add_pass(drawn, *matrices_of(view), is_see_through, kept.outline, is_shadowed)
     return kept
 
 

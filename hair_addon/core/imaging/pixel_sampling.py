@@ -38,6 +38,9 @@ class RenderSettings(Settings):
         "Render hair without surfaces: they hide it and cast shadows on it, and leave the picture empty",
         label="Hair Only",
     )
+    has_preview_shadow: bool = param(
+        True, "Darken surfaces in Material Preview where hair is between them and the lights", label="Preview Shadow"
+    )
     composite_shadow: str = param(
         "PASS",
         "How hair darkens surfaces that another engine renders",

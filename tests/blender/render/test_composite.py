@@ -82,6 +82,24 @@ def test_it_is_vellus_hair_over_shaded_surfaces(cycles, tmp_path):
     assert np.abs(found - surfaces).max() > 0.3
 
 
+def test_on_a_floor_the_shadow_is_as_dark_as_by_cycles(cycles, tmp_path):
+    """Of hair alone, seen beside it: the mean light of the floor that it shades."""
+    scene = bpy.context.scene
+    bpy.ops.mesh.primitive_plane_add(size=12.0, location=(0.0, 0.0, -1.6))
+    scene.camera.location, scene.camera.rotation_euler = (0.0, -7.0, 4.0), (1.1, 0.0, 0.0)
+    bpy.data.objects["Sun"].rotation_euler = (0.0, 0.5, 0.0)
+    whole = picture(tmp_path, engine="CYCLES")
+    bpy.ops.vellus.toggle_composite()
+    shaded = picture(tmp_path)
+    scene.vellus.composite_shadow = "NONE"
+    bpy.context.view_layer.update()
+    bare = picture(tmp_path)
+    darkest = (shaded - bare)[..., 1] < -0.15 * bare[..., 1]
+    assert darkest.sum() > 30
+    assert whole[darkest].mean() < 0.8 * bare[darkest].mean()
+    assert shaded[darkest].mean() == pytest.approx(whole[darkest].mean(), rel=0.1)
+
+
 def test_surfaces_hide_hair_and_are_not_seen_in_hair_only(cycles, tmp_path):
     view_layer = bpy.context.view_layer
     view_layer.vellus.has_hair_mask = True

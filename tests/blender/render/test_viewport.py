@@ -20,6 +20,7 @@ from hair_addon.blender.live import invalidation
 from hair_addon.blender.render import drawn_scene, hair_picture, region_pictures, viewport
 from hair_addon.core.errors import HairError
 from tests.support import glsl
+from tests.support.rendering import rendered
 
 SIZE = 96
 
@@ -179,6 +180,30 @@ def test_surfaces_hide_hair_in_every_sample(lit):
         pictures[name] = picture.read()
     np.testing.assert_array_equal(pictures["through"], pictures["bare"])
     assert pictures["hidden"][..., 3].sum() < 0.9 * pictures["bare"][..., 3].sum()
+
+
+@pytest.mark.parametrize("per_side", [1, 2])
+def test_a_viewport_s_surfaces_are_darkened_by_what_hair_stops(lit, tmp_path, per_side):
+    """Black over them, with the rest of the pass Hair Shadow as alpha; hair itself is as without, and nearest too."""
+    bpy.context.view_layer.update()
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 4000, 0.01
+    bpy.context.view_layer.update()
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+    matrices = scene.read_camera(bpy.context.scene, depsgraph, SIZE, SIZE)
+    plain, shadowed = (hair_picture.HairPicture((SIZE, SIZE), per_side) for _ in range(2))
+    for _ in range(32 // per_side**2):
+        plain.add_pass(drawn, *matrices)
+        shadowed.add_pass(drawn, *matrices, is_shadowed=True)
+    bare, dark = plain.read(), shadowed.read()
+    np.testing.assert_allclose(dark[..., :3], bare[..., :3], atol=2e-3)
+    assert (dark[..., 3] > bare[..., 3] - 1e-3).all() and dark.max() <= bare.max() + 1e-3
+    bpy.context.view_layer.vellus.has_hair_shadow = bpy.context.view_layer.vellus.has_hair_mask = True
+    passes = rendered(tmp_path, film_transparent=True, resolution_x=SIZE, resolution_y=SIZE, sample_count=16)
+    alone = passes["Hair Mask"] < 1e-3
+    expected = 1.0 - passes["Hair Shadow"].mean(axis=-1)
+    assert expected[alone].max() > 0.1
+    np.testing.assert_allclose(dark[..., 3][alone].mean(), expected[alone].mean(), rtol=0.05)
 
 
 # ------------------------------------------------------------------------------------------------- when it is drawn

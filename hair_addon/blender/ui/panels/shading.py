@@ -63,6 +63,7 @@ class VELLUS_PT_shading(_OfHair, bpy.types.Panel):
             row(layout, state, name)
         if state.model != "KAJIYA_KAY":
             row(layout, state.appearance, "mode")
+        row(layout, context.scene.vellus, "has_preview_shadow")
 
 
 def _hair_object(context):

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shader nodes of hair for EEVEE, which does not support hair's own: light scattered around strands, and a highlight.
+
+EEVEE gives strips of hair the normals of cylinders, so that a glossy surface has the highlight of a fibre; a
+translucent one shows light from all sides, as hair does. Colors are fitted to Cycles' light of the sample head with
+dark, brown and blond hair, by suns in front, beside and behind and by a grey world.
+"""
+
+import numpy as np
+
+from ...core.shading import appearance
+from ...core.shading.fibre.pigment import color_from_falloff
+
+_PREFIX = "EEVEE "  # of the names of our nodes, by which they are found again
+
+# Of ln(colour) with sqrt(sigma_a), relative to a groom's in diffuse light: lamps light strands that are seen.
+_FALLOFF = 0.63
+_GAIN = 1.5
+_SURFACE = 0.02  # what reflections send around a strand that absorbs all light inside
+_GLOSS = 0.05  # reflectance of the highlight, of fibres as reflective as those of Principled Hair
+
+# Name: (type, {property: value}, place from the hair node).
+_NODES = {
+    "Color": ("ShaderNodeVectorMath", {"operation": "MULTIPLY_ADD"}, (200, -160)),
+    # EEVEE multiplies light by the color of a translucent surface where it enters and where it leaves.
+    "Entering": ("ShaderNodeVectorMath", {"operation": "POWER"}, (380, -160)),
+    "Around": ("ShaderNodeBsdfTranslucent", {}, (560, -160)),
+    "Highlight": ("ShaderNodeBsdfAnisotropic", {}, (560, -300)),
+    "Sum": ("ShaderNodeAddShader", {}, (740, -160)),
+    "Output": ("ShaderNodeOutputMaterial", {"target": "EEVEE"}, (920, -160)),
+}
+
+_LINKS = (
+    ("Color", 0, "Entering", 0),
+    ("Entering", 0, "Around", "Color"),
+    ("Around", 0, "Sum", 0),
+    ("Highlight", 0, "Sum", 1),
+    ("Sum", 0, "Output", "Surface"),
+)
+
+
+def falloff_of(look):
+    """Decrease of ln(colour) with the square root of the absorption, of strands that vary."""
+    return _FALLOFF * appearance.kajiya_kay_strand_settings(look).falloff
+
+
+def write(tree, hair_node, look, varied_color=None):
+    """Add or update the nodes for an `Appearance`; varied_color: output of e^(-falloff √sigma_a), None of even hair."""
+    nodes = _ours(tree)
+    if set(nodes) != set(_NODES):
+        for node in nodes.values():
+            tree.nodes.remove(node)
+        nodes = _build(tree, hair_node)
+    strands = appearance.kajiya_kay_strand_settings(look)
+    gloss = _GLOSS * strands.reflectance / appearance.kajiya_kay_strand_settings(appearance.Appearance()).reflectance
+    color = nodes["Color"].inputs
+    if varied_color is not None:
+        tree.links.new(varied_color, color[0])
+    else:
+        for link in color[0].links:
+            tree.links.remove(link)
+        color[0].default_value = color_from_falloff(np.array(appearance.sigma_a(look)), falloff_of(look))
+    color[1].default_value, color[2].default_value = (_GAIN,) * 3, (_SURFACE,) * 3
+    nodes["Entering"].inputs[1].default_value = (0.5, 0.5, 0.5)
+    nodes["Highlight"].inputs["Color"].default_value = (gloss, gloss, gloss, 1.0)
+    nodes["Highlight"].inputs["Roughness"].default_value = (1.0 - strands.coat) * strands.roughness
+
+
+def _ours(tree):
+    return {node.name.removeprefix(_PREFIX): node for node in tree.nodes if node.name.startswith(_PREFIX)}
+
+
+def _build(tree, hair_node):
+    nodes = {}
+    for name, (kind, properties, (x, y)) in _NODES.items():
+        node = nodes[name] = tree.nodes.new(kind)
+        node.name, node.label = _PREFIX + name, name
+        node.location = (hair_node.location.x + x, hair_node.location.y + y)
+        for key, value in properties.items():
+            setattr(node, key, value)
+    for source, output, target, socket in _LINKS:
+        tree.links.new(nodes[source].outputs[output], nodes[target].inputs[socket])
+    return nodes
