@@ -100,7 +100,7 @@ def load_kernels(
     device: wp.DeviceLike, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS
 ) -> None:
     """Load what `settled` launches, as `groom.load_kernels` does; same arguments."""
-    modules = [contact_queries, detail, hair_volume, rod_solver]
+    names = [module.__name__ for module in (contact_queries, detail, hair_volume, rod_solver)]
     if wp.get_device(device).is_cpu:
-        modules.append(contact_substep)
-    kernel_setup.load([wp.get_module(module.__name__) for module in modules], device, progress, most_threads)
+        names.append(contact_substep.__name__)
+    kernel_setup.load([wp.get_module(name) for name in names], device, progress, most_threads)
