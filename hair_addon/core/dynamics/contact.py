@@ -100,7 +100,15 @@ class Contacts:
         for is_middle in (0,) if is_final else (1, 0):
             self._launch(
                 contact_queries.find_planes,
-                [surface, asking, positions, last_positions, middle_planes, is_middle, moved if is_again else self._none],
+                [
+                    surface,
+                    asking,
+                    positions,
+                    last_positions,
+                    middle_planes,
+                    is_middle,
+                    moved if is_again else self._none,
+                ],
                 [self.middles if is_middle else self.vertices, middle_planes if is_middle else planes],
             )
         return planes

@@ -1,21 +1,22 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Which of LANES samples of strands look for a surface, and how far: on a processor the lanes of its vectors, on a GPU
-// one sample a thread. A sample that was farther away than it has come since, seen from the surface, is spared, and so is
-// one that the grid of distances knows to be far away.
+// one sample a thread. A sample that was farther away than it has come since, seen from the surface, is spared, and so
+// is one that the grid of distances knows to be far away.
 //
 // The body of `_put_needs` in contact_queries.py. Parameters, of arrays (groups, rows, lanes):
 //
 //   int group, int sample, int first_lane    which samples
 //   int is_middle                            1: the middle of segment `sample`; 0: the vertex after it
-//   Asking asking                            is_final, is_skipping: after the solve; 0: every sample looks; is_again: a
-//                                            sample that has not moved since it last looked keeps its plane; rise [m]
-//   Surface surface                          motion, carry, deformation, to_rest, moved, largest_distance
+//   Asking asking                            is_final: after the solve; is_again: a sample that has not moved since it
+//                                            last looked keeps its plane; is_skipping, 0: every sample looks; rise: of
+//                                            samples that the groom has inside [m]
+//   Surface surface                          as nearest_surface.py says
 //   array_t<float> positions, last_positions 3 rows a vertex [m], now and when the substep began
 //   array_t<float> middle_planes             PLANE rows a segment
-//   Samples samples                          rest: distance in the groom [m], changed by `rise`; sides: 0 for those that do
-//                                            not look; asked: 3 rows, place at rest where it last looked [m]; clear: how
-//                                            far from there it was [m], less the surface's motion since, changed
+//   Samples samples                          rest: distance in the groom [m], changed by `rise`; sides: 0 for those that
+//                                            do not look; asked: 3 rows, place at rest where it last looked [m]; clear:
+//                                            how far from there it was [m], less the surface's motion since, changed
 //   array_t<float> out_planes                PLANE rows: zero, but for how far it looks [m] in place of the offset, and
 //                                            1 in place of the friction where a segment beside has a plane
 //
@@ -93,15 +94,16 @@ const lanes most = lower_of(lanes(surface.largest_distance), at_rest);
 // As the surface sees it. Through a collider that does not deform a ray finds what has passed: the nearest surface is
 // looked for no farther than it may pull.
 const vector carried = turned(surface.carry, last);
-const vector way =
-    minus(point, vector{carried.x + surface.carry_shift[0], carried.y + surface.carry_shift[1], carried.z + surface.carry_shift[2]});
+const auto& shift = surface.carry_shift;
+const vector way = minus(point, vector{carried.x + shift[0], carried.y + shift[1], carried.z + shift[2]});
 const lanes length = length_of(way);
 const lanes moving = lower_of(length, lanes(MOST_MOTION)) + deformation;
 lanes needed = abs_of(most) + MARGIN + (deformation > BACK ? moving : lower_of(moving, lanes(NEAR)));
 
 const lanes before = get(row_of(samples.clear, sample));
 const lanes left = is_final ? before : before - motion;
-const vector place = turned(surface.to_rest, vector{point.x - surface.moved[0], point.y - surface.moved[1], point.z - surface.moved[2]});
+const auto& moved = surface.moved;
+const vector place = turned(surface.to_rest, vector{point.x - moved[0], point.y - moved[1], point.z - moved[2]});
 const lanes away = length_of(minus(place, get_vector(samples.asked, sample)));
 const auto is_spared = (left - away > needed + SLACK) & where(asking.is_skipping);
 needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper

@@ -11,7 +11,7 @@ import warp as wp
 
 from ..kernels import parallel
 from . import rod_solver
-from .contact import PLANE, Contacts, asking_of
+from .contact import Contacts, asking_of
 from .contact_queries import WIDTH, Asking, Samples, any_moved, find_in
 from .nearest_surface import Surface
 from .rod_solver import AGAIN, FINISH, PREDICT, SOLVE, Around, Numbers, RodArrays, Step, Surroundings, advance_block

@@ -30,10 +30,9 @@ class DistanceGrid:
     distances: wp.array3d[float]  # [m]
 
 
+# The least distance [m] that a point may have from any surface: zero near one.
 @wp.func_native(native_code.body(__file__, "distance_grid.cpp", WIDTH=1))
-def least_distance(grid: DistanceGrid, point: wp.vec3) -> float:
-    """The least distance that a point may have from any surface [m]: zero near one."""
-    ...
+def least_distance(grid: DistanceGrid, point: wp.vec3) -> float: ...
 
 
 def cell_size(extent: np.ndarray, cell_count: int) -> float:

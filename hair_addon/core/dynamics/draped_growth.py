@@ -21,7 +21,7 @@ from ..grooming.groom import GuideSettings, distribute_guides
 from ..kernels import kernel_setup
 from ..long_work import Progress, no_progress, part_of
 from ..placement.domain import Mirror
-from . import contact_queries, detail, draping, hair_volume, rod_solver
+from . import contact_queries, contact_substep, detail, draping, hair_volume, rod_solver
 from .settings import DynamicsSettings
 
 SCALP = 0.055  # [m²], of a human head
@@ -100,5 +100,7 @@ def load_kernels(
     device: wp.DeviceLike, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS
 ) -> None:
     """Load what `settled` launches, as `groom.load_kernels` does; same arguments."""
-    modules = (contact_queries, detail, hair_volume, rod_solver)
-    kernel_setup.load([wp.get_module(module.__name__) for module in modules], device, progress, most_threads)
+    names = [module.__name__ for module in (contact_queries, detail, hair_volume, rod_solver)]
+    if wp.get_device(device).is_cpu:
+        names.append(contact_substep.__name__)
+    kernel_setup.load([wp.get_module(name) for name in names], device, progress, most_threads)

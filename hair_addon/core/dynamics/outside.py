@@ -47,7 +47,9 @@ def kept_outside(
     is_moved = np.zeros(len(points), bool)
     if colliders.mesh is None or not points.size:
         return points, is_moved
-    given = wp.array((points - origin).astype(np.float32), dtype=wp.vec3, device=colliders.device)
+    # In rows as long as strands: three numbers at a time take thrice as long.
+    offsets = points.reshape(len(points), -1) - np.tile(origin, points.shape[1])
+    given = wp.array(offsets.astype(np.float32).reshape(points.shape), dtype=wp.vec3, device=colliders.device)
     out = wp.empty_like(given)
     moved = wp.zeros(len(points), dtype=int, device=colliders.device)
     surface = _surface_of(colliders, points.size // 3)

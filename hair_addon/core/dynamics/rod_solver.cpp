@@ -102,7 +102,9 @@ const auto cube_root = [&](lanes value) {
   return root;
 };
 
-const auto rows_of = [&](const auto& array) { return array.data + size_t(group) * (array.strides[0] / sizeof(float)) + lane; };
+const auto rows_of = [&](const auto& array) {
+  return array.data + size_t(group) * (array.strides[0] / sizeof(float)) + lane;
+};
 const int segment_count = strands.lengths.shape[1];
 const int count = step.count, pinned = step.pinned;
 const float h = step.h, damping_time = step.damping_time, twist_ratio = step.twist_ratio;
@@ -113,7 +115,8 @@ float *const x = rows_of(strands.positions), *const v = rows_of(strands.velociti
 float *const q = rows_of(strands.frames), *const spin = rows_of(strands.spins);
 float *const lambda = rows_of(strands.multipliers), *const slip = rows_of(strands.slips);
 const float *const length = rows_of(strands.lengths), *const rest = rows_of(strands.rests);
-const float *const bending = rows_of(strands.bend_compliances), *const stretching = rows_of(strands.stretch_compliances);
+const float* const bending = rows_of(strands.bend_compliances);
+const float* const stretching = rows_of(strands.stretch_compliances);
 const float *const inverse_mass = rows_of(strands.inverse_masses), *const inertia = rows_of(strands.inertias);
 const float *const groom = rows_of(strands.grooms), *const groom_frame = rows_of(strands.groom_frames);
 float *const x_before = rows_of(strands.positions_before), *const q_before = rows_of(strands.frames_before);
@@ -124,7 +127,8 @@ const float *const root_rows = rows_of(strands.roots), *const found_rows = rows_
 float* const plane_rows = rows_of(around.planes);
 const float *const air_rows = rows_of(around.airs), *const drag_rows = rows_of(around.drags);
 const float *const acceleration_rows = rows_of(around.accelerations);
-const bool has_planes = around.planes.shape[0] > 0, has_air = around.airs.shape[0] > 0, has_drag = around.drags.shape[0] > 0;
+const bool has_planes = around.planes.shape[0] > 0;
+const bool has_air = around.airs.shape[0] > 0, has_drag = around.drags.shape[0] > 0;
 const bool has_acceleration = around.accelerations.shape[0] > 0;
 const float* const drag_rate = rows_of(strands.drag_rates);
 const lanes slow_drag = get(drag_rate, 0), drag_square = get(drag_rate, 1), drag_root = get(drag_rate, 2);

@@ -121,8 +121,8 @@ def row_count(name: str, segment_count: int) -> int:
 class Surroundings:
     """What acts on points in a substep, each optional: (groups, rows a point times points, lanes) float32.
 
-    planes: `plane_row` says where; found_planes: the same after the solve, for AGAIN and FINISH; airs: velocity of the air [m/s],
-    3 rows a point; drags: factor of air drag, 1; accelerations: [m/s²], 3.
+    planes: `plane_row` says where; found_planes: the same after the solve, for AGAIN and FINISH; airs: velocity of the
+    air [m/s], 3 rows a point; drags: factor of air drag, 1; accelerations: [m/s²], 3.
     """
 
     planes: wp.array | None = None
@@ -253,8 +253,9 @@ def advance(
 
     stages: PREDICT leaves in `positions` where points go without the rod's forces, for which planes of contact may then
     be found; SOLVE moves them to where they end; AGAIN solves once more for strands of which a point is inside one of
-    `found_planes`, which then takes the place of its plane; FINISH moves out what is inside the
-    planes found last, and computes velocities. One launch does them all for strands that no planes hold. Raises `HairError` where counts do not match.
+    `found_planes`, which then takes the place of its plane; FINISH moves out what is inside the planes found last, and
+    computes velocities. One launch does them all for strands that no planes hold. Raises `HairError` where counts do
+    not match.
     """
     numbers, around = kernel_inputs(arrays, step, scratch, first, end, surroundings)
     device, group_count = arrays.positions.device, len(arrays.positions)

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from hair_addon.core.dynamics.colliders import Collider, Colliders
 from hair_addon.core.dynamics.contact import WIDTH, Contacts
 from hair_addon.core.geometry.mesh import TriMesh
+from tests.support.contacts import bumpy
 from tests.support.meshes import flat_grid, subdivided_sphere
 
 BALL = subdivided_sphere(1, 0.1)
@@ -161,3 +162,21 @@ def test_any_arrays_collide_or_are_named(data):
     assert len(colliders.names) + len(colliders.notes) == 2 and "other" in colliders.names
     colliders.pose(1.0)
     assert finds(colliders, (50.1, 0.0, 0.0))
+
+
+def test_vertices_drift_no_farther_than_is_known(device, rng):
+    """Seen from where they have turned and moved to as a whole, in each substep; a turn alone adds nothing for good."""
+    mesh = bumpy(rng)
+    colliders = Colliders(device)
+    colliders.read([Collider("a", mesh)])
+    for frame in range(1, 7):
+        turn, size = Rotation.from_rotvec([0.0, 0.1, 0.3 * frame]), 1.0 + 0.02 * max(frame - 3, 0)
+        colliders.read([Collider("a", TriMesh((size * turn.apply(mesh.vertices)).astype(np.float32), mesh.triangles))])
+        for part in (0.25, 0.5, 1.0):
+            colliders.pose(part)
+            turned, moved = colliders.rigid_motion_so_far
+            drift = np.linalg.norm((colliders.mesh.points.numpy() - moved) @ turned - mesh.vertices, axis=1).max()
+            known = colliders.drift_before + colliders.drift
+            assert drift <= known + 1e-6 and known < drift + 0.01
+        if frame <= 3:
+            assert known < 1e-5

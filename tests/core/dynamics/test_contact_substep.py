@@ -1,0 +1,74 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands that touch a moving mesh: a group of them at once as stage by stage, on any number of threads."""
+
+import os
+
+import numpy as np
+import pytest
+import warp as wp
+from scipy.spatial.transform import Rotation
+
+from hair_addon.core.dynamics import rotations
+from hair_addon.core.dynamics.contact_substep import TouchingStrands
+from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
+from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.simulation import Obstacle, Simulation, World
+from tests.support.contacts import bumpy
+from tests.support.devices import DEVICE
+
+COUNT, FRAME = 300, 1.0 / 24.0  # more than one share of two threads; [s]
+
+
+def shaken(seed=0, frames=4):
+    """The state of strands on a bumpy ball that turns, after some frames, and how many of their points touch."""
+    rng = np.random.default_rng(seed)
+    mesh = bumpy(rng)
+    faces = rng.integers(len(mesh.triangles), size=COUNT)
+    corners = mesh.corners[faces].astype(np.float64)
+    out = rotations.unit(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    guides = corners.mean(axis=1)[:, None] + 0.08 * np.linspace(0.0, 1.0, 12)[:, None] * out[:, None]
+    pose = RootPose(guides[:, 0], np.tile(rotations.IDENTITY, (COUNT, 1)))
+    settings = DynamicsSettings(
+        vertex_count=12,
+        bend_stiffness=0.1,
+        sag_free=False,
+        hair_friction=0.0,
+        hair_pressure=0.0,
+        automatic_substeps=False,
+        substeps=4,
+    )
+
+    def world(motion):
+        ball = Obstacle("Ball", mesh.vertices.astype(np.float64), mesh.triangles)
+        return World(obstacles=(ball.moved(motion),))
+
+    def turned(frame):
+        turn = Rotation.from_rotvec([0.0, 0.3 * np.sin(frame), 0.4 * frame]).as_quat()
+        return RigidMotion(turn, np.zeros(3), np.array([0.02 * np.sin(frame), 0.0, 0.0]))
+
+    simulation = Simulation(guides, settings, pose, world(turned(0)), DEVICE)
+    for frame in range(1, frames + 1):
+        simulation.advance(pose.moved(turned(frame)), world(turned(frame)), FRAME)
+    touching = np.count_nonzero(simulation._rods.read("slips") >= 0.0)
+    return simulation.save(), touching
+
+
+def assert_equal(state, other):
+    assert state.keys() == other.keys()
+    for name in state:
+        np.testing.assert_array_equal(state[name], other[name], err_msg=name)
+
+
+@pytest.mark.skipif(not wp.get_device(DEVICE).is_cpu, reason="a GPU takes one stage after the other")
+def test_a_group_at_once_moves_as_stage_by_stage(monkeypatch):
+    state, touching = shaken()
+    assert touching > COUNT // 3
+    monkeypatch.setattr(TouchingStrands, "_advance_groups", TouchingStrands._advance_stages)
+    assert_equal(state, shaken()[0])
+
+
+@pytest.mark.parametrize("core_count", [1, 5])
+def test_on_other_numbers_of_threads(monkeypatch, core_count):
+    state, _ = shaken()
+    monkeypatch.setattr(os, "process_cpu_count", lambda: core_count)
+    assert_equal(state, shaken()[0])
