@@ -20,6 +20,7 @@ from hair_addon.core.dynamics import rod_solver, root_motion, rotations, simulat
 from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.geometry.mesh import TriMesh
 from hair_addon.core.geometry.sampling import sample_surface
+from tests.benchmarks.rods_in_warp import NewtonStep
 from tests.benchmarks.test_hair_speed import Time, best_times, report
 from tests.benchmarks.test_live_editing import View, on_gpu
 from tests.support.devices import DEVICE
@@ -124,6 +125,27 @@ def test_four_thousand_strands(monkeypatch):
     joint = times["one thread"].work / (4000 * (POINTS - 1) * simulation.step.count)
     print(f"{1e9 * joint:.1f} ns a joint and substep, asked: 46; goal of a frame: 20 ms")
     assert times["one thread"].work < 40.0 * times["copying the state"].work
+
+
+@pytest.mark.long
+def test_lanes_beside_warps_vectors(monkeypatch):
+    """A whole substep in lanes, and one Newton step of it by the same algebra in Warp's vectors, on one thread."""
+    monkeypatch.setattr(os, "process_cpu_count", lambda: 1)
+    simulation = Simulation(strands(1000), damping_time=0.0)
+    simulation.advance(3)
+    simulation.rods.advance(simulation.step, 0, 1, rod_solver.PREDICT)
+    in_warp = NewtonStep(simulation.rods, simulation.step)
+    predicted = in_warp.positions.numpy().copy()
+    in_warp.solve()
+    simulation.rods.advance(simulation.step, 0, 1, rod_solver.SOLVE | rod_solver.FINISH)
+    moved = np.abs(simulation.rods.positions() - predicted).max()
+    assert np.abs(in_warp.positions.numpy() - simulation.rods.positions()).max() < 1e-3 * moved  # the same algebra
+    calls = {"lanes": lambda: simulation.rods.advance(simulation.step, 0, 1), "Warp's vectors": in_warp.solve}
+    times = best_times(calls, 15)
+    ratios = report("Dynamics, a substep", 1000, times, {"Warp's vectors": 8}, "lanes")
+    joints = 1000 * (POINTS - 1)
+    print(f"ns a joint: {', '.join(f'{name} {1e9 * found.work / joints:.0f}' for name, found in times.items())}")
+    assert ratios["Warp's vectors"].work > 4.0
 
 
 @pytest.mark.long

@@ -84,8 +84,7 @@ class GuideSimulation:
 
     def _change(self, frame):
         """Go on with the settings and the wetness of a frame."""
-        is_as_wet = frame.wetness is self.wetness is None or np.array_equal(frame.wetness, self.wetness)
-        if frame.settings != self.settings or not is_as_wet:
+        if frame.settings != self.settings or not _are_same(frame.wetness, self.wetness):
             self.simulation.change(in_metres(frame.settings, self.metres), wetness=frame.wetness)
             self.settings, self.wetness = frame.settings, frame.wetness
 
@@ -111,6 +110,12 @@ class GuideSimulation:
             and self.settings.vertex_count == settings.vertex_count
             and self.digest == staleness.guides_digest(guides)
         )
+
+
+def _are_same(one, other):
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
 
 
 def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:

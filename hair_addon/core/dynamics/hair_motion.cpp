@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The mean motion of hair around a point, and the push of pressure and cohesion: six numbers from the eight cells around.
+// The mean motion of hair around a point, and the push of pressure and cohesion: six numbers from eight cells.
 //
 // The body of `_around` in hair_volume.py. Parameters:
 //
