@@ -10,5 +10,5 @@ void main()
   ivec2 here = ivec2(gl_FragCoord.xy);
   vec2 ends = texelFetch(hair_front, ivec3(here, light.shadow_layer), 0).rg;
   int layer = layer_among(depth, ends, texelFetch(hidden_depth, here, 0).r);
-  color = vec4(greaterThanEqual(ivec4(0, 1, 2, 3), ivec4(layer))) * strand_coverage;
+  color = vec4(lessThan(vec4(float(layer)), vec4(0.5, 1.5, 2.5, 3.5))) * strand_coverage;
 }

@@ -42,14 +42,15 @@ float lit_part(vec3 at, float depth, float bias)
   return (behind <= 0.0) ? 1.0 : part;
 }
 
-// What a strand adds to the counts of a map at its own place: it covers a part of a texel's width, and interpolation finds
-// three quarters of that in the mean over the places within a texel.
+// What a strand adds to the counts of a map at its own axis, the mean over the places of the axis within a texel:
+// interpolation weighs what the strand covers, a part of one texel's width or more than one.
 float own_count(Light light, vec3 position, float radius)
 {
   mat4 m = light.world_to_shadow;
   float across = length(vec3(m[0][0], m[1][0], m[2][0])) / dot(vec4(m[0][3], m[1][3], m[2][3], m[3][3]), vec4(position, 1.0));
   float covered = radius * across * float(textureSize(hair_layers, 0).x);
-  return (covered < 1.0) ? 0.75 * covered : 1.0 - 0.25 / covered;
+  float width = clamp(covered, 1.0, 2.0);
+  return min(covered, 1.0) * (width - 0.25 * width * width);
 }
 
 // Mean number of strands that the light has crossed; behind: and of those that are left to it, as far as the surface. own:

@@ -25,7 +25,7 @@ import hair_addon
 from hair_addon.blender.data import curves, scene
 from hair_addon.blender.gpu import ambient_visibility, drawing, hair_shading, strand_textures, visibility_buffer
 from hair_addon.blender.render import drawn_scene
-from hair_addon.core.grooming import groom
+from hair_addon.core.grooming import following, groom
 from hair_addon.core.shading.fibre import kajiya_kay, strand_variation
 from hair_addon.core.shading.tables import lookup_tables, strand_tables
 
@@ -76,9 +76,10 @@ def strands_between(guides, strand_count, device):
     density = scene.read_vertex_group(surface_object, depsgraph, "scalp")
     settings = groom.HairSettings(strand_count=strand_count, radius=6e-5)
     rooted = curves.read_guides(guides.data, surface, "cpu")
-    hair = groom.generate_hair(surface.mesh, rooted, settings, density=density, device=device)
+    binding = groom.bind_hair(surface.mesh, rooted, settings, density=density, device=device)
+    hair = following.follow_guides(binding, rooted, None)
     points = surface.to_local(hair.numpy())
-    radii = np.broadcast_to(groom.strand_radii(settings, points.shape[1]), points.shape[:2])
+    radii = np.broadcast_to(groom.strand_radii(settings), points.shape[:2])
     return points, radii
 
 

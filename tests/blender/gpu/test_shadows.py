@@ -67,12 +67,14 @@ def test_triangles_and_the_computed_make_the_same_map(scene, rng, radius, steps)
     for in_compute in (False, True):
         maps = shadows.ShadowMaps(128, 1, in_compute)
         maps.draw(sun(0.4, 0.7), hair, [], steps)
-        front, layers = (np.array(maps.samplers[name].read()) for name in ("hair_front", "hair_layers"))
-        found.append((front.reshape(128, 128), layers.reshape(128, 128, 4)))
-    (triangle_front, triangle_layers), (front, layers) = found
+        ends, layers = (np.array(maps.samplers[name].read()) for name in ("hair_front", "hair_layers"))
+        found.append((*np.moveaxis(ends.reshape(128, 128, 2), 2, 0), layers.reshape(128, 128, 4)))
+    (triangle_front, triangle_back, triangle_layers), (front, back, layers) = found
     hit = (triangle_front < 1.9) & (front < 1.9)
     assert hit.sum() > 0.97 * (triangle_front < 1.9).sum() > 0
     assert np.median(np.abs(front - triangle_front)[hit]) < 2e-3
+    assert np.median(np.abs(back - triangle_back)[hit]) < 2e-3
+    assert (back >= front)[hit].all()
     assert (np.diff(layers, axis=2) >= 0.0).all()  # each counts what is in front of its far side
     np.testing.assert_allclose(layers.mean(axis=(0, 1)), triangle_layers.mean(axis=(0, 1)), rtol=0.03)
 
