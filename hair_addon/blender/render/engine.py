@@ -21,6 +21,7 @@ from .tiled_frame import Frame
 
 NAME = viewport.ENGINE
 
+_CURVE_PARTS = 256  # that a shutter curve is read in, as by Cycles
 _TURN = 0.002  # [s] between passes, to let the window redraw
 
 
@@ -173,7 +174,11 @@ def _offsets(render, count):
     """Of the moments that are rendered, from the frame [frames]."""
     if not render.use_motion_blur or render.motion_blur_shutter <= 0.0:
         return [0.0]
-    return pixel_sampling.moments(render.motion_blur_shutter, render.motion_blur_position, count).tolist()
+    curve = render.motion_blur_shutter_curve
+    curve.initialize()
+    openings = [curve.evaluate(curve.curves[0], (part + 0.5) / _CURVE_PARTS) for part in range(_CURVE_PARTS)]
+    shutter, position = render.motion_blur_shutter, render.motion_blur_position
+    return pixel_sampling.moments(shutter, position, count, np.array(openings)).tolist()
 
 
 def _require_supported(blender_scene, camera):

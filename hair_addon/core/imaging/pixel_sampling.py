@@ -121,13 +121,18 @@ def filter_weights(side: int, width: float, shift: float) -> np.ndarray:
     return sum((weight * np.cos(order * turn) for weight, order in terms), np.zeros(len(turn)))
 
 
-def moments(shutter: float, position: str, count: int) -> np.ndarray:
-    """(count,) times [frames] from a frame, in the middles of equal parts of its exposure.
+def moments(shutter: float, position: str, count: int, openings: np.ndarray | None = None) -> np.ndarray:
+    """(count,) times [frames] from a frame, in the middles of parts of its exposure with equal light.
 
-    shutter: how long it is open [frames]; position: START, CENTER or END: which moment of the exposure the frame is.
+    shutter: how long it is open [frames]; position: START, CENTER or END: which moment of the exposure the frame is;
+    openings: (N,) how far the shutter is open at the middles of N equal parts of that time; None, or all zero: evenly.
     """
     before = {"START": 0.0, "CENTER": 0.5, "END": 1.0}[position]
-    return shutter * ((np.arange(count) + 0.5) / count - before)
+    parts = (np.arange(count) + 0.5) / count
+    if openings is not None and np.any(openings > 0.0):
+        light = np.append(0.0, np.cumsum(np.maximum(openings, 0.0)))
+        parts = np.interp(parts * light[-1], light, np.linspace(0.0, 1.0, len(light)))
+    return shutter * (parts - before)
 
 
 def tiles(window: tuple[int, int, int, int], side: int) -> list[tuple[int, int, int, int]]:

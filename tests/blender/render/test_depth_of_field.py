@@ -2,12 +2,16 @@
 """Depth of field: how far a small bright square spreads, beside the thin lens formula and beside Cycles."""
 
 import math
+from types import SimpleNamespace
 
 import bpy
+import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.render import offscreen
+from hair_addon.blender.data.scene import read_camera
+from hair_addon.blender.render import drawn_scene, offscreen, region_pictures, rendered_view, viewport
+from hair_addon.blender.render.film import Film
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support.rendering import rendered
 
@@ -104,3 +108,32 @@ def test_hair_blurs_with_the_surface_below_it(lit, tmp_path):
         assert steps[1] < 0.85 * steps[0], name
     drawn = offscreen.draw_picture(PictureSettings(96, 72, 8, is_transparent=True))
     assert np.abs(drawn - blurred["Combined"]).mean() < 0.02 * math.sqrt(np.square(drawn).mean())
+
+
+@pytest.mark.parametrize("through_camera", [False, True])
+def test_a_rendered_viewport_blurs_only_through_the_camera(lit, tmp_path, monkeypatch, through_camera):
+    """As a render with as many samples; from elsewhere everything is in focus."""
+    width, height = 96, 72
+    blender_scene, depsgraph = bpy.context.scene, bpy.context.evaluated_depsgraph_get()
+    blender_scene.render.film_transparent = True
+    lens = blender_scene.camera.data.dof
+    lens.focus_distance, lens.aperture_fstop, lens.use_dof = 4.0, 0.1, through_camera
+    expected = rendered(tmp_path, sample_count=32)["Combined"]
+    lens.use_dof = True
+    drawn = drawn_scene.read(blender_scene, bpy.context.view_layer, depsgraph)
+    monkeypatch.setattr(viewport, "drawn_scene_of", lambda _context: drawn)
+    names = ("view_matrix", "window_matrix")
+    matrices = dict(zip(names, read_camera(blender_scene, depsgraph, width, height), strict=True))
+    context = SimpleNamespace(
+        scene=blender_scene,
+        evaluated_depsgraph_get=bpy.context.evaluated_depsgraph_get,
+        space_data=SimpleNamespace(use_local_camera=False),
+        region=SimpleNamespace(width=width, height=height, as_pointer=lambda: 1),
+        region_data=SimpleNamespace(view_perspective="CAMERA" if through_camera else "PERSP", **matrices),
+    )
+    with gpu.types.GPUOffScreen(width, height).bind():
+        while rendered_view.draw(context):
+            pass
+    shown = region_pictures.known_picture(context.region, Film).picture.read()["Combined"]
+    region_pictures.drop_picture(context.region, Film)
+    assert np.abs(shown - expected).mean() < 0.02 * np.sqrt(np.square(expected).mean())

@@ -70,6 +70,21 @@ def test_a_picture_larger_than_any_texture_is_rendered(lit, tmp_path, monkeypatc
     np.testing.assert_allclose(combined.mean(), offscreen_picture().mean(), rtol=1e-3)
 
 
+def test_a_border_between_pixels_is_rounded_as_blender_does(lit, tmp_path):
+    """In single precision 430 of 760 parts of 3040 pixels are 1720, in double precision 1719."""
+    part = rendered(
+        tmp_path,
+        resolution_x=3040,
+        resolution_y=4,
+        sample_count=1,
+        use_border=True,
+        use_crop_to_border=True,
+        border_min_x=430 / 760,
+        border_max_x=580 / 760,
+    )["Combined"]
+    assert part.shape[1] == 600
+
+
 @pytest.mark.parametrize("is_cropped", [False, True])
 def test_a_border_is_rendered_as_in_the_whole_picture(lit, tmp_path, is_cropped):
     whole = rendered(tmp_path, film_transparent=True)["Combined"]

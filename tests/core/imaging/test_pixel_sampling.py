@@ -22,6 +22,22 @@ def test_moments_divide_the_exposure_evenly(position):
     assert np.abs(pixel_sampling.moments(0.0, position, 3)).max() == 0.0
 
 
+def test_moments_are_where_the_shutter_is_open():
+    """As many in each part of the time as its share of the light; a curve without light is none."""
+    openings = np.repeat([0.0, 1.0, 3.0, 0.0], 64)
+    times = pixel_sampling.moments(2.0, "START", 400, openings)
+    np.testing.assert_array_equal(np.histogram(times, [0.0, 0.5, 1.0, 1.5, 2.0])[0], [0, 100, 300, 0])
+    for even in (np.ones(256), np.zeros(256)):
+        np.testing.assert_allclose(pixel_sampling.moments(2.0, "END", 7, even), pixel_sampling.moments(2.0, "END", 7))
+
+
+@pytest.mark.parametrize(("count", "least"), [(64, 32), (128, 32), (256, 32), (9, 32), (36, 4), (7, 1)])
+def test_a_lens_gets_its_passes_where_there_are_samples_for_them(count, least):
+    side = pixel_sampling.samples_per_side(count, least)
+    passes = count // side**2
+    assert passes * side**2 == count and passes >= min(count, least)
+
+
 @pytest.mark.parametrize("side", [1, 5, 16, 100])
 def test_tiles_cover_a_window_once(side):
     covered = np.zeros((50, 60), int)

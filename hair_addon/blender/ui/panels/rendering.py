@@ -62,6 +62,7 @@ class VELLUS_PT_motion_blur(_OfEngine, bpy.types.Panel):
         layout.prop(render, "motion_blur_position", text="Position")
         layout.prop(render, "motion_blur_shutter")
         layout.prop(context.scene.vellus, "motion_steps")
+        layout.template_curve_mapping(render, "motion_blur_shutter_curve")
 
 
 class VELLUS_PT_passes(_OfEngine, bpy.types.Panel):
