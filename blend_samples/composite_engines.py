@@ -20,7 +20,7 @@ import portrait
 
 import hair_addon
 
-SIZE = (300, 380)
+SIZE = (204, 258)
 
 
 def main():
@@ -34,11 +34,14 @@ def main():
     options.out.mkdir(parents=True, exist_ok=True)
     hair_addon.register()
     wp.config.log_level = wp.LOG_WARNING
-    hair = build(options)
+    build(options)
     scene = bpy.context.scene
-    hair.hide_render = True
+    hair = [o for o in scene.objects if o.type == "CURVES" and not o.hide_render]
+    for hair_object in hair:
+        hair_object.hide_render = True
     pictures = [head.rendered()]
-    hair.hide_render = False
+    for hair_object in hair:
+        hair_object.hide_render = False
     bpy.ops.vellus.toggle_composite()
     pictures += [_hair_alone(scene.vellus.hair_scene), head.rendered()]
     _write(np.concatenate(pictures, axis=1), options.out / "composite.png")
@@ -65,7 +68,6 @@ def build(options):
     scene.cycles.use_denoising = False
     scene.vellus.sample_count = options.samples
     bpy.context.view_layer.update()
-    return hair
 
 
 def _hair_alone(hair_scene):

@@ -4,7 +4,33 @@
 #include "include/arrival.glsl"
 #include "include/world.glsl"
 
-vec3 part_past_hair()
+// Visibility of a light from a surface past other surfaces, and past hair too: the mean over texels up to `reach` away.
+void visibilities(Light light, vec3 forward, int reach, out float past_surfaces, out vec3 past_hair)
+{
+  past_surfaces = 1.0;
+  past_hair = vec3(1.0);
+  vec3 at;
+  float depth;
+  if (!shadow_place(light, drawn_position, at, depth)) {
+    return;
+  }
+  float texel = 1.0 / float(textureSize(hair_front, 0).x);
+  past_surfaces = 0.0;
+  past_hair = vec3(0.0);
+  for (int y = -reach; y <= reach; y++) {
+    for (int x = -reach; x <= reach; x++) {
+      vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
+      float lit = lit_part(near, depth);
+      past_surfaces += lit;
+      past_hair += lit * transmitted(crossed_strands(near, depth), forward);
+    }
+  }
+  float count = float((2 * reach + 1) * (2 * reach + 1));
+  past_surfaces /= count;
+  past_hair /= count;
+}
+
+vec3 part_past_hair(int reach)
 {
   vec3 N = normalize(gl_FrontFacing ? surface_normal : -surface_normal);
   mat3 plus;
@@ -19,8 +45,11 @@ vec3 part_past_hair()
     float cosine = dot(N, to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position));
     if (cosine > 0.0) {
       vec3 irradiance = cosine * irradiance_of(light, drawn_position);
-      past_hair += irradiance * surface_visibility(light, drawn_position, view.hair_forward.rgb);
-      past_surfaces += irradiance * surface_visibility(light, drawn_position, vec3(1.0));
+      float of_surfaces;
+      vec3 of_hair;
+      visibilities(light, view.hair_forward.rgb, reach, of_surfaces, of_hair);
+      past_surfaces += irradiance * of_surfaces;
+      past_hair += irradiance * of_hair;
     }
   }
   // Where no light arrives there is none to stop.

@@ -69,7 +69,7 @@ class Layout:
     def template_icon(self, icon_value, scale):
         self.drawn["template_icon"] += 1
 
-    def operator(self, name, text="", icon="NONE", icon_value=0, translate=True):
+    def operator(self, name, text="", icon="NONE", icon_value=0, translate=True, depress=False):
         category, operator = name.split(".")
         assert operator in dir(getattr(bpy.ops, category))
         self.drawn[name] += 1

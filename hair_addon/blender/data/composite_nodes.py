@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compositor nodes that lay hair of another scene over what a scene renders, in the artist's node tree or in one of ours.
+"""Compositor nodes that lay hair of another scene over what a scene renders, in the artist's node tree or a new one.
 
 Between a Render Layers node and whatever its image goes to: its image, multiplied by the light that hair leaves on
 surfaces, and the hair over it. They are found again by their names.

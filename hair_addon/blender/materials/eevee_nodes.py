@@ -45,8 +45,15 @@ def falloff_of(look):
 
 
 def write(tree, hair_node, look, varied_color=None):
-    """Add or update the nodes for an `Appearance`; varied_color: output of e^(-falloff √sigma_a), None of even hair."""
+    """Add or update the nodes for an `Appearance`, unless an artist has made others for EEVEE.
+
+    varied_color: output of e^(-falloff √sigma_a), None of even hair.
+    """
     nodes = _ours(tree)
+    if _has_others(tree):
+        for node in nodes.values():
+            tree.nodes.remove(node)
+        return
     if set(nodes) != set(_NODES):
         for node in nodes.values():
             tree.nodes.remove(node)
@@ -66,8 +73,17 @@ def write(tree, hair_node, look, varied_color=None):
     nodes["Highlight"].inputs["Roughness"].default_value = (1.0 - strands.coat) * strands.roughness
 
 
+def _has_others(tree):
+    outputs = [node for node in tree.nodes if node.bl_idname == _NODES["Output"][0] and node.target == "EEVEE"]
+    return not all(map(_is_ours, outputs))
+
+
+def _is_ours(node):
+    return node.name.startswith(_PREFIX)
+
+
 def _ours(tree):
-    return {node.name.removeprefix(_PREFIX): node for node in tree.nodes if node.name.startswith(_PREFIX)}
+    return {node.name.removeprefix(_PREFIX): node for node in tree.nodes if _is_ours(node)}
 
 
 def _build(tree, hair_node):

@@ -40,9 +40,9 @@ def channels_of(name):
 class Film:
     """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
 
-    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Hair Shadow", "Shadow", "Vector" or of `LOBES`;
-    is_transparent: whether the background is left empty; filter_width: of `picture.filter_weights` [pixels]. motion:
-    `motion.Motion` of a film with the pass "Vector".
+    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Hair Shadow", "Shadow", "Vector" or of
+    `LOBES`; is_transparent: whether the background is left empty; filter_width: of `picture.filter_weights` [pixels].
+    motion: `motion.Motion` of a film with the pass "Vector".
     """
 
     def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0):

@@ -39,7 +39,7 @@ class RenderSettings(Settings):
         label="Hair Only",
     )
     has_preview_shadow: bool = param(
-        True, "Darken surfaces in Material Preview where hair is between them and the lights", label="Preview Shadow"
+        False, "Darken surfaces in Material Preview where hair is between them and the lights", label="Preview Shadow"
     )
     composite_shadow: str = param(
         "PASS",
@@ -47,7 +47,7 @@ class RenderSettings(Settings):
         label="Surface Shadow",
         choices=(
             ("PASS", "Pass", "Multiply the surfaces by the light that Vellus finds hair to leave on them"),
-            ("ENGINE", "Render Engine", "Cycles or EEVEE renders the shadows, reflections and light of its own hair"),
+            ("ENGINE", "Engine", "Cycles or EEVEE renders the shadows, reflections and light of its own hair"),
             ("NONE", "None", "Hair casts no shadow on surfaces"),
         ),
     )

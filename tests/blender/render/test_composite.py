@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves_objects
-from tests.support.rendering import configure, light_up, read_layers, rendered
+from tests.support.rendering import configure, light_up, rendered
 
 RAYS = [f"visible_{ray}" for ray in curves_objects._RAYS]
 
@@ -149,9 +149,7 @@ def test_an_artist_s_compositor_works_on_hair_too(cycles, tmp_path):
     scene = bpy.context.scene
     tree = scene.compositing_node_group = bpy.data.node_groups.new("Artist's", "CompositorNodeTree")
     tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
-    source, invert, output = map(
-        tree.nodes.new, ("CompositorNodeRLayers", "CompositorNodeExposure", "NodeGroupOutput")
-    )
+    source, invert, output = map(tree.nodes.new, ("CompositorNodeRLayers", "CompositorNodeExposure", "NodeGroupOutput"))
     invert.inputs["Exposure"].default_value = 1.0
     tree.links.new(source.outputs["Image"], invert.inputs["Image"])
     tree.links.new(invert.outputs["Image"], output.inputs["Image"])
