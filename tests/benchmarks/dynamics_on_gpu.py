@@ -5,8 +5,8 @@
     .venv/bin/python tests/benchmarks/dynamics_on_gpu.py --strands 1000 --device cpu
 
 Strands of 15 cm and 32 points in frames of 1/24 s and 8 substeps. Free: their roots are shaken. On a body: a ball of
-20,000 triangles with strands all over, which bulges and turns, with hair volume and without. Milliseconds a frame on the
-clock, the shortest and the median, and the largest stretch of a segment.
+20,000 triangles with strands all over, which bulges and turns, with hair volume and without. Milliseconds a frame on
+the clock, the shortest and the median, and the largest stretch of a segment.
 """
 
 import argparse
