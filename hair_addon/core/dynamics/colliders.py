@@ -114,6 +114,11 @@ class Colliders:
         self._put([before for _, before, _ in taken], [after for _, _, after in taken])
         self._set([collider for collider, _, _ in taken])
 
+    @property
+    def is_still(self) -> bool:
+        """Whether there are colliders, none of which moves in this frame."""
+        return self.mesh is not None and self._is_still
+
     def pose(self, part: float) -> None:
         """Move to the pose at a part 0..1 of the frame, greater than the last one: vertices on straight lines."""
         if self.mesh is None:

@@ -33,12 +33,17 @@ class TouchingStrands:
         self._rods, self._contacts = rods, contacts
         self._planes: list[tuple[Any, Any, Any]] = []  # of each share of the strands
 
-    def advance(self, step: Step, substep: int, surroundings: Surroundings) -> None:
-        """Advance by a substep, to whose end colliders are posed. Raises `HairError` where counts do not match."""
+    def advance(self, step: Step, first: int, end: int, surroundings: Surroundings) -> None:
+        """Advance by substeps first … end - 1.
+
+        One, to whose end colliders are posed, or several while they stand still. Raises `HairError` where counts do
+        not match.
+        """
         if self._rods.device.is_cpu:
-            self._advance_groups(step, substep, surroundings)
+            self._advance_groups(step, first, end, surroundings)
         else:
-            self._advance_stages(step, substep, surroundings)
+            for substep in range(first, end):
+                self._advance_stages(step, substep, surroundings)
 
     def _advance_stages(self, step, substep, surroundings):
         """One launch after the other."""
@@ -52,12 +57,12 @@ class TouchingStrands:
         found = contacts.find(*places, step.size, is_final=True, moved=rods.arrays.solved_again)
         rods.advance(step, *part, FINISH, Surroundings(planes, found))
 
-    def _advance_groups(self, step, substep, surroundings):
+    def _advance_groups(self, step, first, end, surroundings):
         """All stages of one group of strands after the other."""
         rods, contacts = self._rods, self._contacts
         contacts.follow()
         step = rods.begun(step)
-        numbers, _ = rod_solver.kernel_inputs(rods.arrays, step, rods.scratch, substep, substep + 1, surroundings)
+        numbers, _ = rod_solver.kernel_inputs(rods.arrays, step, rods.scratch, first, end, surroundings)
         stages = rod_solver.stages_of(rods.arrays, step, PREDICT | SOLVE | AGAIN | FINISH)
         asking = [asking_of(step.size), asking_of(0.0, is_final=True), asking_of(0.0, is_final=True, is_again=True)]
         inputs = [stages, _ROUNDS, numbers, rods.arrays, rods.scratch, contacts.surface(), *asking]
@@ -107,7 +112,9 @@ def _advance_groups(
     """round_count: `_ROUNDS`, which the compiler does not know, so that it has the solver once."""
     group = first + wp.tid()
     is_near = int(0)
-    for part in range(round_count):
+    for index in range(round_count * (step.end - step.first)):
+        part = index % round_count
+        substep = step.first + index // round_count
         stage = _PREDICT
         is_needed = int(1)
         if part == 1:
@@ -125,7 +132,7 @@ def _advance_groups(
             if is_near != 0 and any_moved(strands.solved_again, group, 0, _WIDTH) != 0:
                 find_group(surface, again_asking, strands, middle_planes, 0, group, vertices, around.found_planes)
         if is_needed != 0:
-            advance_block(group, stages & stage, step, strands, around, scratches)
+            advance_block(group, stages & stage, substep, substep + 1, step, strands, around, scratches)
 
 
 @wp.func

@@ -8,8 +8,9 @@
 //
 //   int block                              a group of strands on a processor, a strand on a GPU
 //   int stages                             which parts of a substep: PREDICT, SOLVE, AGAIN, FINISH
+//   int first, end                         substeps first … end - 1
 //   Numbers step                           what all strands share:
-//     first, end, count                    substeps first … end - 1 of the count in a frame
+//     first, end, count                    those of the launch, and how many there are in a frame
 //     pinned                               points from the root that follow the surface beside point 0; M without SOLVE
 //     h                                    a substep [s]
 //     carried                              (h / h of the substep before the first)²
@@ -144,7 +145,7 @@ const auto kept = [&](int j, int row) { return scratch + size_t(KEPT * j + row) 
 const auto contact = [&](int i) { return contacts + size_t(CONTACT * i) * STRIDE; };
 
 const float inverse_square = 1.0f / (h * h), damping = damping_time / h, inverse_damping = 1.0f / (1.0f + damping);
-for (int substep = step.first; substep < step.end; ++substep) {
+for (int substep = first; substep < end; ++substep) {
   // The root: positions linear, rotations nlerp, between the frame's two poses.
   const float part = static_cast<float>(substep + 1) / static_cast<float>(count);
   const float part_before = static_cast<float>(substep) / static_cast<float>(count);

@@ -202,7 +202,14 @@ class Around:
 
 @wp.func_native(native_code.body(__file__, "rod_solver.cpp", **_CONSTANTS))
 def advance_block(
-    block: int, stages: int, step: Numbers, strands: RodArrays, around: Around, scratches: wp.array3d[float]
+    block: int,
+    stages: int,
+    first: int,
+    end: int,
+    step: Numbers,
+    strands: RodArrays,
+    around: Around,
+    scratches: wp.array3d[float],
 ): ...
 
 
@@ -210,7 +217,7 @@ def advance_block(
 def _advance_blocks(
     stages: int, step: Numbers, strands: RodArrays, around: Around, scratches: wp.array3d[float], first_block: int
 ):
-    advance_block(first_block + wp.tid(), stages, step, strands, around, scratches)
+    advance_block(first_block + wp.tid(), stages, step.first, step.end, step, strands, around, scratches)
 
 
 def lane_count(device: wp.DeviceLike) -> int:

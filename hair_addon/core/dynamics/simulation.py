@@ -212,6 +212,9 @@ class Simulation:
         step = step_of(self.settings, self._material, seconds, count, world.gravity)
         if self._is_free:
             self._rods.advance(step)
+        elif self._colliders.is_still and not world.fields and not self._is_rubbing:
+            self._touching.advance(step, 0, count, Surroundings())
+            self._since_rubbed += seconds
         else:
             if self._is_rubbing:
                 self._volume.fit(self._rods.arrays.positions, self._rods.carried_groom())
@@ -241,7 +244,7 @@ class Simulation:
             rods.advance(step, substep, substep + 1, surroundings=around)
         else:
             self._colliders.pose((substep + 1) / step.count)
-            self._touching.advance(step, substep, around)
+            self._touching.advance(step, substep, substep + 1, around)
         self._since_rubbed += step.size
         if self._is_rubbing and self._since_rubbed >= _RUBBING - 1e-9:
             settings = self.settings
