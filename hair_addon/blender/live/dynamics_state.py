@@ -106,8 +106,15 @@ def _of_played(played, frame):
         return "Simulated up to frame {frame}, and frames after it were skipped: play from there", {
             "frame": played.frame
         }
-    substeps = played.simulated.simulation.substeps
-    return "Simulated up to frame {frame}, in {count} substeps a frame", {"frame": played.frame, "count": substeps}
+    simulation = played.simulated.simulation
+    values = {"frame": played.frame, "count": simulation.substeps}
+    if simulation.asked_substeps > simulation.substeps:
+        return (
+            "Simulated up to frame {frame}, in {count} substeps a frame, where motion asks for {asked}:"
+            " use Automatic Substeps",
+            {**values, "asked": simulation.asked_substeps},
+        )
+    return "Simulated up to frame {frame}, in {count} substeps a frame", values
 
 
 def _of_baked(manifest, guides, blender_scene):

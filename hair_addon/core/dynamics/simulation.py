@@ -89,7 +89,7 @@ class Simulation:
         finite, or of other guides.
         """
         self.settings, self.pose, self.world = settings, pose, world
-        self.substeps = 0  # of the last frame
+        self.substeps = self.asked_substeps = 0  # of the last frame, and how many its motion asks for
         self._device = wp.get_device(device)
         self._start, self._origin = pose, np.round(pose.positions.mean(axis=0) / _GRID) * _GRID
         self._scale = pose.scale
@@ -208,7 +208,8 @@ class Simulation:
             self._renew()
         self._rods.move_roots(*self._roots(pose))
         self._read_obstacles(world.obstacles)
-        count = self._substep_count(before, pose)
+        self.asked_substeps = self._substep_count(before, pose)
+        count = self.asked_substeps if self.settings.automatic_substeps else self.settings.substeps
         step = step_of(self.settings, self._material, seconds, count, world.gravity)
         if self._is_free:
             self._rods.advance(step)
@@ -298,9 +299,7 @@ class Simulation:
         return pose.positions - self._origin, turns
 
     def _substep_count(self, before, after):
-        """How many substeps the next frame takes."""
-        if not self.settings.automatic_substeps:
-            return self.settings.substeps
+        """How many substeps the motion in the next frame asks for."""
         way = np.linalg.norm(after.positions - before.positions, axis=1).max()
         way = max(float(way), self._colliders.largest_motion)
         longest = min(_LONGEST_WAY, max(float(self._material.lengths.mean()), _SHORTEST_WAY))

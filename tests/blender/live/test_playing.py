@@ -284,3 +284,14 @@ def test_renders_that_hair_cannot_follow_are_said_with_the_setting(swung, capsys
     bpy.app.timers.unregister(unlocked_renders.offer)
     scene.render.use_lock_interface = True
     assert not draw(panel).drawn["use_lock_interface"]
+
+
+def test_fast_motion_in_few_substeps_is_told(swung):
+    settings = swung[0].data.vellus.dynamics
+    settings.automatic_substeps, settings.substeps = False, 1
+    play(1, 5)
+    sentence, values = dynamics_state.state_of(swung[0].data)
+    assert "use Automatic Substeps" in sentence and values["asked"] > values["count"] == 1
+    settings.automatic_substeps = True
+    play(6, 6)
+    assert "use Automatic Substeps" not in dynamics_state.state_of(swung[0].data)[0]

@@ -266,6 +266,21 @@ def test_pinned_points_only_follow_the_surface(rng, pinned):
     assert pinned == 1.0 or away[-1] > 0.01
 
 
+def test_a_number_of_substeps_that_is_set_is_taken_and_more_are_asked_for(rng):
+    """As many are asked for as automatic substeps would be, in fast frames."""
+    groom, pose = fur(rng)
+    fixed, automatic = (
+        Simulation(groom, DynamicsSettings(automatic_substeps=is_automatic), pose, World(), DEVICE)
+        for is_automatic in (False, True)
+    )
+    for distance in (0.0, 0.1):
+        moved = pose.moved(RigidMotion(rotations.IDENTITY, np.zeros(3), np.array([distance, 0.0, 0.0])))
+        for simulation in (fixed, automatic):
+            simulation.advance(moved, World(), FRAME)
+        assert fixed.substeps == 4 and fixed.asked_substeps == automatic.asked_substeps == automatic.substeps
+    assert automatic.substeps > 8
+
+
 def test_each_guide_is_as_wet_as_it_is_said(rng):
     """Guides that do not touch each other, half of them wet: bit by bit as if all were as they are."""
     groom, pose = fur(rng)
