@@ -47,7 +47,7 @@ def drawing_picture(settings):
     drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
     picture = film.Film(size, per_side, ("Combined",), settings.is_transparent)
     for turn in range(pass_count):
-        yield Stage("Drawing", 0.4 + 0.6 * turn / pass_count)
+        yield Stage("Drawing", 0.4 + 0.55 * turn / pass_count)
         with drawing.ALONE:
             picture.add_pass(drawn, *camera, size, turn, lens=lens)
     return picture.read()["Combined"]

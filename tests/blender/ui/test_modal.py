@@ -121,7 +121,10 @@ def camera(hair):
     bpy.context.scene.camera = camera
 
 
-def test_a_picture_in_stages_is_that_of_one_go_and_esc_ends_it_in_each(camera, window):
+@pytest.mark.parametrize(("has_lens", "stages"), [(False, 2), (True, 5)])
+def test_a_picture_in_stages_is_that_of_one_go_and_esc_ends_it_in_each(camera, window, has_lens, stages):
+    """Shadows, then a picture; or one for each point of the lens."""
+    bpy.context.scene.camera.data.dof.use_dof = has_lens
     settings = PictureSettings(width=24, height=16, samples_per_side=2)
     made = []
 
@@ -131,7 +134,7 @@ def test_a_picture_in_stages_is_that_of_one_go_and_esc_ends_it_in_each(camera, w
 
     assert drive(Operator(work()), window) == {"FINISHED"}
     assert np.array_equal(made.pop(), offscreen.draw_picture(settings))
-    for stage in range(3):
+    for stage in range(stages):
         operator = Operator(work())
         operator.begin(window)
         for _ in range(stage):
