@@ -185,7 +185,10 @@ def test_surfaces_hide_hair_in_every_sample(lit):
 @pytest.mark.parametrize("per_side", [1, 2])
 def test_a_viewport_s_surfaces_are_darkened_by_what_hair_stops(lit, tmp_path, per_side):
     """Black over them, with the rest of the pass Hair Shadow as alpha; hair itself is as without, and nearest too."""
-    bpy.context.view_layer.update()
+    bpy.ops.mesh.primitive_plane_add(size=12.0, location=(0.0, 0.0, -1.6))
+    camera = bpy.context.scene.camera
+    camera.location, camera.rotation_euler = (0.0, -7.0, 4.0), (1.1, 0.0, 0.0)
+    bpy.data.objects["Sun"].rotation_euler = (0.0, 0.5, 0.0)
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 4000, 0.01
     bpy.context.view_layer.update()
     depsgraph = bpy.context.evaluated_depsgraph_get()
@@ -200,10 +203,11 @@ def test_a_viewport_s_surfaces_are_darkened_by_what_hair_stops(lit, tmp_path, pe
     assert (dark[..., 3] > bare[..., 3] - 1e-3).all() and dark.max() <= bare.max() + 1e-3
     bpy.context.view_layer.vellus.has_hair_shadow = bpy.context.view_layer.vellus.has_hair_mask = True
     passes = rendered(tmp_path, film_transparent=True, resolution_x=SIZE, resolution_y=SIZE, sample_count=16)
-    alone = passes["Hair Mask"] < 1e-3
     expected = 1.0 - passes["Hair Shadow"].mean(axis=-1)
-    assert expected[alone].max() > 0.1
-    np.testing.assert_allclose(dark[..., 3][alone].mean(), expected[alone].mean(), rtol=0.05)
+    shaded = (passes["Hair Mask"] < 1e-3) & (bare[..., 3] < 1e-3) & (expected > 0.1)
+    assert shaded.sum() > 50
+    # The pass blurs a shadow by a texel of its map.
+    np.testing.assert_allclose(dark[..., 3][shaded].mean(), expected[shaded].mean(), rtol=0.06)
 
 
 # ------------------------------------------------------------------------------------------------- when it is drawn
