@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Depth of field of a thin lens: a picture is the mean of those seen from the points of its aperture.
 
-Each is in focus at the same plane, as with Haeberli and Akeley, "The Accumulation Buffer" (SIGGRAPH 1990).
+Each is in focus at the same plane, as in [Haeberli90].
 """
 
 import math
@@ -54,7 +54,7 @@ def _radical_inverse(index: int, base: int) -> float:
 
 
 def _disk_point(square):
-    """(2,) in the unit square → (2,) in the unit disk: areas in proportion (Shirley, Chiu 1997)."""
+    """(2,) in the unit square → (2,) in the unit disk: areas in proportion [Shirley97]."""
     a, b = 2.0 * square - 1.0
     if a == 0.0 and b == 0.0:
         return np.zeros(2)
