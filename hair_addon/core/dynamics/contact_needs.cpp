@@ -15,8 +15,8 @@
 //   array_t<float> positions, last_positions 3 rows a vertex [m], now and when the substep began
 //   array_t<float> middle_planes             PLANE rows a segment
 //   Samples samples                          rest: distance in the groom [m], changed by `rise`; sides: 0 for those
-//                                            that do not look; asked: 3 rows, place at rest where it last looked [m]; clear:
-//                                            how far from there it was [m], less the surface's motion since, changed
+//                                            that do not look; asked: 3 rows, place at rest where it last looked [m];
+//                                            clear: how far from there it was [m], less the surface's motion since
 //   array_t<float> out_planes                PLANE rows: zero, but for how far it looks [m] in place of the offset, and
 //                                            1 in place of the friction where a segment beside has a plane
 //
