@@ -123,7 +123,7 @@ def main():
     """Print times."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--strands", type=int, nargs="+", default=[10_000, 100_000], help="[10000 100000]")
-    parser.add_argument("--free", action="store_true", help="without the body, which takes a minute to begin with 100,000")
+    parser.add_argument("--free", action="store_true", help="without the body, which takes long to begin with 100,000")
     parser.add_argument("--frames", type=int, default=24, help="[24]")
     parser.add_argument("--device", default="cuda:0" if wp.get_cuda_devices() else "cpu")
     options = parser.parse_args()
