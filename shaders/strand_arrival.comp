@@ -18,7 +18,7 @@ vec4 sample_value()
     if (shadow_place(light, drawn_position, at, depth)) {
       float behind;
       float own = own_count(light, drawn_position, drawn_radius);
-      part = lit_part(at, depth, strand_bias(root_direction(strand_index), L)) * 
+      part = lit_part(at, depth, strand_bias(root_direction(strand_index), L)) *
              transmitted(crossed_strands(at, depth, own, behind), view.hair_forward.rgb);
     }
     sent += irradiance;
