@@ -42,7 +42,7 @@ vec3 strand_light()
               plus,
               minus);
   vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, returned, back));
-  world *= cone_visibility(seen_x_y, seen_z, dot(T, V));
+  world *= cone_visibility(seen_x_y, seen_z, view.seen_opacity, view.hair_forward.rgb, dot(T, V));
   vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
   vec3 surface_light = view.surface_color.rgb * between_hair_and_surface(strands_behind);
   world += surface_light * surface_radiance(plus, minus, hidden, T, V, returned, towards);

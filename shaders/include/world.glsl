@@ -32,11 +32,13 @@ float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
   return -log(clamp(seen_z.z / max(all_seen(seen_x_y, seen_z), 1e-6), 1e-4, 1.0)) / opacity;
 }
 
-// Visibility of the world from the mirror cone of a strand, sin(theta_i) = -sin(theta_o), relative to that from the
-// strand: linear in sin(theta_i), whose mean over what is seen is in seen_z.
-float cone_visibility(vec4 seen_x_y, vec4 seen_z, float sin_theta_o)
+// Light of the world from the mirror cone of a strand, sin(theta_i) = -sin(theta_o), relative to that from everywhere: linear
+// in sin(theta_i), whose mean over what is seen is in seen_z. Light that has come through hair comes from everywhere.
+vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, float opacity, vec3 forward, float sin_theta_o)
 {
-  return clamp(1.0 - 3.0 * sin_theta_o * seen_z.w / max(all_seen(seen_x_y, seen_z), 1e-6), 0.0, 2.0);
+  float seen = max(all_seen(seen_x_y, seen_z), 1e-6);
+  float cone = clamp(1.0 - 3.0 * sin_theta_o * seen_z.w / seen, 0.0, 1.0);
+  return 1.0 + (cone - 1.0) * min(seen / 6.0 / seen_through(seen / 6.0, opacity, forward), vec3(1.0));
 }
 
 // Irradiance of a surface with the normal N.
