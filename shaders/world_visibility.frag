@@ -41,7 +41,7 @@ void main()
       float behind;
       float front = crossed_strands(at, depth, own_count(light, position, radius), behind);
       open *= lit_part(at, depth, bias);
-      past_hair = exp(-view.seen_opacity * front);
+      past_hair = exp(-view.seen_opacity * (is_strand ? front : crossed_before_surface(at, depth)));
       left = exp(-view.seen_opacity * behind);
       // Through the hair to the surface, and back.
       seen_surface += weight * beyond.surface * left * left * vec4(light.axis.xyz, 1.0);

@@ -20,9 +20,9 @@ void visibilities(Light light, vec3 forward, int reach, out float past_surfaces,
   for (int y = -reach; y <= reach; y++) {
     for (int x = -reach; x <= reach; x++) {
       vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
-      float lit = lit_part(near, depth);
+      float lit = lit_part(near, depth, SURFACE_BIAS);
       past_surfaces += lit;
-      past_hair += lit * transmitted(crossed_strands(near, depth), forward);
+      past_hair += lit * transmitted(crossed_before_surface(near, depth), forward);
     }
   }
   float count = float((2 * reach + 1) * (2 * reach + 1));

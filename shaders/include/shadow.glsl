@@ -65,6 +65,15 @@ float crossed_strands(vec3 at, float depth, float own, out float behind)
   return mix(front, max(0.0, counts.w - own), smoothstep(1.0, 1.5, ends.x));
 }
 
+// The same for a point of a surface: strands that surfaces hide are not in front of those that the light meets.
+float crossed_before_surface(vec3 at, float depth)
+{
+  vec2 ends = textureLod(hair_front, at, 0.0).rg;
+  vec4 counts = textureLod(hair_layers, at, 0.0);
+  float front = strands_in_front(counts, max(0.0, depth - ends.x), ends.y - ends.x, 0.0);
+  return front * (1.0 - smoothstep(1.0, 1.5, ends.x));
+}
+
 // The surface behind a strand along a light: means over places around it.
 struct Beyond {
   float surface;  // the part of places with a surface
@@ -129,8 +138,7 @@ vec3 surface_visibility(Light light, vec3 position, vec3 forward)
   for (int y = -1; y <= 1; y++) {
     for (int x = -1; x <= 1; x++) {
       vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
-      float behind;
-      total += lit_part(near, depth, SURFACE_BIAS) * transmitted(crossed_strands(near, depth, 0.0, behind), forward);
+      total += lit_part(near, depth, SURFACE_BIAS) * transmitted(crossed_before_surface(near, depth), forward);
     }
   }
   return total / 9.0;

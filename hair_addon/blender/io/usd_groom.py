@@ -8,7 +8,7 @@
     /groom/<group>_instance    Xform, an instance of the group: where another object shows the same hair
     /groom/materials/<group>   Material: a preview surface, and the settings of the look as inputs
 
-Primvars with the prefix groom_ are those of [UnrealGroom], whose width is that of the curves; st and displayColor are
+Primvars with the prefix groom_ are those of [UnrealGroom26], whose width is that of the curves; st and displayColor are
 what other programs look for.
 """
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""[Alembic] archives in Ogawa: objects with properties, of which some have a sample for each time.
+"""[Alembic26] archives in Ogawa: objects with properties, of which some have a sample for each time.
 
 An archive is written from its leaves: samples, then the properties that have them, the compounds that hold these, the
 objects, and in the end the archive.

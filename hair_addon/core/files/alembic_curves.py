@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Transforms and curves as AbcGeom of [Alembic] has them: objects of its schemas, and geometry parameters."""
+"""Transforms and curves as AbcGeom of [Alembic26] has them: objects of its schemas, and geometry parameters."""
 
 from collections.abc import Buffer, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field

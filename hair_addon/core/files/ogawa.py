@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The Ogawa container of [Alembic] files: a tree of groups, whose leaves are data.
+"""The Ogawa container of [Alembic26] files: a tree of groups, whose leaves are data.
 
 Children are written before their group, and large data in parts: a file of any size takes the memory of one part.
 
