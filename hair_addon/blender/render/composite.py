@@ -83,6 +83,7 @@ def follow(blender_scene):
     is_ours = blender_scene.render.engine == viewport.ENGINE
     _copy(blender_scene, hair_scene, _OF_SCENE)
     _copy(blender_scene.render, hair_scene.render, _OF_RENDER)
+    _copy_shutter_curve(blender_scene.render.motion_blur_shutter_curve, hair_scene.render.motion_blur_shutter_curve)
     _copy(state, hair_scene.vellus, [n for n in setting_properties.names_of(RenderSettings) if n not in _OWN])
     _copy_cameras(blender_scene, hair_scene)
     composite_nodes.adjust(blender_scene, state.composite_shadow == "PASS", not is_ours)
@@ -103,6 +104,25 @@ def _copy(source, target, names):
         value = getattr(source, name)
         if getattr(target, name) != value:
             setattr(target, name, value)
+
+
+def _copy_shutter_curve(source, target):
+    """The points of a `CurveMapping` of one curve."""
+    wanted = _points_of(source)
+    if _points_of(target) == wanted:
+        return
+    points = target.curves[0].points
+    while len(points) < len(wanted):
+        points.new(0.5, 1.0)
+    while len(points) > len(wanted):
+        points.remove(points[1])  # ends cannot be removed
+    for point, (place, kind) in zip(points, wanted, strict=True):
+        point.location, point.handle_type = place, kind
+    target.update()
+
+
+def _points_of(mapping):
+    return [(tuple(point.location), point.handle_type) for point in mapping.curves[0].points]
 
 
 def _copy_cameras(blender_scene, hair_scene):

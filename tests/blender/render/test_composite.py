@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves_objects
+from hair_addon.blender.render import composite
 from tests.support.rendering import configure, light_up, rendered
 
 RAYS = [f"visible_{ray}" for ray in curves_objects._RAYS]
@@ -52,6 +53,18 @@ def state():
     scene = bpy.context.scene
     group = scene.compositing_node_group
     return trees, objects, [*bpy.data.scenes.keys()], scene.render.use_compositing, group and group.name
+
+
+def set_shutter(mapping, places):
+    """Open the shutter by points (time, opening)."""
+    points = mapping.curves[0].points
+    while len(points) > 2:
+        points.remove(points[1])
+    for place in places[2:]:
+        points.new(*place)
+    for point, place in zip(points, places, strict=True):
+        point.location = place
+    mapping.update()
 
 
 def links_of(tree):
@@ -163,7 +176,7 @@ def test_an_artist_s_compositor_works_on_hair_too(cycles, tmp_path):
 
 
 def test_the_hair_s_scene_follows(cycles):
-    """Camera, size, exposure, samples; and hair that is added later."""
+    """Camera, size, exposure, samples, how the shutter opens; and hair that is added later."""
     scene = bpy.context.scene
     bpy.ops.vellus.toggle_composite()
     other = bpy.data.objects.new("Other", bpy.data.cameras.new("Other"))
@@ -177,6 +190,11 @@ def test_the_hair_s_scene_follows(cycles):
     hair_scene = scene.vellus.hair_scene
     assert (hair_scene.camera, hair_scene.render.resolution_x, hair_scene.vellus.sample_count) == (other, 33, 9)
     assert hair_scene.render.use_motion_blur
+    for places in ([(0.0, 0.0), (0.3, 1.0), (0.6, 0.5), (1.0, 0.25)], [(0.0, 1.0), (1.0, 0.5)]):
+        set_shutter(scene.render.motion_blur_shutter_curve, places)
+        composite.follow(scene)
+        opened = hair_scene.render.motion_blur_shutter_curve.curves[0].points
+        np.testing.assert_allclose([point.location for point in opened], places, atol=1e-6)
     assert [(m.frame, m.camera) for m in hair_scene.timeline_markers] == [(7, other)]
     assert not late.visible_camera
     scene.vellus.composite_shadow = "ENGINE"
