@@ -2,7 +2,8 @@
 """Scenes drawn at random, by Cycles and by Vellus: python blend_samples/random_scenes.py --seeds 0 30.
 
 Prints each scene with the ratio of its hair's mean colour (Vellus / Cycles, channel by channel) and the structural
-similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, and scenes.json.
+similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and
+distribution.png, the part of the scenes up to each deviation, beside that of an earlier scenes.json with --before.
 Cycles' pictures are kept by the scene and the points of its hair: another run renders only what has changed.
 """
 
@@ -21,7 +22,8 @@ import warp as wp
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import picture_pairs  # beside this file
+import line_plot  # beside this file
+import picture_pairs
 import random_scene
 
 import hair_addon
@@ -37,6 +39,7 @@ def main():
     parser.add_argument("--seeds", type=int, nargs=2, default=(0, 30), metavar=("FIRST", "END"))
     parser.add_argument("--size", type=int, default=144, help="pixels along a side")
     parser.add_argument("--samples", type=int, default=48, help="samples a pixel, of Cycles")
+    parser.add_argument("--before", type=Path, help="scenes.json of an earlier run, for the plot")
     options = parser.parse_args()
     (options.out / "cycles").mkdir(parents=True, exist_ok=True)
     prepare()
@@ -61,6 +64,8 @@ def main():
         pairs.append((f"{seed}: " + " ".join(f"{value:.2f}" for value in row["ratio"]), reference, picture))
     (options.out / "scenes.json").write_text(json.dumps(rows, indent=1))
     print(summary(rows))
+    before = [] if options.before is None else json.loads(options.before.read_text())
+    write_distribution({"now": rows, "before": before}, options.out / "distribution.png")
     worst = sorted(zip(rows, pairs, strict=True), key=lambda both: -both[0]["deviation"])[:10]
     picture_pairs.write_sheet([pair for _row, pair in worst], options.out / "worst.png")
 
@@ -144,6 +149,21 @@ def summary(rows):
         f"median {np.median(deviations):.1%}, worst {deviations.max():.0%}; "
         f"structure median {np.median(structures):.3f}, worst {structures.min():.3f}"
     )
+
+
+def write_distribution(runs, path):
+    """Plot the part of the scenes whose largest deviation in a channel is up to a value; runs: {label: rows}."""
+    ticks = (0, 8, 15, 25, 50, 75, 100, 125), (0, 25, 50, 75, 100)
+    words = "% of scenes up to a deviation", (0, 130), (0, 102), ticks, "% of Cycles, in the worst channel"
+    plot = line_plot.Plot(*words, size=(560, 260), legend=(0.75, 0.75))
+    for (label, rows), color in zip(runs.items(), line_plot.COLORS[1::-1], strict=True):
+        if rows:
+            deviations = np.sort([100.0 * row["deviation"] for row in rows])
+            parts = np.linspace(0.0, 100.0, len(rows) + 1)
+            steps = np.stack([np.repeat(deviations, 2), np.repeat(parts, 2)[1:-1]], axis=-1)
+            plot.line([(0.0, 0.0), (deviations[0], 0.0), *steps, (130.0, 100.0)], color)
+            plot.name(color, label)
+    line_plot.write([plot], path)
 
 
 if __name__ == "__main__":
