@@ -10,7 +10,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+from tests.support.each_file import ROOT, each_file
+
 ADDON = ROOT / "hair_addon"
 MODULES = sorted(ADDON.rglob("*.py"))
 NATIVE = sorted(path for path in ADDON.rglob("*") if path.suffix in {".cpp", ".cu", ".h"})
@@ -23,11 +24,6 @@ CODE = MODULES + NATIVE + SHADERS + SCRIPTS
 def name_of(path):
     """Path inside the add-on, as CONTRIBUTING.md writes it: core/geometry/mesh.py."""
     return path.relative_to(ADDON).as_posix()
-
-
-def each(paths):
-    """Parametrize a test over files."""
-    return pytest.mark.parametrize("path", paths, ids=lambda path: path.relative_to(ROOT).as_posix())
 
 
 @functools.cache
@@ -83,7 +79,7 @@ def test_every_package_is_listed_and_says_what_lives_in_it():
         assert len(ast.get_docstring(syntax(ADDON / package / "__init__.py"))) > 20
 
 
-@each(MODULES)
+@each_file(MODULES)
 def test_a_package_imports_only_packages_above_it(path):
     package = package_of(path)
     if not package:
@@ -95,7 +91,7 @@ def test_a_package_imports_only_packages_above_it(path):
         )
 
 
-@each(MODULES)
+@each_file(MODULES)
 def test_no_import_stands_in_a_function(path):
     """What must be imported late is a file of a package that imports its files when they are first used."""
     tree = syntax(path)
@@ -108,7 +104,7 @@ def line_is_ours(path, line):
     return any(number == line and target is not None for number, _, target in imports(path))
 
 
-@each(MODULES)
+@each_file(MODULES)
 def test_the_addon_imports_itself_relatively(path):
     """Blender installs it as bl_ext.<repository>.vellus: no other name of it can be known."""
     assert [(line, name) for line, name in outside_imports(path) if name.split(".")[0] == "hair_addon"] == []
@@ -185,14 +181,14 @@ ROOMS = {
 }
 
 
-@each(MODULES)
+@each_file(MODULES)
 def test_code_is_in_its_package(path):
     elsewhere = {rule: row for rule, row in ROOMS.items() if not re.fullmatch(row[1], name_of(path))}
     found = {f"{rule} belongs in {rooms}": lines_of(path) for rule, (lines_of, rooms) in elsewhere.items()}
     assert {rule: lines for rule, lines in found.items() if lines} == {}
 
 
-@each(MODULES)
+@each_file(MODULES)
 def test_native_code_stands_in_files(path):
     """C++ and CUDA are read from a file beside the module that declares the function."""
     calls = [node for node in ast.walk(syntax(path)) if isinstance(node, ast.Call)]
@@ -200,7 +196,7 @@ def test_native_code_stands_in_files(path):
     assert [source for source in sources if not source.startswith("native_code.body(__file__,")] == []
 
 
-@each(NATIVE)
+@each_file(NATIVE)
 def test_native_code_fits_the_columns_of_python(path):
     assert max(map(len, path.read_text(encoding="utf-8").splitlines())) <= 120
 
@@ -237,7 +233,7 @@ def public_functions(body):
                 yield node
 
 
-@each([path for path in MODULES if re.match(r"core/|api|blender/groom/", name_of(path))])
+@each_file([path for path in MODULES if re.match(r"core/|api|blender/groom/", name_of(path))])
 def test_public_functions_have_type_annotations(path):
     for function in public_functions(syntax(path).body):
         given = function.args
@@ -290,7 +286,7 @@ FORBIDDEN_CALLS = {"eval", "exec", "compile", "__import__"}
 FORBIDDEN_MODULES = ("pickle", "marshal", "shelve", "socket", "urllib", "http", "requests", "ctypes", "subprocess")
 
 
-@each(MODULES)
+@each_file(MODULES)
 def test_nothing_from_a_file_can_become_code(path):
     tree = syntax(path)
     calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
@@ -307,13 +303,13 @@ def test_nothing_from_a_file_can_become_code(path):
 # ------------------------------------------------------------------------------------------------------ the pages
 
 
-@each(CODE)
+@each_file(CODE)
 def test_file_names_its_licence_first(path):
     first = next(line for line in path.read_text(encoding="utf-8").splitlines() if not line.startswith("#!"))
     assert first.lstrip("#/ ") == "SPDX-License-Identifier: GPL-3.0-or-later"
 
 
-@each(CODE)
+@each_file(CODE)
 def test_files_stay_below_400_lines(path):
     assert len(path.read_text(encoding="utf-8").splitlines()) <= 400
 

@@ -9,9 +9,9 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
+from tests.support.each_file import ROOT, each_file
 from tools import build_extension
 
-ROOT = Path(__file__).resolve().parent.parent
 MANIFEST = build_extension.manifest()
 GROUPS = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["dependency-groups"]
 REQUIREMENTS = {group: [Requirement(line) for line in lines] for group, lines in GROUPS.items()}
@@ -26,15 +26,11 @@ TEXTS = [path for folder in TEXT_FOLDERS for path in sorted((ROOT / folder).rglo
 TEXTS = [path for path in TEXTS if path.is_file() and path.suffix in TEXT_SUFFIXES and path != Path(__file__)]
 
 
-def each_text():
-    return pytest.mark.parametrize("path", TEXTS, ids=lambda path: path.relative_to(ROOT).as_posix())
-
-
 def version_of(package):
     return re.match(r"[\w-]+==([^\s;\\]+)", LOCKED[package])[1]
 
 
-@each_text()
+@each_file(TEXTS)
 def test_no_registry_address(path):
     """Where packages come from is each machine's own business."""
     text = path.read_text(encoding="utf-8")
@@ -43,13 +39,13 @@ def test_no_registry_address(path):
     assert re.search(f"{registries}|{options}", text) is None
 
 
-@each_text()
+@each_file(TEXTS)
 def test_no_path_of_one_machine(path):
     found = re.search(r"(?<![\w.~}/])/(root|home|Users|work)/|[A-Z]:\\Users", path.read_text(encoding="utf-8"))
     assert found is None, found
 
 
-@each_text()
+@each_file(TEXTS)
 def test_version_stands_only_in_the_manifest(path):
     if path.name in {"blender_manifest.toml", "CHANGELOG.md"}:
         return
