@@ -31,6 +31,12 @@ def syntax(path):
     return ast.parse(path.read_text(encoding="utf-8"), path)
 
 
+@functools.cache
+def nodes(tree):
+    """All nodes of a file's syntax, walked once for all rules."""
+    return tuple(ast.walk(tree))
+
+
 def listed_packages():
     """CONTRIBUTING.md's list of packages, top to bottom."""
     text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
@@ -52,7 +58,7 @@ def package_of(path):
 
 def imports(path):
     """Every import of a file, nested ones too: (line, absolute dotted name or None, file inside the add-on or None)."""
-    for node in ast.walk(syntax(path)):
+    for node in nodes(syntax(path)):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name, None) for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -95,7 +101,7 @@ def test_a_package_imports_only_packages_above_it(path):
 def test_no_import_stands_in_a_function(path):
     """What must be imported late is a file of a package that imports its files when they are first used."""
     tree = syntax(path)
-    functions = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef)]
+    functions = [node for node in nodes(tree) if isinstance(node, ast.FunctionDef)]
     late = [node.lineno for function in functions for node in ast.walk(function) if isinstance(node, ast.ImportFrom)]
     assert name_of(path).removesuffix(".py") in ROOTS or not [line for line in late if line_is_ours(path, line)]
 
@@ -122,7 +128,7 @@ def attribute_lines(tree, *chains):
 
 @functools.cache
 def _attribute_chains(tree):
-    return [(node.lineno, ast.unparse(node)) for node in ast.walk(tree) if isinstance(node, ast.Attribute)]
+    return [(node.lineno, ast.unparse(node)) for node in nodes(tree) if isinstance(node, ast.Attribute)]
 
 
 def import_lines(path, *names):
@@ -191,7 +197,7 @@ def test_code_is_in_its_package(path):
 @each_file(MODULES)
 def test_native_code_stands_in_files(path):
     """C++ and CUDA are read from a file beside the module that declares the function."""
-    calls = [node for node in ast.walk(syntax(path)) if isinstance(node, ast.Call)]
+    calls = [node for node in nodes(syntax(path)) if isinstance(node, ast.Call)]
     sources = [ast.unparse(call.args[0]) for call in calls if ast.unparse(call.func) == "wp.func_native"]
     assert [source for source in sources if not source.startswith("native_code.body(__file__,")] == []
 
@@ -214,9 +220,9 @@ def test_folder_tuple_names_every_file(folder):
     """What grows without end is found by its folder's tuple, one line each."""
     files = {path.stem for path in (ADDON / folder).glob("*.py")} - {"__init__"} - BASES[folder]
     tree = syntax(ADDON / folder / "__init__.py")
-    imported = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom)]
+    imported = [node for node in nodes(tree) if isinstance(node, ast.ImportFrom)]
     file_of = {alias.asname or alias.name: node.module or alias.name for node in imported for alias in node.names}
-    tuples = [node for node in ast.walk(tree) if isinstance(node, ast.Tuple)]
+    tuples = [node for node in nodes(tree) if isinstance(node, ast.Tuple)]
     assert files == {file_of[ast.unparse(element)] for node in tuples for element in node.elts}
 
 
@@ -289,7 +295,7 @@ FORBIDDEN_MODULES = ("pickle", "marshal", "shelve", "socket", "urllib", "http", 
 @each_file(MODULES)
 def test_nothing_from_a_file_can_become_code(path):
     tree = syntax(path)
-    calls = [node for node in ast.walk(tree) if isinstance(node, ast.Call)]
+    calls = [node for node in nodes(tree) if isinstance(node, ast.Call)]
     assert [ast.unparse(call) for call in calls if ast.unparse(call.func) in FORBIDDEN_CALLS] == []
     assert [
         ast.unparse(call) for call in calls if any(keyword.arg == "allow_pickle" for keyword in call.keywords)

@@ -3,7 +3,7 @@
 
 import ast
 
-from tests.test_house import MODULES, name_of, syntax
+from tests.test_house import MODULES, name_of, nodes, syntax
 
 # What is no cache, each with who ends it.
 STATE = {
@@ -73,7 +73,7 @@ def module_values(tree):
 
 def changed_in_place(tree):
     """Names that are written to by key, or by a method that changes what it is called on."""
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         is_written = isinstance(node, ast.Subscript) and not isinstance(node.ctx, ast.Load)
         if is_written or (isinstance(node, ast.Attribute) and node.attr in _CHANGING):
             yield ast.unparse(node.value)
@@ -81,7 +81,7 @@ def changed_in_place(tree):
 
 def state_of(tree):
     """Names of a module whose values may change while it is loaded, but for caches."""
-    found = {name for node in ast.walk(tree) if isinstance(node, ast.Global) for name in node.names}
+    found = {name for node in nodes(tree) if isinstance(node, ast.Global) for name in node.names}
     changed = set(changed_in_place(tree))
     for name, value in module_values(tree).items():
         is_container = isinstance(value, _DISPLAYS) or called(value) in _CONTAINERS
@@ -92,7 +92,7 @@ def state_of(tree):
 
 def cached_functions(tree):
     """Names of functions under `functools.cache` or `lru_cache`."""
-    for node in ast.walk(tree):
+    for node in nodes(tree):
         if isinstance(node, ast.FunctionDef):
             names = {ast.unparse(decorator).partition("(")[0].rpartition(".")[2] for decorator in node.decorator_list}
             if names & {"cache", "lru_cache"}:
@@ -115,5 +115,5 @@ def test_caches_stand_at_the_top_of_a_module():
     """Where `invalidation.CACHES` can name them."""
     for path in MODULES:
         tree = syntax(path)
-        made = [node.lineno for node in ast.walk(tree) if called(node) == "Cache"]
+        made = [node.lineno for node in nodes(tree) if called(node) == "Cache"]
         assert made == [value.lineno for value in module_values(tree).values() if called(value) == "Cache"], path
