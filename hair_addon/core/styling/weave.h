@@ -21,9 +21,64 @@ if (tress_count == 2) {
   tress = up > abs_of(right) * 0.57735027f ? lanes(0.0f) : right > 0.0f ? lanes(1.0f / 3.0f) : lanes(2.0f / 3.0f);
 }
 const lanes phase = random_number(lock, seed, ints(CLUMP_PHASE)) + tress;
-gather(thickness, 0.0f, lanes(1.0f), radius, [&](lanes arc, lanes amount, lanes& to_u, lanes& to_v) {
+const auto turn_at = [&](lanes along, lanes& sine, lanes& cosine) {
+  sine_and_cosine(phase + along * (1.0f / pitch), sine, cosine);
+};
+// How far a strand goes along the centre by its length, as it goes across as well: 1 / sqrt(1 + |dρ/da|²).
+const lanes steepness = 6.28318530718f * radius / pitch;
+const auto rate_at = [&](lanes along, lanes amount) {
   lanes sine, cosine;
-  sine_and_cosine(phase + arc * (1.0f / pitch), sine, cosine);
-  to_u = radius * amount * (tress_count == 2 ? cosine : sine);
-  to_v = radius * amount * (tress_count == 2 ? sine : 2.0f * flat * sine * cosine);
-});
+  turn_at(along, sine, cosine);
+  const lanes up = 2.0f * flat * (cosine * cosine - sine * sine);
+  const lanes square = tress_count == 2 ? lanes(1.0f) : cosine * cosine + up * up;
+  const lanes across = steepness * amount;
+  return 1.0f / sqrt_of(1.0f + across * across * square);
+};
+centre_course course;
+begin_course(course);
+// Roots stay: what the profile asks for at the root is reached over twice the distance to the centre.
+const lanes root_distance = sqrt_of(dot(course.low, course.low));
+const auto is_apart = root_distance > 1.0e-9f;
+const lanes per_root_distance = is_apart ? 0.5f / (is_apart ? root_distance : lanes(1.0f)) : lanes(1.0e9f);
+vector point = {}, drawn_before = {}, middle_before = course.low;
+vector axis_before = centre_normal, frame = at_centre, run = {}, own_run = t[1];
+lanes arc = 0.0f, ahead = 0.0f, pull = 0.0f;
+for (int i = 1; i < point_count; ++i) {
+  const lanes d = length[i];
+  arc += d;
+  point = point + t[i] * d;
+  const lanes x = arc * per_total, share = lower_of(40.0f * d * per_total, lanes(1.0f));
+  lanes wanted = profile(x);
+  if (at_root > 0.0f) wanted = wanted - at_root * (1.0f - smoothstep(arc * per_root_distance));
+  // No faster than the strand can follow, however steep the profile is.
+  const lanes most_change = 0.6f * d / higher_of(root_distance + radius, lanes(1.0e-9f));
+  pull += clamped(base * wanted - pull, -most_change, most_change);
+  // By the midpoint method.
+  ahead += d * rate_at(ahead + 0.5f * d * rate_at(ahead, pull), pull);
+  lanes sine, cosine;
+  turn_at(ahead, sine, cosine);
+  const lanes size_across = radius * pull;
+  const lanes to_u = size_across * (tress_count == 2 ? cosine : sine);
+  const lanes to_v = size_across * (tress_count == 2 ? sine : 2.0f * flat * sine * cosine);
+  const vector middle = middle_at(course, ahead);
+  // Where the strand is level with its progress along the centre: by its direction over about that length.
+  own_run = own_run + (t[i] - own_run) * share;
+  const vector away = point - own_run * (arc - ahead) - middle;
+  // The centre's direction over about that length, which has no steps.
+  run = run + (middle - middle_before - run) * share;
+  const vector axis = unit_or(run, lanes(1.0e-12f), axis_before);
+  middle_before = middle;
+  frame = turned(frame, axis_before, axis);
+  axis_before = axis;
+  const vector beside = away - axis * dot(away, axis);
+  const vector drawn = middle + away * (1.0f - pull) + beside * (pull * thickness) + frame * to_u
+      + cross(axis, frame) * to_v;
+  const vector way = drawn - drawn_before;
+  const lanes size = sqrt_of(dot(way, way));
+  const auto is_far = size > 1.0e-3f * d;
+  t[i] = chosen(is_far, way * (1.0f / (is_far ? size : lanes(1.0f))), t[i]);
+  next_length[i] = size;
+  drawn_before = drawn;
+}
+swap(length, next_length);
+put_total();
