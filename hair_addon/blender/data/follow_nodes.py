@@ -40,7 +40,7 @@ def set_surface(curves_object, surface_object, vertex_count, is_combed, cage_cor
     """
     for modifier in curves_object.modifiers:
         if modifier.type == "NODES" and _is_ours(modifier.node_group):
-            if cage_corners and modifier.node_group["vellus_version"] < _VERSION:
+            if cage_corners and _is_of_older_version(modifier.node_group):
                 modifier.node_group = _group()
             inputs = {
                 "Surface": surface_object,
@@ -63,7 +63,12 @@ def modifier_of(curves_object):
 def is_older(curves_object):
     """Whether an object's strands turn from the flat faces of a cage, as files of older versions have it."""
     modifier = modifier_of(curves_object)
-    return modifier is not None and modifier.node_group["vellus_version"] < _VERSION
+    return modifier is not None and _is_of_older_version(modifier.node_group)
+
+
+def _is_of_older_version(group):
+    version = group["vellus_version"]
+    return not isinstance(version, int) or version < _VERSION  # anything may stand in a damaged file
 
 
 def modifiers_of_artist(curves_object):

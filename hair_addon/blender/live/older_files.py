@@ -2,7 +2,8 @@
 """Strands of older files on subdivided surfaces.
 
 They turned from the flat faces of the cage, and turn from its smooth surface now (smooth_surface.py). Points at rest
-are moved so that strands stay where they were seen.
+are moved so that strands stay where they were seen. Live hair is then computed again between its guides, where its
+neighbouring strands stay together.
 """
 
 import bpy
@@ -17,22 +18,26 @@ def renew():
     """Let strands of older files on subdivided surfaces turn from smooth surfaces; what is linked stays as it is."""
     older = [o for o in bpy.data.objects if o.type == "CURVES" and o.library is None and follow_nodes.is_older(o)]
     found = {o.data.session_uid: o.data for o in older if o.data.library is None}
-    # All are read before any is written: hair between guides is computed again when these are.
-    read = [(datablock, *_seen(datablock)) for datablock in found.values()]
+    read = []  # all before any is written: hair between guides is computed again when these are
+    for datablock in found.values():
+        try:
+            read.append((datablock, *_seen(datablock)))
+        except HairError:
+            continue  # what is wrong with the surface is said where hair is updated
     for datablock, surface, points in read:
         if points is not None:
             _write(datablock, surface, points)
 
 
 def _seen(datablock):
-    """The surface of strands and (N, 3) points at rest that it carries to where they were; (None, None): no change."""
+    """The surface of strands and (N, 3) points at rest that it carries to where they were; (None, None): no change.
+
+    Raises `HairError`.
+    """
     surface_object, unchanged = datablock.surface, (None, None)
     if datablock.vellus.kind not in {"GUIDES", "HAIR"} or surface_object is None or surface_object.type != "MESH":
         return unchanged
-    try:
-        surface = scene.read_surface(surface_object, scene.present_depsgraph())
-    except HairError:
-        return unchanged  # what is wrong with the surface is said where hair is updated
+    surface = scene.read_surface(surface_object, scene.present_depsgraph())
     places = curves.read_root_places(datablock, len(surface.rest))
     if surface.cage_corners == 0 or surface.topology != datablock.vellus.topology or places is None:
         return unchanged

@@ -105,7 +105,7 @@ def make_older(curves_object):
     update()
 
 
-def test_strands_of_older_files_stay_where_they_were_seen(cube):
+def test_guides_of_older_files_stay_where_they_were_seen(cube):
     grown = grow_straight(cube)
     for curves_object in grown:
         make_older(curves_object)
@@ -117,6 +117,19 @@ def test_strands_of_older_files_stay_where_they_were_seen(cube):
     # The hair between guides is computed again, whose neighbours turn apart no more.
     np.testing.assert_allclose(evaluated_points(grown[0]), seen[0], atol=1e-5)
     assert_follows(*grown)
+
+
+def test_opening_an_older_file_renews_it(cube, tmp_path):
+    grown = grow_straight(cube)
+    for curves_object in grown:
+        make_older(curves_object)
+    seen = evaluated_points(grown[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"), compress=False)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+    opened = [bpy.data.objects[name] for name in ("Guides", "Hair")]
+    np.testing.assert_allclose(evaluated_points(opened[0]), seen, atol=1e-5)
+    assert not any(map(follow_nodes.is_older, opened))
+    assert_follows(*opened)
 
 
 def test_smooth_positions_are_computed_once(cube, monkeypatch):
