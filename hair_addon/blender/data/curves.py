@@ -119,7 +119,7 @@ def write_roots(curves, surface, roots, normals=None):
     for user in bpy.data.objects:
         if user.data == curves and user.library is None:
             is_combed = curves.vellus.kind == "GUIDES" and surface.corner_uvs is not None
-            follow_nodes.set_surface(user, curves.surface, len(surface.rest), is_combed)
+            follow_nodes.set_surface(user, curves.surface, len(surface.rest), is_combed, surface.cage_corners)
     curves.update_tag()
 
 

@@ -8,15 +8,19 @@ as a finer subdivision for renders, by the nearest point of the surface at rest.
 
 import bpy
 
+from ...core import geometry
 from ..host.notices import name_of
 
 _NAME = "Vellus Follow Surface"
-_VERSION = 2  # of the nodes below: groups of other versions, from older files, are not changed
+# Of the nodes below. Groups of other versions, from older files, are not changed: on surfaces without subdivision they
+# do the same, and on others hair takes a new one.
+_VERSION = 3
 # Of the group: identifiers, which stay when an artist renames inputs, and types.
 _INPUTS = {
     "Surface": ("Socket_1", "NodeSocketObject"),
     "Vertices": ("Socket_2", "NodeSocketInt"),
     "Combed": ("Socket_3", "NodeSocketBool"),
+    "Cage Corners": ("Socket_4", "NodeSocketInt"),
 }
 ROOT_VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
 
@@ -28,15 +32,22 @@ def add_modifier(curves_object):
     curves_object.modifiers.move(len(curves_object.modifiers) - 1, 0)
 
 
-def set_surface(curves_object, surface_object, vertex_count, is_combed):
+def set_surface(curves_object, surface_object, vertex_count, is_combed, cage_corners):
     """Set the surface that an object's strands follow, if it still has the modifier.
 
     vertex_count: of the evaluated surface that the strands' root vertices count in; is_combed: whether brushes are to
-    move strands where the surface has carried them, which needs a UV map.
+    move strands where the surface has carried them, which needs a UV map; cage_corners: of a `Surface`.
     """
     for modifier in curves_object.modifiers:
         if modifier.type == "NODES" and _is_ours(modifier.node_group):
-            inputs = {"Surface": surface_object, "Vertices": vertex_count, "Combed": is_combed}
+            if cage_corners and _is_of_older_version(modifier.node_group):
+                modifier.node_group = _group()
+            inputs = {
+                "Surface": surface_object,
+                "Vertices": vertex_count,
+                "Combed": is_combed,
+                "Cage Corners": cage_corners,
+            }
             for name in _intact_inputs(modifier.node_group):
                 socket = getattr(modifier.properties.inputs, _INPUTS[name][0])
                 if socket.value != inputs[name]:
@@ -47,6 +58,17 @@ def modifier_of(curves_object):
     """The modifier that deforms an object's strands with their surface; None where an artist has removed it."""
     found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
     return next(found, None)
+
+
+def is_older(curves_object):
+    """Whether an object's strands turn from the flat faces of a cage, as files of older versions have it."""
+    modifier = modifier_of(curves_object)
+    return modifier is not None and _is_of_older_version(modifier.node_group)
+
+
+def _is_of_older_version(group):
+    version = group["vellus_version"]
+    return not isinstance(version, int) or version < _VERSION  # anything may stand in a damaged file
 
 
 def modifiers_of_artist(curves_object):
@@ -112,7 +134,8 @@ class _Tree:
             data_type="FLOAT_VECTOR",
             domain="POINT",
         ).outputs[0]
-        surface, (after, *axes) = self._with_motion(info.outputs["Geometry"], position)
+        smooth_rest = self._smooth_rest(info.outputs["Geometry"], given["Cage Corners"], self._rest(position))
+        surface, (after, *axes) = self._with_motion(*smooth_rest, position)
         before, after, x_axis, y_axis = self._at_roots(
             surface, info.outputs["Geometry"], given["Vertices"], [self._rest(position), after, *axes]
         )
@@ -152,14 +175,33 @@ class _Tree:
         inputs = {"Switch": is_combed, "False": curves, "True": deformed}
         return self._node("GeometryNodeSwitch", inputs, input_type="GEOMETRY").outputs[0]
 
-    def _with_motion(self, surface, position):
+    def _smooth_rest(self, surface, cage_corners, rest):
+        """The surface and, per vertex, where it is on the smooth surface at rest: smooth_surface.py."""
+        by = geometry.smooth_surface
+        face_count = self._node("GeometryNodeAttributeDomainSize", {0: surface}).outputs["Face Count"]
+        refinement = self._math("DIVIDE", self._math("MULTIPLY", face_count, 4.0), cage_corners)
+        is_fine = self._node(
+            "FunctionNodeCompare", {"A": refinement, "B": by.LEAST_REFINEMENT}, operation="GREATER_EQUAL"
+        ).outputs[0]
+        variance = self._math("MULTIPLY", refinement, by.HAT_VARIANCE)
+        count = self._math(
+            "MINIMUM", self._math("CEIL", self._math("DIVIDE", variance, by.MOST_VARIANCE)), by.MOST_ROUNDS
+        )
+        part = self._math("MINIMUM", self._math("DIVIDE", variance, count), by.MOST_VARIANCE)
+        weight = self._math("DIVIDE", part, self._math("SUBTRACT", 2.0, self._math("MULTIPLY", part, 4.0)))
+        inputs = {"Value": rest, "Iterations": self._math("MULTIPLY", count, is_fine), "Weight": weight}
+        means = self._node("GeometryNodeBlurAttribute", inputs, data_type="FLOAT_VECTOR").outputs[0]
+        surface, (smooth_rest,) = self._capture(surface, [means])
+        return surface, smooth_rest
+
+    def _with_motion(self, surface, smooth_rest, position):
         """The surface and, per vertex, its position and where the rotation there takes the x and the y axis."""
         face = self._node("GeometryNodeInputIndex").outputs[0]
         corners = []
         for offset in (0, 1, -1):
             corner = self._node("GeometryNodeCornersOfFace", {"Face Index": face, "Sort Index": offset}).outputs[0]
             corners.append(self._node("GeometryNodeVertexOfCorner", {0: corner}).outputs[0])
-        inverse = self._node("FunctionNodeInvertMatrix", {0: self._basis(self._rest(position), corners)}).outputs
+        inverse = self._node("FunctionNodeInvertMatrix", {0: self._basis(smooth_rest, corners)}).outputs
         is_now = self._basis(position, corners)
         gradient = self._node("FunctionNodeMatrixMultiply", {0: is_now, 1: inverse["Matrix"]}).outputs[0]
         columns = []
@@ -256,6 +298,9 @@ class _Tree:
         if scale is not None:
             self._group.links.new(scale, node.inputs["Scale"])
         return node.outputs["Value" if operation == "DISTANCE" else "Vector"]
+
+    def _math(self, operation, *numbers):
+        return self._node("ShaderNodeMath", dict(enumerate(numbers)), operation=operation).outputs[0]
 
     def _node(self, kind, inputs=None, **settings):
         node = self._group.nodes.new(kind)

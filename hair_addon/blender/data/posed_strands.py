@@ -66,7 +66,10 @@ def pose_of(surface):
     """The `Pose` of a `Surface` as it was read."""
     if not surface.is_deformed:
         return Pose(surface, None)
-    return Pose(surface, geometry.surface_deform.motion(surface.rest, surface.posed, surface.faces))
+    motion = geometry.surface_deform.motion(
+        surface.rest, surface.posed, surface.faces, smooth_before=surface.smooth_rest
+    )
+    return Pose(surface, motion)
 
 
 def carried(points, motion, places, counts=None, is_back=False):

@@ -14,6 +14,7 @@ from ...core.errors import HairError
 from ...core.geometry.mesh import Faces, TriMesh
 from ...core.geometry.texture import Texture
 from ..host.notices import can_be_drawn, name_of
+from . import subdivided_surfaces
 
 _MOST_CORNERS = 100_000  # of a face: the time to triangulate one grows faster than its corners
 
@@ -36,6 +37,8 @@ class Surface:
     uv_map: str
     to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → these
     is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
+    cage_corners: int  # of the faces that modifiers subdivide to a smooth surface, 0 for none
+    smooth_rest: np.ndarray  # (V, 3) float32, vertices on the smooth surface at rest; `rest` itself where none is
 
     @cached_property
     def to_local_axes(self):
@@ -63,7 +66,7 @@ class Surface:
     def is_at_rest_as(self, other):
         """Whether strands generated on one also fit the other."""
         mine, its = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
-        return all(map(np.array_equal, mine, its))
+        return self.cage_corners == other.cage_corners and all(map(np.array_equal, mine, its))
 
     def is_same(self, other):
         """Whether another surface equals this one, so that cached results are valid."""
@@ -71,7 +74,8 @@ class Surface:
             (s.rest, s.posed, s.mesh.triangles, s.faces.corner_vertices, s.faces.starts, s.to_world_axes, s.corner_uvs)
             for s in (self, other)
         )
-        return (self.name, self.uv_map) == (other.name, other.uv_map) and all(map(np.array_equal, mine, its))
+        named = [(s.name, s.uv_map, s.cage_corners) for s in (self, other)]
+        return named[0] == named[1] and all(map(np.array_equal, mine, its))
 
     @property
     def mirror_normal(self):
@@ -178,13 +182,30 @@ def read_surface(surface_object, depsgraph):
             corner_uvs = uvs[corners]
     finally:
         evaluated.to_mesh_clear()
+    cage_corners, smooth_rest = 0, rest
+    if rest is not posed and np.isfinite(rest).all():
+        cage_corners = subdivided_surfaces.cage_corners(surface_object, depsgraph, faces)
+        smooth_rest = subdivided_surfaces.smooth_positions(rest, faces, cage_corners)
     is_mirrored = bool(determinant < 0.0)
     if is_mirrored:
         triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
         corner_uvs = None if corner_uvs is None else corner_uvs[:, [0, 2, 1]]
     with np.errstate(invalid="ignore"):  # non-finite values are rejected by the check of the mesh
-        mesh = TriMesh(_transformed(rest, to_world_axes), triangles)
-    return Surface(name_of(surface_object), mesh, faces, rest, posed, corner_uvs, uv_map, to_world_axes, is_mirrored)
+        smooth = None if smooth_rest is rest else _transformed(smooth_rest, to_world_axes)
+        mesh = TriMesh(_transformed(rest, to_world_axes), triangles, smooth)
+    return Surface(
+        name_of(surface_object),
+        mesh,
+        faces,
+        rest,
+        posed,
+        corner_uvs,
+        uv_map,
+        to_world_axes,
+        is_mirrored,
+        cage_corners,
+        smooth_rest,
+    )
 
 
 def read_own_mesh(surface_object, to_world_axes):

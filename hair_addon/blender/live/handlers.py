@@ -11,7 +11,7 @@ from ..host.notices import name_of
 from ..materials import looks
 from ..render import composite
 from ..settings import animated
-from . import every_frame, invalidation, live_hair, reported, simulated_hair, unlocked_renders
+from . import every_frame, invalidation, live_hair, older_files, reported, simulated_hair, unlocked_renders
 
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
 _is_opening = False
@@ -196,6 +196,7 @@ def after_load(*_args):
     _is_undone = True  # does not affect a file that was saved during a stroke
     live_hair.cancel_writing()
     invalidation.clear()
+    older_files.renew()
     _hide_drawn_hair()
 
 
@@ -208,6 +209,7 @@ def _hide_drawn_hair():
 
 def _take_over():
     """Draw what Blender drew while the add-on was disabled."""
+    older_files.renew()
     _hide_drawn_hair()
     looks.follow_guides(bpy.context.view_layer)
 

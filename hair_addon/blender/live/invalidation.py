@@ -5,7 +5,7 @@ After an event nothing is drawn or computed from what was cached before it. Func
 `functools.cache`, never become stale.
 """
 
-from ..data import simulated_guides
+from ..data import simulated_guides, subdivided_surfaces
 from ..gpu import lights, shaders, surface_shading, world_texture
 from ..groom import bindings, frame_folders, guide_simulation
 from ..host import notices
@@ -31,6 +31,7 @@ COPIES = (
 # Values keyed by everything they depend on, or that check by themselves whether they are up to date.
 OTHERS = (
     hair_cache.shading_cache,
+    subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,
     simulated_hair.played_cache,

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         resampling,
         root_frames,
         sampling,
+        smooth_surface,
         strands,
         surface_deform,
         texture,

@@ -48,10 +48,14 @@ class TriMesh:
 
     Degenerate triangles are kept, so that triangle indices are the same everywhere; nothing grows on them.
     Call `check_mesh` on meshes from outside.
+
+    smooth_vertices: (V, 3) float32 [m] of the smooth surface that a subdivided mesh stands for, whose normals are those
+    of the vertices; None for the mesh itself.
     """
 
     vertices: np.ndarray
     triangles: np.ndarray
+    smooth_vertices: np.ndarray | None = None
 
     @cached_property
     def checked_triangles(self) -> np.ndarray:
@@ -86,6 +90,8 @@ class TriMesh:
 
         Zero where no face with an area meets, or where those that do cancel.
         """
+        if self.smooth_vertices is not None:
+            return TriMesh(self.smooth_vertices, self.triangles).vertex_normals
         corners, face_normals = self.corners, _unit(self.scaled_normals)
         normals = np.zeros(self.vertices.shape)
         face_normals[self.areas == 0.0] = 0.0

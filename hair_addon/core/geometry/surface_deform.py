@@ -6,6 +6,9 @@ around a vertex has a nearest rotation, its polar factor U V^T of the singular v
 vertices two of its columns are interpolated and made orthonormal again. So rigid motion is reproduced exactly, shear
 and stretch rotate no more than necessary, and neighbouring roots do not separate, as they do with the frames of single
 triangles or of a UV map. blender/data/follow_nodes.py implements the same in geometry nodes.
+
+A subdivided surface is smooth where it is now, and flat on the faces of its cage before: from there, neighbouring roots
+would turn apart. Its rotation is that from the cage's smooth surface (smooth_surface.py).
 """
 
 from dataclasses import dataclass
@@ -33,16 +36,23 @@ class SurfaceMotion:
     axes: np.ndarray
 
 
-def motion(before: np.ndarray, after: np.ndarray, faces: Faces, vertices: np.ndarray | None = None) -> SurfaceMotion:
+def motion(
+    before: np.ndarray,
+    after: np.ndarray,
+    faces: Faces,
+    vertices: np.ndarray | None = None,
+    smooth_before: np.ndarray | None = None,
+) -> SurfaceMotion:
     """The `SurfaceMotion` of vertices (V, 3) that went from `before` to `after`; faces: the mesh's `Faces`.
 
-    vertices: indices, in any shape, of those whose rotation matters, of a large mesh perhaps few; None for all.
+    vertices: indices, in any shape, of those whose rotation matters, of a large mesh perhaps few; None for all;
+    smooth_before: (V, 3) of the smooth surface that they were on, from which the surface turns; None for `before`.
     Raises `HairError` where vertices are not finite numbers: no rotation could be found for them.
     """
     require_finite(before)
     require_finite(after)
     faces = faces if vertices is None else _around(faces, vertices, len(before))
-    return SurfaceMotion(before, after, vertex_axes(before, after, faces))
+    return SurfaceMotion(before, after, vertex_axes(before if smooth_before is None else smooth_before, after, faces))
 
 
 def _around(faces, vertices, vertex_count):

@@ -4,8 +4,12 @@
     ρ = R (sin(φ + 2πg/n), b sin 2(φ + 2πg/n)) for three tresses,    ρ = R (cos(φ + πg), sin(φ + πg)) for two
 
 ρ is in the frames of the lock's centre, φ grows by 2π a pitch along it, and g is the tress that a strand belongs to, by
-its place in the lock. Strands follow the line of their tress as those of a clump follow its centre. Centre lines of
-three tresses stay 0.90 R apart for a pitch of 6 R, so a tress may have half of that as its radius.
+its place in the lock. How far along the centre a point of a strand is, a, follows from its arc length s alone:
+
+    da/ds = 1 / sqrt(1 + |dρ/da|²)
+
+so no point slides along its tress when the hair swings; where strands gather they stretch for it, by half at most.
+Centre lines of three tresses stay 0.90 R apart for a pitch of 6 R, so a tress may have half of that as its radius.
 """
 
 from dataclasses import dataclass

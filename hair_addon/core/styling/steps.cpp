@@ -181,6 +181,7 @@ for (int step = 0; step < numbers.shape[0]; ++step) {
 
 #include "frames.h"
 #include "across.h"
+#include "centre_course.h"
 #include "gather.h"
 
   switch (kind) {

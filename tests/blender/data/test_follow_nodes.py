@@ -127,7 +127,7 @@ def test_nodes_find_roots_on_a_surface_of_other_vertices(sphere):
     _guides, hair = grow(sphere)
     key_shape(sphere, shear)
     wanted = evaluated_points(hair)
-    follow_nodes.set_surface(hair, sphere, 7, is_combed=False)
+    follow_nodes.set_surface(hair, sphere, 7, is_combed=False, cage_corners=0)
     hair.data.update_tag()
     update()
     np.testing.assert_allclose(evaluated_points(hair), wanted, atol=1e-5)

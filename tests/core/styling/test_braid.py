@@ -4,17 +4,18 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.styling import braid
-from tests.support.stepped import stepped
+from hair_addon.core.geometry.strands import segment_lengths
+from hair_addon.core.styling import braid, clump, curl
+from tests.support.stepped import curved_strands, stepped
 
 RADIUS, PITCH = 0.006, 0.036
 EVEN = {"radius": RADIUS, "pitch": PITCH, "thickness": 0.0, "root": 1.0, "tip": 1.0, "start": 0.0, "flatness": 0.0}
 
 
-def lock(count=90, length=0.3, point_count=121):
-    """(S, P, 3): straight strands rooted in a disc, and the strand in the middle."""
+def lock(count=90, length=0.3, point_count=121, size=0.01):
+    """(S, P, 3): straight strands rooted in a disc of a radius [m], and the strand in the middle."""
     rank = np.arange(count)
-    radius, angle = 0.01 * np.sqrt((rank + 0.5) / count), 2.399963 * rank
+    radius, angle = size * np.sqrt((rank + 0.5) / count), 2.399963 * rank
     strands = np.zeros((count, point_count, 3), np.float32)
     strands[:, :, 0], strands[:, :, 1] = (radius * np.cos(angle))[:, None], (radius * np.sin(angle))[:, None]
     strands[:, :, 2] = np.linspace(0.0, length, point_count)
@@ -97,3 +98,76 @@ def test_without_a_radius_a_braid_is_a_clump():
     strands, centre = lock()
     made = stepped(strands, braid.Settings(**(EVEN | {"radius": 0.0})), centres=centre)
     assert np.linalg.norm(made[:, 40:, :2], axis=2).max() < 1e-5
+
+
+def swung(strands, angle, is_bent=False):
+    """(S, P, 3) strands that swing about their roots, which stay, around the Y axis; is_bent: the tips by the angle."""
+    segments = np.diff(strands.astype(np.float64), axis=1)
+    part = np.linspace(0.0, 1.0, segments.shape[1]) if is_bent else np.ones(segments.shape[1])
+    cosine, sine = np.cos(angle * part), np.sin(angle * part)
+    x, y, z = np.moveaxis(segments, 2, 0)
+    turned = np.stack([cosine * x + sine * z, y, cosine * z - sine * x], axis=2)
+    return np.cumsum(np.concatenate([strands[:, :1], turned], axis=1), axis=1).astype(np.float32)
+
+
+def turns(before, after):
+    """(S, P - 1) angles [rad] between the segments of strands in two frames."""
+    units = [np.diff(points.astype(np.float64), axis=1) for points in (before, after)]
+    units = [segments / np.linalg.norm(segments, axis=2, keepdims=True) for segments in units]
+    return 2.0 * np.arcsin(np.linalg.norm(units[1] - units[0], axis=2) / 2.0)
+
+
+STEP = np.radians(4.0)  # of guides, a frame
+FRAMES = STEP * np.arange(-6, 7, 3)
+SWINGING = {
+    "braid": (braid.Settings(radius=RADIUS, pitch=0.04),),
+    "rope": (braid.Settings(pattern="ROPE", radius=RADIUS, pitch=0.04),),
+    "ponytail": (clump.Settings(levels=1, amount=1.0, crossover=0.0, stray=0.0),),
+    "curl": (curl.Settings(),),
+}
+
+
+@pytest.mark.parametrize("is_bent", [False, True])
+@pytest.mark.parametrize("name", SWINGING)
+def test_strands_turn_as_their_guides_do(name, is_bent):
+    """In a lock as wide as a braid of default size: nearly all by a tenth more at most, none twice as far."""
+    strands, centre = lock(size=0.025, count=60)
+    for angle in FRAMES:
+        before, after = (
+            stepped(swung(strands, at, is_bent), *SWINGING[name], centres=swung(centre, at, is_bent))
+            for at in (angle, angle + STEP)
+        )
+        found = turns(before, after)
+        assert np.quantile(found, 0.95) < 1.1 * STEP and found.max() < 2.0 * STEP
+
+
+@pytest.mark.parametrize("pattern", ["BRAID", "ROPE"])
+def test_strands_do_not_slide_along_their_tress(pattern):
+    """A swing of 50° moves no point along the braid by more than a fiftieth of what its root is beside the middle."""
+    strands, centre = lock(size=0.025, count=60)
+    settings = braid.Settings(pattern=pattern, **(EVEN | {"pitch": 0.04}))
+    places = []
+    for angle in np.radians([-25.0, 0.0, 25.0]):
+        made = stepped(swung(strands, angle), settings, centres=swung(centre, angle)).astype(np.float64)
+        places.append(made[:, 60:] @ (np.sin(angle), 0.0, np.cos(angle)))
+    assert np.ptp(places, axis=0).max() < 0.025 / 50.0
+
+
+def test_strands_stretch_only_where_they_gather():
+    """There by half at most, and in the braid by a twentieth: a strand as a whole by one too."""
+    strands, centre = lock(size=0.025, count=60)
+    for angle in np.radians([0.0, 25.0]):
+        before = swung(strands, angle)
+        made = stepped(before, braid.Settings(radius=RADIUS, pitch=0.04), centres=swung(centre, angle))
+        parts = segment_lengths(made) / segment_lengths(before)
+        assert parts.max() < 1.5 + 1e-4
+        np.testing.assert_allclose(parts[:, 50:], 1.0, atol=0.05)
+        np.testing.assert_allclose(parts.mean(axis=1), 1.0, atol=0.05)
+
+
+def test_strands_of_any_shape_stretch_by_half_at_most(rng):
+    strands = curved_strands(rng)
+    made = stepped(strands, braid.Settings(), members=rng.integers(0, 8, len(strands)))
+    assert (
+        segment_lengths(made.astype(np.float64)) < 1.5001 * segment_lengths(strands.astype(np.float64)) + 1e-7
+    ).all()

@@ -1,0 +1,56 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surfaces that modifiers subdivide: how large the cage is, and the smooth surface at rest.
+
+Blender's rest positions of a subdivided mesh lie on the flat faces of its cage; smooth_surface.py estimates the rest.
+"""
+
+import hashlib
+
+import numpy as np
+
+from ...core import geometry
+from ..host import scene_time
+from ..host.caches import Cache
+
+smooth_cache = Cache(capacity=8)  # by all that smooth positions follow from
+
+
+def cage_corners(surface_object, depsgraph, faces):
+    """Number of corners of the mesh that an object's modifiers subdivide to a smooth one; 0 where none does.
+
+    faces: `Faces` of the mesh as a depsgraph has evaluated it. Other modifiers that add faces count as of the cage.
+    """
+    smoothing = [modifier for modifier in surface_object.modifiers if _is_smoothing(modifier)]
+    if not smoothing:
+        return 0
+    levels = sum(_levels(modifier, depsgraph) for modifier in smoothing)
+    # The first level makes a quad of each corner, the others make four of each.
+    return len(faces.corner_vertices) if levels == 0 else (len(faces.starts) - 1) // 4 ** (levels - 1)
+
+
+def _is_smoothing(modifier):
+    is_shown = modifier.show_viewport or modifier.show_render
+    return is_shown and (
+        modifier.type == "MULTIRES" or (modifier.type == "SUBSURF" and modifier.subdivision_type == "CATMULL_CLARK")
+    )
+
+
+def _levels(modifier, depsgraph):
+    is_render = scene_time.is_rendered(depsgraph)
+    if not (modifier.show_render if is_render else modifier.show_viewport):
+        return 0
+    levels = modifier.render_levels if is_render else modifier.levels
+    render = depsgraph.scene.render
+    if not render.use_simplify:
+        return levels
+    return min(levels, render.simplify_subdivision_render if is_render else render.simplify_subdivision)
+
+
+def smooth_positions(rest, faces, corners):
+    """(V, 3) float32: where vertices are on the smooth surface at rest; `rest` itself where `cage_corners` is 0."""
+    if corners == 0:
+        return rest
+    key = hashlib.blake2b(rest.tobytes(), digest_size=16)
+    for array in (faces.corner_vertices, faces.starts, np.int64(corners)):
+        key.update(array.tobytes())
+    return smooth_cache.get(key.digest(), lambda: geometry.smooth_surface.smoothed(rest, faces, corners))

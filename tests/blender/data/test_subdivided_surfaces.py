@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair on surfaces that a modifier subdivides: neighbouring strands stay together, at every level, in every file."""
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Matrix
+
+from hair_addon.blender.data import follow_nodes, scene
+from hair_addon.blender.live import older_files
+from tests.support.following import assert_follows, drawn_points, grow, update
+from tests.support.reading import evaluated_points, points, vertex_positions, write_points
+
+
+@pytest.fixture
+def cube(scene):
+    """A cube of 2 m that a modifier subdivides twice: as bent as a cage is."""
+    bpy.ops.mesh.primitive_cube_add()
+    subdivision = bpy.context.object.modifiers.new("Subdivision", "SUBSURF")
+    subdivision.levels, subdivision.render_levels = 2, 3
+    update()
+    return bpy.context.object
+
+
+def grow_straight(surface):
+    """Guides and hair that all stand along one direction at rest."""
+    guides, hair = grow(surface, guide_count=80, strand_count=400, gravity=0.0, tilt=0.0, length_variation=0.0)
+    combed = points(guides)
+    write_points(guides, combed[:, :1] + np.linspace(0.0, 0.3, combed.shape[1])[:, None] * np.float32([0.6, 0.0, 0.8]))
+    return guides, hair
+
+
+def turns(before, after):
+    """(S,) angles [rad] by which strands turned, from root to tip."""
+    arms = [np.diff(p[:, [0, -1]], axis=1)[:, 0] for p in (before, after)]
+    units = [arm / np.linalg.norm(arm, axis=1, keepdims=True) for arm in arms]
+    return np.arccos(np.clip((units[0] * units[1]).sum(axis=1), -1.0, 1.0))
+
+
+@pytest.mark.parametrize("levels", [1, 2, 3])
+def test_subdivision_does_not_turn_strands(cube, levels):
+    """On a cube, by a fifth of the angle between its cage and the smooth surface; 45° at its edges."""
+    cube.modifiers[0].levels = levels
+    update()
+    for curves_object in grow_straight(cube):
+        assert turns(points(curves_object), evaluated_points(curves_object)).max() < np.radians(12.0)
+
+
+def test_new_guides_stand_on_the_smooth_surface(cube):
+    guides, _hair = grow(cube, gravity=0.0, tilt=0.0)
+    found = evaluated_points(guides)
+    outward = found[:, 0] / np.linalg.norm(found[:, 0], axis=1, keepdims=True)  # a cube becomes nearly a ball
+    assert turns(np.stack([np.zeros_like(outward), outward], axis=1), found).max() < np.radians(15.0)
+
+
+def test_a_simple_subdivision_leaves_strands_in_place(cube):
+    cube.modifiers[0].subdivision_type = "SIMPLE"
+    update()
+    for curves_object in grow_straight(cube):
+        np.testing.assert_allclose(evaluated_points(curves_object), points(curves_object), atol=1e-6)
+
+
+def test_nodes_and_pictures_agree_while_it_deforms(cube):
+    grown = grow_straight(cube)
+    cube.shape_key_add(name="Basis")
+    key = cube.shape_key_add(name="Key")
+    stood = vertex_positions(cube)
+    key.data.foreach_set("co", (stood + 0.4 * stood[:, [2, 0, 1]] * [1.0, 0.0, 0.5]).astype(np.float32).ravel())
+    key.value = 1.0
+    update()
+    assert_follows(*grown)
+
+
+def test_a_rigid_motion_of_the_cage_moves_hair_rigidly(cube):
+    grown = grow_straight(cube)
+    before = [evaluated_points(curves_object) for curves_object in grown]
+    turn = np.array(Matrix.Rotation(2.0, 3, (1.0, -2.0, 0.5)))
+    cube.shape_key_add(name="Basis")
+    key = cube.shape_key_add(name="Key")
+    key.data.foreach_set("co", (vertex_positions(cube) @ turn.T + 1.0).astype(np.float32).ravel())
+    key.value = 1.0
+    update()
+    for curves_object, stood in zip(grown, before, strict=True):
+        np.testing.assert_allclose(evaluated_points(curves_object), stood @ turn.T + 1.0, atol=2e-5)
+
+
+def test_a_finer_subdivision_turns_no_strands_either(cube):
+    """As renders have it: hair stays rooted on the viewport's mesh. The estimates of a cube differ between levels."""
+    guides, hair = grow_straight(cube)
+    guides.data.vellus.is_live = hair.data.vellus.is_live = False
+    before = evaluated_points(hair)
+    cube.modifiers[0].levels = 3
+    update()
+    after = evaluated_points(hair)
+    assert np.abs(after[:, 0] - before[:, 0]).max() > 1e-4  # another mesh
+    assert turns(before, after).max() < np.radians(8.0)
+
+
+def make_older(curves_object):
+    """Let an object's strands follow by the nodes of the version before, without a smooth surface."""
+    modifier = follow_nodes.modifier_of(curves_object)
+    modifier.node_group = modifier.node_group.copy()
+    modifier.node_group["vellus_version"] = 2
+    modifier.properties.inputs.Socket_4.value = 0
+    update()
+
+
+def test_guides_of_older_files_stay_where_they_were_seen(cube):
+    grown = grow_straight(cube)
+    for curves_object in grown:
+        make_older(curves_object)
+    seen = [evaluated_points(curves_object) for curves_object in grown]
+    assert turns(points(grown[1]), seen[1]).max() > np.radians(20.0)
+    older_files.renew()
+    update()
+    assert not any(map(follow_nodes.is_older, grown))
+    # The hair between guides is computed again, whose neighbours turn apart no more.
+    np.testing.assert_allclose(evaluated_points(grown[0]), seen[0], atol=1e-5)
+    assert_follows(*grown)
+
+
+def test_opening_an_older_file_renews_it(cube, tmp_path):
+    grown = grow_straight(cube)
+    for curves_object in grown:
+        make_older(curves_object)
+    seen = evaluated_points(grown[0])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "older.blend"), compress=False)
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "older.blend"))
+    opened = [bpy.data.objects[name] for name in ("Guides", "Hair")]
+    np.testing.assert_allclose(evaluated_points(opened[0]), seen, atol=1e-5)
+    assert not any(map(follow_nodes.is_older, opened))
+    assert_follows(*opened)
+
+
+def test_smooth_positions_are_computed_once(cube, monkeypatch):
+    grow_straight(cube)
+    first, second = (scene.read_surface(cube, bpy.context.evaluated_depsgraph_get()) for _ in range(2))
+    assert first.smooth_rest is second.smooth_rest and first.is_same(second)
+    drawn_points(bpy.data.objects["Hair"])
