@@ -241,6 +241,25 @@ def test_a_copy_bakes_to_a_folder_of_its_own(swung):
     }
 
 
+@pytest.mark.parametrize("is_stored", [True, False])
+def test_files_in_one_folder_have_frames_of_their_own(swung, tmp_path, is_stored):
+    """Guides of one name; a file that is saved under another name keeps its frames, also those of the command line."""
+    guides, _hair = swung
+    guides.data.vellus.cache_folder = "//frames"
+    folders = []
+    for name in ("one.blend", "other.blend"):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / name))
+        folders.append(frame_folders.folder_of(guides.data))
+    assert len(set(folders)) == 2
+    bake(guides, 2)
+    if not is_stored:
+        guides.data.vellus.cache_identity = ""
+    for name in ("renamed.blend", "again.blend"):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / name))
+        assert frame_folders.folder_of(guides.data) == folders[1]
+    assert frame_folders.frames_of(guides.data).frame_numbers() == [1, 2, 3]
+
+
 def test_a_last_frame_before_the_first_is_refused(swung):
     guides, _hair = swung
     guides.data.vellus.dynamics.start_frame = 20
