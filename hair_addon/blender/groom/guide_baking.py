@@ -28,6 +28,7 @@ from .bake_resuming import Task
 
 SOLVER_VERSION = 2  # of all that frames follow from beside settings: raised when they come out otherwise
 STATE_FRAMES = 24  # between states
+_PARTING = "parting"  # a part of `key_of`
 _BEYOND = 1  # frames after the last one, for motion blur
 
 _baking = False
@@ -80,8 +81,25 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
         "units": scene.unit_settings.scale_length,
     }
     regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.present_depsgraph())
-    found = {"parting": regions, "wet places": wetness}
+    found = {_PARTING: regions, "wet places": wetness}
     return frame_manifest.digests_of(parts | {name: part for name, part in found.items() if part is not None})
+
+
+def changed_parts(guides: Curves, scene: Scene, manifest: Manifest) -> list[str]:
+    """The parts of `key_of` some guides that are otherwise than when their frames were baked. Raises `HairError`.
+
+    A part line that a deformed surface leaves behind divides guides otherwise in each frame. Nothing has changed while
+    the hair is parted as it was: guides are baked with the regions of their first frame.
+    """
+    now, baked = key_of(guides, scene), manifest.keys[-1]
+    changed = sorted(part for part in {*now, *baked} if now.get(part) != baked.get(part))
+    if _PARTING in changed and manifest.parted_by == _parted_by(guides) and not isinstance(_regions(guides), str):
+        changed.remove(_PARTING)
+    return changed
+
+
+def _parted_by(guides):
+    return frame_manifest.digest(guide_regions.parting_keys(guides))
 
 
 def _regions(guides):
@@ -171,7 +189,8 @@ def _begin(guides, last, scene, starts_over, stack):
     combed = guide_simulation.combed_points(guides)
     guide_count, point_count = combed.shape[:2]
     keys = (key_of(guides, scene),)
-    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout)
+    parted_by = _parted_by(guides)
+    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout, parted_by=parted_by)
     writer = stack.enter_context(frame_cache.baking(folder, manifest))
     guides_named, there = Remembered(guides), FrameCache(folder)
     numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}

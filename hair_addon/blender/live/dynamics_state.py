@@ -121,7 +121,7 @@ def _of_baked(manifest, guides, blender_scene):
     values = {"first": manifest.first, "last": manifest.last}
     if manifest.guide_count != len(guides.curves):
         return "The baked frames are of other guides: bake again", {}
-    if manifest.keys[-1] != guide_baking.key_of(guides, blender_scene):
+    if guide_baking.changed_parts(guides, blender_scene, manifest):
         return "Frames {first} to {last} are baked with other settings or guides: bake again", values
     change = _first_change(guides)
     if change is not None:

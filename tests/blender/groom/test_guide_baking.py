@@ -191,6 +191,40 @@ def test_a_moved_part_line_outdates_what_was_baked(swung):
     assert guide_baking.key_of(guides.data, bpy.context.scene) != key
 
 
+def test_a_part_line_that_the_deformed_surface_leaves_behind_outdates_nothing(swung):
+    """In a file that is opened in another frame, too; a line that is moved then does."""
+    guides, hair = swung
+    sphere = bpy.data.objects["Sphere"]
+    sphere.shape_key_add(name="Basis")
+    beside = sphere.shape_key_add(name="Beside")
+    for point in beside.data:
+        point.co.x += 0.6
+    for frame, value in ((1, 0.0), (6, 1.0)):
+        beside.value = value
+        beside.keyframe_insert("value", frame=frame)
+    sphere.animation_data_clear()
+    scene = bpy.context.scene
+    scene.frame_set(1)
+    line = draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
+    hair.data.vellus.hair.part_lines = "Line"
+    bpy.context.view_layer.update()
+    bake(guides, 6)
+    key = guide_baking.key_of(guides.data, scene)
+
+    def said_in(frame):
+        dynamics_state.state_cache.clear()
+        scene.frame_set(frame)
+        return dynamics_state.state_of(guides.data)[0]
+
+    for frame in (4, 6):
+        assert said_in(frame) == "Frames {first} to {last} are baked"
+    assert guide_baking.key_of(guides.data, scene) != key
+    assert bake(guides, 6).simulated == 0
+    line.location.x = -0.3
+    bpy.context.view_layer.update()
+    assert "with other settings or guides" in said_in(5)
+
+
 @pytest.mark.gate(id="V20")
 @pytest.mark.parametrize("is_parted", [True, False])
 def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
