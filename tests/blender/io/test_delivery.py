@@ -73,6 +73,7 @@ def largest_difference(some, others):
 
 @pytest.mark.gate(id="V23")
 def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_path):
+    """Also in what Blender's own exporter writes there."""
     set_up_camera()
     times = (0.75, 1.0, 1.25, 4.75, LAST + 0.25, LAST, 4.0)
     before, blurred = live(times), rendered(tmp_path / "live.png", 4)
@@ -84,8 +85,9 @@ def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_pat
     assert largest_difference(live(times), before) < 1e-6
     assert largest_difference(dict.fromkeys(times, before[4.0]), before) > 0.01
     bpy.ops.wm.save_mainfile()
-    found, picture = without_addon(tmp_path / "shot.blend", tmp_path, times)
+    found, picture, exported = without_addon(tmp_path / "shot.blend", tmp_path, times)
     assert largest_difference(found, before) < 1e-6
+    assert exported.keys() == {1.0, 4.0, LAST} and largest_difference(exported, before) < 1e-6
     assert abs(blurred - read_picture(picture)).max() <= 1.0 / 255.0 + 1e-6
     assert abs(blurred - sharp).max() > 0.05
 
