@@ -93,7 +93,7 @@ def _other_folders(guides, folder):
 
 
 def remember() -> None:
-    """Store in the open file where its frames are, before it is saved, maybe under another name: there they play too."""
+    """Store in the open file where its frames are, before it is saved: under another name they play, too."""
     for guides in simulating():
         baked = frames_of(guides)
         with contextlib.suppress(HairError):  # the folder leads nowhere

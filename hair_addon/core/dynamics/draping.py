@@ -36,7 +36,7 @@ def draped(
     """Guides (G, P, 3) [m] → (G, P, 3) float64 where they come to rest, or after some seconds if they do not before.
 
     mesh: the surface that they grow on and lie upon; gravity: [m/s²]; tell: called with the part that is done, and may
-    raise to stop; wetness: as `Simulation` takes it. Raises `HairError`, also where the surface cannot be collided with.
+    raise to stop; wetness: as `Simulation` takes it. Raises `HairError`, also for a surface that nothing collides with.
     """
     pose = RootPose(np.asarray(points[:, 0], np.float64), np.tile(rotations.IDENTITY, (len(points), 1)))
     surface = Obstacle(

@@ -32,8 +32,8 @@ def simulated(
     """Guides (G, P, 3) float32 [m] in each frame: first as they were combed, then one frame for each pose.
 
     mesh: the surface in the first frame; guides: `Strands` on it, that `require` lets pass; poses: (V, 3) [m] of its
-    vertices in the frames after; seconds: that a frame takes; gravity: [m/s²]; regions: as `Simulation` takes them. Raises
-    `HairError`.
+    vertices in the frames after; seconds: that a frame takes; gravity: [m/s²]; regions: as `Simulation` takes them.
+    Raises `HairError`.
     """
     surface = _Surface(mesh, guides, settings.size)
     groom = guides.numpy().astype(np.float64)
