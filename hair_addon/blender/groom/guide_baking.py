@@ -77,7 +77,7 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
         "settings": guide_simulation.unkeyed(guides, settings),
         "guides": guide_simulation.combed_points(guides),
         "surface": guides.vellus.topology,
-        "frame rate": scene.render.fps / scene.render.fps_base,
+        "frame rate": scene_time.animation_rate(scene),
         "units": scene.unit_settings.scale_length,
     }
     regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.present_depsgraph())
@@ -126,18 +126,19 @@ def baking(
     """
     global _baking
     memory.require(memory_of(guides_list))
-    present = scene_time.frame_of(scene)
+    present, its_scene = scene_time.frame_of(scene), Remembered(scene)
     _baking = True
     with contextlib.ExitStack() as stack:
-        stack.callback(_end, scene, present, [Remembered(guides) for guides in guides_list])
+        stack.callback(_end, its_scene, present, [Remembered(guides) for guides in guides_list])
         stack.enter_context(quiet_hair.unevaluated(guides_list, scene))
         tasks = [_begin(guides, last, scene, starts_over, stack) for guides in guides_list]
         yield Stage("Baking", 0.0)
-        yield from bake_resuming.going_on(tasks, scene)
+        yield from bake_resuming.going_on(tasks, its_scene)
         first = min((task.done for task in tasks), default=last)
         counts = [0] * len(tasks)
         for frame in range(first + 1, last + _BEYOND + 1):
             due = [(index, task) for index, task in enumerate(tasks) if task.done == frame - 1]
+            scene = its_scene.find()  # another one after an undo
             scene_time.go_to(scene, frame)
             depsgraph = scenes.present_depsgraph()
             inputs = [_read(task, scene, depsgraph) for _, task in due]
@@ -161,11 +162,14 @@ def _results(tasks, counts):
     return [(task, (count, task.broken)) for task, count in zip(tasks, counts, strict=True)]
 
 
-def _end(scene, present, baked):
+def _end(its_scene, present, baked):
     """Go back to the frame where the scene was; guides are shown there, as baked, after the next update."""
     global _baking
-    scene_time.go_to(scene, present)
-    _baking = False
+    try:
+        with contextlib.suppress(HairError):  # the scene was deleted meanwhile
+            scene_time.go_to(its_scene.find(), present)
+    finally:
+        _baking = False
     for remembered in baked:
         with contextlib.suppress(HairError):  # deleted meanwhile, by a script
             frame_folders.have_changed(remembered.find())
@@ -184,7 +188,7 @@ def _begin(guides, last, scene, starts_over, stack):
         frame_cache.remove(folder)
     scene_time.go_to(scene, start)
     simulated = guide_simulation.begin(guides, scene, scenes.present_depsgraph())
-    rate = scene.render.fps / scene.render.fps_base
+    rate = scene_time.animation_rate(scene)
     layout = array_file.layout_of(simulated.simulation.save())
     combed = guide_simulation.combed_points(guides)
     guide_count, point_count = combed.shape[:2]

@@ -87,7 +87,7 @@ def _first_change(guides):
 
 def _inputs(guides, blender_scene):
     """What `guide_baking.key_of` follows from, quickly read."""
-    state, rate = guides.vellus, blender_scene.render.fps / blender_scene.render.fps_base
+    state, rate = guides.vellus, scene_time.animation_rate(blender_scene)
     units = blender_scene.unit_settings.scale_length
     parted = guide_regions.parting_keys(guides)
     wet_places = () if shared_wetness.is_keyed(state) else tuple(shared_wetness.masked_styles(state))

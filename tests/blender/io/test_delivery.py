@@ -111,6 +111,18 @@ def rendered(path, frame):
     return read_picture(path)
 
 
+def test_hair_in_slow_motion_is_delivered_as_it_moves(shot):
+    """Where the animation takes longer, hair falls in the animation's time."""
+    scene = bpy.context.scene
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 250
+    run_now(guide_baking.baking([shot], LAST, scene))
+    times = (2.0, 3.75, float(LAST))
+    before = live(times)
+    deliver(shot)
+    assert largest_difference(live(times), before) < 1e-5  # time is rounded
+    assert largest_difference(dict.fromkeys(times, before[2.0]), before) > 0.01
+
+
 # Taken off.
 
 
