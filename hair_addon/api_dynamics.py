@@ -139,6 +139,7 @@ def simulate(
     *,
     frame_rate: float = 24.0,
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81),
+    regions: ArrayLike | None = None,
     **changes: Any,
 ) -> Iterator[np.ndarray]:
     """Simulate guides on a mesh of plain arrays that moves: a generator of (G, P, 3) float32 [m], one for each pose.
@@ -146,8 +147,9 @@ def simulate(
     poses: for each frame the vertices (V, 3) [m], read when the frame is asked for; guides: `Strands` on the first of
     them, as `distribute_guides` returns them, which come out first as they are; triangles: (F, 3) indices of vertices,
     wound so that normals point out. settings: `DynamicsSettings`; changes: its fields by name; frame_rate: poses a
-    second; gravity: [m/s²]. Raises `HairError` for what cannot be simulated, and later for a pose that has other
-    vertices, or non-finite ones.
+    second; gravity: [m/s²]; regions: (G,) whole numbers; guides of two of them do not rub or press on each
+    other, as beyond a parting; None for one. Raises `HairError` for what cannot be simulated, and later for a pose that
+    has other vertices, or non-finite ones.
 
     >>> import numpy as np
     >>> vertices = np.array([[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]], np.float32)
@@ -174,4 +176,16 @@ def simulate(
         raise HairError("poses has no frame: give the vertices that the guides were grown on.")
     mesh = mesh_of((first, triangles))
     dynamics.moving_mesh.require(mesh, guides)
-    return dynamics.moving_mesh.simulated(mesh, guides, coming, wanted, 1.0 / rate, (x, y, z))
+    parted = None if regions is None else _regions_of(regions, len(guides))
+    return dynamics.moving_mesh.simulated(mesh, guides, coming, wanted, 1.0 / rate, (x, y, z), regions=parted)
+
+
+def _regions_of(given, guide_count):
+    """(G,) int32 from 0. Raises `HairError`."""
+    try:
+        regions = np.asarray(given)
+    except (TypeError, ValueError):
+        regions = np.empty(0)
+    if regions.dtype.kind not in "iu" or regions.shape != (guide_count,):
+        raise HairError(f"regions must be whole numbers of shape ({guide_count},), one of each guide.")
+    return np.unique(regions, return_inverse=True)[1].astype(np.int32)

@@ -135,6 +135,8 @@ REFUSED = {
     "no frame rate": (lambda: simulate([np.eye(3)], frame_rate=0), "frame_rate must be"),
     "gravity of two numbers": (lambda: simulate([np.eye(3)], gravity=(0, 1)), "gravity needs 3 numbers"),
     "infinite gravity": (lambda: simulate([np.eye(3)], gravity=(0, 0, -math.inf)), "gravity must be"),
+    "regions of other guides": (lambda: simulate([np.eye(3)], regions=range(9)), "regions must be whole numbers"),
+    "regions with parts": (lambda: simulate([np.eye(3)], regions=[0.5]), "regions must be whole numbers"),
     "a collection for arrays": (lambda: simulate([np.eye(3)], colliders="Body"), "names a collection"),
     "dynamics of another class": (lambda: simulate([np.eye(3)], settings=api.Clump()), "settings must be"),
     "plots of none": (lambda: api.bake_tables("tables", has_plots=None, size=16), "has_plots must be True or False"),

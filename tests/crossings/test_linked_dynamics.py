@@ -137,3 +137,28 @@ def test_characters_of_files_with_one_name_have_frames_of_their_own(character, t
     bpy.ops.wm.open_mainfile(filepath=str(moved / "shot.blend"))
     for guides in frame_folders.simulating():
         assert frame_folders.frames_of(guides).frame_numbers() == [1, 2, 3]
+
+
+def test_shots_in_one_folder_have_frames_of_their_own(character, tmp_path):
+    """Also a shot that was saved from another one: it plays the frames of that one until it is baked itself."""
+    path, there = character
+    shutil.rmtree(path.parent / "haircache")
+    first = shot_of(path, tmp_path, "linked")
+    bake()
+    (guides,) = frame_folders.simulating()
+    folder = frame_folders.folder_of(guides)
+    kept = {file.name: file.read_bytes() for file in folder.iterdir()}
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "other.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "other.blend"))
+    (guides,) = frame_folders.simulating()
+    assert frame_folders.folder_of(guides) != folder
+    bpy.context.scene.frame_set(FRAME)
+    np.testing.assert_allclose(points(shown_hair()), there, atol=1e-6)
+    bpy.context.scene.gravity[2] = 3.0
+    bake()
+    bpy.context.scene.frame_set(FRAME)
+    assert np.abs(points(shown_hair()) - there).max() > 1e-3
+    assert {file.name: file.read_bytes() for file in folder.iterdir()} == kept
+    bpy.ops.wm.open_mainfile(filepath=str(first))
+    bpy.context.scene.frame_set(FRAME)
+    np.testing.assert_allclose(points(shown_hair()), there, atol=1e-6)

@@ -286,8 +286,37 @@ def disabled():
     yield from wait(0.5)
 
 
+def loaded():
+    """Another file is opened while it plays, and while it is baked."""
+    activate(of_kind("GUIDES"))
+    scene().frame_end = 1000
+    play()
+    yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
+    yield from go_on()
+    facts["load"] = {"while it plays": state_after_load()}
+    scene().frame_end = 1000
+    with in_viewport():
+        bpy.ops.vellus.bake_dynamics("INVOKE_DEFAULT")
+    yield from wait_for(lambda: len(frames()) > 4, 60.0)
+    yield from go_on()
+    facts["load"]["while it is baked"] = state_after_load()
+    play()
+    yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
+    stop()
+    facts["load"]["plays"] = scene().frame_current >= 6 and bool(np.isfinite(strands()).all())
+    with in_viewport():
+        bpy.ops.vellus.free_dynamics("EXEC_DEFAULT")
+
+
+def state_after_load():
+    """What is wrong after a file was opened: nothing is computed, and hair is where the file has it."""
+    blender = addon()
+    is_busy = blender.host.running.job() is not None or blender.groom.guide_baking.is_baking()
+    return [] if not is_busy and np.isfinite(strands()).all() else [state(), is_busy]
+
+
 PARTS = {"play": (hair_on_a_swinging_ball, played, jumped_back, undone), "bake": (baked, stopped)}
-PARTS["end"] = (deleted, disabled)
+PARTS["end"] = (loaded, deleted, disabled)
 
 
 def go_on():

@@ -111,3 +111,7 @@ def test_guides_are_deleted_while_they_play_and_come_back(dynamics):
 def test_the_addon_is_disabled_while_it_plays(dynamics):
     disable = dynamics.facts["disable"]
     assert disable["goes on"] and disable["are finite"] and disable["state"].startswith("Simulated up to frame")
+
+
+def test_another_file_is_opened_while_it_plays_and_while_it_is_baked(dynamics):
+    assert dynamics.facts["load"] == {"while it plays": [], "while it is baked": [], "plays": True}

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Delivered hair as a Blender without the add-on has it, in a process of its own."""
+"""Delivered hair as a Blender without the add-on has it, and as its exporter writes it, in a process of its own."""
 
 import os
 import subprocess
 import sys
 
+import bpy
 import numpy as np
 
 PROGRAM = """
@@ -26,14 +27,31 @@ for time in map(float, times):
 np.savez(out, **found)
 scene.render.filepath = out + ".png"
 bpy.ops.render.render(write_still=True)
+bpy.ops.wm.usd_export(filepath=out + ".usdc", export_animation=True)
 """
 
 
 def without_addon(path, folder, times):
-    """({time: (N, 3) float32} of the object Hair of a .blend, and a picture at the last time) in another process."""
+    """What another process finds of the object Hair of a .blend.
+
+    ({time: (N, 3) float32}, a picture at the last time, {frame: (N, 3)} as exported of those times that are frames).
+    """
     out = folder / "elsewhere.npz"
     words = [sys.executable, "-c", PROGRAM, str(path), str(out), *map(str, times)]
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
     subprocess.run(words, check=True, cwd=folder, env=environment, capture_output=True, timeout=300)
     with np.load(out) as found:
-        return {float(name): found[name] for name in found}, out.with_name(out.name + ".png")
+        points = {float(name): found[name] for name in found}
+    picture, stage = (out.with_name(out.name + ending) for ending in (".png", ".usdc"))
+    return points, picture, _exported(stage, [time for time in times if time == int(time)])
+
+
+def _exported(path, frames):
+    """{frame: (N, 3)} of the curves Hair of a USD file, in the coordinates of their object."""
+    bpy.utils.expose_bundled_modules()
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(path))
+    prim = next(p for p in stage.Traverse() if p.IsA(UsdGeom.BasisCurves) and p.GetName() == "Hair")
+    points = UsdGeom.BasisCurves(prim).GetPointsAttr()
+    return {frame: np.array(points.Get(frame)) for frame in frames}

@@ -11,6 +11,7 @@ import numpy as np
 from ...core.dynamics.collider_settings import ColliderSettings, contact_of
 from ...core.errors import HairError
 from ...core.files import frame_manifest
+from ...core.styling.strand_wetness import mean_amount
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, shared_wetness
 from . import curves, force_fields, scene, simulated_world
@@ -59,7 +60,7 @@ def _acting(guides, blender_scene, depsgraph, settings, metres):
     fields, _refused = force_fields.read(depsgraph, metres)
     keyed = [getattr(settings, name) for name in sorted(properties.keyed_dynamics_of(guides.vellus))]
     if shared_wetness.is_keyed(guides.vellus):
-        keyed += [style.is_on * style.amount for style in shared_wetness.masked_styles(guides.vellus)]
+        keyed += [style.is_on * mean_amount(style) for style in shared_wetness.masked_styles(guides.vellus)]
     acting_fields = [[_rounded(value) for value in asdict(one).values()] for one in fields]
     return [_rounded(gravity), colliders, acting_fields, [_rounded(value) for value in keyed]]
 

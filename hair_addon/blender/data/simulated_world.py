@@ -41,8 +41,7 @@ def read(blender_scene, depsgraph, settings, guide_pose, surface_object):
             continue
         obstacles.append(_obstacle(collider, vertices, triangles, settings, metres))
     fields, refused = force_fields.read(depsgraph, metres)
-    rate = blender_scene.render.fps / blender_scene.render.fps_base
-    time = scene_time.time_of(blender_scene) / rate
+    time = scene_time.time_of(blender_scene) / scene_time.animation_rate(blender_scene)
     return dynamics.simulation.World(gravity, tuple(obstacles), fields, time), errors + refused
 
 

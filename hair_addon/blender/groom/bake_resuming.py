@@ -50,13 +50,13 @@ def digest_of(guides: Curves, scene: Scene, settings: "guide_simulation.Dynamics
     return frame_animation.digest_of(guides, scene, scenes.present_depsgraph(), settings)
 
 
-def going_on(tasks: list[Task], scene: Scene) -> Work[None]:
+def going_on(tasks: list[Task], its_scene: Remembered) -> Work[None]:
     """Bring tasks, which have come to their first frames, to the last states that the frames lead to; work in steps."""
     kept = {id(task): task.done for task in tasks if task.last_number > task.done}
     frame, said = min(kept.values(), default=0), time.perf_counter()
     while kept:
         frame += 1
-        due = [task for task in tasks if kept.get(id(task)) == frame - 1]
+        due, scene = [task for task in tasks if kept.get(id(task)) == frame - 1], its_scene.find()
         if due:
             scene_time.go_to(scene, frame)
         for task in due:

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where the baked frames of guides are: a folder of theirs in the cache folder that they name."""
 
+import contextlib
 from collections.abc import Iterable
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from ...core.files import frame_cache, frame_manifest
 from ...core.files.frame_cache import FrameCache
 from ..data import attributes, delivered_hair
 from ..data.curves import followers
-from ..host import paths
+from ..host import paths, scene_time
 from ..host.caches import Cache
 from ..host.notices import name_of
 
@@ -22,28 +23,39 @@ folder_cache = Cache()  # session_uid of guide Curves → (folder, FrameCache): 
 def folder_of(guides: Curves) -> Path:
     """The folder of the frames of some guides, whether it exists or not. Raises `HairError` if it leads nowhere.
 
-    Of linked guides it is that of the file that links them: a shot has frames of its own.
+    Of linked guides it is that of the file that links them: a shot has frames of its own, also where others are saved
+    in the same folder.
     """
-    return frame_cache.folder_of(paths.resolve(guides.vellus.cache_folder), _identity_of(guides))
+    base = paths.resolve(guides.vellus.cache_folder)
+    return frame_cache.folder_of(base, _identity_of(guides, _file_seen_from(base)))
 
 
-def _identity_of(guides):
-    if attributes.is_from_library(guides):
-        return _identity_of_name(guides)  # what is stored is the library's
-    return guides.vellus.cache_identity or _identity_of_name(guides)
+def _identity_of(guides, file):
+    """The name of the folder of guides that a file, as `_file_seen_from` its parent, has baked."""
+    if attributes.is_from_library(guides):  # what is stored is the library's
+        linked_from = None if guides.library is None else paths.from_open_file(guides.library)
+        return _identity_of_names(name_of(guides), linked_from, file)
+    return guides.vellus.cache_identity or _identity_of_names(name_of(guides), None, file)
 
 
-def _identity_of_name(guides):
+def _identity_of_names(guides, library, file):
     """The same in every session of a file that was not saved since guides were baked, as by the command line."""
-    name = name_of(guides)
-    of = name if guides.library is None else [name, paths.from_open_file(guides.library)]
-    return frame_manifest.digest(of)[:16]
+    return frame_manifest.digest([guides, library, file])[:16]
+
+
+def _file_seen_from(base):
+    """The open file as seen from a folder of caches, so that both may be moved; "." if it was never saved."""
+    if not bpy.data.filepath:
+        return "."
+    file = Path(bpy.data.filepath)
+    return paths.relative(file.parent.resolve() / file.name, base)
 
 
 def frames_of(guides: Curves) -> FrameCache | None:
     """The baked frames of some guides, of which there may be none; None where their folder leads nowhere.
 
-    Linked guides that are not baked in this file have those that are baked in their library.
+    Linked guides that are not baked in this file have those of the file that it was saved from, or else of their
+    library.
     """
     known = folder_cache.get(guides.session_uid)
     try:
@@ -60,25 +72,49 @@ def _leads_somewhere(guides):
 
 
 def _read(guides, folder):
-    """The `FrameCache` of a folder; of the library's, where the folder has no frames, or None stands for it."""
+    """The `FrameCache` of a folder; another one that has frames, where the folder has none or None stands for it."""
     read = None if folder is None else FrameCache(folder)
-    if guides.library is None or (read is not None and read.manifest is not None):
+    if read is not None and read.manifest is not None:
         return read
-    base = paths.resolve(guides.vellus.cache_folder, guides.library)
-    of_library = FrameCache(
-        frame_cache.folder_of(base, guides.vellus.cache_identity or frame_manifest.digest(name_of(guides))[:16])
-    )
-    return read if of_library.manifest is None else of_library
+    others = map(FrameCache, _other_folders(guides, folder))
+    return next((other for other in others if other.manifest is not None), read)
+
+
+def _other_folders(guides, folder):
+    """Folders that guides have frames in before they are baked in this file; folder: `folder_of` them, or None."""
+    before = scene_time.present_scene().vellus.baked_in
+    if folder is not None and before and attributes.is_from_library(guides):
+        yield frame_cache.folder_of(folder.parent, _identity_of(guides, before))
+    if guides.library is not None:
+        base = paths.resolve(guides.vellus.cache_folder, guides.library)
+        file = paths.relative(paths.of_library(guides.library), base)
+        identity = guides.vellus.cache_identity or _identity_of_names(name_of(guides), None, file)
+        yield frame_cache.folder_of(base, identity)
+
+
+def remember() -> None:
+    """Store in the open file where its frames are, before it is saved: under another name they play, too."""
+    for guides in simulating():
+        baked = frames_of(guides)
+        with contextlib.suppress(HairError):  # the folder leads nowhere
+            if baked is None or baked.manifest is None or baked.folder != folder_of(guides):
+                continue
+            if not attributes.is_from_library(guides):
+                guides.vellus.cache_identity = baked.folder.name
+                continue
+            for scene in bpy.data.scenes:
+                if scene.library is None:
+                    scene.vellus.baked_in = _file_seen_from(baked.folder.parent)
 
 
 def new_folder(guides: Curves) -> Path:
     """The folder to bake some guides to: theirs, or a new one where they have none or share it with other guides."""
+    folder = folder_of(guides)
     if attributes.is_from_library(guides):
-        return folder_of(guides)
-    state = guides.vellus
+        return folder
     others = {other.vellus.cache_identity for other in bpy.data.hair_curves if other != guides} - {""}
-    identity = state.cache_identity or _identity_of_name(guides)
-    state.cache_identity = frame_cache.new_identity() if identity in others else identity
+    identity = folder.name
+    guides.vellus.cache_identity = frame_cache.new_identity() if identity in others else identity
     return folder_of(guides)
 
 

@@ -28,6 +28,7 @@ from .bake_resuming import Task
 
 SOLVER_VERSION = 2  # of all that frames follow from beside settings: raised when they come out otherwise
 STATE_FRAMES = 24  # between states
+_PARTING = "parting"  # a part of `key_of`
 _BEYOND = 1  # frames after the last one, for motion blur
 
 _baking = False
@@ -76,12 +77,29 @@ def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
         "settings": guide_simulation.unkeyed(guides, settings),
         "guides": guide_simulation.combed_points(guides),
         "surface": guides.vellus.topology,
-        "frame rate": scene.render.fps / scene.render.fps_base,
+        "frame rate": scene_time.animation_rate(scene),
         "units": scene.unit_settings.scale_length,
     }
     regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.present_depsgraph())
-    found = {"parting": regions, "wet places": wetness}
+    found = {_PARTING: regions, "wet places": wetness}
     return frame_manifest.digests_of(parts | {name: part for name, part in found.items() if part is not None})
+
+
+def changed_parts(guides: Curves, scene: Scene, manifest: Manifest) -> list[str]:
+    """The parts of `key_of` some guides that are otherwise than when their frames were baked. Raises `HairError`.
+
+    A part line that a deformed surface leaves behind divides guides otherwise in each frame. Nothing has changed while
+    the hair is parted as it was: guides are baked with the regions of their first frame.
+    """
+    now, baked = key_of(guides, scene), manifest.keys[-1]
+    changed = sorted(part for part in {*now, *baked} if now.get(part) != baked.get(part))
+    if _PARTING in changed and manifest.parted_by == _parted_by(guides) and not isinstance(_regions(guides), str):
+        changed.remove(_PARTING)
+    return changed
+
+
+def _parted_by(guides):
+    return frame_manifest.digest(guide_regions.parting_keys(guides))
 
 
 def _regions(guides):
@@ -108,18 +126,19 @@ def baking(
     """
     global _baking
     memory.require(memory_of(guides_list))
-    present = scene_time.frame_of(scene)
+    present, its_scene = scene_time.frame_of(scene), Remembered(scene)
     _baking = True
     with contextlib.ExitStack() as stack:
-        stack.callback(_end, scene, present, [Remembered(guides) for guides in guides_list])
+        stack.callback(_end, its_scene, present, [Remembered(guides) for guides in guides_list])
         stack.enter_context(quiet_hair.unevaluated(guides_list, scene))
         tasks = [_begin(guides, last, scene, starts_over, stack) for guides in guides_list]
         yield Stage("Baking", 0.0)
-        yield from bake_resuming.going_on(tasks, scene)
+        yield from bake_resuming.going_on(tasks, its_scene)
         first = min((task.done for task in tasks), default=last)
         counts = [0] * len(tasks)
         for frame in range(first + 1, last + _BEYOND + 1):
             due = [(index, task) for index, task in enumerate(tasks) if task.done == frame - 1]
+            scene = its_scene.find()  # another one after an undo
             scene_time.go_to(scene, frame)
             depsgraph = scenes.present_depsgraph()
             inputs = [_read(task, scene, depsgraph) for _, task in due]
@@ -143,11 +162,14 @@ def _results(tasks, counts):
     return [(task, (count, task.broken)) for task, count in zip(tasks, counts, strict=True)]
 
 
-def _end(scene, present, baked):
+def _end(its_scene, present, baked):
     """Go back to the frame where the scene was; guides are shown there, as baked, after the next update."""
     global _baking
-    scene_time.go_to(scene, present)
-    _baking = False
+    try:
+        with contextlib.suppress(HairError):  # the scene was deleted meanwhile
+            scene_time.go_to(its_scene.find(), present)
+    finally:
+        _baking = False
     for remembered in baked:
         with contextlib.suppress(HairError):  # deleted meanwhile, by a script
             frame_folders.have_changed(remembered.find())
@@ -166,12 +188,13 @@ def _begin(guides, last, scene, starts_over, stack):
         frame_cache.remove(folder)
     scene_time.go_to(scene, start)
     simulated = guide_simulation.begin(guides, scene, scenes.present_depsgraph())
-    rate = scene.render.fps / scene.render.fps_base
+    rate = scene_time.animation_rate(scene)
     layout = array_file.layout_of(simulated.simulation.save())
     combed = guide_simulation.combed_points(guides)
     guide_count, point_count = combed.shape[:2]
     keys = (key_of(guides, scene),)
-    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout)
+    parted_by = _parted_by(guides)
+    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout, parted_by=parted_by)
     writer = stack.enter_context(frame_cache.baking(folder, manifest))
     guides_named, there = Remembered(guides), FrameCache(folder)
     numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}

@@ -11,7 +11,7 @@ from ...core.geometry.mesh import TriMesh
 from ...core.grooming import cost
 from ...core.grooming.guide_tool_settings import DrapeSettings
 from ...core.long_work import Work, part_of, run_now
-from ..data import simulated_world
+from ..data import simulated_world, wet_guides
 from ..host.datablocks import Remembered
 from ..settings import preferences, properties
 from . import guide_simulation, guide_tools
@@ -37,22 +37,22 @@ def draping(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) ->
     metres = simulated_world.metres_of(blender_scene, dynamics_settings)
     dynamics_settings = guide_simulation.in_metres(dynamics_settings, metres)
     posed, surface = guides.posed(), guides.surface
+    wetness = wet_guides.of_guides(datablock, surface, depsgraph, {}, guides.roots)
     mesh = TriMesh(surface.posed_mesh.vertices * np.float32(metres), surface.posed_mesh.triangles)
     device, remembered, falling = preferences.device(), Remembered(datablock), guide_tools.to_shape(guides)
 
     def compute(progress):
         dynamics.draped_growth.load_kernels(device, part_of(progress, 0.0, 0.1))
         settled = []
-        for index, (_chosen, places) in enumerate(falling):
+        for index, (chosen, places) in enumerate(falling):
             own = part_of(progress, *(0.1 + 0.9 * part / len(falling) for part in (index, index + 1)))
 
             def tell(part, own=own):
                 own("Draping guides", part)
 
             points = metres * posed[places].astype(np.float64)
-            settled.append(
-                dynamics.draping.draped(points, mesh, dynamics_settings, gravity, settings.seconds, device, tell)
-            )
+            given = points, mesh, dynamics_settings, gravity, settings.seconds, device, tell
+            settled.append(dynamics.draping.draped(*given, wetness=None if wetness is None else wetness[chosen]))
         return settled
 
     settled = yield compute

@@ -158,8 +158,7 @@ def read(
     """
     pose = guide_poses.read(guides, depsgraph, simulated_world.metres_of(scene, settings))
     world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface)
-    rate = scene.render.fps / scene.render.fps_base
-    seconds = settings.time_scale / rate
+    seconds = settings.time_scale / scene_time.animation_rate(scene)
     wetness = wet_guides.of_guides(guides, pose.pose.surface, depsgraph, masks)
     return FrameInput(scene_time.frame_of(scene), settings, pose, world, seconds, wetness, tuple(errors))
 

@@ -13,7 +13,8 @@ class Remembered:
     def __init__(self, datablock):
         self._uid = None if datablock is None else datablock.session_uid
         self._name = None if datablock is None else name_of(datablock)
-        self._collection = "objects" if isinstance(datablock, bpy.types.Object) else "hair_curves"
+        kinds = {bpy.types.Object: "objects", bpy.types.Scene: "scenes"}
+        self._collection = kinds.get(type(datablock), "hair_curves")
 
     def find(self):
         """Return the datablock. Raises `HairError` if it was deleted."""

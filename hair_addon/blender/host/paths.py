@@ -34,9 +34,19 @@ def from_open_file(library):
     Absolute where there is none: the file was never saved, or the library is on another drive.
     """
     path = os.path.normpath(bpy.path.abspath(library.filepath))
-    if bpy.data.filepath:
-        with contextlib.suppress(ValueError):
-            path = os.path.relpath(path, os.path.dirname(bpy.data.filepath))
+    return relative(path, os.path.dirname(bpy.data.filepath)) if bpy.data.filepath else Path(path).as_posix()
+
+
+def of_library(library):
+    """The file of a `bpy.types.Library` as an absolute `Path`, in the folder that it is really in."""
+    file = Path(bpy.path.abspath(library.filepath))
+    return file.parent.resolve() / file.name
+
+
+def relative(path, folder):
+    """An absolute path as seen from a folder, with slashes; as it is where it is on another drive."""
+    with contextlib.suppress(ValueError):
+        path = os.path.relpath(path, folder)
     return Path(path).as_posix()
 
 

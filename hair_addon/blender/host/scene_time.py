@@ -16,8 +16,11 @@ def frame_of(blender_scene):
 
 
 def time_of(blender_scene):
-    """Return the current time of a scene in frames, between two of them while a render samples motion."""
-    return blender_scene.frame_current_final
+    """Return the current time of a scene in frames, between two of them while a render samples motion.
+
+    Frames are numbered as the timeline has them, also where the animation's time is remapped.
+    """
+    return blender_scene.frame_current + blender_scene.frame_subframe
 
 
 def present_frame():
@@ -51,6 +54,16 @@ def frame_rate(blender_scene):
     return blender_scene.render.fps / blender_scene.render.fps_base
 
 
+def remapping(blender_scene):
+    """Return the frames of the animation in a frame of a scene: below one in slow motion (Time Stretching)."""
+    return blender_scene.render.frame_map_old / blender_scene.render.frame_map_new
+
+
+def animation_rate(blender_scene):
+    """Return the frames of a scene in a second of its animation."""
+    return frame_rate(blender_scene) / remapping(blender_scene)
+
+
 def exposure_times(blender_scene, steps):
     """Return the times [frames] from a frame at which Cycles samples the motion of objects; [0.0] without motion blur.
 
@@ -75,7 +88,7 @@ def visit(blender_scene, offsets, set_frame):
         whole = math.floor(moment)
         set_frame(whole, subframe=moment - whole)
 
-    now = blender_scene.frame_current_final
+    now = time_of(blender_scene)
     try:
         for index, offset in enumerate(offsets):
             if offset != 0.0 or any(offsets[:index]):

@@ -63,9 +63,9 @@ def delivering(guides, path, blender_scene):
     hair_file.require_ours(path)
     require_place(path)
     times = _times(blender_scene, frames, chosen)
-    present = scene_time.time_of(blender_scene)
+    present, its_scene, its_guides = scene_time.time_of(blender_scene), Remembered(blender_scene), Remembered(guides)
     with contextlib.ExitStack() as stack:
-        stack.callback(go_to, blender_scene, present)
+        stack.callback(_go_back, its_scene, present)
         tasks = [_begin(hair, stack) for hair in chosen]
         units = scene_time.frame_rate(blender_scene), strand_arrays.metres_per_unit(blender_scene)
         yield Stage("Delivering", 0.0)
@@ -74,14 +74,16 @@ def delivering(guides, path, blender_scene):
                 for task in tasks:
                     task.path = file.add(name_of(task.hair.find()), task.counts)
                 for index, time in enumerate(times):
+                    blender_scene = its_scene.find()  # another one after an undo
                     go_to(blender_scene, time)
-                    require_shown(guides, time)
+                    require_shown(its_guides.find(), time)
                     read = [_read(task, time) for task in tasks]
-                    yield _writing(file, tasks, read, time, index / len(times))
+                    in_file = time * scene_time.remapping(blender_scene)  # Blender reads it at the animation's time
+                    yield _writing(file, tasks, read, in_file, (f"Frame {time:g}", index / len(times)))
             byte_count = partial.stat().st_size
             delivered_hair.close_files(path)
     cache_file = delivered_hair.open_file(path)
-    key = frame_folders.frames_of(guides).manifest.key
+    key = frame_folders.frames_of(its_guides.find()).manifest.key
     for task in tasks:
         hair = task.hair.find()
         delivered_hair.deliver(hair, cache_file, task.path)
@@ -142,6 +144,11 @@ def _remove(remembered):
         bpy.data.objects.remove(remembered.find())
 
 
+def _go_back(its_scene, time):
+    with contextlib.suppress(HairError):  # the scene was deleted meanwhile
+        go_to(its_scene.find(), time)
+
+
 def go_to(blender_scene, time):
     """Change the time, and let hair follow as it does without a long operation."""
     with running.set_aside():
@@ -175,11 +182,11 @@ def _read(task, time):
     return points, curves.read_radii(evaluated.data), np.array(evaluated.matrix_world)
 
 
-def _writing(file, tasks, read, time, part):
-    """A function of (progress) that writes the samples of one time."""
+def _writing(file, tasks, read, time, told):
+    """A function of (progress) that writes the samples of one time in the file; told: what progress is called with."""
 
     def write(progress):
-        progress(f"Frame {time:g}", part)
+        progress(*told)
         for task, sample in zip(tasks, read, strict=True):
             file.write(time, task.path, *sample)
         file.save(time)

@@ -76,11 +76,9 @@ def _changed_parts(guides, manifest):
     if manifest.guide_count != len(guides.curves):
         return ["guides"]
     try:
-        present = guide_baking.key_of(guides, scene_time.present_scene())
+        return guide_baking.changed_parts(guides, scene_time.present_scene(), manifest)
     except HairError as error:
         return [str(error)]
-    baked = manifest.keys[-1]
-    return sorted(part for part in {*present, *baked} if present.get(part) != baked.get(part))
 
 
 def _hair(datablock):

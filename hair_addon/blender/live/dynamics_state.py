@@ -87,7 +87,7 @@ def _first_change(guides):
 
 def _inputs(guides, blender_scene):
     """What `guide_baking.key_of` follows from, quickly read."""
-    state, rate = guides.vellus, blender_scene.render.fps / blender_scene.render.fps_base
+    state, rate = guides.vellus, scene_time.animation_rate(blender_scene)
     units = blender_scene.unit_settings.scale_length
     parted = guide_regions.parting_keys(guides)
     wet_places = () if shared_wetness.is_keyed(state) else tuple(shared_wetness.masked_styles(state))
@@ -121,7 +121,7 @@ def _of_baked(manifest, guides, blender_scene):
     values = {"first": manifest.first, "last": manifest.last}
     if manifest.guide_count != len(guides.curves):
         return "The baked frames are of other guides: bake again", {}
-    if manifest.keys[-1] != guide_baking.key_of(guides, blender_scene):
+    if guide_baking.changed_parts(guides, blender_scene, manifest):
         return "Frames {first} to {last} are baked with other settings or guides: bake again", values
     change = _first_change(guides)
     if change is not None:

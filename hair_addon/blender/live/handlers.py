@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..data import curves_objects
-from ..groom import bindings, pipeline
+from ..groom import bindings, frame_folders, pipeline
 from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
@@ -189,6 +189,12 @@ def before_reading(*_args):
 
 
 @persistent
+def before_saving(*_args):
+    """Store in the file what it is known by under another name."""
+    frame_folders.remember()
+
+
+@persistent
 def after_load(*_args):
     """Hair in a file is up to date; without a window Blender reports no update of it."""
     global _is_opening, _is_undone
@@ -241,6 +247,7 @@ _HANDLERS = (
     (bpy.app.handlers.frame_change_post, after_frame_change),
     (bpy.app.handlers.animation_playback_post, after_playing),
     (bpy.app.handlers.save_pre, before_reading),
+    (bpy.app.handlers.save_pre, before_saving),
     (bpy.app.handlers.render_init, before_reading),
     (bpy.app.handlers.render_complete, after_render),
     (bpy.app.handlers.render_cancel, after_render),

@@ -53,13 +53,22 @@ def follow_frame(blender_scene, depsgraph):
             if points is None and is_played and time == int(time):
                 points = _play(guides, blender_scene, depsgraph)
             _show(guides, points, shown_in)
-            _note_state(guides, blender_scene)
-            if points is not None or played_cache.get(guides.session_uid) is not None:
-                guides.vellus.dynamics_status = ""
         except HairError as error:
             played_cache.invalidate(guides.session_uid)
             _show(guides, None, shown_in)
             guides.vellus.dynamics_status = str(error)
+        else:
+            _say(guides, blender_scene, points)
+
+
+def _say(guides, blender_scene, points):
+    """Say what is known of guides, which are shown at some points; or what is wrong with their settings."""
+    try:
+        _note_state(guides, blender_scene)
+        if points is not None or played_cache.get(guides.session_uid) is not None:
+            guides.vellus.dynamics_status = ""
+    except HairError as error:
+        guides.vellus.dynamics_status = str(error)
 
 
 def follow_settings(blender_scene, depsgraph):

@@ -271,6 +271,9 @@ class VellusRenderSettings(bpy.types.PropertyGroup):
         "hair_scene": bpy.props.PointerProperty(
             description="Scene that renders the hair", type=bpy.types.Scene, options={"HIDDEN"}
         ),
+        "baked_in": bpy.props.StringProperty(
+            description="File that the frames of linked guides were baked in", options={"HIDDEN"}
+        ),
     }
 
 

@@ -9,6 +9,7 @@ import bpy
 
 from ...core.styling.base import has_effect
 from ...core.styling.program import mask_key
+from ...core.styling.strand_wetness import mean_amount
 from . import setting_properties, style_items, style_keys
 
 
@@ -21,22 +22,27 @@ def of_hair(state):
 
 
 def of_guides(state):
-    """The wetness that guides move with: that of their wettest hair, or their own where that is more."""
-    return max([_value(state.dynamics), *(of_hair(hair.vellus)[1] for hair in _followers(state))])
+    """The wetness of the wettest guides: that of their wettest hair, or their own where that is more.
+
+    A guide is as wet as the strands around it on the mean, where variation leaves some with less. Raises `HairError`.
+    """
+    return _wettest(state, _wet_styles(state))
 
 
 def evenly_of_guides(state):
-    """The wetness that all guides have at least: what masks do not keep from them."""
-    styles = [style for style in _wet_styles(state) if mask_key(style) is None and has_effect(style)]
+    """The wetness that all guides have at least: what masks do not keep from them. Raises `HairError`."""
+    return _wettest(state, [style for style in _wet_styles(state) if mask_key(style) is None])
+
+
+def _wettest(state, styles):
+    """The largest wetness of dynamics, of the looks of hair, and of some styles."""
     looks = [_value(hair.vellus.appearance) for hair in _followers(state)]
-    return max([_value(state.dynamics), *looks, *(style.amount for style in styles)])
+    amounts = [mean_amount(style) for style in styles if has_effect(style)]
+    return setting_properties.shortest(max([_value(state.dynamics), *looks, *amounts]))
 
 
 def masked_styles(state):
-    """The settings of the Wet styles with a mask of the hair of some guides, disabled ones too: it counts for guides.
-
-    Variation does not: it is between the strands around a guide. Raises `HairError`.
-    """
+    """The settings of the Wet styles with a mask of the hair of some guides, disabled ones too. Raises `HairError`."""
     return [style for style in _wet_styles(state) if mask_key(style) is not None]
 
 
@@ -78,5 +84,5 @@ def is_keyed(state):
 
 def _is_keyed_of_hair(hair):
     paths = style_keys.keyed_paths(hair)
-    ends = (".wet.amount", ".wet.is_on")
+    ends = (".wet.amount", ".wet.is_on", ".wet.vary")
     return any(path == "vellus.appearance.wetness" or path.endswith(ends) for path in paths)

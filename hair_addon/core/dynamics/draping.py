@@ -30,11 +30,13 @@ def draped(
     seconds: float,
     device: wp.DeviceLike = None,
     tell: Callable[[float], None] = lambda _part: None,
+    *,
+    wetness: np.ndarray | None = None,
 ) -> np.ndarray:
     """Guides (G, P, 3) [m] → (G, P, 3) float64 where they come to rest, or after some seconds if they do not before.
 
     mesh: the surface that they grow on and lie upon; gravity: [m/s²]; tell: called with the part that is done, and may
-    raise to stop. Raises `HairError`, also where the surface cannot be collided with.
+    raise to stop; wetness: as `Simulation` takes it. Raises `HairError`, also for a surface that nothing collides with.
     """
     pose = RootPose(np.asarray(points[:, 0], np.float64), np.tile(rotations.IDENTITY, (len(points), 1)))
     surface = Obstacle(
@@ -53,7 +55,7 @@ def draped(
         substeps=min(settings.substeps * _FRAMES, MOST_SUBSTEPS),
     )
     tell(0.0)
-    simulation = Simulation(points, falling, pose, world, device)
+    simulation = Simulation(points, falling, pose, world, device, wetness=wetness)
     for note in simulation.notes:
         raise HairError("Guides cannot be draped on this surface: {cause}.", cause=note.values["cause"])
     before, count = simulation.vertices(), max(round(seconds / FRAME), 1)

@@ -26,11 +26,14 @@ def simulated(
     seconds: float,
     gravity: tuple[float, float, float],
     device: wp.DeviceLike = None,
+    *,
+    regions: np.ndarray | None = None,
 ) -> Iterator[np.ndarray]:
     """Guides (G, P, 3) float32 [m] in each frame: first as they were combed, then one frame for each pose.
 
     mesh: the surface in the first frame; guides: `Strands` on it, that `require` lets pass; poses: (V, 3) [m] of its
-    vertices in the frames after; seconds: that a frame takes; gravity: [m/s²]. Raises `HairError`.
+    vertices in the frames after; seconds: that a frame takes; gravity: [m/s²]; regions: as `Simulation` takes them.
+    Raises `HairError`.
     """
     surface = _Surface(mesh, guides, settings.size)
     groom = guides.numpy().astype(np.float64)
@@ -46,7 +49,7 @@ def simulated(
 
     start, seconds = surface.pose(mesh.vertices), seconds * settings.time_scale
     at_first = world(mesh.vertices, 0)
-    simulation = Simulation(settings.size * groom, scaled, start, at_first, device)
+    simulation = Simulation(settings.size * groom, scaled, start, at_first, device, regions=regions)
     for _ in range(settings.preroll):
         simulation.advance(start, at_first, seconds)
     yield guides.numpy().copy()

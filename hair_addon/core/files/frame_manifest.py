@@ -41,7 +41,8 @@ class Manifest:
 
     keys: for each simulation that frames here may be of, {part: digest of it} (`digests_of`); the last is what is
     baked now. guide_count, point_count: of each frame; state_layout: the arrays of a state. notes: (name, reason) of
-    who was left out. Raises `HairError` for values that no simulation has.
+    who was left out; parted_by: digest of what parts the hair between guides. Raises `HairError` for values that no
+    simulation has.
     """
 
     keys: tuple[Mapping[str, str], ...]
@@ -53,6 +54,7 @@ class Manifest:
     state: str = "part"  # one of `STATES`
     state_layout: array_file.Layout = field(default_factory=dict)
     notes: tuple[tuple[str, str], ...] = ()
+    parted_by: str = ""
 
     def __post_init__(self) -> None:
         if not (0 < self.guide_count <= MOST_GUIDES and 2 <= self.point_count <= MOST_POINTS):
@@ -162,6 +164,7 @@ def _from_json(found):
     for name in ("guide_count", "point_count", "first", "last"):
         _require(found[name], int)
     _require(found["state"], str)
+    _require_text(found["parted_by"])
     if type(found["fps"]) is int:
         found["fps"] = float(found["fps"]) if abs(found["fps"]) < 2**53 else math.inf
     _require(found["fps"], float)

@@ -33,6 +33,11 @@ def of_strands(
     return found
 
 
+def mean_amount(style: StyleSettings) -> float:
+    """The amount that strands take of a style on the mean, where no mask lessens it: h is uniform in [0, 1)."""
+    return style.amount * (1.0 - 0.5 * style.vary)
+
+
 def _soaking(styles):
     return [style for style in styles if isinstance(style, wet.Settings) and has_effect(style)]
 

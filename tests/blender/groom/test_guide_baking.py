@@ -191,6 +191,40 @@ def test_a_moved_part_line_outdates_what_was_baked(swung):
     assert guide_baking.key_of(guides.data, bpy.context.scene) != key
 
 
+def test_a_part_line_that_the_deformed_surface_leaves_behind_outdates_nothing(swung):
+    """In a file that is opened in another frame, too; a line that is moved then does."""
+    guides, hair = swung
+    sphere = bpy.data.objects["Sphere"]
+    sphere.shape_key_add(name="Basis")
+    beside = sphere.shape_key_add(name="Beside")
+    for point in beside.data:
+        point.co.x += 0.6
+    for frame, value in ((1, 0.0), (6, 1.0)):
+        beside.value = value
+        beside.keyframe_insert("value", frame=frame)
+    sphere.animation_data_clear()
+    scene = bpy.context.scene
+    scene.frame_set(1)
+    line = draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
+    hair.data.vellus.hair.part_lines = "Line"
+    bpy.context.view_layer.update()
+    bake(guides, 6)
+    key = guide_baking.key_of(guides.data, scene)
+
+    def said_in(frame):
+        dynamics_state.state_cache.clear()
+        scene.frame_set(frame)
+        return dynamics_state.state_of(guides.data)[0]
+
+    for frame in (4, 6):
+        assert said_in(frame) == "Frames {first} to {last} are baked"
+    assert guide_baking.key_of(guides.data, scene) != key
+    assert bake(guides, 6).simulated == 0
+    line.location.x = -0.3
+    bpy.context.view_layer.update()
+    assert "with other settings or guides" in said_in(5)
+
+
 @pytest.mark.gate(id="V20")
 @pytest.mark.parametrize("is_parted", [True, False])
 def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
@@ -239,6 +273,25 @@ def test_a_copy_bakes_to_a_folder_of_its_own(swung):
     assert {name: data for name, data in files_of(copy).items() if "state" not in name}.keys() == {
         name for name in files_of(guides) if "state" not in name
     }
+
+
+@pytest.mark.parametrize("is_stored", [True, False])
+def test_files_in_one_folder_have_frames_of_their_own(swung, tmp_path, is_stored):
+    """Guides of one name; a file that is saved under another name keeps its frames, also those of the command line."""
+    guides, _hair = swung
+    guides.data.vellus.cache_folder = "//frames"
+    folders = []
+    for name in ("one.blend", "other.blend"):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / name))
+        folders.append(frame_folders.folder_of(guides.data))
+    assert len(set(folders)) == 2
+    bake(guides, 2)
+    if not is_stored:
+        guides.data.vellus.cache_identity = ""
+    for name in ("renamed.blend", "again.blend"):
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / name))
+        assert frame_folders.folder_of(guides.data) == folders[1]
+    assert frame_folders.frames_of(guides.data).frame_numbers() == [1, 2, 3]
 
 
 def test_a_last_frame_before_the_first_is_refused(swung):

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.groom import frame_folders, guide_baking, guide_draping
+from hair_addon.core.grooming.guide_tool_settings import DrapeSettings
 from hair_addon.core.long_work import run_now
+from tests.support.reading import points, write_points
 from tests.support.swung import simulate, swing
 
 LAST = 6
@@ -57,6 +59,52 @@ def test_guides_are_wet_where_the_mask_is(hair, swung):
     np.testing.assert_array_equal(baked(swung)[dry_side], wet[dry_side])
     swung.data.vellus.dynamics.wetness = 1.0  # of all
     np.testing.assert_array_equal(baked(swung), wet)
+
+
+def test_guides_are_as_wet_as_their_strands_on_the_mean(hair, swung):
+    """With a variation, everywhere and where the mask is; keys of it are the animation's."""
+    wet_side, dry_side = sides(swung)
+    swung.data.vellus.dynamics.wetness = 0.5
+    half = baked(swung)
+    swung.data.vellus.dynamics.wetness = 0.0
+    dry = baked(swung)
+    api.add_style(hair, api.Wet(lock=0.1, vary=1.0))
+    np.testing.assert_array_equal(baked(swung), half)
+    paint(1.0)
+    style = hair.data.vellus.styles[0].wet
+    style.mask = "rain"
+    there = baked(swung)
+    np.testing.assert_array_equal(there[wet_side], half[wet_side])
+    np.testing.assert_array_equal(there[dry_side], dry[dry_side])
+    key = guide_baking.key_of(swung.data, bpy.context.scene)
+    style.vary = 0.5
+    assert guide_baking.key_of(swung.data, bpy.context.scene) != key
+    style.keyframe_insert("vary", frame=1)
+    keyed = guide_baking.key_of(swung.data, bpy.context.scene)
+    style.vary = 1.0
+    assert guide_baking.key_of(swung.data, bpy.context.scene) == keyed
+
+
+def test_draped_guides_are_as_wet_as_the_mask_says(hair, swung):
+    """Wet guides sink lower."""
+    wet_side, dry_side = sides(swung)
+
+    def draped():
+        before = points(swung)
+        guide_draping.drape(swung.data, DrapeSettings(seconds=0.5), bpy.context.evaluated_depsgraph_get())
+        found = points(swung)
+        write_points(swung, before)
+        return found
+
+    dry = draped()
+    api.add_style(hair, api.Wet(lock=0.1))
+    wet = draped()
+    paint(1.0)
+    hair.data.vellus.styles[0].wet.mask = "rain"
+    there = draped()
+    np.testing.assert_array_equal(there[wet_side], wet[wet_side])
+    np.testing.assert_array_equal(there[dry_side], dry[dry_side])
+    assert np.abs(wet - dry).max(axis=(1, 2))[dry_side].min() > 1e-5
 
 
 def test_baked_frames_follow_from_the_mask(hair, swung):

@@ -73,6 +73,7 @@ def largest_difference(some, others):
 
 @pytest.mark.gate(id="V23")
 def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_path):
+    """Also in what Blender's own exporter writes there."""
     set_up_camera()
     times = (0.75, 1.0, 1.25, 4.75, LAST + 0.25, LAST, 4.0)
     before, blurred = live(times), rendered(tmp_path / "live.png", 4)
@@ -84,8 +85,9 @@ def test_a_blender_without_the_addon_has_the_same_hair_and_picture(shot, tmp_pat
     assert largest_difference(live(times), before) < 1e-6
     assert largest_difference(dict.fromkeys(times, before[4.0]), before) > 0.01
     bpy.ops.wm.save_mainfile()
-    found, picture = without_addon(tmp_path / "shot.blend", tmp_path, times)
+    found, picture, exported = without_addon(tmp_path / "shot.blend", tmp_path, times)
     assert largest_difference(found, before) < 1e-6
+    assert exported.keys() == {1.0, 4.0, LAST} and largest_difference(exported, before) < 1e-6
     assert abs(blurred - read_picture(picture)).max() <= 1.0 / 255.0 + 1e-6
     assert abs(blurred - sharp).max() > 0.05
 
@@ -107,6 +109,18 @@ def rendered(path, frame):
     scene.render.filepath = str(path)
     bpy.ops.render.render(write_still=True)
     return read_picture(path)
+
+
+def test_hair_in_slow_motion_is_delivered_as_it_moves(shot):
+    """Where the animation takes longer, hair falls in the animation's time."""
+    scene = bpy.context.scene
+    scene.render.frame_map_old, scene.render.frame_map_new = 100, 250
+    run_now(guide_baking.baking([shot], LAST, scene))
+    times = (2.0, 3.75, float(LAST))
+    before = live(times)
+    deliver(shot)
+    assert largest_difference(live(times), before) < 1e-5  # time is rounded
+    assert largest_difference(dict.fromkeys(times, before[2.0]), before) > 0.01
 
 
 # Taken off.

@@ -181,6 +181,29 @@ def test_frames_may_be_negative(swung):
     np.testing.assert_array_equal(simulated_guides.point_cache.get(guides.data.session_uid), fallen)
 
 
+def test_slow_motion_is_the_same_motion(swung):
+    """Time stretched to twice as many frames, of half as many substeps; baked frames too."""
+    guides, hair = swung
+    dynamics = guides.data.vellus.dynamics
+    dynamics.automatic_substeps, dynamics.sag_free, dynamics.substeps = False, False, 8
+    bpy.data.objects["Sphere"].animation_data_clear()
+    falls = played(guides, 1, 6)
+    dynamics.substeps = 4
+    render = bpy.context.scene.render
+    render.frame_map_old, render.frame_map_new = 100, 200
+    np.testing.assert_array_equal(played(guides, 1, 11), falls)
+    run_now(guide_baking.baking([guides.data], 11, bpy.context.scene))
+    for frame in (3, 11):
+        bpy.context.scene.frame_set(frame)
+    np.testing.assert_array_equal(simulated_guides.point_cache.get(guides.data.session_uid), falls)
+    shown = drawn(hair)
+    bpy.context.scene.frame_set(5)
+    assert np.abs(drawn(hair) - shown).max() > 0.01
+    render.frame_map_new = 100
+    bpy.context.scene.frame_set(6)
+    assert "with other settings" in dynamics_state.state_of(guides.data)[0]
+
+
 def test_skipped_frames_are_not_simulated(swung):
     """As with a frame step, or where Blender drops frames: what is known stays shown."""
     guides, _hair = swung

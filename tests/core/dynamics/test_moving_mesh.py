@@ -70,6 +70,26 @@ def test_a_model_of_another_size_moves_as_its_original_does(guides):
     np.testing.assert_allclose([*found][-1] / 8.0, simulated(guides, poses, settings)[-1], atol=1e-6)
 
 
+def test_guides_do_not_feel_those_of_another_region(guides):
+    """Where these are combed does not matter, but for the rounding of sums in mean masses."""
+    is_left = guides.numpy()[:, 0, 0] < 0.0
+    bent = guides.numpy().copy()
+    bent[~is_left] += np.float32([0.0, 0.0, -0.02]) * np.linspace(0.0, 1.0, 41, dtype=np.float32)[:, None]
+    motions = [turned(0.2 * frame) for frame in range(1, 5)]
+    poses = [np.float32(motion.moved(BALL.vertices.astype(np.float64))) for motion in motions]
+
+    def ends(regions):
+        """How far guides of the left end from where they do with the others combed otherwise."""
+        changes = {"regions": regions, "hair_friction": 50.0, "cell_size": 0.2, "vertex_count": 9}
+        one, other = (
+            [*api.simulate([BALL.vertices, *poses], BALL.triangles, combed, **changes)][-1]
+            for combed in (guides, guides.moved(bent))
+        )
+        return abs(one - other)[is_left].max()
+
+    assert ends(7 * is_left) < 1e-5 < 1e-4 < ends(None)
+
+
 def test_poses_are_read_as_they_are_asked_for(guides):
     def poses():
         yield BALL.vertices

@@ -189,6 +189,32 @@ def test_guides_without_length_follow_rigidly(rng):
     np.testing.assert_allclose(points[3], np.tile(shake(8).moved(groom[3, 0]), (41, 1)), atol=1e-6)
 
 
+def test_a_strand_that_breaks_in_ten_frames_running_stays_in_its_groom(rng):
+    """To the end, where the surface carries it; the others move as without it."""
+    groom, pose = fur(rng)
+    simulation, sound = (Simulation(groom, DynamicsSettings(), pose, World(), DEVICE) for _ in range(2))
+    for frame in range(1, 12):
+        state = simulation.save()
+        if frame <= 10:
+            state["rods_velocities"][5, 20] = np.nan
+        motion = shake(frame)
+        simulation.load(state, simulation.pose, simulation.world)
+        for one in (simulation, sound):
+            one.advance(pose.moved(motion), World(), FRAME)
+        assert list(simulation.broken) == [5]
+    points = simulation.points()
+    np.testing.assert_allclose(points[5], motion.moved(groom[5]), atol=1e-6)
+    assert np.isfinite(points).all() and abs(sound.points()[5] - motion.moved(groom[5])).max() > 1e-3
+
+
+@pytest.mark.parametrize("strength", [1e9, -1e9])
+def test_absurd_gravity_leaves_hair_finite(rng, strength):
+    groom, pose = fur(rng)
+    simulation = Simulation(groom, DynamicsSettings(sag_free=False), pose, World(), DEVICE)
+    points = play(simulation, pose, range(1, 6), (0.0, strength, strength))
+    assert np.isfinite(points).all() and np.linalg.norm(points - points[:, :1], axis=2).max() < 2.0 * LENGTH
+
+
 @pytest.mark.parametrize("seconds", [np.nan, np.inf, -1.0])
 def test_time_that_does_not_go_on_changes_nothing(rng, seconds):
     groom, pose = fur(rng)

@@ -72,3 +72,9 @@ def test_the_wettest_style_counts(hair):
     found = hair.bound(low, PLACES, inputs=inputs).wetness()
     np.testing.assert_array_equal(found, hair.bound(PLACES, low, inputs=inputs).wetness())
     assert set(found.round(6)) == {np.float32(0.4), np.float32(1.0)}
+
+
+def test_the_mean_amount_is_that_of_many_strands():
+    varied = replace(VARIED, amount=0.8)
+    found = strand_wetness.of_strands([varied], {}, np.arange(100_000, dtype=np.int32))
+    assert abs(found.mean() - strand_wetness.mean_amount(varied)) < 0.002

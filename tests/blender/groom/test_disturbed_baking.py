@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What happens to guides, the scene and settings while frames are baked: baking goes on, or ends with one sentence."""
+
+import math
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.core.errors import HairError
+from hair_addon.core.long_work import run_now
+from tests.support.reading import points
+from tests.support.swung import simulate, swing
+
+LAST, PRESENT = 8, 3
+
+
+@pytest.fixture
+def guides(hair, tmp_path):
+    """Guides that swing; the scene is at a frame of its own."""
+    guides = bpy.data.objects["Guides"]
+    swing(bpy.data.objects["Sphere"])
+    simulate(guides, tmp_path / "frames")
+    bpy.context.scene.frame_set(PRESENT)
+    return guides
+
+
+def bake(guides, disturb=lambda: None, at=4):
+    """Bake, and do something when a frame was written."""
+    told = []
+
+    def tell(frame):
+        told.append(frame.frame)
+        if frame.frame == at:
+            disturb()
+
+    return run_now(guide_baking.baking([guides.data], LAST, bpy.context.scene, tell=tell)), told
+
+
+def rename():
+    bpy.data.objects["Guides"].name = bpy.data.hair_curves["Guides"].name = "Renamed"
+
+
+def duplicate():
+    bpy.context.scene.collection.objects.link(bpy.data.objects["Guides"].copy())
+    bpy.data.hair_curves["Guides"].copy().use_fake_user = True
+
+
+def undo():
+    bpy.ops.ed.undo_push(message="One")
+    bpy.ops.ed.undo_push(message="Other")
+    assert bpy.ops.ed.undo() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("disturb", [rename, duplicate, undo])
+def test_baking_goes_on_to_the_same_frames(guides, disturb):
+    bake(guides)
+    folder = frame_folders.folder_of(guides.data)
+    whole = {path.name: path.read_bytes() for path in folder.glob("*.npz")}
+    guides.data.vellus.dynamics.damping = 0.1
+    bake(guides)
+    guides.data.vellus.dynamics.damping = 0.005
+    bpy.ops.ed.undo_push(message="Before")
+    (_baked,), told = bake(guides, disturb)
+    assert told == list(range(2, LAST + 2))
+    assert {path.name: path.read_bytes() for path in folder.glob("*.npz")} == whole
+    assert bpy.context.scene.frame_current == PRESENT
+
+
+def delete():
+    bpy.data.hair_curves.remove(bpy.data.hair_curves["Guides"])
+
+
+def lose_faces():
+    bpy.data.objects["Sphere"].data.clear_geometry()
+
+
+def set_to_no_number():
+    bpy.data.hair_curves["Guides"].vellus.dynamics.hold = math.nan
+
+
+@pytest.mark.parametrize(
+    ("disturb", "sentence"), [(delete, "deleted"), (lose_faces, "Sphere|surface"), (set_to_no_number, "Hold must be")]
+)
+def test_baking_ends_with_a_sentence_and_keeps_its_frames(guides, disturb, sentence):
+    folder = frame_folders.folder_of(guides.data)
+    with pytest.raises(HairError, match=sentence):
+        bake(guides, disturb)
+    assert bpy.context.scene.frame_current == PRESENT and not guide_baking.is_baking()
+    assert sorted(path.name for path in folder.glob("+*.npz")) == [f"+{frame:08d}.npz" for frame in range(1, 5)]
+
+
+def test_a_keyed_setting_that_becomes_no_number_is_told_and_hair_stays(guides, hair, monkeypatch):
+    """While it plays: baked frames are shown, and others as combed, until the setting is a number again."""
+    combed = points(hair)
+    bake(guides)
+    bpy.context.scene.frame_set(LAST)
+    shown = points(hair)
+    guides.data.vellus.dynamics.hold = math.nan
+    bpy.context.scene.frame_set(LAST - 1)
+    bpy.context.scene.frame_set(LAST)
+    np.testing.assert_array_equal(points(hair), shown)
+    assert "Hold must be" in guides.data.vellus.dynamics_status
+    bpy.context.scene.frame_set(40)
+    np.testing.assert_array_equal(points(hair), combed)
+    guides.data.vellus.dynamics.hold = 0.0
+    bpy.context.scene.frame_set(LAST)
+    np.testing.assert_array_equal(points(hair), shown)
+    assert guides.data.vellus.dynamics_status == ""
