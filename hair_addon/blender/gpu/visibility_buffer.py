@@ -51,7 +51,7 @@ class VisibilityBuffer:
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
-        self._parts = {}  # format → (framebuffer, texture, depth) of additional passes
+        self._parts = {}  # (format, background) → (framebuffer, texture, depth) of additional passes
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
@@ -97,24 +97,26 @@ class VisibilityBuffer:
 
     def surfaces_of_part(self, texture_format=shaders.PICTURE_FORMAT, background=_NOTHING):
         """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`, `part`."""
-        if texture_format not in self._parts:
+        # Each background has a texture of its own: a software driver now and then loses the clearing of one that
+        # compute programs have filled, if nothing is drawn into it.
+        if (texture_format, background) not in self._parts:
             # A framebuffer does not own its textures.
             texture = gpu.types.GPUTexture(self.size, format=texture_format)
             depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
             framebuffer = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
-            self._parts[texture_format] = framebuffer, texture, depth
-        return drawing.cleared(self._parts[texture_format][0], background)
+            self._parts[texture_format, background] = framebuffer, texture, depth
+        return drawing.cleared(self._parts[texture_format, background][0], background)
 
-    def part(self, texture_format=shaders.PICTURE_FORMAT):
+    def part(self, texture_format=shaders.PICTURE_FORMAT, background=_NOTHING):
         """The texture of `surfaces_of_part`."""
-        return self._parts[texture_format][1]
+        return self._parts[texture_format, background][1]
 
     def part_by(self, program, texture_format=shaders.PICTURE_FORMAT, inputs=None):
         """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.
 
         inputs: of each hair ({instance: record}, {sampler: texture}) that the program reads beside the scene.
         """
-        texture = self._parts[texture_format][1]
+        texture = self._parts[texture_format, _NOTHING][1]
         for placed, (records, textures) in zip(self._hair, inputs or [({}, {})] * len(self._hair), strict=True):
             blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
             self._fill(placed, program, texture, blocks, textures)
@@ -127,7 +129,7 @@ class VisibilityBuffer:
         """
         with self.surfaces_of_part():
             pass
-        texture = self._parts[shaders.PICTURE_FORMAT][1]
+        texture = self._parts[shaders.PICTURE_FORMAT, _NOTHING][1]
         for placed in self._hair:
             self._shade(placed, texture, {"drawn_lobes": lobes, "drawn_world": world})
         return texture

@@ -293,9 +293,10 @@ def draw_arrival(drawn, view, buffer):
 
 def draw_hair_shadow(drawn, view, buffer):
     """Return a texture of the part of the light on surfaces that hair lets through; 1 where there is no surface."""
-    with buffer.surfaces_of_part(background=(1.0, 1.0, 1.0, 1.0)), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+    white = (1.0, 1.0, 1.0, 1.0)
+    with buffer.surfaces_of_part(background=white), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         _draw_by_lights(drawn, view, "hair_shadow.frag")
-    return buffer.part()
+    return buffer.part(background=white)
 
 
 def draw_viewport_shadow(drawn, view):
