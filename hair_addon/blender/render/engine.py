@@ -10,7 +10,7 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.imaging import pixel_sampling
 from ...core.long_work import Stopped, no_progress
-from ..data import camera_lens, panoramic_camera, scene
+from ..data import camera_lens, panoramic_camera, scene, view_cameras
 from ..gpu import drawing, world_texture
 from ..groom import frame_folders
 from ..host import scene_time
@@ -104,7 +104,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
             for view, frame in frames.items():
                 with drawing.ALONE:
                     camera = self._camera(depsgraph, view, size)
-                    lens = camera_lens.read_lens(blender_scene, depsgraph, self.camera_override)
+                    lens = camera_lens.read_lens(blender_scene, depsgraph, self._camera_object(depsgraph, view))
                     moving = None
                     if others:
                         now, (before, after) = motion_vectors.places(drawn, *camera), others[view]
@@ -131,18 +131,23 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         return names or [""]
 
     def _camera(self, depsgraph, view, size):
-        """(world to view, view to clip) of a view, whose camera is that of the engine from now on."""
-        eye = None
+        """(world to view, view to clip) of a view."""
+        camera, eye = self._camera_object(depsgraph, view), None
+        if view and camera is not None:
+            eye = self.camera_model_matrix(camera), self.camera_shift_x(camera)
+        return scene.read_camera(depsgraph.scene, depsgraph, *size, camera, eye)
+
+    def _camera_object(self, depsgraph, view):
+        """The evaluated camera of a view, None without one. The view is that of the engine from now on."""
         if view:
             self.active_view_set(view)
-            camera = self.camera_override.evaluated_get(depsgraph)
-            eye = self.camera_model_matrix(camera), self.camera_shift_x(camera)
-        return scene.read_camera(depsgraph.scene, depsgraph, *size, self.camera_override, eye)
+        camera = self.camera_override or depsgraph.scene.camera
+        return camera and view_cameras.camera_of_view(depsgraph.scene, camera.original, view).evaluated_get(depsgraph)
 
     def _frame(self, depsgraph, view, size, window, settings):
         """What a view is rendered into."""
-        self._camera(depsgraph, view, size)
-        camera = (self.camera_override or depsgraph.scene.camera).evaluated_get(depsgraph)
+        self._camera(depsgraph, view, size)  # raises an error if there is none
+        camera = self._camera_object(depsgraph, view)
         shift = self.camera_shift_x(camera) if view and camera.type == "CAMERA" else None
         panorama = panoramic_camera.read_panorama(depsgraph.scene, camera, size, shift)
         if panorama is None:
