@@ -3,8 +3,8 @@
 
 import numpy as np
 
+from ...core import imaging
 from ...core.errors import HairError
-from ...core.imaging.panorama import Panorama
 from ..host.notices import name_of
 
 
@@ -21,7 +21,7 @@ def read_panorama(blender_scene, camera, size, shift_x=None):
     if not is_panoramic(camera):
         return None
     data = camera.data
-    panorama = Panorama(
+    panorama = imaging.panorama.Panorama(
         data.panorama_type,
         (data.shift_x if shift_x is None else shift_x, data.shift_y),
         _sensor(data, blender_scene.render, size),

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ...core.imaging.panorama import FACES, FaceLookup
+from ...core import imaging
 from . import film
 from .tiled_frame import Frame
 
@@ -16,7 +16,7 @@ class PanoramicFrame:
     """
 
     def __init__(self, panorama, clip, outside, size, window, sample_count, passes, *settings):
-        self._lookup = FaceLookup(panorama, size, window)
+        self._lookup = imaging.panorama.FaceLookup(panorama, size, window)
         self._clip, self._outside = clip, outside
         side = (self._lookup.side, self._lookup.side)
         self._faces = {
@@ -34,7 +34,7 @@ class PanoramicFrame:
         to_clip = _face_projection(self._lookup.half_width, *self._clip)
         for face, frame in self._faces.items():
             turn = np.eye(4)
-            turn[:3, :3] = FACES[face]
+            turn[:3, :3] = imaging.panorama.FACES[face]
             yield from frame.expose(drawn, turn @ world_to_view, to_clip)
             frame.free_film()
 
