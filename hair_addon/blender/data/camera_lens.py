@@ -11,7 +11,7 @@ _LEAST = 1e-5  # of an f-stop, and of a distance [m], as in Blender
 def read_lens(scene, depsgraph, camera=None):
     """The `Lens` of a camera, the scene's own, or None where everything is in focus."""
     camera = camera or scene.camera
-    if camera is None or camera.type != "CAMERA" or not camera.data.dof.use_dof:
+    if camera is None or camera.type != "CAMERA" or not camera.data.dof.use_dof or camera.data.type == "PANO":
         return None
     camera = camera.evaluated_get(depsgraph)
     depth_of_field = camera.data.dof

@@ -8,6 +8,7 @@ from functools import cached_property
 import bmesh
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from ...core import geometry
 from ...core.errors import HairError
@@ -336,8 +337,11 @@ def curves_objects(view_layer, kind, viewport=None):
     ]
 
 
-def read_camera(scene, depsgraph, width, height, camera=None):
-    """(world to view, view to clip), each (4, 4) float64, of a camera, the scene's own, for a picture of this size."""
+def read_camera(scene, depsgraph, width, height, camera=None, eye=None):
+    """(world to view, view to clip), each (4, 4) float64, of a camera, the scene's own, for a picture of this size.
+
+    eye: (matrix, horizontal shift) of a view of a stereo picture, None: the camera's own.
+    """
     camera = camera or scene.camera
     if camera is None:
         raise HairError("The scene has no camera: add one.")
@@ -346,14 +350,25 @@ def read_camera(scene, depsgraph, width, height, camera=None):
     view_to_clip = camera.calc_matrix_camera(
         depsgraph, x=width, y=height, scale_x=render.pixel_aspect_x, scale_y=render.pixel_aspect_y
     )
+    to_world, shift = (camera.matrix_world, 0.0) if eye is None else (eye[0], eye[1] - camera.data.shift_x)
+    if shift:
+        moved = 2.0 * shift * _shift_unit(render, camera.data, width, height) / width  # in clip space
+        view_to_clip = Matrix(((1, 0, 0, -moved), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))) @ view_to_clip
     # The scale of a camera object does not affect the view.
-    location, rotation, _scale = camera.matrix_world.decompose()
+    location, rotation, _scale = to_world.decompose()
     view_to_world = rotation.to_matrix().to_4x4()
     view_to_world.translation = location
     if not can_be_drawn(camera, camera.matrix_world, view_to_clip):
         sentence = 'The camera "{name}" has a non-finite transform or lens: correct its values.'
         raise HairError(sentence, name=name_of(camera))
     return np.array(view_to_world.inverted(), np.float64), np.array(view_to_clip, np.float64)
+
+
+def _shift_unit(render, data, width, height):
+    """Pixels of the picture's width in a shift of one: the side of the picture that the sensor fits."""
+    wide, high = width * render.pixel_aspect_x, height * render.pixel_aspect_y
+    is_horizontal = data.sensor_fit == "HORIZONTAL" or (data.sensor_fit == "AUTO" and wide >= high)
+    return width if is_horizontal else high / render.pixel_aspect_x
 
 
 def picture_size(render):

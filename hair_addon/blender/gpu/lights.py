@@ -7,12 +7,14 @@ import bpy
 import numpy as np
 from mathutils import Euler, Matrix
 
+from ...core.imaging import lamps
+from ..data import light_linking
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn
 from . import uniforms
 
-KINDS = {"SUN": 0, "POINT": 1, "SPOT": 2, "AREA": 3}  # as in shaders/include/lights.glsl
+KINDS = {"SUN": lamps.SUN, "POINT": lamps.POINT, "SPOT": lamps.SPOT, "AREA": lamps.AREA}
 
 frame_cache = Cache()  # session_uid of a sequence or movie → the frame that is loaded
 
@@ -21,18 +23,19 @@ _RAYS = ("visible_diffuse", "visible_glossy", "visible_transmission")
 
 
 def read_lights(depsgraph, for_render):
-    """A `uniforms.LIGHT` record of every visible light, or of every one that is rendered: (N,).
+    """(`uniforms.LIGHT` records (N,) of every visible light, or of every one that is rendered; their links (N,)).
 
-    Lights with non-finite values are skipped with a message.
+    The links are as of `light_linking.read_links`. Lights with non-finite values are skipped with a message.
     """
-    lights = []
+    lights, links = [], []
     for instance in depsgraph.object_instances:
         if instance.object.type == "LIGHT" and _shines(instance.object, for_render):
             with np.errstate(all="ignore"):  # such values are checked below
                 light = _read_light(instance.object.data, np.array(instance.matrix_world))
             if can_be_drawn(instance.object, *(light[name] for name in light.dtype.names)):
                 lights.append(light)
-    return np.array(lights, uniforms.LIGHT.dtype)
+                links.append(light_linking.read_links(instance.object.original))
+    return np.array(lights, uniforms.LIGHT.dtype), links
 
 
 def _shines(light_object, for_render):

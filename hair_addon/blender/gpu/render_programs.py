@@ -39,17 +39,8 @@ def strand_arrival_program():
 
 
 @shaders.kept
-def surface_arrival_program():
-    """The same for surfaces: see surface_arrival.frag."""
-    info, varying = shaders.surface_info()
-    shaders.declare_scene(info, is_lit=False)
-    info.vertex_out(varying)
-    return shaders.compile_drawing(info, "surface.vert", "surface_arrival.frag")
-
-
-@shaders.kept
-def hair_shadow_program(fragment):
-    """The program of the light that hair leaves on surfaces: attributes position, normal, uv; see hair_shadow.glsl."""
+def lit_surface_program(fragment):
+    """The program of how much light reaches surfaces, by a .frag: attributes position, normal, uv."""
     info, varying = shaders.surface_info()
     shaders.declare_scene(info)
     info.vertex_in(2, "VEC2", "uv")

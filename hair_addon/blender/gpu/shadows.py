@@ -45,11 +45,12 @@ class ShadowMaps:
         textures = (self._hair_front, self._hair_layers, self._surface_moments)
         return dict(zip(shaders.SHADOW_SAMPLERS, textures, strict=True))
 
-    def draw(self, lights, hair, surfaces, steps=_ALL):
+    def draw(self, lights, hair, surfaces, steps=_ALL, casters=None):
         """Draw the maps and write each light's part in them into its record.
 
         lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: batches;
-        steps: what is drawn of each hair for all of it.
+        steps: what is drawn of each hair for all of it; casters: a light's index → (hair, surfaces) that cast its
+        shadow, None: all.
         """
         lights["light"]["shadow_layer"] = -1
         if not hair:
@@ -60,7 +61,8 @@ class ShadowMaps:
             if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index
                 view["light_index"] = index
-                self._draw_light(index, view, lights, hair, surfaces, steps)
+                cast = (hair, surfaces) if casters is None else casters(index)
+                self._draw_light(index, view, lights, *cast, steps)
 
     def _draw_light(self, layer, view, lights, hair, surfaces, steps):
         with self._target(self._surface_depth), drawing.gpu_state("LESS_EQUAL", depth_writes=True):

@@ -27,6 +27,7 @@ class _Placed:
     record: np.ndarray  # uniforms.VIEW
     samplers: dict
     first: int
+    lights: gpu.types.GPUUniformBuf
 
     @property
     def segment_count(self):
@@ -50,8 +51,7 @@ class VisibilityBuffer:
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
-        self._lights = None
-        self._parts = {}  # format → (framebuffer, texture, depth) of additional passes
+        self._parts = {}  # (format, background) → (framebuffer, texture, depth) of additional passes
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
@@ -69,24 +69,25 @@ class VisibilityBuffer:
         """Fill `segments` and `depths` with the hair that is nearest, in front of the surfaces. Raises `HairError`.
 
         hair: [(StrandsOnGPU, Shading, object to world, surface colour, {sampler: texture} of the scene, Steps), ...];
-        lights, view: records of `uniforms`; in_compute: whether a compute program finds the nearest strands, None:
-        where it can.
+        lights, view: records of `uniforms`, lights one of all hair or (H,) of each; in_compute: whether a compute
+        program finds the nearest strands, None: where it can.
         """
         self.segments.clear(format="UINT", value=(_NO_SEGMENT,))
         draw = self._find if (shaders.has_image_atomics() if in_compute is None else in_compute) else self._draw_strips
         self._hair, first = [], 0
-        for strands, shading, to_world, surface_color, samplers, steps in hair:
+        light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
+        for index, (strands, shading, to_world, surface_color, samplers, steps) in enumerate(hair):
             record = drawing.strand_record(strands, view, to_world, steps)
             record["seen_points"] = seen_points(strands.point_count)
             record["seen_opacity"] = shading.opacity
             record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
             record["surface_color"][:3] = surface_color
-            self._hair.append(_Placed(strands, shading, record, samplers, first))
+            light_block = light_blocks[index if lights.shape else 0]
+            self._hair.append(_Placed(strands, shading, record, samplers, first, light_block))
             first += self._hair[-1].segment_count
         if first > _NO_SEGMENT:
             self._hair = []
             raise HairError("Too many strands for one picture: hide some hair or some of its instances.")
-        self._lights = uniforms.uniform_buffer(lights)
         draw()
 
     @property
@@ -96,24 +97,26 @@ class VisibilityBuffer:
 
     def surfaces_of_part(self, texture_format=shaders.PICTURE_FORMAT, background=_NOTHING):
         """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`, `part`."""
-        if texture_format not in self._parts:
+        # Each background has a texture of its own: a software driver now and then loses the clearing of one that
+        # compute programs have filled, if nothing is drawn into it.
+        if (texture_format, background) not in self._parts:
             # A framebuffer does not own its textures.
             texture = gpu.types.GPUTexture(self.size, format=texture_format)
             depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
             framebuffer = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
-            self._parts[texture_format] = framebuffer, texture, depth
-        return drawing.cleared(self._parts[texture_format][0], background)
+            self._parts[texture_format, background] = framebuffer, texture, depth
+        return drawing.cleared(self._parts[texture_format, background][0], background)
 
-    def part(self, texture_format=shaders.PICTURE_FORMAT):
+    def part(self, texture_format=shaders.PICTURE_FORMAT, background=_NOTHING):
         """The texture of `surfaces_of_part`."""
-        return self._parts[texture_format][1]
+        return self._parts[texture_format, background][1]
 
     def part_by(self, program, texture_format=shaders.PICTURE_FORMAT, inputs=None):
         """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.
 
         inputs: of each hair ({instance: record}, {sampler: texture}) that the program reads beside the scene.
         """
-        texture = self._parts[texture_format][1]
+        texture = self._parts[texture_format, _NOTHING][1]
         for placed, (records, textures) in zip(self._hair, inputs or [({}, {})] * len(self._hair), strict=True):
             blocks = {name: uniforms.uniform_buffer(record) for name, record in records.items()}
             self._fill(placed, program, texture, blocks, textures)
@@ -126,7 +129,7 @@ class VisibilityBuffer:
         """
         with self.surfaces_of_part():
             pass
-        texture = self._parts[shaders.PICTURE_FORMAT][1]
+        texture = self._parts[shaders.PICTURE_FORMAT, _NOTHING][1]
         for placed in self._hair:
             self._shade(placed, texture, {"drawn_lobes": lobes, "drawn_world": world})
         return texture
@@ -149,7 +152,7 @@ class VisibilityBuffer:
         for is_depth in (1, 0):
             for placed in self._hair:
                 constants = {"first_segment": placed.first, "is_depth": is_depth}
-                drawing.walk_strands(placed.strands, program, placed.record, self._lights, {}, images, constants)
+                drawing.walk_strands(placed.strands, program, placed.record, placed.lights, {}, images, constants)
 
     def _draw_strips(self):
         """The nearest segments, as strips of triangles that the graphics driver draws."""
@@ -158,7 +161,7 @@ class VisibilityBuffer:
             for placed in self._hair:
                 program.bind()
                 program.uniform_int("first_segment", placed.first)
-                drawing.draw_strip(placed.strands, program, placed.record, self._lights)
+                drawing.draw_strip(placed.strands, program, placed.record, placed.lights)
 
     def _shade(self, placed, picture, parts=None):
         """Fill the samples in which a strand of a hair is nearest with its light, or with parts of it.
@@ -186,7 +189,7 @@ class VisibilityBuffer:
     def _fill(self, placed, program, picture, blocks, textures, record=None):
         """Run a program on the samples in which a strand of a hair is nearest; record: in place of the hair's own."""
         record = placed.record if record is None else record
-        blocks = {"view": uniforms.uniform_buffer(record), "lights": self._lights, **blocks}
+        blocks = {"view": uniforms.uniform_buffer(record), "lights": placed.lights, **blocks}
         textures = {"segments": self.segments, "strands": placed.strands.texture, **placed.samplers, **textures}
         with drawing.bound(program, blocks, textures):
             program.image("picture", picture)

@@ -18,7 +18,8 @@ _OF_SCENE = ("camera", "world", "frame_start", "frame_end", "frame_step")
 _OF_RENDER = (
     *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
     *("use_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y", "use_crop_to_border"),
-    *("fps", "fps_base", "filter_size", "use_multiview", "use_lock_interface"),
+    *("fps", "fps_base", "filter_size", "use_lock_interface"),
+    *("use_multiview", "views_format"),
     *("use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
     *("use_simplify", "simplify_subdivision_render"),
 )
@@ -86,6 +87,7 @@ def follow(blender_scene):
     _copy_shutter_curve(blender_scene.render.motion_blur_shutter_curve, hair_scene.render.motion_blur_shutter_curve)
     _copy(state, hair_scene.vellus, [n for n in setting_properties.names_of(RenderSettings) if n not in _OWN])
     _copy_cameras(blender_scene, hair_scene)
+    _copy_views(blender_scene.render.views, hair_scene.render.views)
     composite_nodes.adjust(blender_scene, state.composite_shadow == "PASS", not is_ours)
     for hair_object in _hair_objects(blender_scene):
         curves_objects.hide_from_engines(hair_object, is_seen_by_rays=state.composite_shadow == "ENGINE")
@@ -132,6 +134,18 @@ def _copy_cameras(blender_scene, hair_scene):
         hair_scene.timeline_markers.clear()
         for frame, camera in wanted:
             hair_scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+
+
+def _copy_views(source, target):
+    """Which views a stereo picture has, and the cameras of each."""
+    wanted = [(view.name, view.use, view.camera_suffix) for view in source]
+    if [(view.name, view.use, view.camera_suffix) for view in target] == wanted:
+        return
+    for view in [view for view in target if view.name not in source]:
+        target.remove(view)
+    for name, is_used, suffix in wanted:
+        view = target.get(name) or target.new(name)
+        view.use, view.camera_suffix = is_used, suffix
 
 
 def _hair_objects(blender_scene):

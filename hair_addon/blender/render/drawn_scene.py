@@ -12,20 +12,18 @@ from ..gpu import (
     drawing,
     level_of_detail,
     render_programs,
+    scene_lights,
     strand_textures,
     surface_shading,
     uniforms,
     world_texture,
 )
 from ..gpu import lights as light_door
-from ..gpu.shadows import SUN, ShadowMaps
+from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
 from . import hair_cache, hair_places
 
-_SHADOWED_LIGHTS = 8
-_MAP_SIZE = 512  # texels along a side of each light's map: on a head, 0.8 mm
-
-# The number of strands that such a map can resolve, thickened in proportion; and the number during a stroke of the
+# The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke of the
 # comb.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
 _DRAFT_STEPS = drawing.Steps(point_count=21, strand_count=10_000)
@@ -37,7 +35,7 @@ class DrawnScene:
 
     hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on, part in viewports)
     surfaces: list  # (SurfaceOnGPU, parts of a `DrawnMesh`, None of a holdout)
-    lights: np.ndarray  # uniforms.LIGHTS
+    lights: np.ndarray  # uniforms.LIGHTS: of all, as far as they are drawn one by one
     world: light_door.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
     hair_visibility: list  # {sampler: texture} of the world's light on each of the hair
@@ -48,6 +46,10 @@ class DrawnScene:
     instances: tuple = ()  # of hair, as `hair_places.read_instances` found them
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
     clear: tuple = ()  # as `surfaces`, of those that hide nothing
+    lamps: scene_lights.SceneLights | None = None
+    receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
+    hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each of the hair; None: of all
+    surface_lights: np.ndarray | None = None  # the same of `surfaces`, then of `clear`
 
 
 _EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
@@ -77,34 +79,57 @@ def read(
         # Scenes without hair have no cost.
         return _EMPTY
     if before is None or before.shadow_maps is None:
-        surfaces, clear = _upload(
-            drawn_meshes.read_drawn_meshes(depsgraph, viewport), viewport is None or not is_hair_only
-        )
+        meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport)
+        surfaces, clear, receivers = _upload(meshes, is_shaded=viewport is None or not is_hair_only)
         world = light_door.read_world(blender_scene)
-        lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, _placed(hair))
-        shadow_maps = _new_shadow_maps(lights)
+        lamps = maps = None
     else:
-        surfaces, clear = before.surfaces, before.clear
-        lights, world, shadow_maps = before.lights, before.world, before.shadow_maps
-    placed, batches = _placed(hair), [surface.batch for surface, _ in surfaces]
-    shadow_maps.draw(lights, placed, batches, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
+        surfaces, clear, receivers, world = before.surfaces, before.clear, before.receivers, before.world
+        lamps, maps = before.lamps, before.shadow_maps
+    hair_receivers = _hair_receivers(hair, [(place.owner, place.hair_object.session_uid) for place in places])
+    if lamps is None:
+        found = light_door.read_lights(depsgraph, for_render=viewport is None)
+        lamps = scene_lights.gather(*found, world, hair_receivers)
     if is_draft and before is not None and _have_same_places(before.hair, hair):
         seen = before.hair_visibility, before.surface_visibility
     else:
         seen = _visibility(hair, surfaces, clear)
     owners, selected = tuple(place.owner for place in places), tuple(place.is_selected for place in places)
-    return DrawnScene(
-        hair,
-        surfaces,
-        lights,
-        world,
-        shadow_maps,
-        *seen,
+    drawn = replace(
+        _EMPTY,
+        hair=hair,
+        surfaces=surfaces,
+        world=world,
+        hair_visibility=seen[0],
+        surface_visibility=seen[1],
         owners=owners,
         selected=selected,
         instances=instances,
         clear=clear,
+        receivers=receivers,
     )
+    return _lit(drawn, lamps, maps, hair_receivers, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
+
+
+def _lit(drawn, lamps, maps, hair_receivers, steps):
+    """A `DrawnScene` with `SceneLights`: as all that is in it is lit by them, with their shadow maps."""
+    maps = maps or scene_lights.new_maps(lamps.record)
+    placed, batches = _placed(drawn.hair), [surface.batch for surface, _ in drawn.surfaces]
+    hair_owners = [receiver.owner for receiver in hair_receivers]
+    surface_owners = [receiver.owner for receiver in drawn.receivers[: len(batches)]]
+    maps.draw(lamps.record, placed, batches, steps, lamps.casters(placed, hair_owners, batches, surface_owners))
+    own = {}
+    if not lamps.are_alike:
+        own = {"hair_lights": lamps.lit(hair_receivers), "surface_lights": lamps.lit(drawn.receivers)}
+    return replace(drawn, lights=lamps.record, lamps=lamps, shadow_maps=maps, **own)
+
+
+def _hair_receivers(hair, owners):
+    """[`Receiver`] of hair; owners: session_uids of the instancer, or another time its own, and its own."""
+    return [
+        scene_lights.Receiver(owner, scene_lights.places_of_hair(strands.points, to_world))
+        for (strands, _shading, to_world, *_), owner in zip(hair, owners, strict=True)
+    ]
 
 
 def read_render(depsgraph, known, refused):
@@ -116,18 +141,11 @@ def read_render(depsgraph, known, refused):
     """
     unlit = read_unlit(depsgraph, known, refused)
     world = light_door.read_world(depsgraph.scene_eval)
-    lights = _lights(light_door.read_lights(depsgraph, for_render=True), world, _placed(unlit.hair))
-    shadow_maps = _new_shadow_maps(lights)
-    shadow_maps.draw(lights, _placed(unlit.hair), [surface.batch for surface, _ in unlit.surfaces], _SHADOW_STEPS)
+    hair_receivers = _hair_receivers(unlit.hair, [owner[1::-1] for owner in unlit.owners])
+    lamps = scene_lights.gather(*light_door.read_lights(depsgraph, for_render=True), world, hair_receivers)
     hair_seen, surfaces_seen = _visibility(unlit.hair, unlit.surfaces, unlit.clear)
-    return replace(
-        unlit,
-        lights=lights,
-        world=world,
-        shadow_maps=shadow_maps,
-        hair_visibility=hair_seen,
-        surface_visibility=surfaces_seen,
-    )
+    drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
+    return _lit(drawn, lamps, None, hair_receivers, _SHADOW_STEPS)
 
 
 def read_unlit(depsgraph, known, refused):
@@ -138,21 +156,28 @@ def read_unlit(depsgraph, known, refused):
         meshes = drawn_meshes.held_out(meshes)
     hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)
     surface_owners = tuple(mesh.owner for mesh in meshes if not mesh.is_clear)
-    surfaces, clear = _upload(meshes, is_shaded=True)
-    return replace(_EMPTY, hair=hair, surfaces=surfaces, clear=clear, owners=owners, surface_owners=surface_owners)
+    surfaces, clear, receivers = _upload(meshes, is_shaded=True)
+    return replace(
+        _EMPTY,
+        hair=hair,
+        surfaces=surfaces,
+        clear=clear,
+        receivers=receivers,
+        owners=owners,
+        surface_owners=surface_owners,
+    )
 
 
 def _upload(meshes, is_shaded):
-    """(surfaces, those that are clear) of a `DrawnScene`; is_shaded: whether they are seen as we shade them."""
-    surfaces, clear = [], []
+    """(surfaces, those that are clear, receivers) of a `DrawnScene`; is_shaded: whether they are seen as we shade."""
+    uploaded = {False: [], True: []}
     for mesh in meshes:
-        uploaded = drawing.upload_surface(mesh.positions, mesh.normals, mesh.uvs), mesh.parts
-        (clear if is_shaded and mesh.is_clear else surfaces).append(uploaded)
-    return surfaces, tuple(clear)
-
-
-def _new_shadow_maps(lights):
-    return ShadowMaps(_MAP_SIZE, max(1, min(int(lights["count"]), _SHADOWED_LIGHTS)))
+        surface = drawing.upload_surface(mesh.positions, mesh.normals, mesh.uvs), mesh.parts
+        receiver = scene_lights.Receiver(mesh.owner[1::-1], scene_lights.places_on_surface(mesh.positions))
+        uploaded[is_shaded and mesh.is_clear].append((surface, receiver))
+    solid, clear = ([surface for surface, _receiver in uploaded[is_clear]] for is_clear in (False, True))
+    receivers = tuple(receiver for is_clear in (False, True) for _surface, receiver in uploaded[is_clear])
+    return solid, tuple(clear), receivers
 
 
 def _placed(hair):
@@ -217,32 +242,6 @@ def _have_same_places(hair, others):
     return sizes == other_sizes
 
 
-def _lights(lamps, world, placed):
-    """A `uniforms.LIGHTS` record of a scene's lights (N,) and of its world's: those that matter most where hair is."""
-    lobes, sides = world_texture.light_of(world)
-    suns = np.zeros(len(lobes), uniforms.LIGHT.dtype)
-    for sun, lobe in zip(suns, lobes, strict=True):
-        sun["kind"], sun["casts_shadow"] = SUN, True
-        sun["axis"][:3], sun["power"][:3] = -lobe.direction, lobe.irradiance
-        sun["radius"] = 2.0 * np.sqrt(lobe.variance)  # a disk's variance along an axis is a quarter of its radius²
-    found = np.concatenate([lamps, suns])
-    if len(found) > 1 and placed:
-        centre, _radius = drawing.bounding_sphere(placed)
-        found = found[np.argsort(-_brightness(found, centre), kind="stable")]
-    found = found[: uniforms.LIGHT_CAPACITY]
-    record = uniforms.LIGHTS.record()
-    record["light"][: len(found)], record["count"] = found, len(found)
-    record["world"][:, :3] = sides
-    return record
-
-
-def _brightness(lights, place):
-    """(N,) about how much light arrives at a place (3,): by the distance alone."""
-    distances = np.linalg.norm(lights["position"][:, :3] - place, axis=1)
-    spread = np.where(lights["kind"] == SUN, 1.0, 4.0 * np.pi * np.square(np.maximum(distances, 1e-6)))
-    return lights["power"][:, :3].mean(axis=1) / spread
-
-
 def draw_hiding(drawn, view):
     """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
@@ -255,7 +254,8 @@ def draw_hair(drawn, view, buffer, is_viewport=False):
 
     view: a `uniforms.VIEW` record; is_viewport: only as much of it as is seen from there, and as the artist wants.
     """
-    buffer.add_hair(_hair_in_view(drawn, view, is_viewport), drawn.lights, view)
+    lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
+    buffer.add_hair(_hair_in_view(drawn, view, is_viewport), lights, view)
 
 
 def find_hair(drawn, view, buffer, chosen=None):
@@ -286,38 +286,44 @@ def draw_behind_hair(drawn, view, buffer, is_transparent):
 
 def draw_arrival(drawn, view, buffer):
     """Return a texture of light visibility for the content of a `VisibilityBuffer`, to which hair was added last."""
-    _see_through_hair(drawn, view)
     with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for surface, parts in drawn.surfaces:
-            if parts is None:
-                drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
-                continue
-            program = render_programs.surface_arrival_program()
-            drawing.draw_triangles(surface.batch, program, view, drawn.lights, drawn.shadow_maps.samplers)
+        _draw_by_lights(drawn, view, "surface_arrival.frag", are_holdouts_left_out=True)
     return buffer.part_by(render_programs.strand_arrival_program())
 
 
 def draw_hair_shadow(drawn, view, buffer):
     """Return a texture of the part of the light on surfaces that hair lets through; 1 where there is no surface."""
-    with buffer.surfaces_of_part(background=(1.0, 1.0, 1.0, 1.0)), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_shaded_by_hair(drawn, view, "hair_shadow.frag")
-    return buffer.part()
+    white = (1.0, 1.0, 1.0, 1.0)
+    with buffer.surfaces_of_part(background=white), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        _draw_by_lights(drawn, view, "hair_shadow.frag")
+    return buffer.part(background=white)
 
 
 def draw_viewport_shadow(drawn, view):
     """As `draw_hiding`, and as black over what Blender draws, whose alpha is the part of the light that hair stops."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_shaded_by_hair(drawn, view, "hair_shadow_view.frag")
+        _draw_by_lights(drawn, view, "hair_shadow_view.frag")
 
 
-def _draw_shaded_by_hair(drawn, view, fragment):
+def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
+    """Draw how much of the light reaches surfaces; are_holdouts_left_out: leave the picture empty where they are."""
     _see_through_hair(drawn, view)
-    program = render_programs.hair_shadow_program(fragment)
-    for (surface, _parts), seen in zip(drawn.surfaces, drawn.surface_visibility, strict=False):
+    program = render_programs.lit_surface_program(fragment)
+    for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
+        if parts is None and are_holdouts_left_out:
+            drawing.draw_surface_depth(surface.batch, view, lights, "surface_hides.frag")
+            continue
         placed = view.copy()
         placed["row_strands"] = surface.row_corners
-        samplers = drawn.shadow_maps.samplers | seen
-        drawing.draw_triangles(surface.batch, program, placed, drawn.lights, samplers)
+        drawing.draw_triangles(surface.batch, program, placed, lights, samplers)
+
+
+def _light_of(drawn, solid):
+    """(`uniforms.LIGHTS` records, {sampler: texture} dictionaries) of each surface that is solid, or of each clear."""
+    count = len(drawn.surfaces)
+    of_all = [drawn.lights] * len(drawn.surface_visibility) if drawn.surface_lights is None else drawn.surface_lights
+    chosen = slice(count) if solid else slice(count, None)
+    return of_all[chosen], [drawn.shadow_maps.samplers | seen for seen in drawn.surface_visibility[chosen]]
 
 
 def _see_through_hair(drawn, view):
@@ -330,13 +336,12 @@ def _see_through_hair(drawn, view):
 def draw_surfaces(drawn, view):
     """Draw all surfaces with depth test into the bound framebuffer, and over them those that are clear."""
     _see_through_hair(drawn, view)
-    count = len(drawn.surfaces)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, parts), seen in zip(drawn.surfaces, drawn.surface_visibility[:count], strict=True):
+        for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
             if parts is None:
-                drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
+                drawing.draw_surface_depth(surface.batch, view, lights, "surface_hides.frag")
                 continue
-            surface_shading.draw(surface, parts, view, drawn.lights, drawn.shadow_maps.samplers | seen)
+            surface_shading.draw(surface, parts, view, lights, samplers)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA_PREMULT"):
-        for (surface, parts), seen in zip(drawn.clear, drawn.surface_visibility[count:], strict=True):
-            surface_shading.draw(surface, parts, view, drawn.lights, drawn.shadow_maps.samplers | seen)
+        for (surface, parts), lights, samplers in zip(drawn.clear, *_light_of(drawn, solid=False), strict=True):
+            surface_shading.draw(surface, parts, view, lights, samplers)

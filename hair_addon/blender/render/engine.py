@@ -10,13 +10,14 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.imaging import pixel_sampling
 from ...core.long_work import Stopped, no_progress
-from ..data import camera_lens, scene
+from ..data import camera_lens, panoramic_camera, scene, view_cameras
 from ..gpu import drawing, world_texture
 from ..groom import frame_folders
 from ..host import scene_time
 from ..settings import setting_properties
 from ..settings.translations import error_text, interface_text
 from . import drawn_scene, film, motion_vectors, rendered_view, viewport
+from .panoramic_frame import PanoramicFrame
 from .tiled_frame import Frame
 
 NAME = viewport.ENGINE
@@ -79,60 +80,99 @@ class VellusRenderEngine(bpy.types.RenderEngine):
 
     def _render(self, depsgraph):
         blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
-        _require_supported(blender_scene, self.camera_override)
+        _require_supported(self.camera_override)
         if self.is_animation:
             frame_folders.require_baked([scene_time.frame_of(blender_scene)])
         size, window = scene.picture_size(blender_scene.render)
+        views = self._views(view_layer)
         offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)
         sample_count = view_layer.samples or blender_scene.vellus.sample_count
         passes = _passes(view_layer, blender_scene.render.use_motion_blur)
         film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
-        camera_object = self.camera_override
-        has_lens = camera_lens.read_lens(blender_scene, depsgraph, camera_object) is not None
+        has_lens = camera_lens.read_lens(blender_scene, depsgraph, self.camera_override) is not None
         lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
-        frame = Frame(size, window, -(-sample_count // len(offsets)), *film_settings, lens_passes)
-        others = self._others(depsgraph, size) if "Vector" in passes else []
+        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes
+        frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
+        others = self._others(depsgraph, size, views) if "Vector" in passes else {}
         world_texture.check_image()
-        known, refused, done, in_all = {}, {}, 0, frame.pass_count * len(offsets)
+        known, refused, done, in_all = {}, {}, 0, sum(frame.pass_count for frame in frames.values()) * len(offsets)
         for index in scene_time.visit(blender_scene, offsets, self.frame_set):
             said = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
             self.update_stats("", said)
             with drawing.ALONE:
                 drawn = drawn_scene.read_render(depsgraph, known, refused.__setitem__)
-                camera = scene.read_camera(blender_scene, depsgraph, *size, camera_object)
-                lens = camera_lens.read_lens(blender_scene, depsgraph, camera_object)
-                moving = (
-                    motion_vectors.Motion(others[0], motion_vectors.places(drawn, *camera), others[1], size)
-                    if others
-                    else None
-                )
-            for _pass in frame.expose(drawn, *camera, moving, lens):
-                done += 1
-                if not bpy.app.background:
-                    time.sleep(_TURN)
-                self.update_progress(done / in_all)
-                if self.test_break() or _is_stopped(done / in_all):
-                    return
-            if index + 1 == len(offsets) or not bpy.app.background:
-                self._show(view_layer, window, frame.arrays())
+            for view, frame in frames.items():
+                with drawing.ALONE:
+                    camera = self._camera(depsgraph, view, size)
+                    lens = camera_lens.read_lens(blender_scene, depsgraph, self._camera_object(depsgraph, view))
+                    moving = None
+                    if others:
+                        now, (before, after) = motion_vectors.places(drawn, *camera), others[view]
+                        moving = motion_vectors.Motion(before, now, after, size)
+                for _pass in frame.expose(drawn, *camera, moving, lens):
+                    done += 1
+                    if not bpy.app.background:
+                        time.sleep(_TURN)
+                    self.update_progress(done / in_all)
+                    if self.test_break() or _is_stopped(done / in_all):
+                        return
+                if index + 1 == len(offsets) or not bpy.app.background:
+                    self._show(view_layer, view, window, frame.arrays())
         # Last, so that there is a picture of everything else. A command that renders to a file fails: a picture
         # without some of the hair is not a valid result.
         for error in refused.values():
             self.report({"ERROR"}, error_text(error))
 
-    def _others(self, depsgraph, size):
-        """Where everything is a frame before and a frame after: [`motion.Places`]."""
-        found = []
+    def _views(self, view_layer):
+        """Names of the views of a stereo picture; of other pictures the empty name."""
+        result = self.begin_result(0, 0, 1, 1, layer=view_layer.name)
+        names = [view.name for view in result.views]
+        self.end_result(result, cancel=True)
+        return names or [""]
+
+    def _camera(self, depsgraph, view, size):
+        """(world to view, view to clip) of a view."""
+        camera, eye = self._camera_object(depsgraph, view), None
+        if view and camera is not None:
+            eye = self.camera_model_matrix(camera), self.camera_shift_x(camera)
+        return scene.read_camera(depsgraph.scene, depsgraph, *size, camera, eye)
+
+    def _camera_object(self, depsgraph, view):
+        """The evaluated camera of a view, None without one. The view is that of the engine from now on."""
+        if view:
+            self.active_view_set(view)
+        camera = self.camera_override or depsgraph.scene.camera
+        return camera and view_cameras.camera_of_view(depsgraph.scene, camera.original, view).evaluated_get(depsgraph)
+
+    def _frame(self, depsgraph, view, size, window, settings):
+        """What a view is rendered into."""
+        self._camera(depsgraph, view, size)  # raises an error if there is none
+        camera = self._camera_object(depsgraph, view)
+        shift = self.camera_shift_x(camera) if view and camera.type == "CAMERA" else None
+        panorama = panoramic_camera.read_panorama(depsgraph.scene, camera, size, shift)
+        if panorama is None:
+            return Frame(size, window, *settings)
+        if self.use_spherical_stereo(camera):
+            raise HairError("Vellus cannot render spherical stereo: turn off Spherical Stereo of the camera.")
+        if "Vector" in settings[1]:
+            raise HairError("Panoramic cameras have no motion vectors: turn off the pass Vector.")
+        clip = camera.data.clip_start, camera.data.clip_end
+        outside = 0.0 if depsgraph.scene.vellus.is_hair_only else 1.0
+        return PanoramicFrame(panorama, clip, outside, size, window, *settings)
+
+    def _others(self, depsgraph, size, views):
+        """Where everything is a frame before and a frame after: {view: [`motion.Places`]}."""
+        found = {view: [] for view in views}
         for _index in scene_time.visit(depsgraph.scene, [-1.0, 1.0], self.frame_set):
             with drawing.ALONE:
                 there = drawn_scene.read_unlit(depsgraph, {}, _unheard)
-                camera = scene.read_camera(depsgraph.scene, depsgraph, *size, self.camera_override)
-                found.append(motion_vectors.places(there, *camera))
+                for view, places in found.items():
+                    places.append(motion_vectors.places(there, *self._camera(depsgraph, view, size)))
         return found
 
-    def _show(self, view_layer, window, arrays):
-        """Pass the current picture to Blender."""
-        result = self.begin_result(0, 0, *window[2:], layer=view_layer.name)
+    def _show(self, view_layer, view, window, arrays):
+        """Pass the current picture of a view to Blender."""
+        result = self.begin_result(0, 0, *window[2:], layer=view_layer.name, view=view)
         for render_pass in result.layers[0].passes:
             if render_pass.name in arrays:
                 render_pass.rect.foreach_set(np.ascontiguousarray(arrays[render_pass.name]).ravel())
@@ -181,8 +221,6 @@ def _offsets(render, count):
     return pixel_sampling.moments(shutter, position, count, np.array(openings)).tolist()
 
 
-def _require_supported(blender_scene, camera):
-    if blender_scene.render.use_multiview:
-        raise HairError("Vellus cannot render stereo views: turn off Stereoscopy in the Output properties.")
-    if camera is not None and camera.type == "CAMERA" and camera.data.type not in {"PERSP", "ORTHO"}:
-        raise HairError("Vellus renders only perspective and orthographic cameras: change the camera type.")
+def _require_supported(camera):
+    if camera is not None and camera.type == "CAMERA" and camera.data.type not in {"PERSP", "ORTHO", "PANO"}:
+        raise HairError("Vellus renders perspective, orthographic and panoramic cameras: change the camera type.")

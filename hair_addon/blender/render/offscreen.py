@@ -10,7 +10,7 @@ from ...core.errors import HairError
 from ...core.files.whole_file import whole_file
 from ...core.imaging.pixel_sampling import MOST_DRAWN
 from ...core.long_work import Stage, run_now
-from ..data import camera_lens, scene
+from ..data import camera_lens, panoramic_camera, scene
 from ..gpu import drawing, world_texture
 from . import drawn_scene, film
 
@@ -43,6 +43,8 @@ def drawing_picture(settings):
         raise HairError(f"{sentence}: use fewer.")
     yield Stage("Drawing shadows", 0.0)
     world_texture.check_image()
+    if context.scene.camera is not None and panoramic_camera.is_panoramic(context.scene.camera):
+        raise HairError("Pictures are drawn by perspective and orthographic cameras: render a frame instead.")
     camera = scene.read_camera(context.scene, depsgraph, width, height)
     drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
     picture = film.Film(size, per_side, ("Combined",), settings.is_transparent)

@@ -51,6 +51,10 @@ class Frame:
                 self._add(tile, self._film.read())
         self._moment_count += 1
 
+    def free_film(self):
+        """Free the memory of the graphics card, until the next moment is drawn."""
+        self._film = None
+
     def _add(self, tile, arrays):
         left, bottom, width, height = tile
         left, bottom = left - self._window[0], bottom - self._window[1]

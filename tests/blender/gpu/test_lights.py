@@ -10,6 +10,7 @@ from mathutils import Euler, Matrix
 
 from hair_addon.blender.gpu import lights as door
 from hair_addon.blender.gpu import uniforms
+from hair_addon.core.imaging import lamps
 from tests.support import glsl
 
 SIZE = 17  # pixels along a side of the picture
@@ -128,10 +129,10 @@ def test_irradiance_equals_cycles(wall, tmp_path, name):
         settings = {"size": SMALL, "size_y": 2.0 * SMALL, **settings}
     add_light(wall, kind, matrix, **settings)
     rendered = cycles_irradiance(wall, tmp_path)
-    lamps = door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)
-    assert len(lamps) == 1
+    found, _links = door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)
+    assert len(found) == 1
     lights = uniforms.LIGHTS.record()
-    lights["light"][:1] = lamps
+    lights["light"][:1] = found
     computed = shader_irradiance(lights)
     assert rendered.max() > 0.0
     # A pixel may lie where a hard cone ends for one part of the light and not for another.
@@ -140,7 +141,7 @@ def test_irradiance_equals_cycles(wall, tmp_path, name):
 
 
 def test_a_scene_without_lights_is_dark(wall):
-    assert len(door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)) == 0
+    assert len(door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)[0]) == 0
 
 
 @pytest.mark.parametrize("size", [0.05, 1.0, 3.0])  # radius by distance
@@ -155,3 +156,32 @@ def test_a_disk_lights_by_its_solid_angle(size):
         text, "float", "disk_part(ratio)", structs=uniforms.LIGHT.source, ratio=np.array([size**2], np.float32)
     )
     assert found[0] == pytest.approx(received, rel=1e-4)
+
+
+def test_python_has_the_irradiance_of_the_shaders(rng):
+    """Lamps of all kinds around places at random, cones and beams met by some of them."""
+    count = 400
+    some = np.zeros(count, uniforms.LIGHT.dtype)
+    some["kind"] = np.arange(count) % 4
+    some["position"][:, :3] = rng.normal(size=(count, 3)) * 3.0
+    axes = rng.normal(size=(count, 3)) - some["position"][:, :3]
+    some["axis"][:, :3] = axes / np.linalg.norm(axes, axis=1, keepdims=True)
+    some["power"][:, :3], some["radius"] = rng.uniform(0.0, 100.0, (count, 3)), rng.uniform(0.0, 2.0, count)
+    some["cos_cone"] = np.where(rng.random(count) < 0.2, 0.0, rng.uniform(0.0, 0.95, count))
+    some["blend"] = rng.uniform(0.0, 1.0, count)
+    places = rng.normal(size=(count, 3))
+    given = {name: some[name][:, :3] if some[name].ndim == 2 else some[name] for name in some.dtype.names}
+    names = ("kind", "position", "axis", "power", "cos_cone", "blend", "radius")
+    shown = glsl.evaluate(
+        glsl.source("include/lights.glsl"),
+        "vec3",
+        f"light_irradiance({', '.join(names)}, place)",
+        structs=uniforms.LIGHT.source,
+        **{name: given[name] for name in names},
+        place=places.astype(np.float32),
+    )
+    computed = np.concatenate(
+        [lamps.irradiance(some[i : i + 1], places[i : i + 1].astype(np.float32))[0] for i in range(count)]
+    )
+    assert (computed.max(axis=1) > 0.0).mean() > 0.4
+    np.testing.assert_allclose(computed, shown, rtol=2e-3, atol=1e-4 * shown.max())

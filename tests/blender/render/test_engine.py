@@ -206,13 +206,20 @@ def test_each_frame_follows_the_deformed_surface(arm, tmp_path):
 
 
 def test_unsupported_renders_are_reported_in_one_sentence(lit, tmp_path):
-    configure(filepath=str(tmp_path / "nothing.png"), use_multiview=True)
-    with pytest.raises(RuntimeError, match="stereo views: turn off Stereoscopy"):
+    configure(filepath=str(tmp_path / "nothing.png"))
+    camera = bpy.context.scene.camera.data
+    camera.type = "CUSTOM"
+    with pytest.raises(RuntimeError, match="perspective, orthographic and panoramic"):
         bpy.ops.render.render(write_still=True)
-    bpy.context.scene.render.use_multiview = False
-    bpy.context.scene.camera.data.type = "PANO"
-    with pytest.raises(RuntimeError, match="perspective and orthographic"):
+    camera.type, bpy.context.view_layer.use_pass_vector = "PANO", True
+    with pytest.raises(RuntimeError, match="turn off the pass Vector"):
         bpy.ops.render.render(write_still=True)
+    bpy.context.view_layer.use_pass_vector = False
+    bpy.context.scene.render.use_multiview = camera.stereo.use_spherical_stereo = True
+    with pytest.raises(RuntimeError, match="turn off Spherical Stereo"):
+        bpy.ops.render.render(write_still=True)
+    with pytest.raises(HairError, match="render a frame instead"):
+        offscreen_picture()
     assert not list(tmp_path.iterdir())
 
 

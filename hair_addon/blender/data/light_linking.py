@@ -1,0 +1,41 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light linking: which objects a light lights, and which cast its shadows."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Links:
+    """Objects that a rule includes and excludes, by their session_uid; without any included it holds for all others."""
+
+    included: frozenset
+    excluded: frozenset
+
+    def has(self, owner):
+        """Whether a rule holds for an object; owner: session_uids of its instancer, or 0, and of itself.
+
+        An instance follows its instancer where the rule knows that, as in Cycles.
+        """
+        known = self.included | self.excluded
+        uid = next((uid for uid in owner if uid in known), None)
+        return uid not in self.excluded and (not self.included or uid in self.included)
+
+
+ALL = Links(frozenset(), frozenset())
+
+
+def read_links(light_object):
+    """(`Links` of what an original light lights, `Links` of what casts its shadows)."""
+    linking = light_object.light_linking
+    return _links(linking.receiver_collection), _links(linking.blocker_collection)
+
+
+def _links(collection):
+    if collection is None:
+        return ALL
+    states = {}  # the last one counts: an object's own after those of collections
+    for child, item in zip(collection.children, collection.collection_children, strict=True):
+        states |= dict.fromkeys((o.session_uid for o in child.all_objects), item.light_linking.link_state)
+    for linked, item in zip(collection.objects, collection.collection_objects, strict=True):
+        states[linked.session_uid] = item.light_linking.link_state
+    return Links(*(frozenset(uid for uid, state in states.items() if state == one) for one in ("INCLUDE", "EXCLUDE")))

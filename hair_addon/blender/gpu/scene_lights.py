@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A scene's lights for all that they light: the most important one by one, the others as ambient light."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.imaging import lamps
+from ..data.light_linking import ALL
+from . import uniforms, world_texture
+from .shadows import ShadowMaps
+
+_MAP_SIZE = 512  # texels along a side of each light's map: on a head, 0.8 mm
+_MOST_PLACES = 128  # at which importance is computed
+_PLACES = 16  # on a surface, and strands of hair
+
+
+@dataclass(frozen=True)
+class Receiver:
+    """What is lit: session_uids of its instancer, or 0, and of itself; (P, 3) places [m] on it."""
+
+    owner: tuple
+    places: np.ndarray
+
+
+@dataclass(frozen=True)
+class SceneLights:
+    """The lights of a scene.
+
+    record: `uniforms.LIGHTS`, to which `ShadowMaps.draw` adds its part; links: of each of its lights, as
+    `light_linking.read_links` returns them; rest, rest_links: `uniforms.LIGHT` records of the light that there is no
+    room for, and their links.
+    """
+
+    record: np.ndarray
+    links: list
+    rest: np.ndarray
+    rest_links: list
+
+    def lit(self, receivers):
+        """(R,) `uniforms.LIGHTS` of each `Receiver`: without lights that are not linked to it, and with the others'."""
+        records = np.repeat(self.record[None], len(receivers))
+        for record, receiver in zip(records, receivers, strict=True):
+            is_linked = np.array([links.has(receiver.owner) for links, _blockers in self.links], bool)
+            record["light"]["power"][: len(is_linked)][~is_linked] = 0.0
+            reaches = [links.has(receiver.owner) for links, _blockers in self.rest_links]
+            record["world"][:, :3] += lamps.ambient_sides(self.rest[np.array(reaches, bool)], receiver.places)
+        return records
+
+    @property
+    def are_alike(self):
+        """Whether all receivers have the same light."""
+        return not len(self.rest) and all(receivers == ALL for receivers, _blockers in self.links)
+
+    def casters(self, hair, hair_owners, surfaces, surface_owners):
+        """Return the function of a light's index → (hair, surfaces) that cast its shadow; None: all do."""
+        if all(blockers == ALL for _receivers, blockers in self.links):
+            return None
+
+        def chosen(index):
+            blockers = self.links[index][1]
+            pairs = (hair, hair_owners), (surfaces, surface_owners)
+            return tuple(
+                [one for one, owner in zip(some, owners, strict=True) if blockers.has(owner)] for some, owners in pairs
+            )
+
+        return chosen
+
+
+def gather(found, links, world, receivers):
+    """The `SceneLights` of lights and links as of `lights.read_lights`, and of a `World`.
+
+    receivers: of the hair, which decide what is important.
+    """
+    lobes, sides = world_texture.light_of(world)
+    suns = np.zeros(len(lobes), uniforms.LIGHT.dtype)
+    for sun, lobe in zip(suns, lobes, strict=True):
+        sun["kind"], sun["casts_shadow"] = lamps.SUN, True
+        sun["axis"][:3], sun["power"][:3] = -lobe.direction, lobe.irradiance
+        sun["radius"] = 2.0 * np.sqrt(lobe.variance)  # a disk's variance along an axis is a quarter of its radius²
+    found, links = np.concatenate([found, suns]), [*links, *([(ALL, ALL)] * len(suns))]
+    importance = _importance(found, links, receivers)
+    order = np.argsort(-importance, kind="stable")
+    found, links, importance = found[order], [links[index] for index in order], importance[order]
+    one_by_one = lamps.shares(importance, uniforms.LIGHT_CAPACITY)
+    rest, rest_links = (
+        found[one_by_one < 1.0].copy(),
+        [one for one, part in zip(links, one_by_one, strict=True) if part < 1.0],
+    )
+    rest["power"][:, :3] *= 1.0 - one_by_one[one_by_one < 1.0, None]
+    count = int(np.count_nonzero(one_by_one > 0.0))
+    found["power"][:, :3] *= one_by_one[:, None]
+    record = uniforms.LIGHTS.record()
+    record["light"][:count], record["count"] = found[:count], count
+    record["world"][:, :3] = sides
+    return SceneLights(record, links[:count], rest, rest_links)
+
+
+def _importance(found, links, receivers):
+    """(N,) the most irradiance that reaches the receivers, the mean over the channels."""
+    if not receivers:
+        return found["power"][:, :3].mean(axis=1)
+    importance = np.zeros(len(found))
+    step = -(-sum(len(receiver.places) for receiver in receivers) // _MOST_PLACES)
+    for receiver in receivers:
+        arriving = lamps.irradiance(found, receiver.places[::step]).mean(axis=-1).max(axis=1)
+        is_linked = np.array([of_receivers.has(receiver.owner) for of_receivers, _blockers in links], bool)
+        importance = np.maximum(importance, np.where(is_linked, arriving, 0.0))
+    return importance
+
+
+def places_of_hair(points, to_world):
+    """(P, 3) places [m] among points (S, N, 3) of strands, whose coordinates `to_world` (4, 4) transforms."""
+    some = points[:: -(-len(points) // _PLACES), :: max((points.shape[1] - 1) // 2, 1)].reshape(-1, 3)
+    return some @ to_world[:3, :3].T + to_world[:3, 3]
+
+
+def places_on_surface(positions):
+    """(P, 3) places [m] among the corners (N, 3) of a surface."""
+    return positions[:: -(-len(positions) // _PLACES)].astype(float)
+
+
+def new_maps(record):
+    """`ShadowMaps` for a `uniforms.LIGHTS` record."""
+    return ShadowMaps(_MAP_SIZE, max(1, int(record["count"])))

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lamps by importance: those that are drawn one by one, and an ambient cube of the light of all others.
+
+A lamp is a record with the fields of `Light` in shaders/include/lights.glsl.
+"""
+
+import numpy as np
+
+from . import ambient_cube
+
+SUN, POINT, SPOT, AREA = range(4)  # kinds
+
+_FADE = 0.25  # how much more important than the first lamp that is left out one is that counts in full
+
+
+def directions_to(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """(N, P, 3) unit vectors from places (P, 3) to lamps (N,)."""
+    offsets = lamps["position"][:, None, :3].astype(float) - places
+    offsets /= np.maximum(np.linalg.norm(offsets, axis=-1, keepdims=True), 1e-12)
+    suns = -lamps["axis"][:, None, :3].astype(float)
+    return np.where(lamps["kind"][:, None, None] == SUN, suns, offsets)
+
+
+def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """(N, P, 3) irradiance [W/m²] of a small ball at places (P, 3) by lamps (N,): light_irradiance of lights.glsl."""
+    kind = lamps["kind"][:, None]
+    offsets = places - lamps["position"][:, None, :3].astype(float)
+    squared = np.maximum(np.sum(np.square(offsets), axis=-1), 1e-8)
+    cos_angle = np.sum(lamps["axis"][:, None, :3] * offsets, axis=-1) / np.sqrt(squared)
+    cos_cone, blend, radius = (lamps[name][:, None].astype(float) for name in ("cos_cone", "blend", "radius"))
+    beam = _spot_falloff(cos_angle, cos_cone, blend)
+    point = np.where(kind == SPOT, beam, 1.0) / (4.0 * np.pi * squared)
+    facing = np.maximum(cos_angle, 0.0)
+    root = np.sqrt(1.0 + radius**2 * facing / squared)
+    area = facing * 2.0 / (root * (root + 1.0)) * _area_falloff(cos_angle, cos_cone) / (np.pi * squared)
+    part = np.where(kind == SUN, 1.0, np.where(kind == AREA, area, point))
+    return part[..., None] * lamps["power"][:, None, :3]
+
+
+def _spot_falloff(cos_angle, cos_cone, blend):
+    inner = cos_cone + (1.0 - cos_cone) * np.clip(blend, 1e-4, 1.0)
+    return _smooth((cos_angle - cos_cone) / np.maximum(inner - cos_cone, 1e-12))
+
+
+def _area_falloff(cos_angle, cos_cone):
+    cos_cone = np.where(cos_cone < 1e-3, 1e-3, cos_cone)
+    tan_cone = np.sqrt(1.0 - cos_cone**2) / cos_cone
+    tan_angle = np.sqrt(np.maximum(1.0 - cos_angle**2, 0.0)) / np.maximum(cos_angle, 1e-6)
+    beam = np.maximum(0.0, tan_cone - tan_angle) / np.maximum(tan_cone - np.arctan(tan_cone), 1e-12)
+    return np.where(cos_cone <= 1e-3, 1.0, beam)
+
+
+def _smooth(values):
+    part = np.clip(values, 0.0, 1.0)
+    return part * part * (3.0 - 2.0 * part)
+
+
+def shares(importance: np.ndarray, count: int) -> np.ndarray:
+    """(N,) parts from 0 to 1 of the light of lamps (N,) that are drawn one by one: not zero for `count` at most.
+
+    They are continuous in the importance: a lamp has faded out before another takes its place.
+    """
+    if len(importance) <= count:
+        return np.ones(len(importance))
+    least = np.partition(importance, len(importance) - count - 1)[len(importance) - count - 1]
+    return np.where(importance > least, _smooth((importance / max(least, 1e-30) - 1.0) / _FADE), 0.0)
+
+
+def ambient_sides(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """(6, 3) mean radiance of the sides of an ambient cube with the light of lamps (N,), the mean over places (P, 3).
+
+    A plane that is turned anyhow receives E / 4 from a lamp of the irradiance E in the mean, and π/6 of the sum of the
+    sides' radiance from an ambient cube: the sides have 3 E / (2 π) in all.
+    """
+    sides = ambient_cube.side_shares(directions_to(lamps, places))
+    return 1.5 / np.pi * np.einsum("nps,npc->sc", sides, irradiance(lamps, places)) / len(places)
