@@ -16,7 +16,7 @@ if (has_planes && has_found) {
   }
   if (any_of(is_inside)) {
     is_pinched = repair(is_inside, plane_rows, found_rows);
-    if (any_of(is_pinched)) bound_lengths(is_pinched);
+    bound_lengths(is_pinched);
   }
 }
 const float* const last_plane_rows = has_found ? found_rows : plane_rows;

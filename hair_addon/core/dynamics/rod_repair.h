@@ -54,6 +54,7 @@ const auto repair = [&](ints asked, const float* planes, const float* others) {
 };
 // Segments of some lanes no longer or shorter than by PINCHED, from root to tip.
 const auto bound_lengths = [&](ints asked) {
+  if (!any_of(asked)) return;
   for (int i = pinned + 1; i <= segment_count; ++i) {
     const vector from = get_vector(x, i - 1), to = get_vector(x, i), along = to - from;
     const lanes size = exact_sqrt_of(dot(along, along)), wanted = get(length, i - 1);
