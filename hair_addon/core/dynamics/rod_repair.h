@@ -16,8 +16,9 @@ const auto repair = [&](ints asked, const float* planes, const float* others) {
     const auto is_in = (inside > 0.0f) & (inside >= inside_other), is_in_other = (inside_other > 0.0f) & ~is_in;
     const auto is_both = (apart > LEAST_ANGLE) &
                          ((is_in & (inside_other > along * inside)) | (is_in_other & (inside > along * inside_other)));
-    const lanes by = is_both ? (inside - along * inside_other) / apart : (is_in ? inside : lanes(0.0f));
-    const lanes by_other = is_both ? (inside_other - along * inside) / apart : (is_in_other ? inside_other : lanes(0.0f));
+    const lanes none = lanes(0.0f), alone = is_in ? inside : none, alone_other = is_in_other ? inside_other : none;
+    const lanes by = is_both ? (inside - along * inside_other) / apart : alone;
+    const lanes by_other = is_both ? (inside_other - along * inside) / apart : alone_other;
     put_vector(x, i, chosen(moving & (is_in | is_in_other), point + n * by + m * by_other, point));
   };
   ints is_off = 0;
