@@ -109,6 +109,16 @@ MUTATIONS = (
         (("rods.py", '"multipliers", "slips", "roots"', '"multipliers", "roots"'),),
     ),
     Mutation(
+        "one side of a notch",
+        ("V12",),
+        (("rod_finish.h", "repair(is_inside, plane_rows, found_rows)", "repair(is_inside, found_rows, found_rows)"),),
+    ),
+    Mutation(
+        "pinched strands that are torn",
+        ("V12",),
+        (("rod_finish.h", "(inside < 0.0f) & (is_pinched == 0)", "inside < 0.0f"),),
+    ),
+    Mutation(
         "contact that holds what is pulled away",
         ("V15",),
         (("rod_contact.h", "(dot(n, n) > 0.5f) & (push > 0.0f)", "(dot(n, n) > 0.5f)"),),

@@ -5,7 +5,21 @@
 lanes stretch = 0.0f, reach = 0.0f, whole = 0.0f;
 ints is_sound = -1;
 const float per_step = 1.0f / h;
-const float* const last_plane_rows = around.found_planes.shape[0] > 0 ? found_rows : plane_rows;
+const bool has_found = around.found_planes.shape[0] > 0;
+ints is_pinched = 0;  // lanes that cannot be outside at their length: they are not torn, and come out later
+if (has_planes && has_found) {
+  // Inside a plane once more, after AGAIN: between two, of which each solve knew one.
+  ints is_inside = 0;
+  for (int i = pinned + 1; i <= segment_count; ++i) {
+    const float* const found = found_rows + size_t(8 * i) * STRIDE;
+    is_inside = is_inside | (get(found, 3) - dot(get_vector(found, 0), get_vector(x, i)) > INSIDE * get(length, i - 1));
+  }
+  if (any_of(is_inside)) {
+    is_pinched = repair(is_inside, plane_rows, found_rows);
+    bound_lengths(is_pinched);
+  }
+}
+const float* const last_plane_rows = has_found ? found_rows : plane_rows;
 vector last = get_vector(x, 0);
 for (int i = 0; i <= segment_count; ++i) {
   vector point = get_vector(x, i);
@@ -13,7 +27,7 @@ for (int i = 0; i <= segment_count; ++i) {
     const float* plane = last_plane_rows + size_t(8 * i) * STRIDE;
     const vector n = get_vector(plane, 0);
     const lanes inside = dot(n, point) - get(plane, 3);
-    point = chosen(inside < 0.0f, point - n * inside, point);
+    point = chosen((inside < 0.0f) & (is_pinched == 0), point - n * inside, point);
     put_vector(x, i, point);
   }
   // Divided by h, as it was multiplied by h: what h · (1 / h) is off by would grow with each substep.

@@ -2,15 +2,24 @@
 //
 // Points of the lanes that are `asked` in front of their planes, and segments as long as at rest, by turns: what the
 // solve leaves of a strand that is folded against a surface. A lane whose lengths are right is not moved any more.
-// Stands in rod_solver.cpp, before its use.
+// In a notch a point has two planes, `others` too: it is kept in front of both. Returns the lanes whose lengths are not
+// right in the end. Stands in rod_solver.cpp, before its use.
 
-const auto repair = [&](ints asked) {
+const auto repair = [&](ints asked, const float* planes, const float* others) {
   ints moving = asked;
   const auto put_out = [&](int i) {
-    const float* plane = plane_rows + size_t(8 * i) * STRIDE;
-    const vector n = get_vector(plane, 0), point = get_vector(x, i);
-    const lanes inside = get(plane, 3) - dot(n, point);
-    put_vector(x, i, chosen(moving & (inside > 0.0f), point + n * inside, point));
+    const float *one = planes + size_t(8 * i) * STRIDE, *other = others + size_t(8 * i) * STRIDE;
+    const vector n = get_vector(one, 0), m = get_vector(other, 0), point = get_vector(x, i);
+    const lanes inside = get(one, 3) - dot(n, point), inside_other = get(other, 3) - dot(m, point);
+    // The nearest place in front of one plane, of the other, or of both: on the line where they meet.
+    const lanes along = dot(n, m), apart = 1.0f - along * along;
+    const auto is_in = (inside > 0.0f) & (inside >= inside_other), is_in_other = (inside_other > 0.0f) & ~is_in;
+    const auto is_both = (apart > LEAST_ANGLE) &
+                         ((is_in & (inside_other > along * inside)) | (is_in_other & (inside > along * inside_other)));
+    const lanes none = lanes(0.0f), alone = is_in ? inside : none, alone_other = is_in_other ? inside_other : none;
+    const lanes by = is_both ? (inside - along * inside_other) / apart : alone;
+    const lanes by_other = is_both ? (inside_other - along * inside) / apart : alone_other;
+    put_vector(x, i, chosen(moving & (is_in | is_in_other), point + n * by + m * by_other, point));
   };
   ints is_off = 0;
   const auto set_length = [&](int i) {  // of the segment before point i
@@ -39,6 +48,18 @@ const auto repair = [&](ints asked) {
     moving = moving & is_off;
     if (!any_of(moving)) break;
   }
+  const ints pinched = moving;
   moving = asked;
   for (int i = pinned + 1; i <= segment_count; ++i) put_out(i);
+  return pinched;
+};
+// Segments of some lanes no longer or shorter than by PINCHED, from root to tip.
+const auto bound_lengths = [&](ints asked) {
+  if (!any_of(asked)) return;
+  for (int i = pinned + 1; i <= segment_count; ++i) {
+    const vector from = get_vector(x, i - 1), to = get_vector(x, i), along = to - from;
+    const lanes size = exact_sqrt_of(dot(along, along)), wanted = get(length, i - 1);
+    const lanes bounded = clamped(size, wanted * (1.0f - PINCHED), wanted * (1.0f + PINCHED));
+    put_vector(x, i, chosen(asked & (bounded != size), from + along * (bounded / higher_of(size, wanted * 0.01f)), to));
+  }
 };

@@ -163,11 +163,11 @@ for (int substep = first; substep < end; ++substep) {
   if (stages & PREDICT) {
 #include "rod_predict.h"
   }
+#include "rod_repair.h"
   if (stages & (SOLVE | AGAIN)) {
     const bool is_again = stages & AGAIN;
 #include "rod_newton.h"
 #include "rod_contact.h"
-#include "rod_repair.h"
     // Lanes with any plane; again, those of which a point is inside one of those that were found since.
     ints touches = 0;
     for (int i = pinned + 1; has_planes && i <= segment_count; ++i) {
@@ -206,7 +206,7 @@ for (int substep = first; substep < end; ++substep) {
       asked = changed_contacts(asked & touches);
       if (any_of(asked)) put_contacts(false, 1.0f, asked);
     }
-    if (is_again && is_touching) repair(touches);
+    if (is_again && is_touching) bound_lengths(repair(touches, plane_rows, plane_rows));
     if (is_again) put(again, 0, touches ? lanes(1.0f) : lanes(0.0f));
     for (int i = 0; i <= segment_count && (is_touching || !is_again); ++i) {
       lanes slid = is_again ? get(slip, i) : lanes(-1.0f);

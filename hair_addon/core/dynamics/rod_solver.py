@@ -47,6 +47,8 @@ _CONSTANTS = {
     "CHANGE": 0.05,  # of friction, that asks for another pass
     "INSIDE": 5e-3,  # of a segment, that a point may be moved out, or a length be off, without another solve
     "SWEEPS": 20,  # of a repair after that, at most
+    "PINCHED": 0.02,  # of a segment, that it may be too long or too short where a strand cannot be outside otherwise
+    "LEAST_ANGLE": 0.05,  # squared sine, of two planes that meet in a line that can be reached
     "LEAST_INERTIA": 3e-6,  # of a frame, in h² (1 + τ / h) / the compliance of its joint; rounding shows from 1e-7 down
 }
 

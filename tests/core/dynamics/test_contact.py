@@ -220,3 +220,26 @@ def test_a_ball_goes_through_hanging_hair_which_closes_behind_it():
     simulation.advance(72)
     assert np.linalg.norm(simulation.points - groom, axis=2).max() < 1e-3
     assert abs(simulation.rods.stretch()).max() < 1e-3
+
+
+@pytest.mark.gate(id="V12")
+def test_a_tip_in_a_notch_comes_in_front_of_both_of_its_sides(rng):
+    """It is inside one, whose plane the solve had, and inside the other, whose plane was found since."""
+    count = 32
+    simulation = Simulation(np.repeat(line(0.05, 6), count, axis=0), substeps=8)
+    step = replace(simulation.step, gravity=(0.0, 0.0, 0.0))
+    simulation.rods.advance(step, 0, 1, PREDICT)
+    sides = []
+    for sign in (-1.0, 1.0):
+        angles = rng.uniform(np.radians(10.0), np.radians(70.0), count)  # of a side, from level
+        normals = np.stack([0.0 * angles, sign * np.sin(angles), np.cos(angles)], axis=1)
+        depths = rng.uniform(5e-4, 2e-3, count)
+        planes = np.zeros((count, 6, 8))
+        planes[:, -1, :3] = normals
+        planes[:, -1, 3] = np.einsum("si,si->s", normals, simulation.points[:, -1]) + depths
+        sides.append(planes)
+    simulation.rods.advance(step, 0, 1, FINISH, Surroundings(*map(in_lanes, sides)))
+    for planes in sides:
+        gaps = np.einsum("si,si->s", planes[:, -1, :3], simulation.points[:, -1]) - planes[:, -1, 3]
+        assert gaps.min() > -1e-6
+    assert abs(simulation.rods.stretch()).max() < 0.006
