@@ -160,9 +160,9 @@ class Rods:
 
         positions: (S, 3) [m]; turns: (S, 4) rotations x, y, z, w of the surface since the groom, none for None.
         """
-        now = self._root_rows(positions, turns)
-        last = self.read("roots")[:, rod_solver.ROOT_ROWS // 2 :]
-        self._put("roots", np.concatenate([last, now], axis=1))
+        now = wp.array(self._root_rows(positions, turns), dtype=float, device=self.device)
+        roots = self.arrays.roots
+        kernel_cache.launch(_move_roots, (len(roots), self.lanes), inputs=[now], outputs=[roots], device=self.device)
 
     def in_lanes(self, values: np.ndarray, is_padded: bool = True) -> wp.array:
         """(S, rows) numbers → (groups, rows, lanes) float32 on the device; is_padded: lanes without a strand repeat.
@@ -291,6 +291,20 @@ class Rods:
         if not np.isfinite(rows).all():
             raise HairError("Roots of simulated strands have non-finite coordinates.")
         return rows
+
+
+@wp.kernel
+def _move_roots(
+    ends: wp.array2d[float],
+    # outputs
+    roots: wp.array3d[float],
+):
+    """The frame begins where the last one ended; the last strand also fills the last group."""
+    group, lane = wp.tid()
+    strand = wp.min(group * roots.shape[2] + lane, ends.shape[0] - 1)
+    for row in range(_ROOT_END):
+        roots[group, row, lane] = roots[group, _ROOT_END + row, lane]
+        roots[group, _ROOT_END + row, lane] = ends[strand, row]
 
 
 @wp.kernel
