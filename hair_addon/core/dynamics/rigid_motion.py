@@ -13,7 +13,7 @@ class RigidMotion:
     """Of points from `before` to `after`, (V, 3) float32 [m]: the rotation of least squares [Kabsch76]."""
 
     def __init__(self, before: np.ndarray, after: np.ndarray) -> None:
-        self._centre, end = (pose.mean(axis=0, dtype=np.float64) for pose in (before, after))
+        self._centre, end = (pose.astype(np.float64).mean(axis=0) for pose in (before, after))
         self._way = end - self._centre
         start = before - self._centre.astype(np.float32)
         self._radius = largest(start)

@@ -100,6 +100,7 @@ class Simulation:
         vertices = detail.vertices_of(combed, settings.vertex_count)
         self._material, rest = self._shapes(vertices)
         self._rods = Rods(vertices, self._material, rest, self._device)
+        self._rods.set_start(pose.turns)
         self._detail = detail.detail_of(combed, self._rods)
         self._resets = np.zeros((2, len(groom)), int)  # in all, and frames running
         self._colliders = Colliders(self._device)
@@ -206,7 +207,7 @@ class Simulation:
         if pose.scale != self._scale:
             self._scale = pose.scale
             self._renew()
-        self._rods.move_roots(*self._roots(pose))
+        self._rods.move_roots(pose.positions - self._origin, pose.turns)
         self._read_obstacles(world.obstacles)
         self.asked_substeps = self._substep_count(before, pose)
         count = self.asked_substeps if self.settings.automatic_substeps else self.settings.substeps
@@ -304,15 +305,9 @@ class Simulation:
     def _read_obstacles(self, obstacles):
         self._colliders.read([obstacle.seen_from(self._origin) for obstacle in obstacles])
 
-    def _roots(self, pose):
-        """(positions, turns since the first frame) for the rods."""
-        turns = rotations.product(pose.turns, rotations.inverse(self._start.turns))
-        return pose.positions - self._origin, turns
-
     def _substep_count(self, before, after):
         """How many substeps the motion in the next frame asks for."""
-        way = np.linalg.norm(after.positions - before.positions, axis=1).max()
-        way = max(float(way), self._colliders.largest_motion)
+        way = max(float(root_motion.ways(before, after).max()), self._colliders.largest_motion)
         longest = min(_LONGEST_WAY, max(float(self._material.lengths.mean()), _SHORTEST_WAY))
         return min(max(math.ceil(way / longest), self.settings.substeps), MOST_SUBSTEPS)
 
