@@ -6,7 +6,7 @@
 
 Strands of 15 cm and 32 points in frames of 1/24 s and 8 substeps. Free: their roots are shaken. On a body: a ball of
 20,000 triangles with strands all over, which bulges and turns, with hair volume and without. Milliseconds a frame on
-the clock, the shortest, the median and the mean; where roots and the body go is found before the clock starts. Last, the
+the clock, the shortest, the median and the mean; where roots and the body go is found before it starts. Last, the
 largest stretch of a segment.
 """
 

@@ -237,6 +237,10 @@ class Contacts:
         device, count = self.colliders.device, self._vertex_count - 1
         at_once = (count, WIDTH) if device.is_cpu else (1, 1)
         thread_count = groups * count * lanes // (at_once[0] * at_once[1])
+        if not device.is_cpu:
+            first, block = 0, contact_queries.BLOCK
+            kernel_cache.launch(kernel, thread_count, [*inputs, *at_once, first], outputs, device, block)
+            return
         kernel_cache.load(device, kernel.module)
         shares = parallel.share_count(thread_count, device, LEAST_ROWS)
         parallel.launch_shares(kernel, thread_count, [*inputs, *at_once], [outputs] * shares, device)

@@ -12,7 +12,8 @@ from ..kernels import native_code
 from .nearest_surface import BACK, Hit, Surface, crossed, nearest
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+BLOCK = 64  # threads of a GPU: of 256, which look for as long as the slowest, a multiprocessor has few at once
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "block_dim": BLOCK})
 
 PLANE = wp.constant(8)  # rows of an array that a plane takes
 WIDTH = 16  # samples that a thread of the processor takes at once

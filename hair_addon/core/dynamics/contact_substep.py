@@ -2,7 +2,8 @@
 """A substep of strands that may touch colliders: the solver's stages, and between them the planes of contact.
 
 On a processor one kernel does it all for a group of strands, whose state stays in the nearest memory meanwhile: going
-through all strands once for each stage took twice as long where nothing touches. On a GPU each is a launch.
+through all strands once for each stage took twice as long where nothing touches. On a GPU each is a launch; from Python
+these would take longer than the GPU needs for them, so a frame's are recorded once and then replayed.
 """
 
 from dataclasses import replace
@@ -31,10 +32,11 @@ _WIDTH = wp.constant(WIDTH)
 class TouchingStrands:
     """Strands with their contacts, and memory for the planes of those that are at hand."""
 
+    takes_groups = True  # on a processor; off: stage by stage there too
+
     def __init__(self, rods: Rods, contacts: Contacts) -> None:
         self._rods, self._contacts = rods, contacts
         self._replays = Replays(rods.device)
-        self._in_stages = not rods.device.is_cpu
         self._planes: list[tuple[Any, Any, Any]] = []  # of each share of the strands
 
     def advance(self, step: Step, first: int, end: int, surroundings: Surroundings) -> None:
@@ -42,7 +44,7 @@ class TouchingStrands:
         not match."""
         colliders = self._contacts.colliders
         self._contacts.expect(step.count)
-        if self._in_stages:
+        if not (self._rods.device.is_cpu and self.takes_groups):
             self._advance_stages(step, first, end, surroundings)
         elif colliders.is_still:
             self._advance_groups(step, first, end, surroundings)
@@ -62,11 +64,17 @@ class TouchingStrands:
         contacts.send_motions(first, end)
         step = rods.begun(step)
         around = (surroundings.airs, surroundings.drags, surroundings.accelerations)
-        around = [None if array is None else array.ptr for array in around]
-        of_colliders = colliders.build_count, colliders.is_still, colliders.largest_distance
-        key = step, first, end, *of_colliders, *contacts.memory(), *around
-        self._replays.run(key, lambda: self._launch_stages(step, first, end, surroundings))
+        memory = contacts.memory() + [None if array is None else array.ptr for array in around]
+        key = colliders.build_count, colliders.is_still, colliders.largest_distance, *memory
+        # The first substep after some of another size is like no other: the rest may be.
+        middle = end if step.carried == 1.0 else first + 1
+        self._replay(key, step, first, middle, surroundings)
+        if middle < end:
+            self._replay(key, replace(step, carried=1.0), middle, end, surroundings)
         rods.step_size = step.size
+
+    def _replay(self, key, step, first, end, surroundings):
+        self._replays.run((*key, step, first, end), lambda: self._launch_stages(step, first, end, surroundings))
 
     def _launch_stages(self, step, first, end, surroundings):
         rods, contacts = self._rods, self._contacts

@@ -7,13 +7,8 @@
   lanes z[6];
   lanes largest = 0.0f;
   for (int j = segment_count - 1; j >= pinned; --j) {
-    if (FETCH_BACK > 0 && j > pinned) {
-      fetch(kept(j - 1, 0), 0, GRADIENT_AGAIN > 0 ? GRADIENT : KEPT);
-      if (GRADIENT_AGAIN > 0) {
-        fetch(kept(j - 1, TURNING), 0, 1);
-        fetch(rest, 4 * (j - 1), 4);
-        if (j - 1 > pinned) fetch(q, 4 * (j - 2), 4);
-      }
+    if (j > pinned) {
+      fetch(kept(j - 1, 0), 0, KEPT);
       fetch(lambda, 6 * (j - 1), 6);
       fetch(x, 3 * j, 3);
       fetch(q, 4 * (j - 1), 4);
@@ -35,18 +30,11 @@
       UNROLLED for (int k = r + 1; k < 6; ++k) sum -= get(kept(j, LOWER), k * (k + 1) / 2 + r) * z[k];
       z[r] = sum * get(kept(j, LOWER), r * (r + 1) / 2 + r);
     }
-    const quaternion frame = get_frame(q, j);
     vector G_row[3];
-    if (GRADIENT_AGAIN > 0) {
-      const quaternion frame_before_j = j > 0 ? get_frame(q, j - 1) : root_frame;
-      const quaternion half_j = get_frame(rest, j);
-      const rows again_G = bend_gradient(bend_of(frame_before_j, frame, half_j), times(frame_before_j, half_j));
-      UNROLLED for (int r = 0; r < 3; ++r) G_row[r] = again_G.row[r];
-    } else {
-      UNROLLED for (int r = 0; r < 3; ++r) G_row[r] = get_vector(kept(j, GRADIENT), r);
-    }
+    UNROLLED for (int r = 0; r < 3; ++r) G_row[r] = get_vector(kept(j, GRADIENT), r);
     const vector moment_here = G_row[0] * z[0] + G_row[1] * z[1] + G_row[2] * z[2];
     const vector shear{z[3], z[4], z[5]};
+    const quaternion frame = get_frame(q, j);
     const vector turn = (moment_here - cross(direction_of(frame), shear) - moment_after) * get(kept(j, TURNING), 0);
     largest = higher_of(largest, dot(turn, turn));
     UNROLLED for (int k = 0; k < 6; ++k) {

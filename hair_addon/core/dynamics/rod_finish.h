@@ -8,7 +8,7 @@ const float per_step = 1.0f / h;
 const float* const last_plane_rows = around.found_planes.shape[0] > 0 ? found_rows : plane_rows;
 vector last = get_vector(x, 0);
 for (int i = 0; i <= segment_count; ++i) {
-  if (FETCH_ENDS > 0 && i < segment_count) {
+  if (i < segment_count) {
     fetch(x, 3 * (i + 1), 3);
     fetch(x_before, 3 * (i + 1), 3);
     fetch(length, i, 1);
@@ -35,7 +35,7 @@ for (int i = 0; i <= segment_count; ++i) {
   last = point;
 }
 for (int j = 0; j < segment_count; ++j) {
-  if (FETCH_ENDS > 0 && j + 1 < segment_count) {
+  if (j + 1 < segment_count) {
     fetch(q, 4 * (j + 1), 4);
     fetch(q_before, 4 * (j + 1), 4);
   }

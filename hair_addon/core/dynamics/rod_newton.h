@@ -30,7 +30,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
   lanes moment = size_of_bend(pinned);
   lanes L[21], Y[27], y[6];  // L: rows of the lower triangle, diagonal inverted; Y: see `reduce`
   for (int j = pinned; j < segment_count; ++j) {
-    if (FETCH_NEXT > 0 && j + 2 < segment_count) {
+    if (j + 2 < segment_count) {
       fetch(lambda, 6 * (j + 2), 6);
       fetch(x, 3 * (j + 2), 3);
       fetch(q, 4 * (j + 2), 4);

@@ -7,7 +7,7 @@
 // divided by the same m'. The part of drag along the strand that is less than the part across is explicit.
 
 for (int i = 0; i <= segment_count; ++i) {
-  if (FETCH_ENDS > 0 && i < segment_count) {
+  if (i < segment_count) {
     fetch(x, 3 * (i + 1), 3);
     fetch(v, 3 * (i + 1), 3);
     fetch(q, 4 * i, 4);
@@ -49,7 +49,7 @@ for (int i = 0; i <= segment_count; ++i) {
   put(mobility, i, get(inverse_mass, i) * share);
 }
 for (int j = 0; j < segment_count; ++j) {
-  if (FETCH_ENDS > 0 && j + 1 < segment_count) {
+  if (j + 1 < segment_count) {
     fetch(q, 4 * (j + 1), 4);
     fetch(spin, 3 * (j + 1), 3);
   }

@@ -33,7 +33,7 @@ UNROLLED for (int r = 0; r < 6; ++r) {
 }
 UNROLLED for (int k = 0; k < 21; ++k) put(kept(j, LOWER), k, L[k]);
 UNROLLED for (int k = 0; k < 6; ++k) put(kept(j, RIGHT), k, y[k]);
-UNROLLED for (int r = 0; r < (GRADIENT_AGAIN > 0 ? 0 : 3); ++r) {
+UNROLLED for (int r = 0; r < 3; ++r) {
   put(kept(j, GRADIENT), 3 * r, G.row[r].x);
   put(kept(j, GRADIENT), 3 * r + 1, G.row[r].y);
   put(kept(j, GRADIENT), 3 * r + 2, G.row[r].z);

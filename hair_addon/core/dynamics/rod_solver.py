@@ -9,7 +9,6 @@ Arrays are (groups, rows, lanes) float32: a group is as many strands as `lane_co
 number of every strand lies together. `to_lanes` and `from_lanes` convert.
 """
 
-import os
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,10 +34,6 @@ _KEPT_ROWS, _CONTACT_ROWS = 64, 7
 wp.set_module_options({"enable_backward": False, "block_dim": BLOCK})
 
 _CONSTANTS = {
-    "FETCH_BACK": int(os.environ.get("FB", "0")),
-    "FETCH_ENDS": int(os.environ.get("FE", "0")),
-    "GRADIENT_AGAIN": int(os.environ.get("GA", "0")),
-    "FETCH_NEXT": int(os.environ.get("FN", "0")),
     "WIDTH": LANES,
     "GROUP": GPU_LANES,
     "MOST": MOST_SEGMENTS,
@@ -205,12 +200,7 @@ class Around:
     accelerations: wp.array3d[float]
 
 
-_BODY = native_code.body(__file__, "rod_solver.cpp", **_CONSTANTS)
-if os.environ.get("UN", "1") == "0":
-    _BODY = _BODY.replace('_Pragma("unroll")', "")
-
-
-@wp.func_native(_BODY)
+@wp.func_native(native_code.body(__file__, "rod_solver.cpp", **_CONSTANTS))
 def advance_block(
     block: int,
     stages: int,

@@ -8,13 +8,15 @@ import warp as wp
 from .colliders import Colliders
 from .nearest_surface import Motion
 
+_SUBSTEPS = 32  # that there is room for from the beginning
+
 
 class SurfaceMotions:
     """The `Motion` of each substep, written on the processor and read on the colliders' device."""
 
     def __init__(self, device: wp.DeviceLike) -> None:
         self._device = wp.get_device(device)
-        self.make_room(1)
+        self.make_room(_SUBSTEPS)
 
     def make_room(self, count: int) -> None:
         """Let there be as many substeps at least; what was noted before may be lost."""

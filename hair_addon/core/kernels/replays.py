@@ -16,7 +16,7 @@ class Replays:
 
     def __init__(self, device: wp.DeviceLike) -> None:
         self._device = wp.get_device(device)
-        self._is_recording = self._device.is_cuda
+        self._is_refused = False  # by the driver
         self._known: dict[Hashable, wp.Graph | None] = {}  # None for a sequence that has run once
 
     def run(self, key: Hashable, launch: Callable[[], None]) -> None:
@@ -27,7 +27,7 @@ class Replays:
         """
         graph = self._known.get(key)
         if graph is None:
-            graph = self._recorded(launch) if self._is_recording and key in self._known else None
+            graph = self._recorded(launch) if self.is_recording and key in self._known else None
             if len(self._known) >= _MOST:
                 self._known.clear()
             self._known[key] = graph
@@ -36,12 +36,17 @@ class Replays:
         else:
             wp.capture_launch(graph)
 
+    @property
+    def is_recording(self) -> bool:
+        """Whether launches are recorded: on a GPU whose driver does not refuse to."""
+        return self._device.is_cuda and not self._is_refused
+
     def _recorded(self, launch):
         """The launches as a graph, none of which has run; None where the driver does not record them."""
         try:
             wp.capture_begin(self._device, force_module_load=False)
         except RuntimeError:
-            self._is_recording = False
+            self._is_refused = True
             return None
         graph = None
         try:
@@ -50,5 +55,5 @@ class Replays:
             try:
                 graph = wp.capture_end(self._device)
             except RuntimeError:
-                self._is_recording = False
+                self._is_refused = True
         return graph
