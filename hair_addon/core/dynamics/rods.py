@@ -164,8 +164,8 @@ class Rods:
 
         positions: (S, 3) [m]; turns: (S, 4) rotations x, y, z, w of the surface since the groom, none for None.
         """
-        require_count("roots", len(positions), self.strand_count)
-        turns = _NO_TURNS if turns is None else np.asarray(turns)
+        require_count("coordinates of roots", np.size(positions), 3 * self.strand_count)
+        positions, turns = np.reshape(positions, (-1, 3)), _NO_TURNS if turns is None else np.reshape(turns, (-1, 4))
         if len(turns):
             require_count("rotations of roots", len(turns), self.strand_count)
         squares = np.einsum("si,si->s", turns, turns)
@@ -177,7 +177,7 @@ class Rods:
 
     def set_start(self, turns: np.ndarray) -> None:
         """Let turns of `move_roots` and `reset` be counted from others (S, 4): those of the surface in the groom."""
-        require_count("rotations of roots", len(turns), self.strand_count)
+        require_count("numbers of rotations of roots", np.size(turns), 4 * self.strand_count)
         self._start_turns, self._start = turns, self._doubles(turns)
 
     def _doubles(self, rows):
