@@ -35,6 +35,7 @@ if TYPE_CHECKING:
         simulation,
         stiffness_advice,
         stopped_colliders,
+        surface_motions,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -5,6 +5,7 @@ All is checked before Warp sees it: a mesh without faces, an index out of range 
 would end Blender, or silence every query.
 """
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -52,6 +53,17 @@ class _Known:
     rims: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Move:
+    """How colliders move from one part of a frame to another; names as of `Colliders`."""
+
+    rigid_motion: tuple[np.ndarray, np.ndarray]
+    motion: float
+    carry: tuple[np.ndarray, np.ndarray]
+    deformation: float
+    drift: float
+
+
 class Colliders:
     """Colliders on a device; `read` once a frame, then `pose` once a substep.
 
@@ -69,6 +81,7 @@ class Colliders:
         self.face_colliders: Any = None  # (F,) int
         self.rims: Any = None  # (F,) int, of `closed_parts.rims`
         self.settings: Any = None  # (C,) vec3: friction, distance [m], 1 where double-sided
+        self._rows: list[tuple[float, float, float]] = []  # of `settings`
         self.names: tuple[str, ...] = ()
         self.largest_distance = 0.0  # [m]
         self.largest_motion = 0.0  # [m] of a vertex in this frame
@@ -89,6 +102,7 @@ class Colliders:
         self._part = 0.0
         self._is_still = True
         self._posed: Any = None  # the vertices that the mesh has; None between two frames
+        self._moves: dict[tuple[float, float], _Move] = {}  # of this frame, from part to part
 
     def read(self, colliders: Sequence[Collider], frame: int = 0) -> None:
         """Take the poses at the end of a frame: its beginning is the end of the frame before.
@@ -121,16 +135,41 @@ class Colliders:
 
     def pose(self, part: float) -> None:
         """Move to the pose at a part 0..1 of the frame, greater than the last one: vertices on straight lines."""
-        if self.mesh is None:
+        self.go_to(part)
+        self.place(part)
+
+    def expect(self, count: int) -> None:
+        """Say in how many poses at equal distances the frame will be gone through, whose motions are found at once."""
+        if self.mesh is None or self._is_still or (0.0, 1.0 / count) in self._moves:
             return
-        if self._is_still:
+        parts = [step / count for step in range(count + 1)]
+        self._moves.update(zip(itertools.pairwise(parts), self._moves_of(parts[:-1], parts[1:]), strict=True))
+
+    def go_to(self, part: float) -> None:
+        """What is known on the host of a pose, as `pose` does, which also moves the mesh."""
+        if self.mesh is None or self._is_still:
             return
-        self.rigid_motion, self.motion = self._way.between(self._part, part)
-        self.carry, self.deformation = self._way.carried(self._part, part)
+        key = self._part, part
+        move = self._moves[key] if key in self._moves else self._moves_of([self._part], [part])[0]
+        self.rigid_motion, self.motion = move.rigid_motion, move.motion
+        self.carry, self.deformation = move.carry, move.deformation
         (turn, shift), (turned, moved) = self.rigid_motion, self.rigid_motion_so_far
         self.rigid_motion_so_far = turn @ turned, turn @ moved + shift
-        self.drift = self._way.between(0.0, part)[1]
+        self.drift = move.drift
         self._part, self._posed = part, self._end if part == 1.0 else None
+
+    def _moves_of(self, first, last):
+        """The `_Move` of each of some substeps, from parts of the frame to later ones."""
+        (turns, shifts), motions = self._way.between(first, last)
+        (carries, carry_shifts), deformations = self._way.carried(first, last)
+        drifts = self._way.between(np.zeros(len(last)), last)[1]
+        whole = zip(turns, shifts, strict=True), motions.tolist(), zip(carries, carry_shifts, strict=True)
+        return [_Move(*row) for row in zip(*whole, deformations.tolist(), drifts.tolist(), strict=True)]
+
+    def place(self, part: float) -> None:
+        """Move the mesh, as `pose` does, on the device alone."""
+        if self.mesh is None or self._is_still:
+            return
         parallel.launch(
             _interpolate,
             len(self._before),
@@ -186,6 +225,7 @@ class Colliders:
         self.rigid_motion = self.carry = STILL
         self.drift_before, self.drift = self.drift_before + self.drift, 0.0
         self._is_still = True
+        self._moves.clear()
         if self.mesh is None:
             return
         before, after = np.concatenate(before), np.concatenate(after)
@@ -194,18 +234,20 @@ class Colliders:
             self.mesh.refit()
             self._posed = before
             self.jump_count += 1
-        self.previous.assign(before)
+        wp.copy(self.previous, self.mesh.points)
         self._is_still = np.array_equal(before, after)
         if self._is_still:
             return
         self._way, self._end = RigidMotion(before, after), after
         self.largest_motion = largest(after - before)
-        self._before.assign(before)
+        wp.copy(self._before, self.mesh.points)
         self._after.assign(after)
 
     def _set(self, colliders):
         rows = [(one.friction, one.distance, float(one.is_double_sided)) for one in colliders]
-        self.settings = wp.array(np.array(rows, np.float32).reshape(-1, 3), dtype=wp.vec3, device=self.device)
+        if rows != self._rows:  # else it stays where it is
+            self._rows = rows
+            self.settings = wp.array(np.array(rows, np.float32).reshape(-1, 3), dtype=wp.vec3, device=self.device)
         self.largest_distance = max((one.distance for one in colliders), default=0.0)
 
 

@@ -19,6 +19,7 @@ from .colliders import Colliders
 from .contact_queries import PLANE, WIDTH, Asking, Samples
 from .distance_grid import distance_grid
 from .nearest_surface import Surface
+from .surface_motions import SurfaceMotions
 
 RISE = 0.02  # [m/s] at most, of a point that the groom has inside
 LEAST_ROWS = 128  # times `WIDTH` strands that are worth a thread
@@ -48,6 +49,8 @@ class Contacts:
         self.vertices, self.middles = (self._new_samples() for _ in range(2))
         self._planes: Any = None
         self._grid: Any = None
+        self._distances = wp.empty(0, dtype=float, device=device)  # of the grid
+        self._motions = SurfaceMotions(device)
         # How far colliders had drifted before the frame in which the grid was made, and in that frame [m].
         self._grid_drift = self._first_drift = 0.0
         self._none = wp.empty((0, 0, 0), dtype=float, device=device)
@@ -84,34 +87,37 @@ class Contacts:
         self._require_shape(last_positions)
         if not is_final:
             self.follow()
-        if self._planes is None:
-            self._planes = self.planes_of(self._shape[0])
-        *either, middle_planes = self._planes
-        planes = either[int(is_final)]
         if self.colliders.mesh is None:
+            planes = self.planes[int(is_final)]
             planes.zero_()
             return planes
         is_again = moved is not None
         if is_again:
             require_count("groups", moved.shape[0], self._shape[0])
             require_count("lanes", moved.shape[2], self._shape[2])
-        surface = self.surface()
+        self.note_motion()
+        self.send_motions()
         asking = asking_of(0.0 if is_final else duration, is_final, is_again, is_skipping)
+        return self.look(self.surface(), asking, positions, last_positions, moved)
+
+    def look(self, surface: Surface, asking: Asking, positions: Any, last_positions: Any, moved: Any = None) -> Any:
+        """The launches of `find`, of arrays that it has checked: for a surface and a way of asking."""
+        is_final = asking.is_final != 0
+        *either, middle_planes = self.planes
+        planes = either[int(is_final)]
+        moved = self._none if moved is None else moved
         for is_middle in (0,) if is_final else (1, 0):
-            self._launch(
-                contact_queries.find_planes,
-                [
-                    surface,
-                    asking,
-                    positions,
-                    last_positions,
-                    middle_planes,
-                    is_middle,
-                    moved if is_again else self._none,
-                ],
-                [self.middles if is_middle else self.vertices, middle_planes if is_middle else planes],
-            )
+            inputs = [surface, asking, positions, last_positions, middle_planes, is_middle, moved]
+            outputs = [self.middles if is_middle else self.vertices, middle_planes if is_middle else planes]
+            self._launch(contact_queries.find_planes, inputs, outputs)
         return planes
+
+    @property
+    def planes(self) -> tuple[Any, Any, Any]:
+        """Planes of all groups, as `planes_of`."""
+        if self._planes is None:
+            self._planes = self.planes_of(self._shape[0])
+        return self._planes
 
     def follow(self) -> None:
         """Keep what is known of the colliders true; once in a substep, after they were posed."""
@@ -127,6 +133,7 @@ class Contacts:
         if self._grid is None or (is_new_frame and drifted > _MOST_DRIFT * self._grid.size):
             self._grid, self._grid_drift, drifted = self._new_grid(), colliders.drift_before, 0.0
             self._first_drift = colliders.drift
+            self._put_distances()
         self._grid.drift = self._first_drift + drifted + colliders.drift
 
     def _new_grid(self):
@@ -137,6 +144,32 @@ class Contacts:
         groups, rows, lanes = self._shape
         sample_count = groups * rows // 3 * lanes
         return distance_grid(vertices, mesh.indices.numpy().reshape(-1, 3), sample_count, self.colliders.device)
+
+    def _put_distances(self):
+        """Copy the grid's distances to where kernels read them: the same memory for as long as they fit."""
+        distances = self._grid.distances.flatten()
+        if len(self._distances) < len(distances):
+            count = len(distances) + len(distances) // 2
+            self._distances = wp.empty(count, dtype=float, device=self.colliders.device)
+        wp.copy(self._distances, distances, count=len(distances))
+
+    def expect(self, count: int) -> None:
+        """Say how many substeps the frame has, at most."""
+        self.colliders.expect(count)
+        self._motions.make_room(count)
+
+    def note_motion(self, substep: int = 0) -> None:
+        """Write down how the colliders come to where they are posed now."""
+        self._motions.note(substep, self.colliders, self._grid)
+
+    def send_motions(self, first: int = 0, end: int = 1) -> None:
+        """Let kernels read what was noted of substeps first … end - 1."""
+        self._motions.send(first, end)
+
+    def memory(self) -> list[tuple[int, int]]:
+        """Address and length of the arrays of `surface` that may become others."""
+        arrays = self._motions.array, self._distances, self.colliders.settings
+        return [(array.ptr, len(array)) for array in arrays]
 
     def planes_of(self, group_count: int) -> tuple[Any, Any, Any]:
         """Memory for planes of some groups: of vertices before and after the solve, and of segments."""
@@ -177,19 +210,19 @@ class Contacts:
         samples.asked = wp.zeros((groups, 3 * shape[1], lanes), dtype=float, device=device)
         return samples
 
-    def surface(self) -> Surface:
-        """The colliders in their present pose, for kernels."""
+    def surface(self, substep: int = 0) -> Surface:
+        """The colliders in their present pose, for kernels; substep: whose motion they read."""
         colliders, surface = self.colliders, Surface()
         surface.mesh, surface.points, surface.indices = colliders.mesh.id, colliders.mesh.points, colliders.mesh.indices
         surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
         surface.rims, surface.settings = colliders.rims, colliders.settings
-        surface.largest_distance, surface.motion = colliders.largest_distance, colliders.motion
-        turned, moved = colliders.rigid_motion_so_far
-        (carry, carry_shift), surface.deformation = colliders.carry, colliders.deformation
-        surface.carry, surface.carry_shift = wp.mat33(carry), wp.vec3(carry_shift)
-        surface.to_rest, surface.moved = wp.mat33(turned.T), wp.vec3(moved)
+        surface.largest_distance, surface.motions, surface.substep = (
+            colliders.largest_distance,
+            self._motions.array,
+            substep,
+        )
         if self._grid is not None:
-            surface.grid = self._grid
+            surface.distances = self._distances
         return surface
 
     def _require_shape(self, positions):
@@ -204,6 +237,10 @@ class Contacts:
         device, count = self.colliders.device, self._vertex_count - 1
         at_once = (count, WIDTH) if device.is_cpu else (1, 1)
         thread_count = groups * count * lanes // (at_once[0] * at_once[1])
+        if not device.is_cpu:
+            first, block = 0, contact_queries.BLOCK
+            kernel_cache.launch(kernel, thread_count, [*inputs, *at_once, first], outputs, device, block)
+            return
         kernel_cache.load(device, kernel.module)
         shares = parallel.share_count(thread_count, device, LEAST_ROWS)
         parallel.launch_shares(kernel, thread_count, [*inputs, *at_once], [outputs] * shares, device)

@@ -74,7 +74,8 @@ const auto where = [](int condition) { return condition ? ints(-1) : ints(0); };
 const auto is_some = [](const vector& v) { return (v.x != 0.0f) | (v.y != 0.0f) | (v.z != 0.0f); };
 
 const bool is_final = asking.is_final != 0, is_again = asking.is_again != 0;
-const float deformation = surface.deformation, motion = surface.motion, rise = asking.rise;
+const auto& now = surface.motions.data[surface.substep];
+const float deformation = now.deformation, motion = now.motion, rise = asking.rise;
 vector point = get_vector(positions, sample + 1), last = get_vector(last_positions, sample + 1);
 lanes segment = lanes(0.0f);
 if (is_middle) {
@@ -93,8 +94,8 @@ const lanes most = lower_of(lanes(surface.largest_distance), at_rest);
 
 // As the surface sees it. Through a collider that does not deform a ray finds what has passed: the nearest surface is
 // looked for no farther than it may pull.
-const vector carried = turned(surface.carry, last);
-const auto& shift = surface.carry_shift;
+const vector carried = turned(now.carry, last);
+const auto& shift = now.carry_shift;
 const vector way = minus(point, vector{carried.x + shift[0], carried.y + shift[1], carried.z + shift[2]});
 const lanes length = length_of(way);
 const lanes moving = lower_of(length, lanes(MOST_MOTION)) + deformation;
@@ -102,8 +103,8 @@ lanes needed = abs_of(most) + MARGIN + (deformation > BACK ? moving : lower_of(m
 
 const lanes before = get(row_of(samples.clear, sample));
 const lanes left = is_final ? before : before - motion;
-const auto& moved = surface.moved;
-const vector place = turned(surface.to_rest, vector{point.x - moved[0], point.y - moved[1], point.z - moved[2]});
+const auto& moved = now.moved;
+const vector place = turned(now.to_rest, vector{point.x - moved[0], point.y - moved[1], point.z - moved[2]});
 const lanes away = length_of(minus(place, get_vector(samples.asked, sample)));
 const auto is_spared = (left - away > needed + SLACK) & where(asking.is_skipping);
 needed = before < 0.0f ? higher_of(needed, moving + MARGIN - left) : needed;  // inside, maybe deeper
@@ -111,10 +112,10 @@ const auto is_kept = (away <= STAYED) & where(is_again);
 const auto is_number = length - length == 0.0f;
 const auto is_short = (segment <= 2.0f * most) & where(is_middle);
 auto is_asking = is_number & !is_spared & !is_short & !is_kept;
-if (asking.is_skipping && any_of(is_asking) && surface.grid.distances.shape[0] > 0) {
+if (asking.is_skipping && any_of(is_asking) && surface.distances.shape[0] > 0) {
   // So far from any surface that neither the nearest one matters, nor any was passed on the way.
   const lanes limit = higher_of(needed, length + 2.0f * (deformation + BACK)) + SLACK;
-  is_asking = is_asking & !(least_distance(surface.grid, place.x, place.y, place.z) > limit);
+  is_asking = is_asking & !(least_distance(now.grid, surface.distances.data, place.x, place.y, place.z) > limit);
 }
 ints is_any = is_asking ? ints(1) : ints(0);
 if (is_again && !any_of(is_any)) return 0;

@@ -12,7 +12,8 @@ from ..kernels import native_code
 from .nearest_surface import BACK, Hit, Surface, crossed, nearest
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
-wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+BLOCK = 64  # threads of a GPU: of 256, which look for as long as the slowest, a multiprocessor has few at once
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "block_dim": BLOCK})
 
 PLANE = wp.constant(8)  # rows of an array that a plane takes
 WIDTH = 16  # samples that a thread of the processor takes at once
@@ -152,14 +153,15 @@ def _look(
     point = _sample(positions, group, sample, lane, is_middle)
     last = _sample(last_positions, group, sample, lane, is_middle)
     at_rest = samples.rest[group, sample, lane]
+    now = surface.motions[surface.substep]
     out_planes[group, _index(row, PLANE, 3), lane] = 0.0
     largest = wp.min(surface.largest_distance, at_rest)
     entry = Hit()
     entry.collider = -1
     radius = needed + wp.min(0.5 * needed, _AHEAD)
     hit = nearest(surface, point, last, radius, samples.sides[group, sample, lane])
-    if surface.deformation <= BACK and at_rest >= 0.0:
-        start = surface.carry * last + surface.carry_shift
+    if now.deformation <= BACK and at_rest >= 0.0:
+        start = now.carry * last + now.carry_shift
         way = wp.length(point - start)
         # Nothing was passed if no surface is as near as the way is long.
         if hit.gap <= way + 2.0 * BACK:
@@ -168,10 +170,10 @@ def _look(
                 needed = wp.max(needed, wp.abs(largest) + wp.min(way, MOST_MOTION) + MARGIN)
                 if needed > radius and hit.collider < 0:
                     hit = nearest(surface, point, last, needed, samples.sides[group, sample, lane])
-    if surface.deformation > BACK and at_rest >= 0.0 and hit.collider >= 0:
+    if now.deformation > BACK and at_rest >= 0.0 and hit.collider >= 0:
         entry = crossed(surface, point, last + hit.displacement, largest)
     samples.sides[group, sample, lane] = 0
-    _put_vector(samples.asked, group, sample, lane, surface.to_rest * (point - surface.moved))
+    _put_vector(samples.asked, group, sample, lane, now.to_rest * (point - now.moved))
     samples.clear[group, sample, lane] = hit.gap
     is_near = hit.collider >= 0 and hit.gap <= needed
     if entry.collider >= 0 and not (is_near and hit.distance <= 0.0 and wp.dot(hit.normal, entry.normal) > 0.0):

@@ -2,14 +2,17 @@
 """A substep of strands that may touch colliders: the solver's stages, and between them the planes of contact.
 
 On a processor one kernel does it all for a group of strands, whose state stays in the nearest memory meanwhile: going
-through all strands once for each stage took twice as long where nothing touches. On a GPU each is a launch.
+through all strands once for each stage took twice as long where nothing touches. On a GPU each is a launch; from Python
+these would take longer than the GPU needs for them, so a frame's are recorded once and then replayed.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import warp as wp
 
 from ..kernels import parallel
+from ..kernels.replays import Replays
 from . import rod_solver
 from .contact import Contacts, asking_of
 from .contact_queries import WIDTH, Asking, Samples, any_moved, find_in
@@ -29,42 +32,78 @@ _WIDTH = wp.constant(WIDTH)
 class TouchingStrands:
     """Strands with their contacts, and memory for the planes of those that are at hand."""
 
+    takes_groups = True  # on a processor; off: stage by stage there too
+
     def __init__(self, rods: Rods, contacts: Contacts) -> None:
         self._rods, self._contacts = rods, contacts
+        self._replays = Replays(rods.device)
         self._planes: list[tuple[Any, Any, Any]] = []  # of each share of the strands
 
     def advance(self, step: Step, first: int, end: int, surroundings: Surroundings) -> None:
-        """Advance by substeps first … end - 1.
-
-        One, to whose end colliders are posed, or several while they stand still. Raises `HairError` where counts do
-        not match.
-        """
-        if self._rods.device.is_cpu:
+        """Advance by substeps first … end - 1, to whose ends colliders are posed. Raises `HairError` where counts do
+        not match."""
+        colliders = self._contacts.colliders
+        self._contacts.expect(step.count)
+        if not (self._rods.device.is_cpu and self.takes_groups):
+            self._advance_stages(step, first, end, surroundings)
+        elif colliders.is_still:
             self._advance_groups(step, first, end, surroundings)
         else:
             for substep in range(first, end):
-                self._advance_stages(step, substep, surroundings)
+                colliders.pose((substep + 1) / step.count)
+                self._advance_groups(step, substep, substep + 1, surroundings)
 
-    def _advance_stages(self, step, substep, surroundings):
-        """One launch after the other."""
-        rods, contacts, part = self._rods, self._contacts, (substep, substep + 1)
+    def _advance_stages(self, step, first, end, surroundings):
+        """One launch after the other, which are recorded: all that changes from frame to frame is in arrays."""
+        rods, contacts, colliders = self._rods, self._contacts, self._contacts.colliders
+        contacts.follow()
+        for substep in range(first, end):
+            colliders.go_to((substep + 1) / step.count)
+            contacts.follow()
+            contacts.note_motion(substep)
+        contacts.send_motions(first, end)
+        step = rods.begun(step)
+        around = (surroundings.airs, surroundings.drags, surroundings.accelerations)
+        memory = contacts.memory() + [None if array is None else array.ptr for array in around]
+        key = colliders.build_count, colliders.is_still, colliders.largest_distance, *memory
+        # The first substep after some of another size is like no other: the rest may be.
+        middle = end if step.carried == 1.0 else first + 1
+        self._replay(key, step, first, middle, surroundings)
+        if middle < end:
+            self._replay(key, replace(step, carried=1.0), middle, end, surroundings)
+        rods.step_size = step.size
+
+    def _replay(self, key, step, first, end, surroundings):
+        self._replays.run((*key, step, first, end), lambda: self._launch_stages(step, first, end, surroundings))
+
+    def _launch_stages(self, step, first, end, surroundings):
+        rods, contacts = self._rods, self._contacts
+        planes, found, _middle_planes = contacts.planes
         places = rods.arrays.positions, rods.arrays.positions_before
-        rods.advance(step, *part, PREDICT, surroundings)
-        planes = contacts.find(*places, step.size)
-        rods.advance(step, *part, SOLVE, Surroundings(planes))
-        found = contacts.find(*places, step.size, is_final=True)
-        rods.advance(step, *part, AGAIN, Surroundings(planes, found))
-        found = contacts.find(*places, step.size, is_final=True, moved=rods.arrays.solved_again)
-        rods.advance(step, *part, FINISH, Surroundings(planes, found))
+        asking, final, again = _ways_of_asking(step)
+        with_planes, with_found = Surroundings(planes), Surroundings(planes, found)
+        for substep in range(first, end):
+            contacts.colliders.place((substep + 1) / step.count)
+            surface, part = contacts.surface(substep), (substep, substep + 1)
+            rod_solver.advance(rods.arrays, step, rods.scratch, *part, PREDICT, surroundings)
+            contacts.look(surface, asking, *places)
+            rod_solver.advance(rods.arrays, step, rods.scratch, *part, SOLVE, with_planes)
+            contacts.look(surface, final, *places)
+            rod_solver.advance(rods.arrays, step, rods.scratch, *part, AGAIN, with_found)
+            contacts.look(surface, again, *places, rods.arrays.solved_again)
+            rod_solver.advance(rods.arrays, step, rods.scratch, *part, FINISH, with_found)
+            step = replace(step, carried=1.0)
 
     def _advance_groups(self, step, first, end, surroundings):
         """All stages of one group of strands after the other."""
         rods, contacts = self._rods, self._contacts
         contacts.follow()
+        contacts.note_motion()
+        contacts.send_motions()
         step = rods.begun(step)
         numbers, _ = rod_solver.kernel_inputs(rods.arrays, step, rods.scratch, first, end, surroundings)
         stages = rod_solver.stages_of(rods.arrays, step, PREDICT | SOLVE | AGAIN | FINISH)
-        asking = [asking_of(step.size), asking_of(0.0, is_final=True), asking_of(0.0, is_final=True, is_again=True)]
+        asking = _ways_of_asking(step)
         inputs = [stages, _ROUNDS, numbers, rods.arrays, rods.scratch, contacts.surface(), *asking]
         inputs += [contacts.vertices, contacts.middles]
         group_count = len(rods.arrays.positions)
@@ -82,6 +121,11 @@ class TouchingStrands:
         while len(self._planes) < share_count:
             self._planes.append(self._contacts.planes_of(1))
         return self._planes[:share_count]
+
+
+def _ways_of_asking(step):
+    """Before the solve, after it, and after it was done again."""
+    return asking_of(step.size), asking_of(0.0, is_final=True), asking_of(0.0, is_final=True, is_again=True)
 
 
 def _for_each(array, group_count):

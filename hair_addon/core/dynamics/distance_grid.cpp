@@ -9,5 +9,5 @@
 #include "lanes.h"
 #include "distance_grid.h"
 
-return get_lane(least_distance(grid, lanes(point[0]), lanes(point[1]), lanes(point[2])), 0);
+return get_lane(least_distance(grid, grid.distances.data, lanes(point[0]), lanes(point[1]), lanes(point[2])), 0);
 }

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
-// The least distance that a `DistanceGrid` knows points to have from any surface [m]. Included after lanes.h.
+// The least distance that a grid knows points to have from any surface [m]: a `GridPlace` or `DistanceGrid`, and its
+// distances. Included after lanes.h.
 
-const auto least_distance = [&](const auto& grid, lanes x, lanes y, lanes z) {
+const auto least_distance = [&](const auto& grid, const float* distances, lanes x, lanes y, lanes z) {
   const auto size_of = [&](lanes a, lanes b, lanes c) { return exact_sqrt_of(a * a + b * b + c * c); };
   // In a box that contains all triangles, the place that is nearest to a point, and the vertex beside that.
   const auto inside_of = [&](lanes along, int axis) {
@@ -16,9 +17,9 @@ const auto least_distance = [&](const auto& grid, lanes x, lanes y, lanes z) {
   const lanes inside_x = inside_of(x, 0), inside_y = inside_of(y, 1), inside_z = inside_of(z, 2);
   const auto beside = [&](lanes along) { return to_ints(along * (1.0f / grid.size) + 0.5f); };
   const ints i = beside(inside_x), j = beside(inside_y), k = beside(inside_z);
-  const ints index = (i * grid.distances.shape[1] + j) * grid.distances.shape[2] + k;
+  const ints index = (i * (grid.last[1] + 1) + j) * (grid.last[2] + 1) + k;
   lanes distance = lanes(0.0f);
-  for (int l = 0; l < LANES; ++l) set_lane(distance, l, grid.distances.data[get_lane(index, l)]);
+  for (int l = 0; l < LANES; ++l) set_lane(distance, l, distances[get_lane(index, l)]);
   const auto from_vertex = [&](lanes along, ints vertex) { return along - to_lanes(vertex) * grid.size; };
   distance -= size_of(from_vertex(inside_x, i), from_vertex(inside_y, j), from_vertex(inside_z, k)) + grid.drift;
   distance = distance > 0.0f ? distance : lanes(0.0f);

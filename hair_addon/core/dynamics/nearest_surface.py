@@ -3,11 +3,27 @@
 
 import warp as wp
 
-from .distance_grid import DistanceGrid
+from .distance_grid import GridPlace
 
 BACK = wp.constant(1e-4)  # [m] before a point's last position, where its ray starts
 _AT_EDGE = wp.constant(1e-5)  # a barycentric coordinate that counts as zero
 _TINY = wp.constant(1e-6)  # [m]: nearer points take the normal of the face
+
+
+@wp.struct
+class Motion:
+    """How colliders move in one substep, and where their grid of distances is by its end."""
+
+    # How far a vertex moves, at most, but for their turn as a whole.
+    motion: float
+    # Where points that move with them come to, and how far they deform otherwise.
+    carry: wp.mat33
+    carry_shift: wp.vec3
+    deformation: float
+    # How they have since the beginning: place at rest = to_rest (x - moved).
+    to_rest: wp.mat33
+    moved: wp.vec3
+    grid: GridPlace  # at rest
 
 
 @wp.struct
@@ -22,16 +38,9 @@ class Surface:
     rims: wp.array[int]
     settings: wp.array[wp.vec3]
     largest_distance: float
-    # How far a vertex moves in this substep, at most, but for their turn as a whole.
-    motion: float
-    # Where points that move with it come to in this substep, and how far it deforms otherwise.
-    carry: wp.mat33
-    carry_shift: wp.vec3
-    deformation: float
-    # How it has since the beginning: place at rest = to_rest (x - moved).
-    to_rest: wp.mat33
-    moved: wp.vec3
-    grid: DistanceGrid  # at rest
+    distances: wp.array[float]  # of the grid; empty where there is none
+    motions: wp.array[Motion]  # of the substeps of a frame
+    substep: int  # the present one
 
 
 @wp.struct

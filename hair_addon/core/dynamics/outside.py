@@ -15,7 +15,7 @@ from ..errors import HairError
 from ..kernels import parallel
 from ..kernels.parallel import Rows
 from .colliders import Colliders
-from .distance_grid import distance_grid, least_distance
+from .distance_grid import DistanceGrid, distance_grid, least_distance
 from .nearest_surface import Surface, nearest
 from .simulation import Obstacle
 
@@ -52,8 +52,8 @@ def kept_outside(
     given = wp.array(offsets.astype(np.float32).reshape(points.shape), dtype=wp.vec3, device=colliders.device)
     out = wp.empty_like(given)
     moved = wp.zeros(len(points), dtype=int, device=colliders.device)
-    surface = _surface_of(colliders, points.size // 3)
-    parallel.launch(_keep_outside, len(points), [Rows(given), surface], [out, moved], colliders.device, least_rows=256)
+    inputs = [Rows(given), _surface_of(colliders), _grid_of(colliders, points.size // 3)]
+    parallel.launch(_keep_outside, len(points), inputs, [out, moved], colliders.device, least_rows=256)
     is_moved = moved.numpy() != 0
     if not is_moved.any():
         return points, is_moved
@@ -64,11 +64,16 @@ def kept_outside(
     return kept, is_moved
 
 
-def _surface_of(colliders, point_count):
-    """The colliders as points ask them, with a grid that is worth its time for so many."""
-    surface, mesh = Surface(), colliders.mesh
+def _grid_of(colliders, point_count):
+    """Distances from the colliders, on a grid that is worth its time for so many points."""
+    mesh = colliders.mesh
     triangles = mesh.indices.numpy().reshape(-1, 3)
-    surface.grid = distance_grid(mesh.points.numpy(), triangles, point_count // _PER_CELL + 1, colliders.device)
+    return distance_grid(mesh.points.numpy(), triangles, point_count // _PER_CELL + 1, colliders.device)
+
+
+def _surface_of(colliders):
+    """The colliders as points ask them."""
+    surface = Surface()
     surface.mesh, surface.points, surface.indices = colliders.mesh.id, colliders.mesh.points, colliders.mesh.indices
     surface.previous, surface.face_colliders = colliders.previous, colliders.face_colliders
     surface.rims, surface.settings = colliders.rims, colliders.settings
@@ -90,6 +95,7 @@ def _lack(surface: Surface, place: wp.vec3, radius: float):
 def _keep_outside(
     points: wp.array2d[wp.vec3],
     surface: Surface,
+    grid: DistanceGrid,
     # outputs
     out_points: wp.array2d[wp.vec3],
     out_moved: wp.array[int],
@@ -109,7 +115,7 @@ def _keep_outside(
         step_size = wp.length(place - last)
         clear -= step_size
         if clear <= 0.0:
-            clear = least_distance(surface.grid, place) - surface.largest_distance
+            clear = least_distance(grid, place) - surface.largest_distance
             if clear > step_size:  # outside, as the point before: there is no surface between the two
                 out_points[strand, i] = place
                 last = place

@@ -4,6 +4,7 @@
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 STILL = np.eye(3), np.zeros(3)
 
@@ -12,7 +13,7 @@ class RigidMotion:
     """Of points from `before` to `after`, (V, 3) float32 [m]: the rotation of least squares [Kabsch76]."""
 
     def __init__(self, before: np.ndarray, after: np.ndarray) -> None:
-        self._centre, end = (pose.mean(axis=0, dtype=np.float64) for pose in (before, after))
+        self._centre, end = (pose.astype(np.float64).mean(axis=0) for pose in (before, after))
         self._way = end - self._centre
         start = before - self._centre.astype(np.float32)
         self._radius = largest(start)
@@ -23,39 +24,60 @@ class RigidMotion:
         if rest_of_none <= self._rest:
             self._angle, self._rest = 0.0, rest_of_none
 
-    def between(self, first: float, last: float) -> tuple[tuple[np.ndarray, np.ndarray], float]:
+    def between(self, first: ArrayLike, last: ArrayLike) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
         """The motion between two parts 0..1: (rotation (3, 3), translation [m]), and a bound of the rest [m].
+
+        Of many pairs of parts (…) at once: rotations (…, 3, 3), translations (…, 3), bounds (…).
 
         Points at part p are c + p d + (1 - p + p R) a + p e, for the centre c, its way d, offsets a and a rest e. Their
         whole turns by φ(p) then, with tan φ = p sin θ / (1 - p + p cos θ).
         """
+        first, last = np.asarray(first, np.float64), np.asarray(last, np.float64)
         turn = self._turn(self._turned(last) - self._turned(first))
         narrowed = self._offsets(last) - turn @ self._offsets(first)
-        rest = np.linalg.norm(narrowed, 2) * self._radius
-        return (turn, self._shift(turn, first, last)), float(rest) + self._rest_of(turn, first, last)
+        rest = _norm(narrowed) * self._radius
+        return (turn, self._shift(turn, first, last)), rest + self._rest_of(turn, first, last)
 
-    def carried(self, first: float, last: float) -> tuple[tuple[np.ndarray, np.ndarray], float]:
+    def carried(self, first: ArrayLike, last: ArrayLike) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
         """As `between`, but by a matrix that also narrows as the lines do: the rest is what bends or grows, at most."""
+        first, last = np.asarray(first, np.float64), np.asarray(last, np.float64)
         carry = self._offsets(last) @ np.linalg.inv(self._offsets(first))
         return (carry, self._shift(carry, first, last)), self._rest_of(carry, first, last)
 
     def _offsets(self, part):
+        part = part[..., None, None]
         return (1.0 - part) * np.eye(3) + part * self._turn(self._angle)
 
     def _shift(self, matrix, first, last):
-        return self._centre + last * self._way - matrix @ (self._centre + first * self._way)
+        first, last = first[..., None], last[..., None]
+        there = (matrix @ (self._centre + first * self._way)[..., None])[..., 0]
+        return self._centre + last * self._way - there
 
     def _rest_of(self, matrix, first, last):
-        return float(np.linalg.norm(last * np.eye(3) - first * matrix, 2)) * self._rest
+        first, last = first[..., None, None], last[..., None, None]
+        return _norm(last * np.eye(3) - first * matrix) * self._rest
 
     def _turned(self, part):
-        return math.atan2(part * math.sin(self._angle), 1.0 - part + part * math.cos(self._angle))
+        sine, cosine = math.sin(self._angle), math.cos(self._angle)
+        return _each(lambda part: math.atan2(part * sine, 1.0 - part + part * cosine), part)
 
     def _turn(self, angle):
-        """The rotation by an angle about the axis: Rodrigues' formula."""
+        """The rotations by angles (…) about the axis: Rodrigues' formula."""
         x, y, z = self._axis
         cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-        return np.eye(3) + math.sin(angle) * cross + (1.0 - math.cos(angle)) * (cross @ cross)
+        sine, cosine = (_each(function, angle)[..., None, None] for function in (math.sin, math.cos))
+        return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
+
+
+def _each(function, values):
+    """A function of numbers, of each of some (…); as NumPy's differ from machine to machine."""
+    values = np.asarray(values)
+    return np.array([function(value) for value in values.ravel().tolist()]).reshape(values.shape)
+
+
+def _norm(matrices):
+    """The largest factor by which matrices (…, 3, 3) lengthen."""
+    return np.linalg.norm(matrices, 2, axis=(-2, -1))
 
 
 def _rotation(start, end):

@@ -22,6 +22,11 @@ if (has_planes && has_found) {
 const float* const last_plane_rows = has_found ? found_rows : plane_rows;
 vector last = get_vector(x, 0);
 for (int i = 0; i <= segment_count; ++i) {
+  if (i < segment_count) {
+    fetch(x, 3 * (i + 1), 3);
+    fetch(x_before, 3 * (i + 1), 3);
+    fetch(length, i, 1);
+  }
   vector point = get_vector(x, i);
   if (has_planes && i > pinned) {
     const float* plane = last_plane_rows + size_t(8 * i) * STRIDE;
@@ -44,6 +49,10 @@ for (int i = 0; i <= segment_count; ++i) {
   last = point;
 }
 for (int j = 0; j < segment_count; ++j) {
+  if (j + 1 < segment_count) {
+    fetch(q, 4 * (j + 1), 4);
+    fetch(q_before, 4 * (j + 1), 4);
+  }
   const quaternion frame = get_frame(q, j);
   const quaternion turn = times(frame, conjugate(get_frame(q_before, j)));
   // Bounded where a frame has turned by nearly half a turn.

@@ -30,6 +30,18 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
   lanes moment = size_of_bend(pinned);
   lanes L[21], Y[27], y[6];  // L: rows of the lower triangle, diagonal inverted; Y: see `reduce`
   for (int j = pinned; j < segment_count; ++j) {
+    if (j + 2 < segment_count) {
+      fetch(lambda, 6 * (j + 2), 6);
+      fetch(x, 3 * (j + 2), 3);
+      fetch(q, 4 * (j + 2), 4);
+      fetch(rest, 4 * (j + 2), 4);
+      fetch(q_before, 4 * (j + 1), 4);
+      fetch(bending, j + 1, 1);
+      fetch(inertia, j + 1, 1);
+      fetch(stretching, j + 1, 1);
+      fetch(length, j + 2, 1);
+      fetch(mobility, j + 2, 1);
+    }
     // Geometric stiffness [Tournier15] turns less what is under tension: w = 1 / (I + |λ_s| + ½ (|λ_b| + |λ_b'|)).
     const lanes compliance = get(bending, j);
     const vector tension = get_vector(lambda, 2 * j + 1);
@@ -68,7 +80,7 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     D[3] = both * dot(G.row[2], G.row[0]);
     D[4] = both * dot(G.row[2], G.row[1]);
     D[5] = both * dot(G.row[2], G.row[2]) + per_twist * inverse_damping;
-    for (int c = 0; c < 3; ++c) {  // (-w G [d]×)ᵀ
+    UNROLLED for (int c = 0; c < 3; ++c) {  // (-w G [d]×)ᵀ
       const vector column = cross(d, G.row[c]) * turning;
       D[6 + c] = column.x;
       D[10 + c] = column.y;
@@ -117,16 +129,16 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
     half = get_frame(rest, j + 1);
     const quaternion e_next = bend_of(frame_b, frame_c, half);
     const rows G_next = bend_gradient(e_next, times(frame_b, half));
-    for (int c = 0; c < 3; ++c) {
+    UNROLLED for (int c = 0; c < 3; ++c) {
       const vector& g = G_next.row[c];
-      for (int r = 0; r < 3; ++r) Y[3 * r + c] = -turning * dot(G.row[r], g);
+      UNROLLED for (int r = 0; r < 3; ++r) Y[3 * r + c] = -turning * dot(G.row[r], g);
       const vector shear = cross(d, g) * turning;
       Y[9 + c] = -shear.x;
       Y[12 + c] = -shear.y;
       Y[15 + c] = -shear.z;
     }
     const lanes coupled = -inverse_length / get(length, j + 1) * mobility_b;
-    for (int k = 18; k < 27; ++k) Y[k] = 0.0f;
+    UNROLLED for (int k = 18; k < 27; ++k) Y[k] = 0.0f;
     Y[18] = Y[22] = Y[26] = coupled;
     if (is_touching) {
       const lanes less = less_b * coupled, normal = normal_b * coupled;
@@ -137,15 +149,15 @@ const auto newton_step = [&](bool is_first, float carried, ints stepping, bool i
       Y[20] = Y[24] = normal * n_b.x * n_b.z;
       Y[23] = Y[25] = normal * n_b.y * n_b.z;
     }
-    for (int c = 0; c < 3; ++c) {
-      for (int r = 0; r < 6; ++r) {
+    UNROLLED for (int c = 0; c < 3; ++c) {
+      UNROLLED for (int r = 0; r < 6; ++r) {
         lanes sum = Y[3 * r + c];
-        for (int k = 0; k < r; ++k) sum -= L[r * (r + 1) / 2 + k] * Y[3 * k + c];
+        UNROLLED for (int k = 0; k < r; ++k) sum -= L[r * (r + 1) / 2 + k] * Y[3 * k + c];
         Y[3 * r + c] = sum * L[r * (r + 1) / 2 + r];
       }
-      for (int r = 3; r < 6; ++r) {
+      UNROLLED for (int r = 3; r < 6; ++r) {
         lanes sum = Y[9 + 3 * r + c];
-        for (int k = 3; k < r; ++k) sum -= L[r * (r + 1) / 2 + k] * Y[9 + 3 * k + c];
+        UNROLLED for (int k = 3; k < r; ++k) sum -= L[r * (r + 1) / 2 + k] * Y[9 + 3 * k + c];
         Y[9 + 3 * r + c] = sum * L[r * (r + 1) / 2 + r];
       }
     }

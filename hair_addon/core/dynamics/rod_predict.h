@@ -7,6 +7,12 @@
 // divided by the same m'. The part of drag along the strand that is less than the part across is explicit.
 
 for (int i = 0; i <= segment_count; ++i) {
+  if (i < segment_count) {
+    fetch(x, 3 * (i + 1), 3);
+    fetch(v, 3 * (i + 1), 3);
+    fetch(q, 4 * i, 4);
+    fetch(inverse_mass, i + 1, 1);
+  }
   const vector point = get_vector(x, i);
   put_vector(x_before, i, point);
   if (i <= pinned) {
@@ -43,6 +49,10 @@ for (int i = 0; i <= segment_count; ++i) {
   put(mobility, i, get(inverse_mass, i) * share);
 }
 for (int j = 0; j < segment_count; ++j) {
+  if (j + 1 < segment_count) {
+    fetch(q, 4 * (j + 1), 4);
+    fetch(spin, 3 * (j + 1), 3);
+  }
   const quaternion frame = get_frame(q, j);
   put_frame(q_before, j, frame);
   const vector turn = get_vector(spin, j) * lanes(h);

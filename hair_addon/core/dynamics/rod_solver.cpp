@@ -50,6 +50,12 @@
 #if !defined(__CUDA_ARCH__)
   #pragma clang fp contract(fast)
 #endif
+// On a GPU, loops over rows of small matrices: an index that is not known would put these in memory.
+#if defined(__CUDA_ARCH__)
+#define UNROLLED _Pragma("unroll")
+#else
+#define UNROLLED
+#endif
 #include "lanes.h"
 #include "vectors.h"
 #include "rod_rotations.h"
@@ -64,6 +70,12 @@ constexpr int STRIDE = GROUP;
 const int group = block / GROUP, lane = block % GROUP;
 const auto get = [](const float* rows, int row) { return rows[size_t(row) * STRIDE]; };
 const auto put = [](float* rows, int row, lanes value) { rows[size_t(row) * STRIDE] = value; };
+// Asks for rows that are read soon: a strand a thread leaves a GPU little else to do while memory answers.
+const auto fetch = [](const float* rows, int first, int count) {
+  for (int row = first; row < first + count; ++row) {
+    asm volatile("prefetch.global.L1 [%0];" ::"l"(rows + size_t(row) * STRIDE));
+  }
+};
 #else
 constexpr int STRIDE = WIDTH;
 const int group = block, lane = 0;
@@ -74,6 +86,7 @@ const auto get = [](const float* rows, int row) -> lanes {
 const auto put = [](float* rows, int row, lanes value) {
   *reinterpret_cast<lanes_anywhere*>(rows + size_t(row) * STRIDE) = value;
 };
+const auto fetch = [](const float*, int, int) {};
 #endif
 const auto get_vector = [&](const float* rows, int i) {
   return vector{get(rows, 3 * i), get(rows, 3 * i + 1), get(rows, 3 * i + 2)};
@@ -225,4 +238,5 @@ for (int substep = first; substep < end; ++substep) {
 #include "rod_finish.h"
   }
 }
+#undef UNROLLED
 }

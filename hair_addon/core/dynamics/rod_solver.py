@@ -325,10 +325,11 @@ def _check(arrays, step, scratch, surroundings):
     if not device.is_cpu:
         expected["scratch"] = _KEPT_ROWS * segment_count + _CONTACT_ROWS * (segment_count + 1)
         given["scratch"] = scratch
+    lanes = lane_count(device)
     for name, rows in expected.items():
         array = given[name]
         require_count(f"groups of {name}", array.shape[0], group_count)
         require_count(f"rows of {name}", array.shape[1], rows)
-        require_count(f"lanes of {name}", array.shape[2], lane_count(device))
+        require_count(f"lanes of {name}", array.shape[2], lanes)
         if not array.is_contiguous or array.device != device:
             raise HairError(f"{name} must be contiguous, on the device of the strands.")

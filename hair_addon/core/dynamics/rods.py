@@ -25,6 +25,8 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 # What a substep reads and the groom, material and roots do not say.
 STATE = ("positions", "velocities", "frames", "spins", "multipliers", "slips", "roots", "resets")
 _ROOT_END = wp.constant(rod_solver.ROOT_ROWS // 2)  # the row of a root's place at the end of the frame
+_NO_TURNS = np.zeros((0, 4))
+_FARTHEST = 1e30  # [m]
 MOST_STRETCH = 1.2  # of a segment, above which a strand is put back to its groom; more where hair is made to stretch
 
 
@@ -94,6 +96,7 @@ class Rods:
         rest = combed_shape(groom) if rest is None else rest
         self._root_frames = rest.frames[:, 0]  # in the groom, as are these roots
         self._roots = groom[:, 0]
+        self._start_turns, self._start = _NO_TURNS, self._doubles(_NO_TURNS)
         groups = -(-self.strand_count // self.lanes)
         self.arrays = RodArrays()
         for name in rod_solver.ROWS:
@@ -137,6 +140,7 @@ class Rods:
         require_count("points", groom.size, self.strand_count * (self.segment_count + 1) * 3)
         back = rotations.inverse(rest.frames[:, :1])
         self._root_frames, self._roots = rest.frames[:, 0], np.asarray(groom, np.float64)[:, 0]
+        self._frames_at_root = self._doubles(self._root_frames)
         self._put("grooms", rotations.rotated(back, groom - groom[:, :1]))
         self._put("groom_frames", rotations.product(back, rest.frames))
 
@@ -160,9 +164,24 @@ class Rods:
 
         positions: (S, 3) [m]; turns: (S, 4) rotations x, y, z, w of the surface since the groom, none for None.
         """
-        now = self._root_rows(positions, turns)
-        last = self.read("roots")[:, rod_solver.ROOT_ROWS // 2 :]
-        self._put("roots", np.concatenate([last, now], axis=1))
+        require_count("coordinates of roots", np.size(positions), 3 * self.strand_count)
+        positions, turns = np.reshape(positions, (-1, 3)), _NO_TURNS if turns is None else np.reshape(turns, (-1, 4))
+        if len(turns):
+            require_count("rotations of roots", len(turns), self.strand_count)
+        squares = np.einsum("si,si->s", turns, turns)
+        if not ((np.abs(positions) < _FARTHEST).all() and ((squares > 0.0) & (squares < np.inf)).all()):
+            raise HairError("Roots of simulated strands have non-finite coordinates.")
+        inputs = [self._doubles(positions), self._doubles(turns), self._start, self._frames_at_root]
+        roots = self.arrays.roots
+        kernel_cache.launch(_move_roots, (len(roots), self.lanes), inputs=inputs, outputs=[roots], device=self.device)
+
+    def set_start(self, turns: np.ndarray) -> None:
+        """Let turns of `move_roots` and `reset` be counted from others (S, 4): those of the surface in the groom."""
+        require_count("numbers of rotations of roots", np.size(turns), 4 * self.strand_count)
+        self._start_turns, self._start = turns, self._doubles(turns)
+
+    def _doubles(self, rows):
+        return wp.array(np.asarray(rows, np.float64), dtype=wp.float64, device=self.device)
 
     def in_lanes(self, values: np.ndarray, is_padded: bool = True) -> wp.array:
         """(S, rows) numbers → (groups, rows, lanes) float32 on the device; is_padded: lanes without a strand repeat.
@@ -286,11 +305,57 @@ class Rods:
 
     def _root_rows(self, positions, turns):
         require_count("roots", len(positions), self.strand_count)
-        turned = self._root_frames if turns is None else rotations.product(np.asarray(turns), self._root_frames)
+        turned = self._root_frames
+        if turns is not None:
+            turns = np.asarray(turns)
+            since = rotations.product(turns, rotations.inverse(self._start_turns)) if len(self._start_turns) else turns
+            turned = rotations.product(since, turned)
         rows = np.concatenate([positions, rotations.unit(turned)], axis=1).astype(np.float32)
         if not np.isfinite(rows).all():
             raise HairError("Roots of simulated strands have non-finite coordinates.")
         return rows
+
+
+@wp.func
+def _product(a: wp.vec4d, b: wp.vec4d):
+    """As `rotations.product`, to the last bit."""
+    x = a[3] * b[0] + b[3] * a[0] + (a[1] * b[2] - a[2] * b[1])
+    y = a[3] * b[1] + b[3] * a[1] + (a[2] * b[0] - a[0] * b[2])
+    z = a[3] * b[2] + b[3] * a[2] + (a[0] * b[1] - a[1] * b[0])
+    return wp.vec4d(x, y, z, a[3] * b[3] - (a[0] * b[0] + a[1] * b[1] + a[2] * b[2]))
+
+
+@wp.func
+def _row(rows: wp.array2d[wp.float64], row: int):
+    return wp.vec4d(rows[row, 0], rows[row, 1], rows[row, 2], rows[row, 3])
+
+
+@wp.kernel
+def _move_roots(
+    positions: wp.array2d[wp.float64],
+    turns: wp.array2d[wp.float64],
+    start: wp.array2d[wp.float64],
+    frames: wp.array2d[wp.float64],
+    # outputs
+    roots: wp.array3d[float],
+):
+    """The frame begins where the last one ended; the last strand also fills the last group."""
+    group, lane = wp.tid()
+    strand = wp.min(group * roots.shape[2] + lane, positions.shape[0] - 1)
+    for row in range(_ROOT_END):
+        roots[group, row, lane] = roots[group, _ROOT_END + row, lane]
+    frame = _row(frames, strand)
+    if turns.shape[0] > 0:
+        turn = _row(turns, strand)
+        if start.shape[0] > 0:
+            before = _row(start, strand)
+            turn = _product(turn, wp.vec4d(-before[0], -before[1], -before[2], before[3]))
+        frame = _product(turn, frame)
+    square = frame[0] * frame[0] + frame[1] * frame[1] + frame[2] * frame[2] + frame[3] * frame[3]
+    for axis in range(3):
+        roots[group, _ROOT_END + axis, lane] = wp.float32(positions[strand, axis])
+    for component in range(4):
+        roots[group, _ROOT_END + 3 + component, lane] = wp.float32(frame[component] / wp.sqrt(square))
 
 
 @wp.kernel

@@ -80,11 +80,16 @@ def rigid_motion(before: RootPose, after: RootPose) -> RigidMotion:
     return RigidMotion(_mean(turned), center, after.positions.mean(axis=0) - center)
 
 
+def ways(before: RootPose, after: RootPose) -> np.ndarray:
+    """(S,) how far roots move [m]."""
+    moved = after.positions - before.positions
+    return np.sqrt(np.einsum("si,si->s", moved, moved))
+
+
 def jumps(before: RootPose, after: RootPose, distance: float) -> np.ndarray:
     """(S,) bool: whether roots move farther than a distance [m], or turn by more than `TELEPORT_ANGLE`."""
-    ways = np.linalg.norm(after.positions - before.positions, axis=1)
-    cosines = np.abs(np.sum(before.turns * after.turns, axis=1))
-    return (ways > distance) | (cosines < math.cos(TELEPORT_ANGLE / 2.0))
+    cosines = np.abs(np.einsum("si,si->s", before.turns, after.turns))
+    return (ways(before, after) > distance) | (cosines < math.cos(TELEPORT_ANGLE / 2.0))
 
 
 def jump_of(before: RootPose, after: RootPose, chosen: np.ndarray) -> RigidMotion:

@@ -11,9 +11,13 @@ IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     """The rotation b, then a."""
-    a_axis, a_real, b_axis, b_real = a[..., :3], a[..., 3:], b[..., :3], b[..., 3:]
-    axis = a_real * b_axis + b_real * a_axis + np.cross(a_axis, b_axis)
-    return np.concatenate([axis, a_real * b_real - np.sum(a_axis * b_axis, axis=-1, keepdims=True)], axis=-1)
+    # By components: NumPy's cross product of many takes three times as long as all of this.
+    ax, ay, az, aw = _components(a)
+    bx, by, bz, bw = _components(b)
+    x = aw * bx + bw * ax + (ay * bz - az * by)
+    y = aw * by + bw * ay + (az * bx - ax * bz)
+    z = aw * bz + bw * az + (ax * by - ay * bx)
+    return np.stack([x, y, z, aw * bw - (ax * bx + ay * by + az * bz)], axis=-1)
 
 
 def inverse(a: np.ndarray) -> np.ndarray:
@@ -23,8 +27,16 @@ def inverse(a: np.ndarray) -> np.ndarray:
 
 def rotated(a: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Vectors (…, 3), rotated."""
-    twice = 2.0 * np.cross(a[..., :3], v)
-    return v + a[..., 3:] * twice + np.cross(a[..., :3], twice)
+    ax, ay, az, aw = _components(a)
+    x, y, z = _components(v)
+    tx, ty, tz = 2.0 * (ay * z - az * y), 2.0 * (az * x - ax * z), 2.0 * (ax * y - ay * x)
+    along_x, along_y, along_z = ay * tz - az * ty, az * tx - ax * tz, ax * ty - ay * tx
+    return np.stack([x + aw * tx + along_x, y + aw * ty + along_y, z + aw * tz + along_z], axis=-1)
+
+
+def _components(a):
+    """Arrays (…) of each component; copies, as one beside the other is slow to read."""
+    return np.moveaxis(np.asarray(a), -1, 0).copy()
 
 
 def unit(a: np.ndarray) -> np.ndarray:

@@ -32,7 +32,7 @@ MOST_SUBSTEPS = 64
 _LONGEST_WAY = 0.01  # [m] that roots and colliders move in a substep, less where segments are shorter,
 _SHORTEST_WAY = 0.003  # but no less: short fur moves the same from there on
 _GRID = 0.125  # [m] between the places of the origin
-_RUBBING = 0.01  # [s] between effects of hair on hair, at least
+_LEAST_RUBBING = 0.01 - 1e-9  # [s] between effects of hair on hair
 _ASKED = 256  # guides that are asked how far others are
 _MOST_RESETS = 10  # frames running in which a strand breaks, after which it stays in its groom
 
@@ -100,6 +100,7 @@ class Simulation:
         vertices = detail.vertices_of(combed, settings.vertex_count)
         self._material, rest = self._shapes(vertices)
         self._rods = Rods(vertices, self._material, rest, self._device)
+        self._rods.set_start(pose.turns)
         self._detail = detail.detail_of(combed, self._rods)
         self._resets = np.zeros((2, len(groom)), int)  # in all, and frames running
         self._colliders = Colliders(self._device)
@@ -206,7 +207,7 @@ class Simulation:
         if pose.scale != self._scale:
             self._scale = pose.scale
             self._renew()
-        self._rods.move_roots(*self._roots(pose))
+        self._rods.move_roots(pose.positions - self._origin, pose.turns)
         self._read_obstacles(world.obstacles)
         self.asked_substeps = self._substep_count(before, pose)
         count = self.asked_substeps if self.settings.automatic_substeps else self.settings.substeps
@@ -220,8 +221,10 @@ class Simulation:
             if self._is_rubbing:
                 self._volume.fit(self._rods.arrays.positions, self._rods.carried_groom())
             fields = [self._seen(field) for field in world.fields]
-            for substep in range(count):
-                self._advance(step, substep, fields, world.time - seconds * (1.0 - substep / count))
+            end = 0
+            while end < count:
+                first, end = end, end + 1 if fields else self._end_of_run(step, end)
+                self._advance(step, first, end, fields, world.time - seconds * (1.0 - first / count))
         self.substeps = count
         self._put_back_broken()
 
@@ -235,19 +238,28 @@ class Simulation:
         settings = self.settings
         return settings.hair_friction > 0.0 or settings.hair_pressure > 0.0
 
-    def _advance(self, step, substep, fields, time):
+    def _end_of_run(self, step, first):
+        """The substep, after one, before which hair acts on hair, or the frame ends."""
+        if not self._is_rubbing:
+            return step.count
+        since, end = self._since_rubbed, first
+        while end < step.count and (end == first or since < _LEAST_RUBBING):
+            since, end = since + step.size, end + 1
+        return end
+
+    def _advance(self, step, first, end, fields, time):
         rods, around = self._rods, Surroundings()
         state = rods.arrays.positions, rods.arrays.velocities
         if fields:
             self._air.blow(fields, *state, time)
             around = Surroundings(airs=self._air.airs, drags=self._air.drags, accelerations=self._air.accelerations)
         if self._colliders.mesh is None:
-            rods.advance(step, substep, substep + 1, surroundings=around)
+            rods.advance(step, first, end, surroundings=around)
         else:
-            self._colliders.pose((substep + 1) / step.count)
-            self._touching.advance(step, substep, substep + 1, around)
-        self._since_rubbed += step.size
-        if self._is_rubbing and self._since_rubbed >= _RUBBING - 1e-9:
+            self._touching.advance(step, first, end, around)
+        for _ in range(first, end):
+            self._since_rubbed += step.size
+        if self._is_rubbing and self._since_rubbed >= _LEAST_RUBBING:
             settings = self.settings
             values = settings.hair_friction, settings.hair_pressure, self._waters
             self._volume.rub(*state, self._since_rubbed, *values)
@@ -261,9 +273,9 @@ class Simulation:
     def _carried_along(self, before, after):
         """Move all by what hair is not to feel of the surface's motion; the pose from which it feels the rest."""
         origin = np.round(after.positions.mean(axis=0) / _GRID) * _GRID
-        shared = root_motion.rigid_motion(before, after).part(1.0 - self.settings.inertia)
-        is_shared = self.settings.inertia < 1.0
-        if is_shared:
+        shared = None
+        if self.settings.inertia < 1.0:
+            shared = root_motion.rigid_motion(before, after).part(1.0 - self.settings.inertia)
             before = before.moved(shared)
             self._carry(shared)
         jumping = np.flatnonzero(root_motion.jumps(before, after, self.settings.teleport_distance))
@@ -272,10 +284,10 @@ class Simulation:
             before = before.with_rows(jumping, after)
         if (origin != self._origin).any():
             self._carry(RigidMotion(rotations.IDENTITY, np.zeros(3), self._origin - origin))
-        if is_shared or len(jumping) or (origin != self._origin).any():
+        if shared or len(jumping) or (origin != self._origin).any():
             self._origin = origin
             obstacles = self.world.obstacles
-            self._read_obstacles([one.moved(shared) for one in obstacles] if is_shared else obstacles)
+            self._read_obstacles([one.moved(shared) for one in obstacles] if shared else obstacles)
             self._contacts.forget()
         return before
 
@@ -293,15 +305,9 @@ class Simulation:
     def _read_obstacles(self, obstacles):
         self._colliders.read([obstacle.seen_from(self._origin) for obstacle in obstacles])
 
-    def _roots(self, pose):
-        """(positions, turns since the first frame) for the rods."""
-        turns = rotations.product(pose.turns, rotations.inverse(self._start.turns))
-        return pose.positions - self._origin, turns
-
     def _substep_count(self, before, after):
         """How many substeps the motion in the next frame asks for."""
-        way = np.linalg.norm(after.positions - before.positions, axis=1).max()
-        way = max(float(way), self._colliders.largest_motion)
+        way = max(float(root_motion.ways(before, after).max()), self._colliders.largest_motion)
         longest = min(_LONGEST_WAY, max(float(self._material.lengths.mean()), _SHORTEST_WAY))
         return min(max(math.ceil(way / longest), self.settings.substeps), MOST_SUBSTEPS)
 

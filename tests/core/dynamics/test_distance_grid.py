@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.core.dynamics.distance_grid import DistanceGrid, distance_grid, least_distance
+from hair_addon.core.dynamics.distance_grid import DistanceGrid, distance_grid, distances_by_kernels, least_distance
 from tests.support.brute_force import distances
 from tests.support.contacts import bumpy, sheet
 from tests.support.meshes import flat_grid
@@ -42,6 +42,16 @@ def test_distances_are_never_more_than_by_brute_force(device, rng, shape, cell_c
     is_among = ((points >= mesh.vertices.min(axis=0)) & (points <= mesh.vertices.max(axis=0))).all(axis=1)
     assert is_among.sum() > 30
     assert (least >= np.minimum(true, 15.0 * grid.size) - loose)[is_among].all()
+
+
+@pytest.mark.parametrize("cell_count", [1, 1000, 40_000])
+@pytest.mark.parametrize("shape", [bumpy, sheet])
+def test_kernels_find_what_numpy_finds(device, rng, shape, cell_count):
+    mesh = shape(rng)
+    grid = distance_grid(mesh.vertices, mesh.triangles, cell_count, "cpu")
+    places = (mesh.vertices - np.array(grid.low)) / grid.size
+    found = distances_by_kernels(places, mesh.triangles, np.array(grid.last), grid.size, device)
+    np.testing.assert_allclose(found.numpy(), grid.distances.numpy(), rtol=1e-6)
 
 
 def test_a_mesh_without_height_has_a_grid(device):

@@ -22,6 +22,20 @@ def test_a_rigid_motion_is_found(rng):
     assert rest < 1e-6 and np.abs(by).max() < 1e-6
 
 
+def test_many_parts_at_once_move_as_each_does(rng):
+    points = rng.normal(size=(200, 3)).astype(np.float32)
+    turned = Rotation.from_rotvec([0.4, 0.1, -0.6]).apply(points) * [1.1, 1.0, 0.9]
+    way = RigidMotion(points, turned.astype(np.float32))
+    parts = np.linspace(0.0, 1.0, 6)
+    for motions in (way.between, way.carried):
+        (matrices, ways), rests = motions(parts[:-1], parts[1:])
+        for index, part in enumerate(pairwise(parts)):
+            (matrix, shift), rest = motions(*part)
+            np.testing.assert_array_equal(matrices[index], matrix)
+            np.testing.assert_array_equal(ways[index], shift)
+            assert rests[index] == rest
+
+
 @pytest.mark.parametrize("kind", ["turn", "half turn", "mirror", "swell", "bend", "any", "point", "line"])
 def test_the_rest_is_no_more_than_what_is_said(rng, kind):
     points = rng.normal(size=(300, 3)) * [1.0, 0.5, 0.2] + [3.0, 0.0, 0.0]

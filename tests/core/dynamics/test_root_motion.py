@@ -7,6 +7,7 @@ import pytest
 from hair_addon.core.dynamics import root_motion, rotations
 from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
 from hair_addon.core.errors import HairError
+from tests.support.rods import Simulation, line
 
 
 def random_pose(rng, count=20):
@@ -64,3 +65,23 @@ def test_coordinates_that_are_no_numbers_are_refused(name):
     values[name][1, 0] = np.nan
     with pytest.raises(HairError, match="non-finite"):
         RootPose(**values)
+
+
+@pytest.mark.parametrize("has_start", [False, True])
+def test_kernels_turn_roots_as_numpy_does(rng, has_start):
+    """To the last bit, since the groom or since another rotation; and the frame begins where the last one ended."""
+    simulation = Simulation(line(0.1, 4) + rng.normal(size=(35, 1, 3)))
+    rods, (start, turns) = simulation.rods, rotations.unit(rng.normal(size=(2, 35, 4)))
+    if has_start:
+        rods.set_start(start)
+    positions = rng.normal(size=(35, 3))
+    rods.reset(positions, turns)
+    expected = rods.read("roots")
+    rods.reset()
+    before = rods.read("roots")
+    rods.move_roots(positions, turns)
+    np.testing.assert_array_equal(rods.read("roots")[:, 7:], expected[:, 7:])
+    np.testing.assert_array_equal(rods.read("roots")[:, :7], before[:, 7:])
+    if has_start:
+        rods.move_roots(positions, start)
+        np.testing.assert_allclose(rods.read("roots")[:, 10:], before[:, 10:], atol=1e-6)
