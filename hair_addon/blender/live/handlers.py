@@ -30,6 +30,8 @@ def after_depsgraph_update(scene, depsgraph):
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
+        if composite.needs_repair(scene) and not bpy.app.timers.is_registered(composite.repair):
+            bpy.app.timers.register(composite.repair)
     if _is_opening:
         _is_opening = False
         return
@@ -185,6 +187,8 @@ def after_frame_change(scene, depsgraph):
 def before_reading(*_args):
     """Write hair before its Curves are read by a save or a render, and what a render reads of hair's own scene."""
     live_hair.write_all()
+    if bpy.app.background:  # in a window a timer repairs, and a render runs beside it
+        composite.repair()
     composite.follow_all()
 
 
@@ -197,6 +201,7 @@ def after_load(*_args):
     live_hair.cancel_writing()
     invalidation.clear()
     _hide_drawn_hair()
+    composite.follow_all()  # of linked hair a file does not store that it is hidden from engines
 
 
 def _hide_drawn_hair():
@@ -209,6 +214,7 @@ def _hide_drawn_hair():
 def _take_over():
     """Draw what Blender drew while the add-on was disabled."""
     _hide_drawn_hair()
+    composite.follow_all()
     looks.follow_guides(bpy.context.view_layer)
 
 
@@ -257,12 +263,15 @@ def register():
 
 
 def unregister():
-    """Remove the handlers, after writing pending hair."""
+    """Remove the handlers; write pending hair, and leave composited hair to the engines."""
     for handlers, handler in _HANDLERS:
         handlers.remove(handler)
     if bpy.app.timers.is_registered(_take_over):
         bpy.app.timers.unregister(_take_over)
     if bpy.app.timers.is_registered(unlocked_renders.offer):
         bpy.app.timers.unregister(unlocked_renders.offer)
+    if bpy.app.timers.is_registered(composite.repair):
+        bpy.app.timers.unregister(composite.repair)
     every_frame.end()
     live_hair.write_all()
+    composite.suspend()
