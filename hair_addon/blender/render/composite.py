@@ -117,6 +117,19 @@ def repair():
                 follow(blender_scene)
 
 
+def is_in_sequence(blender_scene):
+    """Whether a scene is rendered as the hair of another in an animation, or without a window.
+
+    Blender does not tell the engine of a scene that the compositor has rendered that this is for an animation. Without
+    a window it cannot be known, and nothing has played.
+    """
+    if not any(other.vellus.hair_scene == blender_scene.original for other in bpy.data.scenes):
+        return False
+    running = [operator for window in bpy.context.window_manager.windows for operator in window.modal_operators]
+    is_animation = any(one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)
+    return is_animation or bpy.app.background
+
+
 def _separate(blender_scene):
     """Part a copy of a scene from the hair's scene of the original: by one of its own, or none without nodes for it."""
     state = blender_scene.vellus

@@ -2,10 +2,12 @@
 """Composite Hair where its scenes are copied and deleted, its hair is linked, and the add-on is disabled."""
 
 import bpy
+import numpy as np
 import pytest
 
 import hair_addon
 from hair_addon.blender.live import handlers
+from tests.support.rendering import configure
 
 
 @pytest.fixture
@@ -103,3 +105,17 @@ def test_hair_is_laid_over_the_view_layer_that_it_is_rendered_with(composited):
     bpy.ops.vellus.toggle_composite()
     shaded = next(link for link in tree.links if link.to_node.name == "Vellus Hair Shadow" and not link.is_muted)
     assert shaded.from_node.layer == first
+
+
+def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composited, tmp_path, capfd):
+    scene = bpy.context.scene
+    bpy.data.objects["Guides"].data.vellus.simulates = True
+    configure(engine="CYCLES", resolution_x=8, resolution_y=6, film_transparent=True, use_compositing=True)
+    scene.cycles.samples, scene.frame_start, scene.frame_end = 1, 1, 2
+    bpy.data.objects["Sphere"].hide_render = True  # what Cycles sees is empty: the picture is the hair
+    scene.render.filepath = str(tmp_path / "frame_")
+    bpy.ops.render.render(animation=True)
+    assert 'Frame 2 of the guides "Guides" is not baked' in "".join(capfd.readouterr())
+    found = [bpy.data.images.load(str(tmp_path / f"frame_000{frame}.png")) for frame in (1, 2)]
+    first, second = (np.reshape(image.pixels, (-1, 4))[:, 3].max() for image in found)
+    assert first > 0.1 and second == 0.0
