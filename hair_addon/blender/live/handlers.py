@@ -10,7 +10,7 @@ from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
 from ..render import composite
-from ..settings import animated
+from ..settings import animated, style_items
 from . import every_frame, invalidation, live_hair, reported, simulated_hair, unlocked_renders
 
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
@@ -193,11 +193,19 @@ def before_reading(*_args):
 
 
 @persistent
+def after_import(*_args):
+    """Make the names of styles readable, which Blender passes to a rename."""
+    for hair in _of_kind("HAIR"):
+        style_items.make_names_readable(hair.vellus)
+
+
+@persistent
 def after_load(*_args):
     """Hair in a file is up to date; without a window Blender reports no update of it."""
     global _is_opening, _is_undone
     _is_opening = not bpy.app.background
     _is_undone = True  # does not affect a file that was saved during a stroke
+    after_import()
     live_hair.cancel_writing()
     invalidation.clear()
     _hide_drawn_hair()
@@ -251,6 +259,7 @@ _HANDLERS = (
     (bpy.app.handlers.undo_post, after_undo),
     (bpy.app.handlers.redo_post, after_undo),
     (bpy.app.handlers.load_post, after_load),
+    (bpy.app.handlers.blend_import_post, after_import),
 )
 
 
