@@ -20,9 +20,19 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
-from tests.desktop.window import drag, import_head, in_viewport, places, take_picture, viewport, wait, wait_for  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    MODULE,
+    drag,
+    import_head,
+    in_viewport,
+    install,
+    places,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+)
 
-MODULE = "bl_ext.user_default.vellus"
 PART, ZIP, HEAD, OUT = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 
@@ -146,7 +156,7 @@ def offers():
 
 def bare_head():
     """1. A head with a vertex group where hair grows."""
-    bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+    install(ZIP)
     bpy.context.preferences.system.use_region_overlap = False
     for thing in list(bpy.data.objects):
         if thing.type == "MESH":
