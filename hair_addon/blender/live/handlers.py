@@ -30,8 +30,9 @@ def after_depsgraph_update(scene, depsgraph):
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
-        if composite.needs_repair(scene) and not bpy.app.timers.is_registered(composite.repair):
-            bpy.app.timers.register(composite.repair)
+    # Blender does not report a scene that was copied or deleted.
+    if composite.needs_repair(scene) and not bpy.app.timers.is_registered(composite.repair):
+        bpy.app.timers.register(composite.repair)
     if _is_opening:
         _is_opening = False
         return
