@@ -225,11 +225,13 @@ def export():
     with in_viewport():
         bpy.ops.vellus.export_groom("INVOKE_DEFAULT", animation="ALL")
     yield from wait_for(lambda: browsers() and browsers()[0][1].spaces.active.params is not None, 10.0)
-    browser_window, browser = browsers()[0]
-    browser.spaces.active.params.directory = str(OUT).encode()
-    browser.spaces.active.params.filename = "groom.abc"
-    yield from press("RET", browser_window, browser)
-    yield from wait_for((OUT / "groom.abc").exists, 30.0)
+    params = browsers()[0][1].spaces.active.params
+    params.directory, params.filename = str(OUT).encode(), "groom.abc"
+    for _time in range(5):  # a browser that is not drawn yet takes no keys
+        if browsers():
+            yield from press("RET", *browsers()[0])
+            yield from wait_for(lambda: not browsers(), 3.0)
+    yield from wait_for((OUT / "groom.abc").exists)
     facts["exported"] = (OUT / "groom.abc").exists() and (OUT / "groom.abc").stat().st_size
     facts["frame"] = scene().frame_current
 
