@@ -47,7 +47,6 @@ def dynamics(request, desktop, extension, new_profile):
             profile=profile,
             log=folder / f"{part}.log",
             limit=400,
-            size=(760, 540),
         )
         for part in PARTS
     ]

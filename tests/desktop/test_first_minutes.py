@@ -13,8 +13,6 @@ from tools import build_extension, desktop_blender
 pytestmark = pytest.mark.desktop
 
 SCRIPT = Path(__file__).with_name("first_minutes.py")
-# Pictures of the manual are taken with OpenGL.
-SIZES = {"opengl": (1600, 1000), "vulkan": (1100, 700)}
 HEAD = build_extension.ROOT / "blend_samples" / "head.obj"
 
 
@@ -40,7 +38,7 @@ def minutes(request, desktop, extension, tmp_path_factory):
         profile=tmp_path_factory.mktemp("profile"),
         log=folder / "first_minutes.log",
         limit=600,
-        size=SIZES[request.param],
+        size=(1600, 1000),
     )
     return Minutes(folder, status)
 
