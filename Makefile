@@ -21,7 +21,7 @@ test: $(installed) ## all tests except long benchmarks and tests in a window, in
 	$(python) -m pytest -m "not long and not desktop" --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
 
 desktop: $(installed) ## tests in a window of Blender, with OpenGL and Vulkan: screenshots in out/desktop
-	$(python) -m pytest -m "desktop and not long" tests/desktop $(ARGS)
+	$(python) -m pytest -m "desktop and not long" --numprocesses 2 --dist loadfile tests/desktop $(ARGS)
 
 bench: $(installed) $(peers) ## the benchmarks, with their figures
 	$(python) -m pytest tests/benchmarks -s $(ARGS)

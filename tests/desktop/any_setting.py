@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every setting in random order in a real window, on surfaces that are deformed, animated, emptied and linked.
 
-Run by a desktop Blender: any_setting.py -- SEED END OUT [ZIP]. Installs the extension from ZIP unless it is there.
+Run by a desktop Blender: any_setting.py -- SEED END OUT ZIP. Installs the extension from ZIP unless it is there.
 Takes the steps before number END, and saves the scene to OUT with any_setting_SEED.json: the steps taken, the state of
 the random numbers and whether END was reached. Where these are there already, it goes on with them: so each part of a
 long walk has a Blender of its own, as a hundred redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or
@@ -19,11 +19,10 @@ from pathlib import Path
 import bpy
 import numpy as np
 
-MODULE = "bl_ext.user_default.vellus"
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop import any_scene  # noqa: E402
-from tests.desktop.window import in_viewport, viewport, wait  # noqa: E402
+from tests.desktop.window import MODULE, in_viewport, install, viewport, wait  # noqa: E402
 
 
 class Artist:
@@ -362,8 +361,6 @@ def advance(steps):
 if __name__ == "__main__":
     SEED, END, OUT = sys.argv[sys.argv.index("--") + 1 :][:3]
     bpy.context.preferences.view.show_splash = False
-    if MODULE not in bpy.context.preferences.addons:
-        zip_path = sys.argv[sys.argv.index("--") + 4]
-        bpy.ops.extensions.package_install_files(filepath=zip_path, repo="user_default", enable_on_install=True)
+    install(sys.argv[sys.argv.index("--") + 4])
     walking = walk(int(SEED), int(END), Path(OUT))
     bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)

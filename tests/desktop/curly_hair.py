@@ -20,9 +20,9 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+from tests.desktop import window as desktop  # noqa: E402
 from tests.desktop.window import drag, import_head, in_viewport, places, take_picture, viewport, wait, wait_for  # noqa: E402
 
-MODULE = "bl_ext.user_default.vellus"
 PART, ZIP, HEAD, OUT = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 
@@ -64,7 +64,7 @@ def points(curves_object):
 
 def strands():
     """(S, P, 3) positions of the hair as it is drawn, which may not be written yet."""
-    bound = sys.modules[f"{MODULE}.hair_addon.blender"].groom.bindings.of(hair_object().data)
+    bound = sys.modules[f"{desktop.MODULE}.hair_addon.blender"].groom.bindings.of(hair_object().data)
     if bound is not None:
         return bound.points.copy()
     return points(hair_object()).reshape(len(hair_object().data.curves), -1, 3)
@@ -109,7 +109,7 @@ def click(x, y):
 
 def show_styles_alone():
     """Of the tab's panels, the sidebar shows Styles and no other."""
-    classes = sys.modules[f"{MODULE}.hair_addon.blender"].panels.CLASSES
+    classes = sys.modules[f"{desktop.MODULE}.hair_addon.blender"].panels.CLASSES
     for panel in reversed(classes):
         is_shown = panel.bl_idname.startswith(("VELLUS_PT_style", "VELLUS_UL"))
         if not is_shown and panel.is_registered and getattr(panel, "bl_category", "") == "Hair":
@@ -138,7 +138,7 @@ def add_style(offer):
 
 
 def offers():
-    return sys.modules[f"{MODULE}.hair_addon.core"].styling.kinds.OFFERS
+    return sys.modules[f"{desktop.MODULE}.hair_addon.core"].styling.kinds.OFFERS
 
 
 # The ten steps.
@@ -146,7 +146,7 @@ def offers():
 
 def bare_head():
     """1. A head with a vertex group where hair grows."""
-    bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+    desktop.install(ZIP)
     bpy.context.preferences.system.use_region_overlap = False
     for thing in list(bpy.data.objects):
         if thing.type == "MESH":

@@ -19,9 +19,18 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
-from tests.desktop.window import in_viewport, offscreen_light, take_picture, viewport, wait, wait_for, window  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    MODULE,
+    in_viewport,
+    install,
+    offscreen_light,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+    window,
+)
 
-MODULE = "bl_ext.user_default.vellus"
 PART, ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 
@@ -128,7 +137,7 @@ def look(_scene, _depsgraph):
 
 
 def hair_on_a_swinging_ball():
-    bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+    install(ZIP)
     for thing in list(bpy.data.objects):
         if thing.type == "MESH":
             bpy.data.objects.remove(thing)

@@ -15,9 +15,19 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
-from tests.desktop.window import drag, in_viewport, places, take_picture, viewport, wait, wait_for, window  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    MODULE,
+    drag,
+    in_viewport,
+    install,
+    places,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+    window,
+)
 
-MODULE = "bl_ext.user_default.vellus"
 ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 
@@ -83,7 +93,7 @@ def are_in(rows, others):
 
 def groom():
     """Hair on a sphere, its guides waved, one eighth of them selected in Sculpt Mode; two empties to cut with."""
-    bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+    install(ZIP)
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
     with in_viewport():

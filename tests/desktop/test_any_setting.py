@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import build_extension, compile_kernels, desktop_blender
+from tools import build_extension, desktop_blender
 
 pytestmark = pytest.mark.desktop
 
@@ -17,7 +17,7 @@ SCRIPT = Path(__file__).with_name("any_setting.py")
 PART = 25
 
 
-def check(desktop, profile, seed, step_count, limit, backend="opengl"):
+def check(desktop, extension, profile, seed, step_count, limit, backend="opengl"):
     """Take the steps that follow from a seed; what was printed is in out/desktop.
 
     limit: of a part [s]. The steps are the same with either backend.
@@ -25,7 +25,6 @@ def check(desktop, profile, seed, step_count, limit, backend="opengl"):
     folder = build_extension.ROOT / "out" / "desktop" / f"any_setting_{seed}_{step_count}_{backend}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    extension = build_extension.build(compile_kernels.this_platform())
     for end in [*range(PART, step_count, PART), step_count]:
         path = folder / f"any_setting_{end}.log"
         status = desktop.run(
@@ -45,12 +44,12 @@ def check(desktop, profile, seed, step_count, limit, backend="opengl"):
         assert "Not freed memory blocks" not in log, log[-4000:]
 
 
-def test_a_few_random_settings(desktop, tmp_path):
-    check(desktop, tmp_path, seed=1, step_count=15, limit=300)
+def test_a_few_random_settings(desktop, extension, new_profile):
+    check(desktop, extension, new_profile(), seed=1, step_count=15, limit=300)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("backend", desktop_blender.BACKENDS)
 @pytest.mark.parametrize("seed", [1, 2, 3, 4, 5])
-def test_many_random_settings(desktop, tmp_path, seed, backend):
-    check(desktop, tmp_path, seed, step_count=300, limit=1200, backend=backend)
+def test_many_random_settings(desktop, extension, new_profile, seed, backend):
+    check(desktop, extension, new_profile(), seed, step_count=300, limit=1200, backend=backend)

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from tests.support.commands import HEAD, load, run
-from tools import build_extension, compile_kernels
 
 pytestmark = pytest.mark.desktop
 
@@ -16,11 +15,11 @@ SMALL = ("--guides", 40, "--strands", 300, "--seed", 5)
 
 
 @pytest.fixture(scope="module")
-def vellus(desktop, tmp_path_factory):
+def vellus(desktop, extension, tmp_path_factory):
     """A function that calls blender --command vellus in a profile with the extension; `.folder` is seen by both."""
     profile = tmp_path_factory.mktemp("profile")
     installing = ("--command", "extension", "install-file", "--repo", "user_default", "--enable")
-    installed = desktop.command(*installing, build_extension.build(compile_kernels.this_platform()), profile=profile)
+    installed = desktop.command(*installing, extension, profile=profile)
     assert installed.returncode == 0, installed.stdout + installed.stderr
 
     def call(*arguments):

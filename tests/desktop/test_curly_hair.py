@@ -8,11 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from tools import build_extension, compile_kernels, desktop_blender
+from tools import build_extension, desktop_blender
 
 pytestmark = pytest.mark.desktop
 
 SCRIPT = Path(__file__).with_name("curly_hair.py")
+# Pictures of the manual are taken with OpenGL.
+SIZES = {"opengl": (1600, 1000), "vulkan": (1100, 700)}
 HEAD = build_extension.ROOT / "blend_samples" / "head.obj"
 
 
@@ -30,12 +32,12 @@ class Walk:
 
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
-def walk(request, desktop, tmp_path_factory):
+def walk(request, desktop, extension, new_profile):
     """The `Walk` with one backend; its pictures are in out/desktop."""
     folder = build_extension.ROOT / "out" / "desktop" / f"curly_{request.param}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    extension, profile = build_extension.build(compile_kernels.this_platform()), tmp_path_factory.mktemp("profile")
+    profile = new_profile()
     statuses = [
         desktop.run(
             SCRIPT,
@@ -44,7 +46,7 @@ def walk(request, desktop, tmp_path_factory):
             profile=profile,
             log=folder / f"{part}.log",
             limit=600,
-            size=(1600, 1000),
+            size=SIZES[request.param],
         )
         for part in PARTS
     ]

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import build_extension, compile_kernels, desktop_blender
+from tools import build_extension, desktop_blender
 
 pytestmark = pytest.mark.desktop
 
@@ -33,12 +33,12 @@ class Dynamics:
 
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
-def dynamics(request, desktop, tmp_path_factory):
+def dynamics(request, desktop, extension, new_profile):
     """The `Dynamics` with one backend; their pictures are in out/desktop."""
     folder = build_extension.ROOT / "out" / "desktop" / f"dynamics_{request.param}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    extension, profile = build_extension.build(compile_kernels.this_platform()), tmp_path_factory.mktemp("profile")
+    profile = new_profile()
     statuses = [
         desktop.run(
             SCRIPT,

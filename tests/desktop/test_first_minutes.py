@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tools import build_extension, compile_kernels, desktop_blender
+from tools import build_extension, desktop_blender
 
 pytestmark = pytest.mark.desktop
 
@@ -26,14 +26,14 @@ class Minutes:
 
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
-def minutes(request, desktop, tmp_path_factory):
+def minutes(request, desktop, extension, tmp_path_factory):
     """The `Minutes` with one backend; their pictures are in out/desktop."""
     folder = build_extension.ROOT / "out" / "desktop" / f"first_{request.param}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     status = desktop.run(
         SCRIPT,
-        [build_extension.build(compile_kernels.this_platform()), HEAD, folder],
+        [extension, HEAD, folder],
         backend=request.param,
         profile=tmp_path_factory.mktemp("profile"),
         log=folder / "first_minutes.log",

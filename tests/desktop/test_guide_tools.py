@@ -8,7 +8,7 @@ import shutil
 import pytest
 
 from tests.desktop.conftest import ROOT
-from tools import build_extension, compile_kernels, desktop_blender
+from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
@@ -36,16 +36,16 @@ class Walk:
         pytest.param(name, marks=pytest.mark.long if name == "vulkan" else ()) for name in desktop_blender.BACKENDS
     ],
 )
-def walk(request, desktop, tmp_path_factory):
+def walk(request, desktop, extension, new_profile):
     """The `Walk` with one backend; its pictures are in out/desktop."""
     folder = ROOT / "out" / "desktop" / f"guide_tools_{request.param}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     status = desktop.run(
         SCRIPT,
-        [build_extension.build(compile_kernels.this_platform()), folder],
+        [extension, folder],
         backend=request.param,
-        profile=tmp_path_factory.mktemp("profile"),
+        profile=new_profile(),
         log=folder / "guide_tools.log",
         limit=300,
         size=(760, 540),

@@ -2,6 +2,7 @@
 """Blender's window as the walk handles it: its 3-D view, pictures of the screen, the mouse."""
 
 import subprocess
+import sys
 import time
 
 import bpy
@@ -9,6 +10,16 @@ import numpy as np
 
 # Seconds after which a window that was drawn is seen.
 _SHOWN = 0.5
+
+
+MODULE = "bl_ext.user_default.vellus"
+
+
+def install(path):
+    """Install the extension from its zip, unless the profile has it; returns its package `blender`."""
+    if MODULE not in bpy.context.preferences.addons:
+        bpy.ops.extensions.package_install_files(filepath=path, repo="user_default", enable_on_install=True)
+    return sys.modules[f"{MODULE}.hair_addon.blender"]
 
 
 def window():

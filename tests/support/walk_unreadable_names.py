@@ -138,6 +138,10 @@ def use_styled(path):
             see(shown)
     for hair in (c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR"):
         assert "not valid UTF-8" in hair.vellus.status, hair.vellus.status
+        assert [item.name[-4:] for item in hair.vellus.styles] == ["TRIM", "LEAN", "CURL"]
+        for item in hair.vellus.styles:
+            item.name = "Renamed"
+        assert hair.vellus.styles[2].name == "Renamed.002"
     bpy.ops.wm.save_as_mainfile(filepath=str(path.with_name("saved_styled.blend")))
 
 

@@ -27,6 +27,24 @@ def has_nodes(blender_scene):
     return tree is not None and any(_ours(tree))
 
 
+def have_lost_scene(blender_scene):
+    """Whether the scene was deleted that renders the hair for a scene's compositor."""
+    return any(_is_hair(node) and node.scene is None for node in _ours(blender_scene.compositing_node_group))
+
+
+def are_of(blender_scene, hair_scene):
+    """Whether a scene has a node tree of its own that lays what `hair_scene` renders over something."""
+    tree = blender_scene.compositing_node_group
+    return any(_is_hair(node) and node.scene == hair_scene for node in _ours(tree)) and tree.users == 1
+
+
+def lay_over(blender_scene, hair_scene):
+    """Let the nodes of `insert` lay over what another hair's scene renders."""
+    for node in _ours(blender_scene.compositing_node_group):
+        if _is_hair(node):
+            node.scene = hair_scene
+
+
 def insert(blender_scene, hair_scene):
     """Lay what `hair_scene` renders over what a scene renders. Raises `HairError`."""
     tree = blender_scene.compositing_node_group
@@ -82,12 +100,18 @@ def _ours(tree):
     return [node for node in tree.nodes if node.name.startswith(_PREFIX)] if tree is not None else []
 
 
+def _is_hair(node):
+    return node.name == _PREFIX + _HAIR
+
+
 def _rendered(tree, blender_scene):
-    """The Render Layers node of a scene whose image is used."""
-    for node in tree.nodes:
-        if node.bl_idname == "CompositorNodeRLayers" and node.scene == blender_scene and node.outputs["Image"].links:
-            return node
-    raise HairError("The compositor does not use the image of this scene's Render Layers: add and link them.")
+    """The Render Layers node of a scene whose image is used; of several that of the view layer that a set shows."""
+    shown = next((layer.name for layer in blender_scene.view_layers if layer.use), "")
+    layers = [n for n in tree.nodes if n.bl_idname == "CompositorNodeRLayers" and n.scene == blender_scene]
+    used = [node for node in layers if node.outputs["Image"].links]
+    if not used:
+        raise HairError("The compositor does not use the image of this scene's Render Layers: add and link them.")
+    return next((node for node in used if node.layer == shown), used[0])
 
 
 def _new_tree(blender_scene):

@@ -10,7 +10,7 @@ from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
 from ..render import composite
-from ..settings import animated
+from ..settings import animated, style_items
 from . import every_frame, invalidation, live_hair, older_files, reported, simulated_hair, unlocked_renders
 
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
@@ -30,6 +30,9 @@ def after_depsgraph_update(scene, depsgraph):
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
+    # Blender does not report a scene that was copied or deleted.
+    if composite.needs_repair(scene) and not bpy.app.timers.is_registered(composite.repair):
+        bpy.app.timers.register(composite.repair)
     if _is_opening:
         _is_opening = False
         return
@@ -185,6 +188,8 @@ def after_frame_change(scene, depsgraph):
 def before_reading(*_args):
     """Write hair before its Curves are read by a save or a render, and what a render reads of hair's own scene."""
     live_hair.write_all()
+    if bpy.app.background:  # in a window a timer repairs, and a render runs beside it
+        composite.repair()
     composite.follow_all()
 
 
@@ -195,15 +200,24 @@ def before_saving(*_args):
 
 
 @persistent
+def after_import(*_args):
+    """Make the names of styles readable, which Blender passes to a rename."""
+    for hair in _of_kind("HAIR"):
+        style_items.make_names_readable(hair.vellus)
+
+
+@persistent
 def after_load(*_args):
     """Hair in a file is up to date; without a window Blender reports no update of it."""
     global _is_opening, _is_undone
     _is_opening = not bpy.app.background
     _is_undone = True  # does not affect a file that was saved during a stroke
+    after_import()
     live_hair.cancel_writing()
     invalidation.clear()
     older_files.renew()
     _hide_drawn_hair()
+    composite.follow_all()  # of linked hair a file does not store that it is hidden from engines
 
 
 def _hide_drawn_hair():
@@ -217,6 +231,7 @@ def _take_over():
     """Draw what Blender drew while the add-on was disabled."""
     older_files.renew()
     _hide_drawn_hair()
+    composite.follow_all()
     looks.follow_guides(bpy.context.view_layer)
 
 
@@ -254,6 +269,7 @@ _HANDLERS = (
     (bpy.app.handlers.undo_post, after_undo),
     (bpy.app.handlers.redo_post, after_undo),
     (bpy.app.handlers.load_post, after_load),
+    (bpy.app.handlers.blend_import_post, after_import),
 )
 
 
@@ -266,12 +282,15 @@ def register():
 
 
 def unregister():
-    """Remove the handlers, after writing pending hair."""
+    """Remove the handlers; write pending hair, and leave composited hair to the engines."""
     for handlers, handler in _HANDLERS:
         handlers.remove(handler)
     if bpy.app.timers.is_registered(_take_over):
         bpy.app.timers.unregister(_take_over)
     if bpy.app.timers.is_registered(unlocked_renders.offer):
         bpy.app.timers.unregister(unlocked_renders.offer)
+    if bpy.app.timers.is_registered(composite.repair):
+        bpy.app.timers.unregister(composite.repair)
     every_frame.end()
     live_hair.write_all()
+    composite.suspend()

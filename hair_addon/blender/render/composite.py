@@ -39,9 +39,8 @@ def turn_on(blender_scene):
         raise HairError("The scene is linked from another file and cannot be changed.")
     if blender_scene.render.engine == viewport.ENGINE:
         raise HairError("The render engine Vellus renders hair with its surfaces: choose Cycles or EEVEE.")
-    hair_scene = bpy.data.scenes.new(f"{blender_scene.name} Hair")
+    hair_scene = _new_hair_scene(blender_scene)
     try:
-        _prepare(hair_scene, blender_scene)
         composite_nodes.insert(blender_scene, hair_scene)
     except HairError:
         bpy.data.scenes.remove(hair_scene)
@@ -59,16 +58,25 @@ def turn_off(blender_scene):
     blender_scene.vellus.hair_scene = None
     for hair_object in _hair_objects(blender_scene):
         curves_objects.show_again(hair_object)
-    if hair_scene is None:
-        return
-    blender_scene.render.use_compositing = bool(hair_scene.get(_COMPOSITED, True))
-    if not any(other.vellus.hair_scene == hair_scene for other in bpy.data.scenes):
-        bpy.data.scenes.remove(hair_scene)
+    if hair_scene is not None:
+        blender_scene.render.use_compositing = bool(hair_scene.get(_COMPOSITED, True))
+        if not any(other.vellus.hair_scene == hair_scene for other in bpy.data.scenes):
+            bpy.data.scenes.remove(hair_scene)
+    follow_all()  # hair of this scene may be in another that composites it
+
+
+def suspend():
+    """Let Cycles and EEVEE render hair themselves until `follow_all`: without the add-on nothing renders it."""
+    for blender_scene in bpy.data.scenes:
+        if blender_scene.vellus.hair_scene is not None and blender_scene.library is None:
+            composite_nodes.adjust(blender_scene, False, False)
+        for hair_object in _hair_objects(blender_scene):
+            curves_objects.show_again(hair_object)
 
 
 def follow_all():
     """`follow` every scene of the file."""
-    for blender_scene in bpy.data.scenes:
+    for blender_scene in list(bpy.data.scenes):
         follow(blender_scene)
 
 
@@ -78,9 +86,65 @@ def follow(blender_scene):
     What is up to date is not written.
     """
     state = blender_scene.vellus
-    hair_scene = state.hair_scene
-    if hair_scene is None or hair_scene == blender_scene:
+    if state.hair_scene is None:
         return
+    if state.hair_scene.background_set == blender_scene and blender_scene.library is None:
+        _bring_up_to_date(blender_scene, state.hair_scene)
+    for hair_object in _hair_objects(blender_scene):
+        curves_objects.hide_from_engines(hair_object, is_seen_by_rays=state.composite_shadow == "ENGINE")
+
+
+def needs_repair(blender_scene):
+    """Whether a scene's hair is rendered by the hair's scene of another, of which it is a copy, or by a deleted one."""
+    if blender_scene.library is not None:
+        return False
+    hair_scene = blender_scene.vellus.hair_scene
+    if hair_scene is None:
+        return composite_nodes.have_lost_scene(blender_scene)
+    return hair_scene.background_set != blender_scene
+
+
+def repair():
+    """Give copies of scenes a hair's scene of their own, and turn off where that was deleted.
+
+    Not within an update of a depsgraph or beside a render: it creates and removes datablocks.
+    """
+    for blender_scene in list(bpy.data.scenes):
+        if needs_repair(blender_scene):
+            if blender_scene.vellus.hair_scene is None:
+                turn_off(blender_scene)
+            else:
+                _separate(blender_scene)
+                follow(blender_scene)
+
+
+def is_in_sequence(blender_scene):
+    """Whether a scene is rendered as the hair of another in an animation, or without a window.
+
+    Blender does not tell the engine of a scene that the compositor has rendered that this is for an animation. Without
+    a window it cannot be known, and nothing has played.
+    """
+    if not any(other.vellus.hair_scene == blender_scene.original for other in bpy.data.scenes):
+        return False
+    running = [operator for window in bpy.context.window_manager.windows for operator in window.modal_operators]
+    is_animation = any(one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)
+    return is_animation or bpy.app.background
+
+
+def _separate(blender_scene):
+    """Part a copy of a scene from the hair's scene of the original: by one of its own, or none without nodes for it."""
+    state = blender_scene.vellus
+    of_original, state.hair_scene = state.hair_scene, None
+    if composite_nodes.are_of(blender_scene, of_original):
+        hair_scene = _new_hair_scene(blender_scene)
+        hair_scene[_COMPOSITED] = of_original.get(_COMPOSITED, True)
+        composite_nodes.lay_over(blender_scene, hair_scene)
+        state.hair_scene = hair_scene
+
+
+def _bring_up_to_date(blender_scene, hair_scene):
+    """Copy what a scene shares with its hair's scene, and adjust its nodes."""
+    state = blender_scene.vellus
     is_ours = blender_scene.render.engine == viewport.ENGINE
     _copy(blender_scene, hair_scene, _OF_SCENE)
     _copy(blender_scene.render, hair_scene.render, _OF_RENDER)
@@ -89,16 +153,16 @@ def follow(blender_scene):
     _copy_cameras(blender_scene, hair_scene)
     _copy_views(blender_scene.render.views, hair_scene.render.views)
     composite_nodes.adjust(blender_scene, state.composite_shadow == "PASS", not is_ours)
-    for hair_object in _hair_objects(blender_scene):
-        curves_objects.hide_from_engines(hair_object, is_seen_by_rays=state.composite_shadow == "ENGINE")
 
 
-def _prepare(hair_scene, blender_scene):
+def _new_hair_scene(blender_scene):
+    hair_scene = bpy.data.scenes.new(f"{blender_scene.name} Hair")
     hair_scene.background_set = blender_scene
     hair_scene.render.engine, hair_scene.render.film_transparent = viewport.ENGINE, True
     hair_scene.vellus.is_hair_only = True
     view_layer = hair_scene.view_layers[0]
     view_layer.use_pass_z = view_layer.vellus.has_hair_shadow = True
+    return hair_scene
 
 
 def _copy(source, target, names):

@@ -16,7 +16,7 @@ from ..groom import frame_folders
 from ..host import scene_time
 from ..settings import setting_properties
 from ..settings.translations import error_text, interface_text
-from . import drawn_scene, film, motion_vectors, rendered_view, viewport
+from . import composite, drawn_scene, film, motion_vectors, rendered_view, viewport
 from .panoramic_frame import PanoramicFrame
 from .tiled_frame import Frame
 
@@ -81,7 +81,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
     def _render(self, depsgraph):
         blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
         _require_supported(self.camera_override)
-        if self.is_animation:
+        if self.is_animation or composite.is_in_sequence(blender_scene):
             frame_folders.require_baked([scene_time.frame_of(blender_scene)])
         size, window = scene.picture_size(blender_scene.render)
         views = self._views(view_layer)

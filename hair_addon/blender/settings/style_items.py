@@ -79,6 +79,15 @@ def names_of(state):
     return tuple(text_of(item, "name") for item in state.styles)
 
 
+def make_names_readable(state):
+    """Replace the bytes of names that are not valid UTF-8, as in a damaged file: renaming such a style ends Blender."""
+    for item in state.styles:
+        if not text_of(item, "name"):
+            stored = item.bl_system_properties_get()
+            name = stored.get("name", "").encode(errors="surrogateescape").decode(errors="replace")
+            stored["name"] = unique_name(name or LABELS[item.kind], names_of(state))
+
+
 def active_of(state):
     """The item that is active in the list, None in an empty list."""
     return state.styles[state.active_style] if state.active_style < len(state.styles) else None

@@ -261,6 +261,5 @@ def test_without_its_scene_it_is_still_taken_away(cycles):
     before = state()
     bpy.ops.vellus.toggle_composite()
     bpy.data.scenes.remove(bpy.context.scene.vellus.hair_scene)
-    bpy.context.view_layer.update()
     bpy.ops.vellus.toggle_composite()
     assert state() == before

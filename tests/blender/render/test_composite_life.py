@@ -1,0 +1,121 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Composite Hair where its scenes are copied and deleted, its hair is linked, and the add-on is disabled."""
+
+import bpy
+import numpy as np
+import pytest
+
+import hair_addon
+from hair_addon.blender.live import handlers
+from tests.support.rendering import configure
+
+
+@pytest.fixture
+def composited(lit):
+    """The hairy sphere in a scene of Cycles, with Composite Hair on."""
+    bpy.context.scene.render.engine = "CYCLES"
+    bpy.ops.vellus.toggle_composite()
+    return lit
+
+
+def copied(kind):
+    """A copy of the scene, which is the active one then, with a first frame of its own."""
+    bpy.ops.scene.new(type=kind)
+    scene = bpy.context.scene
+    scene.frame_start = 7
+    bpy.context.view_layer.update()
+    handlers.before_reading()  # as a render and a save do
+    return scene
+
+
+def node_of(scene):
+    return next(n for n in scene.compositing_node_group.nodes if n.name == "Vellus Hair")
+
+
+@pytest.mark.parametrize("kind", ["LINK_COPY", "FULL_COPY"])
+def test_a_copied_scene_has_hair_of_its_own(composited, kind):
+    scene = bpy.context.scene
+    hair_scene = scene.vellus.hair_scene
+    copy = copied(kind)
+    assert copy.vellus.hair_scene.background_set == copy and node_of(copy).scene == copy.vellus.hair_scene
+    assert (hair_scene.background_set, hair_scene.frame_start) == (scene, scene.frame_start)
+    assert scene.vellus.hair_scene == node_of(scene).scene == hair_scene
+    assert copy.vellus.hair_scene.frame_start == 7
+    bpy.ops.vellus.toggle_composite()
+    assert copy.vellus.hair_scene is None and len(bpy.data.scenes) == 3
+    assert scene.vellus.hair_scene == hair_scene and not composited.visible_camera
+
+
+def test_a_scene_with_copied_settings_alone_leaves_the_hair_s_scene_to_the_other(composited):
+    scene = bpy.context.scene
+    empty = copied("EMPTY")
+    assert empty.vellus.hair_scene is None
+    assert scene.vellus.hair_scene.frame_start == scene.frame_start
+
+
+def test_deleting_the_hair_s_scene_turns_it_off(composited):
+    scene = bpy.context.scene
+    bpy.data.scenes.remove(scene.vellus.hair_scene)
+    bpy.context.view_layer.update()
+    handlers.before_reading()
+    assert composited.visible_camera and scene.compositing_node_group is None
+
+
+def test_a_file_hides_linked_hair_as_soon_as_it_is_open(composited, tmp_path):
+    """Whose ray visibility this file does not store."""
+    bpy.ops.vellus.toggle_composite()
+    bpy.data.libraries.write(str(tmp_path / "library.blend"), {composited})
+    with bpy.data.libraries.load(str(tmp_path / "library.blend"), link=True) as (_there, here):
+        here.objects = ["Hair"]
+    linked = here.objects[0]
+    bpy.context.scene.collection.objects.link(linked)
+    bpy.ops.vellus.toggle_composite()
+    assert not linked.visible_camera
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "shot.blend"))
+    hair = [o for o in bpy.data.objects if o.name == "Hair"]
+    assert len(hair) == 2 and not any(o.visible_camera for o in hair)
+
+
+def test_without_the_add_on_engines_render_their_own_hair(composited):
+    scene = bpy.context.scene
+    hair_addon.unregister()
+    try:
+        assert composited.visible_camera and node_of(scene).mute
+    finally:
+        hair_addon.register()
+    handlers._take_over()  # Blender's timer, which does not run without a window
+    assert not composited.visible_camera and not node_of(scene).mute
+
+
+def test_hair_is_laid_over_the_view_layer_that_it_is_rendered_with(composited):
+    """The first one: it is what Blender shows of a background scene."""
+    bpy.ops.vellus.toggle_composite()
+    scene = bpy.context.scene
+    first = scene.view_layers[0].name
+    scene.view_layers.new("Front")
+    tree = scene.compositing_node_group = bpy.data.node_groups.new("Layers", "CompositorNodeTree")
+    tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
+    over, output = tree.nodes.new("CompositorNodeAlphaOver"), tree.nodes.new("NodeGroupOutput")
+    for layer, socket in (("Front", "Foreground"), (first, "Background")):
+        node = tree.nodes.new("CompositorNodeRLayers")
+        node.scene, node.layer = scene, layer
+        tree.links.new(node.outputs["Image"], over.inputs[socket])
+    tree.links.new(over.outputs["Image"], output.inputs["Image"])
+    bpy.ops.vellus.toggle_composite()
+    shaded = next(link for link in tree.links if link.to_node.name == "Vellus Hair Shadow" and not link.is_muted)
+    assert shaded.from_node.layer == first
+
+
+def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composited, tmp_path, capfd):
+    scene = bpy.context.scene
+    bpy.data.objects["Guides"].data.vellus.simulates = True
+    configure(engine="CYCLES", resolution_x=8, resolution_y=6, film_transparent=True, use_compositing=True)
+    scene.cycles.samples, scene.frame_start, scene.frame_end = 1, 1, 2
+    bpy.data.objects["Sphere"].hide_render = True  # what Cycles sees is empty: the picture is the hair
+    scene.render.filepath = str(tmp_path / "frame_")
+    bpy.ops.render.render(animation=True)
+    assert 'Frame 2 of the guides "Guides" is not baked' in "".join(capfd.readouterr())
+    found = [bpy.data.images.load(str(tmp_path / f"frame_000{frame}.png")) for frame in (1, 2)]
+    first, second = (np.reshape(image.pixels, (-1, 4))[:, 3].max() for image in found)
+    assert first > 0.1 and second == 0.0

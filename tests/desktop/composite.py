@@ -1,0 +1,264 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Composite Hair, depth of field and Export Groom in a window, on surfaces that are deformed, keyed and linked.
+
+Run by a desktop Blender: composite.py -- ZIP OUT. Writes pictures to OUT, and composite.json with what the tests want
+to know. Pictures by Cycles have one sample: with the same seed they are equal where the scene is.
+"""
+
+import json
+import sys
+import traceback
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT))
+from tests.desktop import any_scene  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    MODULE,
+    in_viewport,
+    install,
+    press,
+    rectangle,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+    window,
+)
+
+ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
+OUT = Path(OUT)
+SCENE = str(OUT / "composited.blend")
+
+facts = {}
+
+
+def scene():
+    return bpy.context.scene
+
+
+def hair():
+    """The objects of hair of the scene."""
+    return [o for o in scene().objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]
+
+
+def pixels_of(path):
+    """(height, width, 3) display colors of a file."""
+    image = bpy.data.images.load(str(path))
+    pixels = np.array(image.pixels, np.float32).reshape(image.size[1], image.size[0], 4)
+    bpy.data.images.remove(image)
+    return pixels[..., :3]
+
+
+def differ(name, other):
+    """The mean difference of two pictures."""
+    return float(np.abs(pixels_of(OUT / f"{name}.png") - pixels_of(OUT / f"{other}.png")).mean())
+
+
+def close_other_windows():
+    for other in bpy.context.window_manager.windows[1:]:
+        with bpy.context.temp_override(window=other):
+            bpy.ops.wm.window_close()
+
+
+def begin_render(name, **options):
+    scene().render.filepath = str(OUT / name)
+    with in_viewport():
+        bpy.ops.render.render("INVOKE_DEFAULT", **options)
+
+
+def rendering():
+    """Wait for the end of a render, and close its window."""
+    yield
+    yield from wait_for(lambda: not bpy.app.is_job_running("RENDER"))
+    yield
+    close_other_windows()
+    yield
+
+
+def render(name):
+    """F12, into a file."""
+    begin_render(f"{name}.png", write_still=True)
+    yield from rendering()
+    print(f"composite: {name}", flush=True)
+
+
+def toggle():
+    """Press the button, which leaves a step of the undo history behind."""
+    with in_viewport():
+        bpy.ops.vellus.toggle_composite("EXEC_DEFAULT", True)
+    yield
+
+
+def undo():
+    with in_viewport():
+        bpy.ops.ed.undo()
+    yield
+
+
+def is_on():
+    """Whether there is a scene of the hair, and no engine sees hair."""
+    return [scene().vellus.hair_scene is not None, not any(o.visible_camera for o in hair())]
+
+
+def browsers():
+    """[(window, area)] of file browsers."""
+    windows = bpy.context.window_manager.windows
+    return [(other, area) for other in windows for area in other.screen.areas if area.type == "FILE_BROWSER"]
+
+
+# The steps.
+
+
+def build():
+    """The surfaces before a camera, one sample a pixel; the hair of one was deleted by hand."""
+    install(ZIP)
+    yield from any_scene.build(OUT)
+    emptied = next(o for o in hair() if o.data.surface.name == "Scaled")
+    bpy.context.view_layer.objects.active = emptied
+    with in_viewport():
+        bpy.ops.object.mode_set(mode="EDIT")
+        bpy.ops.curves.select_all(action="SELECT")
+        bpy.ops.curves.delete()
+        bpy.ops.object.mode_set(mode="OBJECT")
+    camera = scene().camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.location, camera.rotation_euler = (0.0, -16.0, 4.0), (1.35, 0.0, 0.0)
+    camera.data.dof.focus_distance, camera.data.dof.aperture_fstop = 8.0, 0.05
+    scene().collection.objects.link(camera)
+    render_settings = scene().render
+    render_settings.engine, render_settings.resolution_x, render_settings.resolution_y = "CYCLES", 160, 60
+    render_settings.image_settings.file_format = "PNG"
+    scene().cycles.samples, scene().cycles.use_denoising, scene().vellus.sample_count = 1, False, 4
+    scene().frame_start, scene().frame_end, scene().frame_step = 1, 20, 19
+    yield
+
+
+def turn_on():
+    """Pictures by Cycles alone, and with the hair by Vellus; undone, and redone."""
+    yield from render("own")
+    yield from toggle()
+    yield from render("on")
+    facts["on"], facts["changed"] = is_on(), differ("on", "own")
+    yield from undo()
+    facts["undone"] = is_on()
+    with in_viewport():
+        bpy.ops.ed.redo()
+    yield
+    facts["redone"] = is_on()
+
+
+def animate():
+    begin_render("frame_", animation=True)
+    yield from rendering()
+    facts["frames"] = [differ("frame_0001", "on"), differ("frame_0020", "on")]
+
+
+def reload_while_it_renders():
+    """Another file is opened in the middle of a render."""
+    bpy.ops.wm.save_as_mainfile(filepath=SCENE)
+    scene().vellus.sample_count = 64
+    yield
+    begin_render("stopped.png", write_still=True)
+    yield from wait(0.5)
+    with in_viewport():
+        bpy.ops.wm.open_mainfile(filepath=SCENE)
+    yield from rendering()
+    facts["opened"] = is_on()
+    yield from render("opened")
+    facts["as before"] = differ("opened", "on")
+
+
+def copy():
+    """The scene is copied with its objects; then the scene of the copy's hair is deleted."""
+    with in_viewport():
+        bpy.ops.scene.new(type="FULL_COPY")
+    yield from wait_for(lambda: scene().vellus.hair_scene.background_set == scene(), 10.0)
+    owner = scene().vellus.hair_scene.background_set
+    facts["copy"] = {"has its own": owner == scene(), "scenes": len(bpy.data.scenes)}
+    yield from render("copy")
+    facts["copy"]["picture"] = differ("copy", "on")
+    bpy.data.scenes.remove(scene().vellus.hair_scene)
+    yield from wait_for(lambda: is_on() == [False, False], 10.0)
+    facts["copy"]["without its scene"] = is_on()
+    bpy.data.scenes.remove(scene())
+    yield
+    window().scene = bpy.data.scenes["Scene"]
+    yield
+
+
+def disable():
+    """Without the add-on, and with it again; then everything as before."""
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    yield from render("disabled")
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    yield from wait_for(lambda: is_on() == [True, True], 10.0)
+    facts["enabled"] = is_on()
+    yield from toggle()
+    yield from render("off")
+    facts["disabled"], facts["off"] = differ("disabled", "own"), differ("off", "own")
+
+
+def focus():
+    """Our engine in the viewport through the camera, in focus and out of it."""
+    area, region = viewport()
+    scene().render.engine, area.spaces.active.shading.type = "VELLUS", "RENDERED"
+    area.spaces.active.region_3d.view_perspective = "CAMERA"
+    area.spaces.active.overlay.show_overlays = False
+    for name in ("sharp", "blurred"):
+        scene().camera.data.dof.use_dof = name == "blurred"
+        yield
+        take_picture(OUT / f"{name}.png")
+    left, bottom, width, height = rectangle(region)
+    rows, columns = slice(bottom + height // 4, bottom + 3 * height // 4), slice(left, left + width)
+    shown = [pixels_of(OUT / f"{name}.png")[rows, columns].max(axis=-1) > 0.05 for name in ("sharp", "blurred")]
+    facts["shown"] = [float(part.mean()) for part in shown]
+    area.spaces.active.shading.type = "SOLID"
+
+
+def export():
+    """Export Groom, where the file browser is told to, of hair that moves with its surface."""
+    keyed = next(o for o in hair() if o.data.surface.name == "Keyed")
+    bpy.context.view_layer.objects.active = keyed
+    with in_viewport():
+        bpy.ops.vellus.export_groom("INVOKE_DEFAULT", animation="ALL")
+    yield from wait_for(lambda: browsers() and browsers()[0][1].spaces.active.params is not None, 10.0)
+    params = browsers()[0][1].spaces.active.params
+    params.directory, params.filename = str(OUT).encode(), "groom.abc"
+    for _time in range(5):  # a browser that is not drawn yet takes no keys
+        if browsers():
+            yield from press("RET", *browsers()[0])
+            yield from wait_for(lambda: not browsers(), 3.0)
+    yield from wait_for((OUT / "groom.abc").exists)
+    facts["exported"] = (OUT / "groom.abc").exists() and (OUT / "groom.abc").stat().st_size
+    facts["frame"] = scene().frame_current
+
+
+def walk():
+    """All steps; between them Blender handles its events and redraws."""
+    for step in (build, turn_on, animate, reload_while_it_renders, copy, disable, focus, export):
+        print(f"composite: {step.__name__}", flush=True)
+        yield from step()
+    facts["is done"] = True
+
+
+def advance(steps):
+    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
+    try:
+        next(steps)
+        return 0.05
+    except StopIteration:
+        pass
+    except Exception:
+        traceback.print_exc()
+    (OUT / "composite.json").write_text(json.dumps(facts, indent=1))
+    bpy.ops.wm.quit_blender()
+    return None
+
+
+if __name__ == "__main__":
+    bpy.context.preferences.view.show_splash = False
+    walking = walk()
+    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
