@@ -77,14 +77,14 @@ def read(
         # Scenes without hair have no cost.
         return _EMPTY
     if before is None or before.shadow_maps is None:
-        surfaces, clear = _upload(
-            drawn_meshes.read_drawn_meshes(depsgraph, viewport), viewport is None or not is_hair_only
-        )
+        meshes, is_shaded = drawn_meshes.read_drawn_meshes(depsgraph, viewport), viewport is None or not is_hair_only
+        surfaces, clear = _upload(meshes, is_shaded)
+        surface_owners = tuple(mesh.owner for mesh in meshes if not (is_shaded and mesh.is_clear))
         world = light_door.read_world(blender_scene)
         lights = _lights(light_door.read_lights(depsgraph, for_render=viewport is None), world, _placed(hair))
         shadow_maps = _new_shadow_maps(lights)
     else:
-        surfaces, clear = before.surfaces, before.clear
+        surfaces, clear, surface_owners = before.surfaces, before.clear, before.surface_owners
         lights, world, shadow_maps = before.lights, before.world, before.shadow_maps
     placed, batches = _placed(hair), [surface.batch for surface, _ in surfaces]
     shadow_maps.draw(lights, placed, batches, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
@@ -103,6 +103,7 @@ def read(
         owners=owners,
         selected=selected,
         instances=instances,
+        surface_owners=surface_owners,
         clear=clear,
     )
 
