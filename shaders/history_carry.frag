@@ -6,7 +6,7 @@
 #include "include/history_blocks.glsl"
 
 const uint NO_SEGMENT = 0x7FFFFFFFu;
-const float MOST_PASSES = 12.0;
+const float MOST_PASSES = 24.0;
 
 // Standard errors by which the means of two blocks may differ.
 const float TOLERANCE = 2.0;
@@ -112,5 +112,5 @@ void main()
   vec4 excess = abs(mean_before - mean) / bound;
   float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
   color = light;
-  passes = min(textureLod(before_passes, place / history.size.xy, 0.0).r, MOST_PASSES) / max(most, 1.0);
+  passes = min(textureLod(before_passes, place / history.size.xy, 0.0).r, MOST_PASSES) / max(0.5 * most, 1.0);
 }

@@ -5,7 +5,7 @@ import gpu
 
 from . import shaders, uniforms
 
-BLOCK_SIDE = 4  # pixels: BLOCK_SIDE of shaders/include/history_blocks.glsl
+BLOCK_SIDE = 8  # pixels: BLOCK_SIDE of shaders/include/history_blocks.glsl
 
 
 @shaders.kept
