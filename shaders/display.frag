@@ -18,7 +18,7 @@ float depth_at(ivec2 pixel)
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy - origin);
-  vec4 light = texelFetch(passes, pixel, 0);
+  vec4 light = max(texelFetch(passes, pixel, 0), vec4(0.0));
   if (light.a == 0.0) {
     discard;
   }
@@ -26,6 +26,6 @@ void main()
   vec3 at = display_place(exposure * light.rgb / light.a);
   vec3 display = textureLod(display_table, (at * (side - 1.0) + 0.5) / side, 0.0).rgb;
   // Blender interprets colours drawn over a viewport as display colours to the power of 2.2, for any display encoding.
-  color = vec4(pow(display, vec3(2.2)), 1.0) * (opacity * light.a / float(pass_count));
+  color = vec4(pow(display, vec3(2.2)), 1.0) * (opacity * min(light.a / float(pass_count), 1.0));
   gl_FragDepth = depth_at(pixel);
 }

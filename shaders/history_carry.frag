@@ -61,7 +61,8 @@ vec2 place_before(ivec2 pixel)
 }
 
 // The previous picture at a place [pixels], by Catmull and Rom's cubics: bilinear filtering would blur it more in each
-// frame. Five bilinear samples; the corners' weights are small.
+// frame. Five bilinear samples; the corners' weights are small. Beside bright strands it may be below zero: that is cut
+// off where it is shown, as frame by frame it would add up to more light.
 vec4 previous_at(vec2 place)
 {
   vec2 middle = floor(place - 0.5) + 0.5;
@@ -81,9 +82,7 @@ vec4 previous_at(vec2 place)
   total += textureLod(before, vec2(between.x, low.y), 0.0) * (inner.x * before_it.y);
   total += textureLod(before, vec2(between.x, high.y), 0.0) * (inner.x * after_it.y);
   float weight = inner.x * inner.y + (before_it.x + after_it.x) * inner.y + inner.x * (before_it.y + after_it.y);
-  vec4 light = max(total / weight, vec4(0.0));
-  light.a = min(light.a, 1.0);
-  return light;
+  return total / weight;
 }
 
 void main()
@@ -108,7 +107,6 @@ void main()
   // Too bright, it is darkened in proportion, so that what was black remains so.
   vec4 darker = light * (allowed / max(mean_before, vec4(1e-6)));
   light = mix(light + (allowed - mean_before), darker, vec4(lessThan(allowed, mean_before)));
-  light.a = min(light.a, 1.0);
   vec4 excess = abs(mean_before - mean) / bound;
   float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
   color = light;

@@ -90,8 +90,8 @@ class History:
         """Take note of a pass, the pass_count-th of a picture.
 
         drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; buffer: its
-        `VisibilityBuffer`; light: (texture, weight) of the passes so far, their sum and what to divide it by; part_left: of
-        all passes, those that are still to come.
+        `VisibilityBuffer`; light: (texture, weight) of the passes so far, their sum and what to divide it by;
+        part_left: of all passes, those that are still to come.
         """
         if pass_count == 1:
             self._turn_to(drawn, camera, view, buffer, light)
