@@ -13,19 +13,17 @@ const float TOLERANCE = 2.0;
 
 float nearest_at(ivec2 place)
 {
-  float depth = texelFetch(surface_depth, place, 0).r;
-  if (texelFetch(segments, place, 0).r < NO_SEGMENT) {
-    depth = min(depth, uintBitsToFloat(texelFetch(depths, place, 0).r));
-  }
-  return depth;
+  bool is_hair = texelFetch(segments, place, 0).r < NO_SEGMENT;
+  return is_hair ? uintBitsToFloat(texelFetch(depths, place, 0).r) : texelFetch(surface_depth, place, 0).r;
 }
 
 void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
 {
-  float depth = nearest_at(clamp(place, ivec2(0), textureSize(segments, 0) - 1));
+  place = clamp(place, ivec2(0), ivec2(history.size.xy) * history.samples_per_side - 1);
+  float depth = nearest_at(place);
   if (depth < nearest) {
     nearest = depth;
-    nearest_place = clamp(place, ivec2(0), textureSize(segments, 0) - 1);
+    nearest_place = place;
   }
 }
 
@@ -47,9 +45,11 @@ vec2 place_before(ivec2 pixel)
   look(corner + ivec2(0, side), nearest_place, nearest);
   look(corner + ivec2(0, -1), nearest_place, nearest);
   // A thin strand is in few samples: before the background, look for it a little further.
-  for (int reach = 2; reach <= 4 && nearest == 1.0; reach += 2) {
-    for (int turn = 0; turn < 9; turn++) {
-      look(corner + ivec2(turn % 3 - 1, turn / 3 - 1) * (reach * side), nearest_place, nearest);
+  if (nearest == 1.0) {
+    for (int turn = 0; turn < 4; turn++) {
+      int sign = (turn & 2) - 1;
+      look(corner + ivec2(2 * sign * side, 2 * side * (2 * (turn & 1) - 1)), nearest_place, nearest);
+      look(corner + ((turn & 1) == 0 ? ivec2(4 * sign * side, 0) : ivec2(0, 4 * sign * side)), nearest_place, nearest);
     }
   }
   vec2 at = vec2(pixel) + 0.5;
@@ -88,22 +88,26 @@ vec4 previous_at(vec2 place)
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
-  vec2 place = place_before(pixel);
-  if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
-    color = vec4(0.0);
-    passes = 0.0;
-    return;
-  }
   ivec2 blocks = textureSize(now_mean, 0);
   vec2 here = block_place(vec2(pixel) + 0.5, blocks);
-  vec2 there = block_place(place, blocks);
   vec4 mean = textureLod(now_mean, here, 0.0);
+  color = vec4(0.0);
+  passes = 0.0;
+  if (mean.a == 0.0) {
+    return;  // nothing is near
+  }
+  vec2 place = place_before(pixel);
+  if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
+    return;
+  }
+  vec2 there = block_place(place, blocks);
   vec4 mean_before = textureLod(before_mean, there, 0.0);
   vec4 deviation = max(textureLod(now_deviation, here, 0.0), textureLod(before_deviation, there, 0.0));
   // Half floats resolve a thousandth.
   vec4 bound = (TOLERANCE / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
-  vec4 light = previous_at(place);
+  bool is_flat = all(lessThan(deviation, 1e-3 * mean + 1e-6));
+  vec4 light = is_flat ? textureLod(before, place / history.size.xy, 0.0) : previous_at(place);
   // Too bright, it is darkened in proportion, so that what was black remains so.
   vec4 darker = light * (allowed / max(mean_before, vec4(1e-6)));
   light = mix(light + (allowed - mean_before), darker, vec4(lessThan(allowed, mean_before)));
