@@ -11,7 +11,8 @@ void main()
   vec4 squares = vec4(0.0);
   for (int y = corner.y; y < end.y; y++) {
     for (int x = corner.x; x < end.x; x++) {
-      vec4 light = texelFetch(picture, ivec2(x, y), 0) / weight;
+      // A single glint is no change.
+      vec4 light = clamp(texelFetch(picture, ivec2(x, y), 0) / weight, -100.0, 100.0);
       sum += light;
       squares += light * light;
     }

@@ -10,7 +10,7 @@ from hair_addon.blender.data import scene
 from hair_addon.blender.render import drawn_scene, hair_picture, view_film
 
 SIZE = 80
-FRAMES, WARM_UP = 10, 8
+FRAMES, WARM_UP = 8, 6
 
 
 def read_drawn():
@@ -133,8 +133,8 @@ def test_hair_is_carried_where_its_surface_takes_it(lit):
     push = bpy.data.objects["Sphere"].modifiers.new("Push", "DISPLACE")
     push.direction, push.mid_level = "X", 0.0
     picture = new_picture("HAIR")
-    for frame in range(6):
-        push.strength = 0.15 * frame
+    for frame in range(4):
+        push.strength = 0.2 * frame
         drawn, view = read_drawn(), camera()
         shown = move(picture, drawn, view)
     still = rest(new_picture("HAIR"), drawn, view)
