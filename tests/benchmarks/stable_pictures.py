@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How steady a viewport's hair is while something moves, on the sample head: differences between frames.
 
-Each movement is drawn with one pass a frame, as a viewport does while it lasts, and as pictures that have come to rest.
-Printed are display levels of 255, where hair is: the 99th percentile of how far a pixel changes from one frame to the
-next, for both; the largest change; how far the moving picture is from the resting one in its mean and its 99th
-percentile.
+Each movement is drawn with one pass a frame, as a viewport does while it lasts, alone and with what was shown before,
+and as pictures that have come to rest. Printed are display levels of 255, where hair is: the 99th percentile of how far
+a pixel changes from one frame to the next, for the three; the largest change; how far the mean of the moving picture is
+from that of the resting one, and the 99th percentile of a pixel's distance.
 
 .venv/bin/python tests/benchmarks/stable_pictures.py --strands 10000 --size 240 180
 """
@@ -134,6 +134,12 @@ class HairFrames:
         self._picture.add_pass(drawn, *camera)
         return _over_grey(self._picture.read_shown())
 
+    def alone(self, drawn, camera):
+        """The same without what was shown before."""
+        self._picture.restart()
+        self._picture.add_pass(drawn, *camera)
+        return _over_grey(self._picture.read())
+
     def rested(self, drawn, camera):
         """The same of a picture at rest."""
         self._picture.restart()
@@ -153,6 +159,12 @@ class FilmFrames:
         self._film.restart(is_moved=True)
         self._film.add_pass(drawn, *camera)
         return self._film.read_shown()[..., :3]
+
+    def alone(self, drawn, camera):
+        """The same without what was shown before."""
+        self._film.restart()
+        self._film.add_pass(drawn, *camera)
+        return self._film.read()[..., :3]
 
     def rested(self, drawn, camera):
         """The same of a picture at rest."""
@@ -177,9 +189,9 @@ def levels(light):
 
 
 def measure(movement, kind, options):
-    """(moved, rested) display levels of all frames."""
+    """(alone, moved, rested) scene-linear light of the frames after those of the warm-up."""
     moving, resting = (KINDS[kind](tuple(options.size), options.per_side) for _ in range(2))
-    found, drawn = ([], []), None
+    found, drawn = ([], [], []), None
     for frame in range(options.frames):
         movement.step(frame)
         bpy.context.view_layer.update()
@@ -187,27 +199,28 @@ def measure(movement, kind, options):
         if drawn is None or not movement.is_of_camera:
             drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
         camera = scene.read_camera(bpy.context.scene, depsgraph, *options.size)
-        for of, picture in zip(found, (moving.moved, resting.rested), strict=True):
-            of.append(picture(drawn, camera))
+        moved = moving.moved(drawn, camera)
+        if frame >= options.warm_up:
+            for of, light in zip(found, (resting.alone(drawn, camera), moved), strict=False):
+                of.append(light)
+            found[2].append(resting.rested(drawn, camera))
     movement.end()
     bpy.context.view_layer.update()
     return found
 
 
-def report(name, kind, moved, rested, warm_up):
+def report(name, kind, alone, moved, rested):
     """Print a row of figures."""
-    moved, rested = np.array(moved), np.array(rested)
-    shown, still = (np.stack([levels(light) for light in of]) for of in (moved, rested))
+    single, shown, still = (np.stack([levels(light) for light in of]) for of in (alone, moved, rested))
     is_hair = np.abs(still - levels(np.full((1, 1, 3), BEHIND))).max(axis=-1) > 2.0
-    is_hair = (is_hair[1:] | is_hair[:-1])[warm_up:]
-    changes = [np.abs(np.diff(of, axis=0)).max(axis=-1)[warm_up:][is_hair] for of in (shown, still)]
-    errors = np.abs(shown - still).max(axis=-1)[warm_up + 1 :][is_hair]
+    is_hair = is_hair[1:] | is_hair[:-1]
+    changes = [np.abs(np.diff(of, axis=0)).max(axis=-1)[is_hair] for of in (single, shown, still)]
+    errors = np.abs(shown - still).max(axis=-1)[1:][is_hair]
     steps = [np.quantile(of, 0.99) for of in changes]
-    means = [of[warm_up + 1 :].mean() for of in (moved, rested)]
     print(
-        f"{kind:5}{name:12} change {steps[0]:6.2f}, at rest {steps[1]:6.2f}, ratio {steps[0] / steps[1]:5.2f}; "
-        f"most {changes[0].max():6.1f} {changes[1].max():6.1f}; mean {means[0] / means[1] - 1.0:+7.2%}; "
-        f"error {np.quantile(errors, 0.99):6.2f}",
+        f"{kind:5}{name:12} change alone {steps[0]:6.2f}, with history {steps[1]:6.2f}, at rest {steps[2]:6.2f}, "
+        f"ratio {steps[1] / steps[2]:5.2f}; most {' '.join(f'{of.max():6.1f}' for of in changes)}; "
+        f"mean {np.mean(moved) / np.mean(rested) - 1.0:+7.2%}; error {np.quantile(errors, 0.99):6.2f}",
         flush=True,
     )
 
@@ -218,11 +231,11 @@ def main():
     parser.add_argument("--strands", type=int, default=10_000)
     parser.add_argument("--size", type=int, nargs=2, default=[240, 180], metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--per-side", type=int, default=1, help="samples along each side of a pixel")
-    parser.add_argument("--frames", type=int, default=16)
-    parser.add_argument("--warm-up", type=int, default=8, help="frames that are not counted")
+    parser.add_argument("--frames", type=int, default=20)
+    parser.add_argument("--warm-up", type=int, default=14, help="frames that are not counted")
     parser.add_argument("--movements", nargs="+", choices=MOVEMENTS, default=list(MOVEMENTS))
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
-    parser.add_argument("--out", type=Path, help="folder for the last frame of each, moving beside resting")
+    parser.add_argument("--out", type=Path, help="folder for the last frame of each, alone, with history, at rest")
     options = parser.parse_args()
     hair_addon.register()
     gpu.init()
@@ -231,10 +244,10 @@ def main():
     head.light()
     for name in options.movements:
         for kind in options.kinds:
-            moved, rested = measure(MOVEMENTS[name](), kind, options)
-            report(name, kind, moved, rested, options.warm_up)
+            alone, moved, rested = measure(MOVEMENTS[name](), kind, options)
+            report(name, kind, alone, moved, rested)
             if options.out is not None:
-                pair = np.concatenate([moved[-1], rested[-1]], axis=1)
+                pair = np.concatenate([alone[-1], moved[-1], rested[-1]], axis=1)
                 pixels = np.concatenate([pair, np.ones((*pair.shape[:2], 1))], axis=-1).astype(np.float32)
                 offscreen.write_picture(pixels, options.out / f"{name}_{kind}.png", bpy.context.scene)
 
