@@ -7,6 +7,8 @@
 
 const uint NO_SEGMENT = 0x7FFFFFFFu;
 const float MOST_PASSES = 24.0;
+const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
+const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
 
 // Standard errors by which the means of two blocks may differ.
 const float TOLERANCE = 2.0;
@@ -28,8 +30,8 @@ void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
 }
 
 // Where in the previous picture the nearest of what is in a pixel or beside it was [pixels]: silhouettes move with what
-// they are of.
-vec2 place_before(ivec2 pixel)
+// they are of. is_background: there is nothing.
+vec2 place_before(ivec2 pixel, out bool is_background)
 {
   int side = history.samples_per_side;
   ivec2 corner = pixel * side;
@@ -52,6 +54,7 @@ vec2 place_before(ivec2 pixel)
       look(corner + ((turn & 1) == 0 ? ivec2(4 * sign * side, 0) : ivec2(0, 4 * sign * side)), nearest_place, nearest);
     }
   }
+  is_background = nearest == 1.0;
   vec2 at = vec2(pixel) + 0.5;
   if (history.has_motion != 0 && nearest < 1.0) {
     return at + texelFetch(motion, nearest_place, 0).xy;
@@ -96,7 +99,8 @@ void main()
   if (mean.a == 0.0) {
     return;  // nothing is near
   }
-  vec2 place = place_before(pixel);
+  bool is_background;
+  vec2 place = place_before(pixel, is_background);
   if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
     return;
   }
@@ -108,11 +112,12 @@ void main()
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
   bool is_flat = all(lessThan(deviation, 1e-3 * mean + 1e-6));
   vec4 light = is_flat ? textureLod(before, place / history.size.xy, 0.0) : previous_at(place);
-  // Too bright, it is darkened in proportion, so that what was black remains so.
-  vec4 darker = light * (allowed / max(mean_before, vec4(1e-6)));
-  light = mix(light + (allowed - mean_before), darker, vec4(lessThan(allowed, mean_before)));
+  // In proportion: what is black beside a bright edge remains so.
+  light *= clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
   vec4 excess = abs(mean_before - mean) / bound;
   float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
   color = light;
-  passes = min(textureLod(before_passes, place / history.size.xy, 0.0).r, MOST_PASSES) / max(0.5 * most, 1.0);
+  passes = textureLod(before_passes, place / history.size.xy, 0.0).r;
+  passes = min(passes, is_background ? MOST_OF_BACKGROUND : MOST_PASSES) / max(0.5 * most, 1.0);
+  passes /= max(distance(place, vec2(pixel) + 0.5) / SLOW, 1.0);
 }
