@@ -3,5 +3,5 @@
 
 void main()
 {
-  color = texelFetch(sums, ivec2(gl_FragCoord.xy - origin), 0) / weight_sum;
+  color = max(texelFetch(sums, ivec2(gl_FragCoord.xy - origin), 0) / weight_sum, vec4(0.0));
 }

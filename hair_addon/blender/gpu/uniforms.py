@@ -140,6 +140,16 @@ MOTION = Block(
     },
 )
 
+HISTORY = Block(
+    "History",
+    {
+        "now_to_before": "mat4",  # clip space of a view → that of the view before
+        "size": "vec4",  # width and height of the picture [pixels]
+        "samples_per_side": "int",
+        "has_motion": "int",  # whether more than the view has moved: by the texture of motion vectors
+    },
+)
+
 ENVIRONMENT = Block(
     "Environment",
     {

@@ -79,13 +79,14 @@ def read(
         # Scenes without hair have no cost.
         return _EMPTY
     if before is None or before.shadow_maps is None:
-        meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport)
-        surfaces, clear, receivers = _upload(meshes, is_shaded=viewport is None or not is_hair_only)
+        meshes, is_shaded = drawn_meshes.read_drawn_meshes(depsgraph, viewport), viewport is None or not is_hair_only
+        surfaces, clear, receivers = _upload(meshes, is_shaded)
+        surface_owners = tuple(mesh.owner for mesh in meshes if not (is_shaded and mesh.is_clear))
         world = light_door.read_world(blender_scene)
         lamps = maps = None
     else:
-        surfaces, clear, receivers, world = before.surfaces, before.clear, before.receivers, before.world
-        lamps, maps = before.lamps, before.shadow_maps
+        surfaces, clear, surface_owners = before.surfaces, before.clear, before.surface_owners
+        receivers, world, lamps, maps = before.receivers, before.world, before.lamps, before.shadow_maps
     hair_receivers = _hair_receivers(hair, [(place.owner, place.hair_object.session_uid) for place in places])
     if lamps is None:
         found = light_door.read_lights(depsgraph, for_render=viewport is None)
@@ -105,6 +106,7 @@ def read(
         owners=owners,
         selected=selected,
         instances=instances,
+        surface_owners=surface_owners,
         clear=clear,
         receivers=receivers,
     )

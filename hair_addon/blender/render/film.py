@@ -48,7 +48,7 @@ class Film:
     def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0):
         self.size, self._per_side, self.is_transparent = size, per_side, is_transparent
         self._filter_width, self._margin = filter_width, pixel_sampling.filter_margin(per_side, filter_width)
-        self._samples = VisibilityBuffer(*(length * per_side + 2 * self._margin for length in size))
+        self.samples = VisibilityBuffer(*(length * per_side + 2 * self._margin for length in size))
         self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
         self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
         self._passes, self.motion = passes, None
@@ -70,15 +70,15 @@ class Film:
 
         world_to_view, view_to_clip: (4, 4); size: (width, height) of the whole picture [pixels]; turn: which of all
         passes over it this is; place: (left, bottom) of the tile in it [pixels]; lens: a `Lens`, through another point
-        of which each pass looks, None: all in focus.
+        of which each pass looks, None: all in focus. Returns the `uniforms.VIEW` record of the pass.
         """
         if lens is not None:
             world_to_view = lens.world_to_view(world_to_view, turn)
         whole = tuple(length * self._per_side for length in size)
         corner = (length * self._per_side - self._margin for length in place)
-        view = drawing.pass_record(world_to_view, view_to_clip, whole, turn, (*corner, *self._samples.size))
-        drawn_scene.draw_behind_hair(drawn, view, self._samples, self.is_transparent)
-        drawn_scene.draw_hair(drawn, view, self._samples)
+        view = drawing.pass_record(world_to_view, view_to_clip, whole, turn, (*corner, *self.samples.size))
+        drawn_scene.draw_behind_hair(drawn, view, self.samples, self.is_transparent)
+        drawn_scene.draw_hair(drawn, view, self.samples)
         weights = [
             pixel_sampling.filter_weights(self._per_side, self._filter_width, shift)
             for shift in drawing.pass_shift(turn)
@@ -92,10 +92,11 @@ class Film:
             program.bind()
             program.uniform_float("view_to_clip", view_to_clip[2:, 2:].ravel())
             names = ("segments", "depths", "surface_depth")
-            samplers = {name: getattr(self._samples, name) for name in names}
+            samplers = {name: getattr(self.samples, name) for name in names}
             self._add(program, {**samplers, "filter_weights": weighting}, self._depth)
         self.pass_count += 1
         self._weight_sum += float(weights[0].sum() * weights[1].sum())
+        return view
 
     @property
     def sample_count(self):
@@ -105,14 +106,14 @@ class Film:
     def _picture(self, name, drawn, view):
         """The samples of a pass, as a texture."""
         if name == "Combined":
-            return self._samples.color
+            return self.samples.color
         if name == "Vector":
-            return motion_vectors.draw(drawn, self.motion, view, self._samples)
+            return motion_vectors.draw(drawn, self.motion, view, self.samples)
         if name == "Shadow":
-            return drawn_scene.draw_arrival(drawn, view, self._samples)
+            return drawn_scene.draw_arrival(drawn, view, self.samples)
         if name == "Hair Shadow":
-            return drawn_scene.draw_hair_shadow(drawn, view, self._samples)
-        return self._samples.part_of_light(*LOBES[name])
+            return drawn_scene.draw_hair_shadow(drawn, view, self.samples)
+        return self.samples.part_of_light(*LOBES[name])
 
     def _add(self, program, samplers, sums):
         with drawing.bound(program, {}, samplers):
@@ -121,16 +122,21 @@ class Film:
             program.image("sums", sums)
             drawing.dispatch_over(program, self.size)
 
-    def show(self):
-        """Lay the mean of the samples over the viewport that is bound."""
+    @property
+    def light(self):
+        """(texture, weight) of all passes' light: the weighted sum of their samples, and the sum of the weights."""
+        return self._sums["Combined"], self._weight_sum
+
+    def show(self, picture=None):
+        """Lay the mean of the samples over the viewport that is bound, or another picture of this size."""
         program = render_programs.film_view_program()
         x, y, _width, _height = gpu.state.viewport_get()
         with (
-            drawing.bound(program, {}, {"sums": self._sums["Combined"]}),
+            drawing.bound(program, {}, {"sums": picture or self._sums["Combined"]}),
             drawing.gpu_state("NONE", False, "ALPHA_PREMULT"),
         ):
             program.uniform_float("origin", (x, y))
-            program.uniform_float("weight_sum", self._weight_sum)
+            program.uniform_float("weight_sum", 1.0 if picture else self._weight_sum)
             drawing.cover(program)
 
     def read(self):

@@ -7,6 +7,7 @@ import numpy as np
 from ..gpu import drawing, shaders
 from ..gpu.visibility_buffer import VisibilityBuffer
 from . import drawn_scene
+from .history import History
 
 SAMPLE_COUNT = 32  # of a pixel, in all passes of a picture
 
@@ -27,7 +28,8 @@ class HairPicture:
         self.per_side = per_side or samples_per_side()
         samples = (width * self.per_side, height * self.per_side)
         self._sides = range(self.per_side)
-        self.pass_count = 0
+        self.pass_count = self._first_turn = 0
+        self._history = History(self.size, self.per_side)
         self._pass = VisibilityBuffer(*samples)
         self._color = gpu.types.GPUTexture(self.size, format="RGBA16F")
         self._depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
@@ -36,10 +38,20 @@ class HairPicture:
     @property
     def is_fine(self):
         """Whether another pass would change nothing that is seen."""
-        return self.pass_count * self.per_side**2 >= SAMPLE_COUNT
+        return self.pass_count >= self._pass_total
 
-    def restart(self):
-        """Start another picture."""
+    @property
+    def _pass_total(self):
+        return -(-SAMPLE_COUNT // self.per_side**2)
+
+    def restart(self, is_moved=False):
+        """Start another picture; is_moved: of the same things from elsewhere, or elsewhere."""
+        if is_moved:
+            self._history.turn((self._color, self.pass_count), self.pass_count)
+            self._first_turn += self.pass_count
+        else:
+            self._history.forget()
+            self._first_turn = 0
         self.pass_count = 0
 
     def add_pass(self, drawn, world_to_view, view_to_clip, is_see_through=False, outline=None, is_shadowed=False):
@@ -48,7 +60,8 @@ class HairPicture:
         world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not hide hair; outline: a `HairOutline` that
         takes part in it until it is fine; is_shadowed: whether it darkens surfaces by the shadow of hair.
         """
-        view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, self.pass_count)
+        turn = self._first_turn + self.pass_count
+        view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, turn)
         is_outlined = outline is not None and not outline.is_fine
         if is_outlined:
             outline.add_pass(drawn, view, self._pass)
@@ -65,6 +78,9 @@ class HairPicture:
                 self._sum.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
             self._accumulate()
         self.pass_count += 1
+        camera, part_left = (world_to_view, view_to_clip), 1.0 - self.pass_count / self._pass_total
+        light = self._color, self.pass_count
+        self._history.add(drawn, camera, view, self._pass, light, self.pass_count, part_left)
 
     def _accumulate(self):
         program = shaders.accumulate_program()
@@ -91,8 +107,9 @@ class HairPicture:
         program.uniform_float("origin", (x, y))
         program.uniform_float("exposure", exposure)
         program.uniform_float("opacity", opacity)
-        program.uniform_int("pass_count", self.pass_count)
-        program.uniform_sampler("passes", self._color)
+        carried = self._history.picture
+        program.uniform_int("pass_count", self.pass_count if carried is None else 1)
+        program.uniform_sampler("passes", self._color if carried is None else carried)
         program.uniform_sampler("depths", self._depth)
         program.uniform_sampler("display_table", display_table)
         # Its depth is not written: surfaces occlude guides, the hair around them does not.
@@ -108,6 +125,10 @@ class HairPicture:
         """(height, width, 4) float32: premultiplied linear light, first row at the bottom."""
         pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")
         return np.array(pixels, np.float32).reshape(self.size[1], self.size[0], 4) / self.pass_count
+
+    def read_shown(self):
+        """The same of what `show` shows, which may hold some of what was shown before something moved."""
+        return self.read() if self._history.picture is None else self._history.read()
 
 
 def table_texture(table):

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Motion vectors of everything drawn, from the previous frame and to the next."""
 
+from collections import Counter
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,12 +14,25 @@ class Places:
     """Transforms and points of everything drawn at one time.
 
     world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world)}; surfaces: {owner:
-    (texture of corners, how many)}.
+    (texture of corners, how many)}. Owners are keys of `_told_apart`.
     """
 
     world_to_clip: np.ndarray
     hair: dict
     surfaces: dict
+
+    def are_where(self, others):
+        """Whether everything is where it is in other `Places`, whatever the camera does."""
+        return (
+            self.hair.keys() == others.hair.keys()
+            and self.surfaces.keys() == others.surfaces.keys()
+            and all(_is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items())
+            and all(place[0] is others.surfaces[owner][0] for owner, place in self.surfaces.items())
+        )
+
+
+def _is_unmoved(hair, other):
+    return hair[0] is other[0] and np.array_equal(hair[2], other[2])
 
 
 @dataclass(frozen=True)
@@ -59,14 +73,14 @@ class Motion:
 def draw(drawn, motion, view, buffer):
     """Return a texture of motion vectors [pixels] for the `VisibilityBuffer` that a `DrawnScene` was drawn into."""
     with buffer.surfaces_of_part(render_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, _parts), owner in zip(drawn.surfaces, drawn.surface_owners, strict=True):
+        for (surface, _parts), owner in zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True):
             record, samplers = motion.surface(owner)
             placed = view.copy()
             placed["row_strands"] = surface.row_corners
             blocks = {"view": uniforms.uniform_buffer(placed), "motion": uniforms.uniform_buffer(record)}
             with drawing.bound(render_programs.surface_motion_program(), blocks, samplers):
                 surface.batch.draw(render_programs.surface_motion_program())
-    inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, drawn.owners)]
+    inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, _told_apart(drawn.owners))]
     return buffer.part_by(render_programs.strand_motion_program(), render_programs.MOTION_FORMAT, inputs)
 
 
@@ -74,10 +88,20 @@ def places(drawn, world_to_view, view_to_clip):
     """Return the `Places` of a `DrawnScene`, also one read without lighting."""
     hair = {
         owner: (strands.texture, (strands.strand_count, strands.point_count), to_world)
-        for (strands, _shading, to_world, *_), owner in zip(drawn.hair, drawn.owners, strict=True)
+        for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _told_apart(drawn.owners), strict=True)
     }
     surfaces = {
         owner: (surface.places, surface.corner_count)
-        for (surface, _parts), owner in zip(drawn.surfaces, drawn.surface_owners, strict=True)
+        for (surface, _parts), owner in zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True)
     }
     return Places(view_to_clip @ world_to_view, hair, surfaces)
+
+
+def _told_apart(owners):
+    """[(owner, how many of its things come before)]: an object may own several instances."""
+    counts = Counter()
+    keys = []
+    for owner in owners:
+        keys.append((owner, counts[owner]))
+        counts[owner] += 1
+    return keys

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 
 from ..host.caches import Cache
 from .drawn_scene import DrawnScene
-from .film import Film
 from .hair_picture import HairPicture
 from .outline import HairOutline
 from .selected_hair import LoneOutline
+from .view_film import ViewFilm
 
 # (pointer of a region, class of the picture) → RegionPicture: of twelve regions at least, each with a picture and the
 # outline over it. Regions come and go without a word.
@@ -19,7 +19,7 @@ picture_cache = Cache(capacity=24)
 class RegionPicture:
     """A picture of a region, and what it is of."""
 
-    picture: HairPicture | Film | LoneOutline
+    picture: HairPicture | ViewFilm | LoneOutline
     options: tuple  # that it was made with, its size first
     drawn: DrawnScene | None = None
     seen: tuple = ()  # the view, and other options it depends on

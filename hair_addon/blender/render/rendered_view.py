@@ -4,7 +4,7 @@
 from ..data import camera_lens
 from ..gpu import drawing
 from . import hair_picture, region_pictures, viewport
-from .film import Film
+from .view_film import ViewFilm
 
 
 def draw(context):
@@ -13,15 +13,15 @@ def draw(context):
         drawn, camera = viewport.drawn_scene_of(context), viewport.matrices_of(context.region_data)
         lens = _lens(context)
         per_side = 1 if lens is not None else hair_picture.samples_per_side()
-        options = per_side, ("Combined",), context.scene.render.film_transparent
-        kept = region_pictures.picture_of(context.region, Film, *options)
+        options = per_side, context.scene.render.film_transparent
+        kept = region_pictures.picture_of(context.region, ViewFilm, *options)
         film = kept.picture
         if kept.turn_to(drawn, (*map(float, (*camera[0].ravel(), *camera[1].ravel())), lens)):
-            film.clear()
-        if film.sample_count < hair_picture.SAMPLE_COUNT:
-            film.add_pass(drawn, *camera, film.size, film.pass_count, lens=lens)
+            film.restart(is_moved=True)
+        if not film.is_fine:
+            film.add_pass(drawn, *camera, lens)
         film.show()
-        return film.sample_count < hair_picture.SAMPLE_COUNT
+        return not film.is_fine
 
 
 def _lens(context):

@@ -190,9 +190,11 @@ def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=Fal
     outlined: as `selected_hair.outlined` returns it; is_shadowed: as for `HairPicture.add_pass`.
     """
     kept = region_pictures.picture_of(region, hair_picture.HairPicture)
-    seen = (is_see_through, is_shadowed, outlined, *map(tuple, view.view_matrix), *map(tuple, view.window_matrix))
+    options = is_see_through, is_shadowed
+    is_moved = kept.seen[:2] == options
+    seen = (*options, outlined, *map(tuple, view.view_matrix), *map(tuple, view.window_matrix))
     if kept.turn_to(drawn, seen):
-        kept.picture.restart()
+        kept.picture.restart(is_moved)
         if outlined is None:
             kept.outline = None
         else:

@@ -11,7 +11,7 @@ import pytest
 
 from hair_addon.blender.data.scene import read_camera
 from hair_addon.blender.render import drawn_scene, offscreen, region_pictures, rendered_view, viewport
-from hair_addon.blender.render.film import Film
+from hair_addon.blender.render.view_film import ViewFilm
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support.rendering import rendered
 
@@ -134,6 +134,6 @@ def test_a_rendered_viewport_blurs_only_through_the_camera(lit, tmp_path, monkey
     with gpu.types.GPUOffScreen(width, height).bind():
         while rendered_view.draw(context):
             pass
-    shown = region_pictures.known_picture(context.region, Film).picture.read()["Combined"]
-    region_pictures.drop_picture(context.region, Film)
+    shown = region_pictures.known_picture(context.region, ViewFilm).picture.read()
+    region_pictures.drop_picture(context.region, ViewFilm)
     assert np.abs(shown - expected).mean() < 0.02 * np.sqrt(np.square(expected).mean())

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The outline of selected hair: where its line is, in which colour, when it is drawn and what it costs."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import bpy
@@ -52,9 +53,7 @@ def outlined(drawn, channels, style=STYLE):
 def bare(lit):
     """The hair without its surface, which would hide some of it."""
     lit.select_set(True)
-    drawn = read()
-    drawn.surfaces.clear()
-    return drawn
+    return replace(read(), surfaces=[], surface_owners=())
 
 
 def test_the_line_surrounds_the_hair_at_its_gap(bare):

@@ -4,6 +4,7 @@
 import re
 import shutil
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import bpy
@@ -170,8 +171,7 @@ def test_surfaces_hide_hair_in_every_sample(lit):
     """The half of the strands that is behind the sphere shows only where surfaces are seen through."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
-    bare = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
-    bare.surfaces.clear()
+    bare = replace(drawn, surfaces=[], surface_owners=())
     matrices = scene.read_camera(bpy.context.scene, depsgraph, SIZE, SIZE)
     pictures = {}
     for name, of, through in (("hidden", drawn, False), ("through", drawn, True), ("bare", bare, False)):

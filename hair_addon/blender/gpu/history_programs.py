@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""GLSL files → GPU programs of a viewport's history."""
+
+import gpu
+
+from . import shaders, uniforms
+
+BLOCK_SIDE = 8  # pixels: BLOCK_SIDE of shaders/include/history_blocks.glsl
+
+
+@shaders.kept
+def blocks_program():
+    """The program of the mean and deviation of each block of a picture's pixels: see history_blocks.frag."""
+    return _filter("history_blocks.frag", ("picture",), (("mean", "VEC4"), ("deviation", "VEC4")), ("weight",))
+
+
+@shaders.kept
+def carry_program():
+    """The program that moves the previous picture to where its contents are now: see history_carry.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.typedef_source(uniforms.HISTORY.source)
+    info.uniform_buf(0, "History", "history")
+    samplers = ("before", "before_passes", "before_mean", "before_deviation", "now_mean", "now_deviation")
+    for slot, name in enumerate((*samplers, "surface_depth", "motion")):
+        info.sampler(slot, "FLOAT_2D", name)
+    for slot, name in enumerate(("depths", "segments"), start=len(samplers) + 2):
+        info.sampler(slot, "UINT_2D", name)
+    return shaders.compile_drawing(info, "cover.vert", "history_carry.frag", _PICTURE)
+
+
+@shaders.kept
+def mix_program():
+    """The program that blends carried pixels with the passes so far: see history_mix.frag."""
+    samplers = ("sums", "carried", "carried_passes")
+    return _filter("history_mix.frag", samplers, _PICTURE, ("weight", "pass_count", "part_left"))
+
+
+_PICTURE = (("color", "VEC4"), ("passes", "FLOAT"))
+
+
+def _filter(fragment, samplers, targets, constants):
+    info = gpu.types.GPUShaderCreateInfo()
+    for name in constants:
+        info.push_constant("FLOAT", name)
+    for slot, name in enumerate(samplers):
+        info.sampler(slot, "FLOAT_2D", name)
+    return shaders.compile_drawing(info, "cover.vert", fragment, targets)

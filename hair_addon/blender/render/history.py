@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a viewport showed before: it takes part in its next pictures, so that few samples flicker less.
+
+When something moves, the picture that was shown is carried to where its contents are now, and blended with the passes
+of the new one. It counts for less with each pass, and for nothing in the last one: a picture at rest is the mean of its
+own passes. Where the two disagree by more than noise it counts for less from the start [Karis14] [Yang20].
+"""
+
+from dataclasses import dataclass
+
+import gpu
+import numpy as np
+
+from ..gpu import drawing, history_programs, uniforms
+from . import motion_vectors
+
+_COLOR, _PASSES = "RGBA16F", "R16F"
+
+
+class _Targets:
+    """Textures and their framebuffer, which does not own them."""
+
+    def __init__(self, size, formats, is_smooth):
+        self.textures = [gpu.types.GPUTexture(size, format=one) for one in formats]
+        for texture in self.textures:
+            texture.filter_mode(is_smooth)
+            texture.extend_mode("EXTEND")
+            texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+        self._framebuffer = gpu.types.GPUFrameBuffer(color_slots=tuple(self.textures))
+
+    def fill(self, program, samplers, blocks=None, **constants):
+        """Run a program on every texel; blocks: {instance: record}; constants: numbers."""
+        with self._framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
+            blocks = {name: uniforms.uniform_buffer(record) for name, record in (blocks or {}).items()}
+            with drawing.bound(program, blocks, samplers):
+                for name, value in constants.items():
+                    program.uniform_float(name, value)
+                drawing.cover(program)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a picture was of."""
+
+    looks: tuple  # `Shading` of each of the hair: pictures of one history have the same ones
+    places: motion_vectors.Places
+    world_to_clip: np.ndarray
+
+
+class History:
+    """What a picture of size (width, height) [pixels] showed before, with per_side² samples of a pixel in a pass."""
+
+    def __init__(self, size, per_side):
+        self.size, self._per_side = size, per_side
+        self._shown = self._before = None  # _Targets: the picture, and how many passes it is worth
+        self._carried = self._blocks = None
+        self._seen = None
+        self._is_carried = False
+
+    @property
+    def picture(self):
+        """The texture to be shown in place of the passes, or None."""
+        return self._shown.textures[0] if self._is_carried else None
+
+    def read(self):
+        """(height, width, 4) float32 of `picture`, first row at the bottom."""
+        return np.array(self.picture.read(), np.float32).reshape(self.size[1], self.size[0], 4)
+
+    def forget(self):
+        """Start without what was shown before."""
+        self._seen, self._is_carried = None, False
+
+    def turn(self, light, pass_count):
+        """Keep what is shown, as something has moved; light: as for `add`, of pass_count passes."""
+        if self._seen is None or not pass_count:
+            return
+        if self._shown is None:
+            self._allocate()
+        if not self._is_carried:
+            self._mix(light, pass_count, 0.0)
+        self._shown, self._before = self._before, self._shown
+
+    def _allocate(self):
+        formats = (_COLOR, _PASSES)
+        self._shown, self._before, self._carried = (_Targets(self.size, formats, True) for _ in range(3))
+        blocks = tuple(-(-length // history_programs.BLOCK_SIDE) for length in self.size)
+        self._blocks = [_Targets(blocks, (_COLOR, _COLOR), True) for _ in range(2)]
+
+    def add(self, drawn, camera, view, buffer, light, pass_count, part_left):
+        """Take note of a pass, the pass_count-th of a picture.
+
+        drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; buffer: its
+        `VisibilityBuffer`; light: (texture, weight) of the passes so far, their sum and what to divide it by;
+        part_left: of all passes, those that are still to come.
+        """
+        if pass_count == 1:
+            self._turn_to(drawn, camera, view, buffer, light)
+        if self._is_carried:
+            self._is_carried = part_left > 0.0
+        if self._is_carried:
+            self._mix(light, pass_count, part_left)
+
+    def _turn_to(self, drawn, camera, view, buffer, light):
+        before, world_to_clip = self._seen, camera[1] @ camera[0]
+        looks = tuple(shading for _strands, shading, *_ in drawn.hair)
+        self._seen = _Seen(looks, motion_vectors.places(drawn, *camera), world_to_clip)
+        self._is_carried = before is not None and _are_same(before.looks, looks)
+        if self._is_carried:
+            self._carry(before, drawn, view, buffer, light)
+
+    def _carry(self, before, drawn, view, buffer, light):
+        now = self._seen
+        record = uniforms.HISTORY.record()
+        record["now_to_before"] = (before.world_to_clip @ np.linalg.inv(now.world_to_clip)).T
+        record["size"][:2], record["samples_per_side"] = self.size, self._per_side
+        record["has_motion"] = not now.places.are_where(before.places)
+        motion = light[0]
+        if record["has_motion"]:
+            motion = motion_vectors.draw(
+                drawn, motion_vectors.Motion(before.places, now.places, now.places, self.size), view, buffer
+            )
+        program = history_programs.blocks_program()
+        for blocks, of in zip(self._blocks, ((self._before.textures[0], 1.0), light), strict=True):
+            blocks.fill(program, {"picture": of[0]}, weight=of[1])
+        (before_blocks, now_blocks), (picture, passes) = self._blocks, self._before.textures
+        samplers = {
+            "before": picture,
+            "before_passes": passes,
+            "before_mean": before_blocks.textures[0],
+            "before_deviation": before_blocks.textures[1],
+            "now_mean": now_blocks.textures[0],
+            "now_deviation": now_blocks.textures[1],
+            "surface_depth": buffer.surface_depth,
+            "motion": motion,
+            "depths": buffer.depths,
+            "segments": buffer.segments,
+        }
+        self._carried.fill(history_programs.carry_program(), samplers, {"history": record})
+
+    def _mix(self, light, pass_count, part_left):
+        sums, weight = light
+        carried, passes = self._carried.textures
+        samplers = {"sums": sums, "carried": carried, "carried_passes": passes}
+        program = history_programs.mix_program()
+        self._shown.fill(program, samplers, weight=weight, pass_count=float(pass_count), part_left=part_left)
+
+
+def _are_same(looks, others):
+    return len(looks) == len(others) and all(look is other for look, other in zip(looks, others, strict=True))

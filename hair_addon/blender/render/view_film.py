@@ -1,0 +1,54 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The picture of a viewport with Rendered shading: a film, and what was shown before something moved."""
+
+from .film import Film
+from .hair_picture import SAMPLE_COUNT
+from .history import History
+
+
+class ViewFilm:
+    """Light over a region of `size` (width, height) [pixels], refined pass by pass while nothing moves.
+
+    per_side, is_transparent: as for `Film`.
+    """
+
+    def __init__(self, size, per_side, is_transparent):
+        self._film = Film(size, per_side, ("Combined",), is_transparent)
+        self._history = History(size, per_side)
+        self._pass_total = -(-SAMPLE_COUNT // per_side**2)
+        self._first_turn = 0
+
+    @property
+    def is_fine(self):
+        """Whether another pass would change nothing that is seen."""
+        return self._film.pass_count >= self._pass_total
+
+    def restart(self, is_moved=False):
+        """Start another picture: as `HairPicture.restart`."""
+        if is_moved:
+            self._history.turn(self._film.light, self._film.pass_count)
+            self._first_turn += self._film.pass_count
+        else:
+            self._history.forget()
+            self._first_turn = 0
+        self._film.clear()
+
+    def add_pass(self, drawn, world_to_view, view_to_clip, lens=None):
+        """Draw a `DrawnScene` once more: arguments as for `Film.add_pass`."""
+        film, camera = self._film, (world_to_view, view_to_clip)
+        view = film.add_pass(drawn, *camera, film.size, self._first_turn + film.pass_count, lens=lens)
+        self._history.add(
+            drawn, camera, view, film.samples, film.light, film.pass_count, 1.0 - film.pass_count / self._pass_total
+        )
+
+    def show(self):
+        """Lay the picture over the viewport that is bound."""
+        self._film.show(self._history.picture)
+
+    def read(self):
+        """(height, width, 4) float32: the mean of the passes so far, first row at the bottom."""
+        return self._film.read()["Combined"]
+
+    def read_shown(self):
+        """The same of what `show` shows, which may hold some of what was shown before something moved."""
+        return self.read() if self._history.picture is None else self._history.read()

@@ -1,0 +1,123 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// The previous picture of a viewport, moved to where its contents are now [Karis14], and how many passes it is worth.
+// Clamping each pixel to its neighbours would remove thin strands, which are in few samples of a pass. Means of
+// blocks are compared instead: they may differ as far as noise allows.
+
+#include "include/history_blocks.glsl"
+
+const uint NO_SEGMENT = 0x7FFFFFFFu;
+const float MOST_PASSES = 24.0;
+const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
+const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
+
+// Standard errors by which the means of two blocks may differ.
+const float TOLERANCE = 2.0;
+
+float nearest_at(ivec2 place)
+{
+  bool is_hair = texelFetch(segments, place, 0).r < NO_SEGMENT;
+  return is_hair ? uintBitsToFloat(texelFetch(depths, place, 0).r) : texelFetch(surface_depth, place, 0).r;
+}
+
+void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
+{
+  place = clamp(place, ivec2(0), ivec2(history.size.xy) * history.samples_per_side - 1);
+  float depth = nearest_at(place);
+  if (depth < nearest) {
+    nearest = depth;
+    nearest_place = place;
+  }
+}
+
+// Where in the previous picture the nearest of what is in a pixel or beside it was [pixels]: silhouettes move with what
+// they are of. is_background: there is nothing.
+vec2 place_before(ivec2 pixel, out bool is_background)
+{
+  int side = history.samples_per_side;
+  ivec2 corner = pixel * side;
+  ivec2 nearest_place = corner;
+  float nearest = 2.0;
+  for (int y = 0; y < side; y++) {
+    for (int x = 0; x < side; x++) {
+      look(corner + ivec2(x, y), nearest_place, nearest);
+    }
+  }
+  look(corner + ivec2(side, 0), nearest_place, nearest);
+  look(corner + ivec2(-1, 0), nearest_place, nearest);
+  look(corner + ivec2(0, side), nearest_place, nearest);
+  look(corner + ivec2(0, -1), nearest_place, nearest);
+  // A thin strand is in few samples: before the background, look for it a little further.
+  if (nearest == 1.0) {
+    for (int turn = 0; turn < 4; turn++) {
+      int sign = (turn & 2) - 1;
+      look(corner + ivec2(2 * sign * side, 2 * side * (2 * (turn & 1) - 1)), nearest_place, nearest);
+      look(corner + ((turn & 1) == 0 ? ivec2(4 * sign * side, 0) : ivec2(0, 4 * sign * side)), nearest_place, nearest);
+    }
+  }
+  is_background = nearest == 1.0;
+  vec2 at = vec2(pixel) + 0.5;
+  if (history.has_motion != 0 && nearest < 1.0) {
+    return at + texelFetch(motion, nearest_place, 0).xy;
+  }
+  vec4 clip = history.now_to_before * vec4(2.0 * at / history.size.xy - 1.0, 2.0 * nearest - 1.0, 1.0);
+  return (clip.w > 0.0) ? (0.5 * clip.xy / clip.w + 0.5) * history.size.xy : vec2(-1.0);
+}
+
+// The previous picture at a place [pixels], by Catmull and Rom's cubics: bilinear filtering would blur it more in each
+// frame. Five bilinear samples; the corners' weights are small. Beside bright strands it may be below zero: that is cut
+// off where it is shown, as frame by frame it would add up to more light.
+vec4 previous_at(vec2 place)
+{
+  vec2 middle = floor(place - 0.5) + 0.5;
+  vec2 t = place - middle;
+  vec2 before_it = t * (-0.5 + t * (1.0 - 0.5 * t));
+  vec2 first = 1.0 + t * t * (-2.5 + 1.5 * t);
+  vec2 second = t * (0.5 + t * (2.0 - 1.5 * t));
+  vec2 after_it = t * t * (-0.5 + 0.5 * t);
+  vec2 inner = first + second;
+  vec2 texel = 1.0 / history.size.xy;
+  vec2 low = (middle - 1.0) * texel;
+  vec2 between = (middle + second / inner) * texel;
+  vec2 high = (middle + 2.0) * texel;
+  vec4 total = textureLod(before, between, 0.0) * (inner.x * inner.y);
+  total += textureLod(before, vec2(low.x, between.y), 0.0) * (before_it.x * inner.y);
+  total += textureLod(before, vec2(high.x, between.y), 0.0) * (after_it.x * inner.y);
+  total += textureLod(before, vec2(between.x, low.y), 0.0) * (inner.x * before_it.y);
+  total += textureLod(before, vec2(between.x, high.y), 0.0) * (inner.x * after_it.y);
+  float weight = inner.x * inner.y + (before_it.x + after_it.x) * inner.y + inner.x * (before_it.y + after_it.y);
+  return total / weight;
+}
+
+void main()
+{
+  ivec2 pixel = ivec2(gl_FragCoord.xy);
+  ivec2 blocks = textureSize(now_mean, 0);
+  vec2 here = block_place(vec2(pixel) + 0.5, blocks);
+  vec4 mean = textureLod(now_mean, here, 0.0);
+  color = vec4(0.0);
+  passes = 0.0;
+  if (mean.a == 0.0) {
+    return;  // nothing is near
+  }
+  bool is_background;
+  vec2 place = place_before(pixel, is_background);
+  if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
+    return;
+  }
+  vec2 there = block_place(place, blocks);
+  vec4 mean_before = textureLod(before_mean, there, 0.0);
+  vec4 deviation = max(textureLod(now_deviation, here, 0.0), textureLod(before_deviation, there, 0.0));
+  // Half floats resolve a thousandth.
+  vec4 bound = (TOLERANCE / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
+  vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
+  bool is_flat = all(lessThan(deviation, 1e-3 * mean + 1e-6));
+  vec4 light = is_flat ? textureLod(before, place / history.size.xy, 0.0) : previous_at(place);
+  // In proportion: what is black beside a bright edge remains so.
+  light *= clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
+  vec4 excess = abs(mean_before - mean) / bound;
+  float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
+  color = light;
+  passes = textureLod(before_passes, place / history.size.xy, 0.0).r;
+  passes = min(passes, is_background ? MOST_OF_BACKGROUND : MOST_PASSES) / max(0.5 * most, 1.0);
+  passes /= max(distance(place, vec2(pixel) + 0.5) / SLOW, 1.0);
+}

@@ -1,0 +1,259 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How steady a viewport's hair is while something moves, on the sample head: differences between frames.
+
+Each movement is drawn with one pass a frame, as a viewport does while it lasts, alone and with what was shown before,
+and as pictures that have come to rest. Printed are display levels of 255, where hair is: the 99th percentile of how far
+a pixel changes from one frame to the next, for the three; the largest change; how far the mean of the moving picture is
+from that of the resting one, and the 99th percentile of a pixel's distance.
+
+.venv/bin/python tests/benchmarks/stable_pictures.py --strands 10000 --size 240 180
+"""
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+import bpy
+import gpu
+import numpy as np
+import warp as wp
+from mathutils import Matrix
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
+
+import head  # the samples' scene
+
+import hair_addon
+from hair_addon.blender.data import scene
+from hair_addon.blender.gpu import display_transform
+from hair_addon.blender.render import drawn_scene, hair_picture, offscreen, view_film
+
+BEHIND = 0.05  # scene-linear grey behind the hair
+
+
+class Movement:
+    """Something that moves the scene of the sample head a step with each frame."""
+
+    is_of_camera = False  # whether nothing else moves
+
+    def __init__(self):
+        self.camera = bpy.context.scene.camera
+        self.start = self.camera.matrix_world.copy()
+
+    def end(self):
+        """Put all back."""
+        self.camera.matrix_world = self.start
+
+
+class Orbit(Movement):
+    """The camera goes round the head, a quarter of a degree a frame."""
+
+    is_of_camera = True
+
+    def step(self, frame):
+        turn = Matrix.Rotation(np.radians(0.25 * frame), 4, "Z")
+        self.camera.matrix_world = turn @ self.start
+
+
+class Sway(Orbit):
+    """The camera goes round the head by two degrees a frame."""
+
+    def step(self, frame):
+        super().step(8 * frame)
+
+
+class Zoom(Orbit):
+    """The camera goes away from the head, from 1 distance to 50 in 120 frames."""
+
+    def step(self, frame):
+        middle = Matrix.Translation(head.LOOK_AT)
+        away = Matrix.Translation((middle.inverted() @ self.start).translation * (50.0 ** (frame / 120.0) - 1.0))
+        self.camera.matrix_world = away @ self.start
+
+
+class Turntable(Movement):
+    """The head turns by a quarter of a degree a frame."""
+
+    def step(self, frame):
+        bpy.data.objects["Head"].rotation_euler.z = np.radians(0.25 * frame)
+
+    def end(self):
+        self.step(0)
+
+
+class MovingLight(Movement):
+    """The key light goes round the head, two degrees a frame."""
+
+    def __init__(self):
+        super().__init__()
+        self.light = bpy.data.objects["Key"]
+        self.place = self.light.matrix_world.copy()
+
+    def step(self, frame):
+        self.light.matrix_world = Matrix.Rotation(np.radians(2.0 * frame), 4, "Z") @ self.place
+
+    def end(self):
+        self.light.matrix_world = self.place
+
+
+class Combing(Movement):
+    """Guides in front sway to the side: 1 mm at their tips with each frame."""
+
+    def __init__(self):
+        super().__init__()
+        self.guides = bpy.data.objects["Guides"].data
+        points = np.empty((len(self.guides.points), 3), np.float32)
+        self.guides.attributes["position"].data.foreach_get("vector", points.ravel())
+        self.points = points
+
+    def step(self, frame):
+        strands = self.points.reshape(len(self.guides.curves), -1, 3).copy()
+        along = np.linspace(0.0, 1.0, strands.shape[1]) ** 2
+        strands[strands[:, 0, 1] < 0.0, :, 0] += np.float32(0.001 * frame) * along.astype(np.float32)
+        self.guides.attributes["position"].data.foreach_set("vector", strands.ravel())
+        self.guides.update_tag()
+
+    def end(self):
+        self.step(0)
+
+
+MOVEMENTS = {one.__name__: one for one in (Orbit, Sway, Zoom, Turntable, MovingLight, Combing)}
+
+
+class HairFrames:
+    """Pictures of hair alone, as a viewport lays them over what Blender draws."""
+
+    def __init__(self, size, per_side):
+        self._picture = hair_picture.HairPicture(size, per_side)
+
+    def moved(self, drawn, camera):
+        """(H, W, 3) scene-linear light of the first pass after a movement."""
+        self._picture.restart(is_moved=True)
+        self._picture.add_pass(drawn, *camera)
+        return _over_grey(self._picture.read_shown())
+
+    def alone(self, drawn, camera):
+        """The same without what was shown before."""
+        self._picture.restart()
+        self._picture.add_pass(drawn, *camera)
+        return _over_grey(self._picture.read())
+
+    def rested(self, drawn, camera):
+        """The same of a picture at rest."""
+        self._picture.restart()
+        while not self._picture.is_fine:
+            self._picture.add_pass(drawn, *camera)
+        return _over_grey(self._picture.read())
+
+
+class FilmFrames:
+    """Pictures of hair and surfaces, as in Rendered view."""
+
+    def __init__(self, size, per_side):
+        self._film = view_film.ViewFilm(size, per_side, False)
+
+    def moved(self, drawn, camera):
+        """(H, W, 3) scene-linear light of the first pass after a movement."""
+        self._film.restart(is_moved=True)
+        self._film.add_pass(drawn, *camera)
+        return self._film.read_shown()[..., :3]
+
+    def alone(self, drawn, camera):
+        """The same without what was shown before."""
+        self._film.restart()
+        self._film.add_pass(drawn, *camera)
+        return self._film.read()[..., :3]
+
+    def rested(self, drawn, camera):
+        """The same of a picture at rest."""
+        self._film.restart()
+        while not self._film.is_fine:
+            self._film.add_pass(drawn, *camera)
+        return self._film.read()[..., :3]
+
+
+KINDS = {"hair": HairFrames, "film": FilmFrames}
+
+
+def _over_grey(light):
+    return light[..., :3] + (1.0 - light[..., 3:]) * BEHIND
+
+
+def levels(light):
+    """Scene-linear light → what the scene's view transform shows of it, from 0 to 255."""
+    transform = display_transform.DisplayTransform.of(bpy.context.scene)
+    shown = display_transform.apply(transform, light.reshape(-1, 3).astype(np.float32))
+    return 255.0 * np.clip(shown, 0.0, 1.0).reshape(light.shape)
+
+
+def measure(movement, kind, options):
+    """(alone, moved, rested) scene-linear light of the frames after those of the warm-up."""
+    moving, resting = (KINDS[kind](tuple(options.size), options.per_side) for _ in range(2))
+    found, drawn = ([], [], []), None
+    for frame in range(options.frames):
+        movement.step(frame)
+        bpy.context.view_layer.update()
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        if drawn is None or not movement.is_of_camera:
+            drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
+        camera = scene.read_camera(bpy.context.scene, depsgraph, *options.size)
+        moved = moving.moved(drawn, camera)
+        if frame >= options.warm_up:
+            for of, light in zip(found, (resting.alone(drawn, camera), moved), strict=False):
+                of.append(light)
+            found[2].append(resting.rested(drawn, camera))
+    movement.end()
+    bpy.context.view_layer.update()
+    return found
+
+
+def report(name, kind, alone, moved, rested):
+    """Print a row of figures."""
+    single, shown, still = (np.stack([levels(light) for light in of]) for of in (alone, moved, rested))
+    is_hair = np.abs(still - levels(np.full((1, 1, 3), BEHIND))).max(axis=-1) > 2.0
+    is_hair = is_hair[1:] | is_hair[:-1]
+    changes = [np.abs(np.diff(of, axis=0)).max(axis=-1)[is_hair] for of in (single, shown, still)]
+    errors = np.abs(shown - still).max(axis=-1)[1:][is_hair]
+    steps = [np.quantile(of, 0.99) for of in changes]
+    print(
+        f"{kind:5}{name:12} change alone {steps[0]:6.2f}, with history {steps[1]:6.2f}, at rest {steps[2]:6.2f}, "
+        f"ratio {steps[1] / steps[2]:5.2f}; most {' '.join(f'{of.max():6.1f}' for of in changes)}; "
+        f"mean {np.mean(moved) / np.mean(rested) - 1.0:+7.2%}; error {np.quantile(errors, 0.99):6.2f}",
+        flush=True,
+    )
+
+
+def main():
+    """Print a row of each movement."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--strands", type=int, default=10_000)
+    parser.add_argument("--size", type=int, nargs=2, default=[240, 180], metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--per-side", type=int, default=1, help="samples along each side of a pixel")
+    parser.add_argument("--frames", type=int, default=20)
+    parser.add_argument("--warm-up", type=int, default=14, help="frames that are not counted")
+    parser.add_argument("--movements", nargs="+", choices=MOVEMENTS, default=list(MOVEMENTS))
+    parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
+    parser.add_argument("--out", type=Path, help="folder for the last frame of each, alone, with history, at rest")
+    options = parser.parse_args()
+    hair_addon.register()
+    gpu.init()
+    wp.config.log_level = wp.LOG_WARNING
+    head.grow(head.build(), strand_count=options.strands)
+    head.light()
+    for name in options.movements:
+        for kind in options.kinds:
+            alone, moved, rested = measure(MOVEMENTS[name](), kind, options)
+            report(name, kind, alone, moved, rested)
+            if options.out is not None:
+                pair = np.concatenate([alone[-1], moved[-1], rested[-1]], axis=1)
+                pixels = np.concatenate([pair, np.ones((*pair.shape[:2], 1))], axis=-1).astype(np.float32)
+                offscreen.write_picture(pixels, options.out / f"{name}_{kind}.png", bpy.context.scene)
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    # Blender's module may crash while it is torn down after drawing.
+    os._exit(0)

@@ -1,0 +1,143 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Viewports in which something moves: steady pictures, without what is no longer there."""
+
+import bpy
+import numpy as np
+import pytest
+from scipy.ndimage import binary_dilation
+
+from hair_addon.blender.data import scene
+from hair_addon.blender.render import drawn_scene, hair_picture, view_film
+
+SIZE = 80
+FRAMES, WARM_UP = 8, 6
+
+
+def read_drawn():
+    bpy.context.view_layer.update()
+    return drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+
+
+def camera():
+    return scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE)
+
+
+def new_picture(kind):
+    if kind == "HAIR":
+        return hair_picture.HairPicture((SIZE, SIZE), 1)
+    return view_film.ViewFilm((SIZE, SIZE), 1, is_transparent=True)
+
+
+def move(picture, drawn, view):
+    """What a viewport shows of the first pass after something moved."""
+    picture.restart(is_moved=True)
+    picture.add_pass(drawn, *view)
+    return picture.read_shown()
+
+
+def rest(picture, drawn, view):
+    while not picture.is_fine:
+        picture.add_pass(drawn, *view)
+    return picture.read()
+
+
+def turn_object(degrees):
+    bpy.data.objects["Sphere"].rotation_euler.z = np.radians(degrees)
+
+
+def turn_camera(degrees):
+    angle = np.radians(degrees)
+    bpy.context.scene.camera.location = 6.0 * np.array([np.sin(angle), -np.cos(angle), 0.0])
+    bpy.context.scene.camera.rotation_euler.z = angle
+
+
+def biggest_change(frames):
+    """The 99th percentile of how far a pixel with hair changes from frame to frame, as a display shows it on grey."""
+    frames = np.array(frames)
+    shown = (frames[..., :3] + 0.05 * (1.0 - frames[..., 3:])) ** (1.0 / 2.2)
+    is_hair = (frames[..., 3] > 0.02).any(axis=0)
+    return np.quantile(np.abs(np.diff(shown, axis=0)).max(axis=-1)[:, is_hair], 0.99)
+
+
+@pytest.mark.parametrize(("kind", "turn"), [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera)])
+def test_what_turns_changes_no_more_than_pictures_at_rest(lit, kind, turn):
+    """A degree a frame, one sample a pixel: at most 1.2 times as much, and as bright."""
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
+    moving, shown, still = new_picture(kind), [], []
+    turn_camera(0.0)
+    drawn = read_drawn()
+    for frame in range(FRAMES):
+        turn(float(frame))
+        bpy.context.view_layer.update()
+        drawn, view = drawn if turn is turn_camera else read_drawn(), camera()
+        shown.append(move(moving, drawn, view))
+        if frame >= WARM_UP:
+            still.append(rest(new_picture(kind), drawn, view))
+    assert biggest_change(shown[WARM_UP:]) <= 1.2 * biggest_change(still)
+    means = [np.mean(frames, axis=(0, 1, 2)) for frames in (shown[WARM_UP:], still)]
+    np.testing.assert_allclose(*means, rtol=0.03)
+
+
+@pytest.mark.parametrize("kind", ["HAIR", "FILM"])
+def test_a_picture_that_comes_to_rest_is_the_mean_of_its_own_passes(lit, kind):
+    picture, drawn = new_picture(kind), read_drawn()
+    for degrees in (0.0, 2.0, 4.0):
+        turn_camera(degrees)
+        bpy.context.view_layer.update()
+        move(picture, drawn, camera())
+    assert not np.array_equal(picture.read_shown(), picture.read())
+    last = rest(picture, drawn, camera())
+    np.testing.assert_array_equal(picture.read_shown(), last)
+    np.testing.assert_allclose(last.mean(axis=(0, 1)), rest(new_picture(kind), drawn, camera()).mean(axis=(0, 1)), 0.02)
+
+
+@pytest.mark.parametrize("kind", ["HAIR", "FILM"])
+def test_nothing_remains_where_something_has_been(lit, kind):
+    """Hair that moves by a tenth of the picture's width a frame leaves no trail, also where it moved away."""
+    picture = new_picture(kind)
+    rest(picture, read_drawn(), camera())
+    was_there = picture.read()[..., 3] > 0.0
+    for frame in range(4):
+        bpy.data.objects["Sphere"].location.x = 0.45 * (frame + 1)
+        drawn, view = read_drawn(), camera()
+        shown = move(picture, drawn, view)
+        is_there = rest(new_picture(kind), drawn, view)[..., 3] > 0.0
+        # A pixel is carried with what is beside it.
+        left = was_there & ~binary_dilation(is_there, iterations=5)
+        was_there |= is_there
+        assert left.sum() > 40
+        assert shown[left].mean() < 0.04
+    assert shown[left].max() < 0.2
+
+
+def test_light_that_goes_out_is_gone_in_a_few_frames(lit):
+    picture = new_picture("HAIR")
+    before = rest(picture, read_drawn(), camera())[..., :3].mean()
+    bpy.data.objects["Sun"].data.energy = 0.0
+    drawn = read_drawn()
+    after = [move(picture, drawn, camera())[..., :3].mean() for _ in range(4)]
+    assert after[-1] < 0.05 * before and after == sorted(after, reverse=True)
+
+
+def test_another_look_is_shown_at_once(lit):
+    picture = new_picture("HAIR")
+    rest(picture, read_drawn(), camera())
+    lit.data.vellus.appearance.melanin = 0.9
+    shown = move(picture, read_drawn(), camera())
+    np.testing.assert_array_equal(shown, picture.read())
+
+
+def test_hair_is_carried_where_its_surface_takes_it(lit):
+    """Strands of which the points move, not the object: without their motion the picture would lag behind them."""
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
+    push = bpy.data.objects["Sphere"].modifiers.new("Push", "DISPLACE")
+    push.direction, push.mid_level = "X", 0.0
+    picture = new_picture("HAIR")
+    for frame in range(4):
+        push.strength = 0.2 * frame
+        drawn, view = read_drawn(), camera()
+        shown = move(picture, drawn, view)
+    still = rest(new_picture("HAIR"), drawn, view)
+    columns = np.arange(SIZE)
+    middles = [(of[..., 3].sum(axis=0) * columns).sum() / of[..., 3].sum() for of in (shown, still)]
+    assert abs(middles[0] - middles[1]) < 0.5
