@@ -32,12 +32,27 @@ float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
   return -log(clamp(seen_z.z / max(all_seen(seen_x_y, seen_z), 1e-6), 1e-4, 1.0)) / opacity;
 }
 
-// Light of the world from the mirror cone of a strand, sin(theta_i) = -sin(theta_o), relative to that from everywhere: linear
-// in sin(theta_i), whose mean over what is seen is in seen_z. Light that has come through hair comes from everywhere.
-vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, float opacity, vec3 forward, float sin_theta_o)
+// Light of the world from the inclinations that a strand scatters to the viewer, relative to that from all sides: the
+// visibility as a sum of Legendre's polynomials of sin(theta_i) up to P2, whose mean is in seen_z. zonal_1, zonal_2: response
+// to P1 and P2 as parts of that to even light. Light that has come through hair comes from everywhere.
+vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, float opacity, vec3 forward, vec3 T, vec3 zonal_1, vec3 zonal_2)
 {
   float seen = max(all_seen(seen_x_y, seen_z), 1e-6);
-  float cone = clamp(1.0 - 3.0 * sin_theta_o * seen_z.w / seen, 0.0, 1.0);
+  // Sides weigh directions by squared cosines: of light that is linear in them 3/4 of its first moment.
+  vec3 uneven = vec3(seen_x_y.x - seen_x_y.y, seen_x_y.z - seen_x_y.w, seen_z.x - seen_z.y) * (4.0 / 3.0);
+  float first = clamp(dot(T, uneven) / seen, -0.95, 0.95);
+  // Where little is seen P1 and P2 alone would find light behind the strand: the exponential of b sin(theta_i) of this first
+  // moment [Banerjee05], and what the second has more.
+  float b = first * (3.0 - first * first) / (1.0 - first * first);
+  b = (abs(b) < 1e-2) ? 1e-2 : b;
+  vec3 variance = max((2.0 * zonal_2 + 1.0) / 3.0 - zonal_1 * zonal_1, vec3(0.0));
+  vec3 cone = b / sinh(b) * min(exp(b * zonal_1 + 0.5 * b * b * variance), cosh(b) + sinh(b) * zonal_1);
+  cone += 5.0 * (seen_z.w / seen - 1.0 + 3.0 * first / b) * zonal_2;
+  // `strand_radiance` weighs sides by the sine.
+  vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
+  vec3 pairs = vec3(seen_x_y.x + seen_x_y.y, seen_x_y.z + seen_x_y.w, seen_z.x + seen_z.y);
+  float weighted = max(dot(sides, pairs) / (2.0 * dot(sides, vec3(1.0))), 1e-6);
+  cone = clamp(cone * seen / 6.0, vec3(0.0), vec3(1.0)) / weighted;
   return 1.0 + (cone - 1.0) * min(seen / 6.0 / seen_through(seen / 6.0, opacity, forward), vec3(1.0));
 }
 
