@@ -36,7 +36,6 @@ vec3 dual(int row, float theta_i)
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
 {
   fibre_return(sin_theta_o, returned, towards, zonal_1, zonal_2);
-  towards = clamp(towards, -0.5 * returned, 0.5 * returned);
 }
 
 #include "include/dual_radiance.glsl"

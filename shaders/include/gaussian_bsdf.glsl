@@ -25,5 +25,4 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
 void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
 {
   fibre_return(sin_theta_o, returned, towards, zonal_1, zonal_2);
-  towards = clamp(towards, -0.5 * returned, 0.5 * returned);
 }

@@ -44,7 +44,7 @@ vec3 strand_light()
               view.hair_forward.rgb,
               plus,
               minus);
-  vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, returned, back));
+  vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, back));
   vec3 all = max(returned, vec3(1e-6));
   world *= cone_visibility(seen_x_y, seen_z, view.seen_opacity, view.hair_forward.rgb, T, zonal_1 / all, zonal_2 / all);
   vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
@@ -78,7 +78,7 @@ vec3 strand_light()
         Beyond beyond = look_beyond(light, at, depth, L);
         vec2 below = light_from_below(T, V, beyond.normal);
         vec3 bounced = drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front, behind);
-        radiance += bounced * (below.x * returned + below.y * towards);
+        radiance += bounced * max(below.x * returned + below.y * towards, vec3(0.0));
       }
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
       radiance += irradiance * hair_radiance(T, L, V, front, behind, blur);

@@ -67,6 +67,23 @@ vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
   return irradiance;
 }
 
+// The modified Bessel function I0, within 0.3 % [Olivares18].
+vec3 bessel_i0(vec3 x)
+{
+  vec3 squared = x * x;
+  return cosh(x) / sqrt(sqrt(1.0 + 0.25 * squared)) * (1.0 + 0.24273 * squared) / (1.0 + 0.43023 * squared);
+}
+
+// What a fibre sends to the viewer of light around it, as a part of that of even light. first: mean cosine of the azimuth
+// phi of the light, which is taken to be as exp(k cos(phi)); turned: the mean of cos(phi) over what the fibre scatters: so
+// much of it comes from straight behind or from the viewer, the rest from all around.
+vec3 azimuthal_part(vec3 first, vec3 turned)
+{
+  vec3 m = clamp(first, vec3(-0.95), vec3(0.95));
+  vec3 k = m * (2.0 - m * m) / (1.0 - m * m);  // [Banerjee05]
+  return mix(vec3(1.0), exp(sign(turned) * k) / bessel_i0(k), abs(turned));
+}
+
 // Radiance of a strand towards V. returned: response to uniform light; towards: its moment with the cosine of phi,
 // positive if the strand scatters more light backward.
 vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 towards)
@@ -74,15 +91,13 @@ vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 
   // A fibre receives light in proportion to the sine between tangent and direction.
   vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
   float sin_theta_o = dot(T, V);
-  // sin(T, side) cos(phi) of each side: V across the strand.
-  vec3 across = (V - sin_theta_o * T) / max(sin_from_cos(sin_theta_o), 1e-4);
-  vec3 radiance = vec3(0.0);
-  for (int axis = 0; axis < 3; axis++) {
-    vec3 even = sides[axis] * returned;
-    vec3 uneven = 2.0 * across[axis] * towards;
-    radiance += plus[axis] * (even + uneven) + minus[axis] * (even - uneven);
-  }
-  return radiance / (2.0 * dot(sides, vec3(1.0)));
+  // sin(T, side) cos(phi) of each side, times the cosine of the mirror cone: V across the strand. Of light that is linear
+  // in the direction sides have 3/4 of its change.
+  vec3 across = (V - sin_theta_o * T) * (4.0 / 3.0);
+  vec3 even = (plus + minus) * sides;
+  vec3 uneven = (plus - minus) * across;
+  vec3 part = azimuthal_part(uneven / max(even, vec3(1e-12)), towards / max(returned, vec3(1e-6)));
+  return even / (2.0 * dot(sides, vec3(1.0))) * returned * part;
 }
 
 // Radiance of a strand towards V in the light of the world that white surfaces send to it. hidden: the sum of the directions
@@ -94,13 +109,12 @@ vec3 surface_radiance(mat3 plus, mat3 minus, vec4 hidden, vec3 T, vec3 V, vec3 r
   }
   vec3 N = -hidden.xyz * inversesqrt(max(dot(hidden.xyz, hidden.xyz), 1e-8));
   vec2 below = light_from_below(T, V, N);
-  return surface_irradiance(plus, minus, N) / PI * min(2.0 * hidden.w, 1.0) * (below.x * returned + below.y * towards);
+  return surface_irradiance(plus, minus, N) / PI * min(2.0 * hidden.w, 1.0) * max(below.x * returned + below.y * towards, vec3(0.0));
 }
 
 // The moment `towards` of a strand with its share of what strands behind send back: the integral of
-// (1 - |phi| / pi) / pi × cos(phi). Held to half of all, so that light from one side never takes some away.
-vec3 with_back(vec3 towards, vec3 returned, vec3 back)
+// (1 - |phi| / pi) / pi × cos(phi).
+vec3 with_back(vec3 towards, vec3 back)
 {
-  vec3 most = 0.5 * (returned + back);
-  return clamp(towards + 4.0 / (PI * PI) * back, -most, most);
+  return towards + 4.0 / (PI * PI) * back;
 }

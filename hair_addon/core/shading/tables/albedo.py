@@ -30,18 +30,14 @@ def azimuthal_moments(tables: lookup_tables.Tables) -> np.ndarray:
     """(4, K, 3) float32: of light from everywhere, the radiance that leaves towards theta_o, and its moments.
 
     The second row is the same integral with the weight cos(phi), phi the light's azimuth from the viewer: positive if
-    a strand sends light back. Held to half of the first, so that light from one side never takes some away. The third and
-    fourth are the radiance in light that varies as Legendre's polynomials P1 and P2 of sin(theta_i). Columns are those of
+    a strand sends light back. The third and fourth are the radiance in light that varies as Legendre's polynomials P1 and P2 of sin(theta_i). Columns are those of
     `DualTables.theta`.
     """
-    moments = fibre_moments(tables.lobes, tables.settings)
-    half = 0.5 * moments[0]
-    moments[1] = np.clip(moments[1], -half, half)
-    return moments.astype(np.float32)
+    return fibre_moments(tables.lobes, tables.settings).astype(np.float32)
 
 
 def fibre_moments(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> np.ndarray:
-    """`azimuthal_moments` (4, K, C) of one fibre, as they are; lobes as `azimuthal_lobes` bakes them."""
+    """`azimuthal_moments` (4, K, C) of one fibre; lobes as `azimuthal_lobes` bakes them."""
     theta = dual_scattering.light_inclinations()
     rows = [dual_scattering.row_weights(settings, theta, degree) for degree in range(3)]
     edges = lookup_tables.phi_edges(settings)

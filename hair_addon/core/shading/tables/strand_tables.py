@@ -111,7 +111,7 @@ def hair_return(
     v = (along * (_RETURN_STEPS - 1) + 0.5) / _RETURN_STEPS
     u = np.broadcast_to((np.asarray(theta_o) / np.pi + 0.5)[..., None], v.shape)
     returned, towards, zonal_1, zonal_2 = np.moveaxis(lookup_tables.sample(tables.returned, u, v), -1, 0)
-    return returned, np.clip(towards, -0.5 * returned, 0.5 * returned), zonal_1, zonal_2
+    return returned, towards, zonal_1, zonal_2
 
 
 def sample_radiance(
