@@ -3,6 +3,7 @@
 // visible part of its directions, `sphere.SIDES` as +x -x +y -y and +z -z.
 
 #include "include/fibre.glsl"
+#include "include/uneven_light.glsl"
 
 // Part of light that is left for each channel where strands of an opacity would leave a part `seen`.
 vec3 seen_through(float seen, float opacity, vec3 forward)
@@ -32,22 +33,15 @@ float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
   return -log(clamp(seen_z.z / max(all_seen(seen_x_y, seen_z), 1e-6), 1e-4, 1.0)) / opacity;
 }
 
-// Light of the world from the inclinations that a strand scatters to the viewer, relative to that from all sides: the
-// visibility as a sum of Legendre's polynomials of sin(theta_i) up to P2, whose mean is in seen_z. zonal_1, zonal_2: response
-// to P1 and P2 as parts of that to even light. Light that has come through hair comes from everywhere.
+// Light of the world from the inclinations that a strand scatters to the viewer, relative to that from all sides. The mean
+// of P2 over what is seen is in seen_z; zonal_1, zonal_2: as in `zonal_part`. Light that has come through hair comes from
+// everywhere.
 vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, float opacity, vec3 forward, vec3 T, vec3 zonal_1, vec3 zonal_2)
 {
   float seen = max(all_seen(seen_x_y, seen_z), 1e-6);
   // Sides weigh directions by squared cosines: of light that is linear in them 3/4 of its first moment.
   vec3 uneven = vec3(seen_x_y.x - seen_x_y.y, seen_x_y.z - seen_x_y.w, seen_z.x - seen_z.y) * (4.0 / 3.0);
-  float first = clamp(dot(T, uneven) / seen, -0.95, 0.95);
-  // Where little is seen P1 and P2 alone would find light behind the strand: the exponential of b sin(theta_i) of this first
-  // moment [Banerjee05], and what the second has more.
-  float b = first * (3.0 - first * first) / (1.0 - first * first);
-  b = (abs(b) < 1e-2) ? 1e-2 : b;
-  vec3 variance = max((2.0 * zonal_2 + 1.0) / 3.0 - zonal_1 * zonal_1, vec3(0.0));
-  vec3 cone = b / sinh(b) * min(exp(b * zonal_1 + 0.5 * b * b * variance), cosh(b) + sinh(b) * zonal_1);
-  cone += 5.0 * (seen_z.w / seen - 1.0 + 3.0 * first / b) * zonal_2;
+  vec3 cone = zonal_part(dot(T, uneven) / seen, seen_z.w / seen, zonal_1, zonal_2);
   // `strand_radiance` weighs sides by the sine.
   vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
   vec3 pairs = vec3(seen_x_y.x + seen_x_y.y, seen_x_y.z + seen_x_y.w, seen_z.x + seen_z.y);
@@ -65,23 +59,6 @@ vec3 surface_irradiance(mat3 plus, mat3 minus, vec3 N)
     irradiance += PI * N[axis] * N[axis] * (N[axis] > 0.0 ? plus[axis] : minus[axis]);
   }
   return irradiance;
-}
-
-// The modified Bessel function I0, within 0.3 % [Olivares18].
-vec3 bessel_i0(vec3 x)
-{
-  vec3 squared = x * x;
-  return cosh(x) / sqrt(sqrt(1.0 + 0.25 * squared)) * (1.0 + 0.24273 * squared) / (1.0 + 0.43023 * squared);
-}
-
-// What a fibre sends to the viewer of light around it, as a part of that of even light. first: mean cosine of the azimuth
-// phi of the light, which is taken to be as exp(k cos(phi)); turned: the mean of cos(phi) over what the fibre scatters: so
-// much of it comes from straight behind or from the viewer, the rest from all around.
-vec3 azimuthal_part(vec3 first, vec3 turned)
-{
-  vec3 m = clamp(first, vec3(-0.95), vec3(0.95));
-  vec3 k = m * (2.0 - m * m) / (1.0 - m * m);  // [Banerjee05]
-  return mix(vec3(1.0), exp(sign(turned) * k) / bessel_i0(k), abs(turned));
 }
 
 // Radiance of a strand towards V. returned: response to uniform light; towards: its moment with the cosine of phi,
