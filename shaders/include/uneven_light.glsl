@@ -27,11 +27,13 @@ vec3 bessel_i0(vec3 x)
 }
 
 // What a fibre sends to the viewer of light around it, as a part of that of even light. first: mean cosine of the azimuth
-// phi of the light, which is taken to be as exp(k cos(phi)); turned: the mean of cos(phi) over what the fibre scatters: so
-// much of it comes from straight behind or from the viewer, the rest from all around.
+// phi of the light from the viewer; turned: the mean of cos(phi) over what the fibre scatters. What it reflects it spreads
+// widely: the first harmonic. What it transmits comes from straight behind, the rest from all around: light is taken to be
+// as exp(k cos(phi)).
 vec3 azimuthal_part(vec3 first, vec3 turned)
 {
   vec3 m = clamp(first, vec3(-0.95), vec3(0.95));
   vec3 k = m * (2.0 - m * m) / (1.0 - m * m);  // [Banerjee05]
-  return mix(vec3(1.0), exp(sign(turned) * k) / bessel_i0(k), abs(turned));
+  vec3 reflected = 1.0 + 2.0 * m * max(turned, vec3(0.0));
+  return max(reflected, vec3(0.0)) * mix(vec3(1.0), exp(-k) / bessel_i0(k), max(-turned, vec3(0.0)));
 }
