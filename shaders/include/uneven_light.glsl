@@ -9,7 +9,7 @@
 vec3 zonal_part(float first, float second, vec3 zonal_1, vec3 zonal_2)
 {
   float m = clamp(first, -0.95, 0.95);
-  float b = m * (3.0 - m * m) / (1.0 - m * m);  // [Banerjee05]
+  float b = m * (3.0 - m * m) / (1.0 - m * m);  // Banerjee et al. 2005
   b = (abs(b) < 1e-3) ? 1e-3 : b;
   // Its mean of P2, near even light without the difference of nearly equal numbers.
   float expected = (abs(b) < 0.3) ? b * b / 15.0 : 1.0 - 3.0 / b * (1.0 / tanh(b) - 1.0 / b);
@@ -19,7 +19,7 @@ vec3 zonal_part(float first, float second, vec3 zonal_1, vec3 zonal_2)
   return max(part + 5.0 * (second - expected) * zonal_2, vec3(0.0));
 }
 
-// The modified Bessel function I0, within 0.6 % [Olivares18].
+// The modified Bessel function I0, within 0.6 % (Olivares et al. 2018).
 vec3 bessel_i0(vec3 x)
 {
   vec3 squared = x * x;
@@ -33,7 +33,7 @@ vec3 bessel_i0(vec3 x)
 vec3 azimuthal_part(vec3 first, vec3 turned)
 {
   vec3 m = clamp(first, vec3(-0.95), vec3(0.95));
-  vec3 k = m * (2.0 - m * m) / (1.0 - m * m);  // [Banerjee05]
+  vec3 k = m * (2.0 - m * m) / (1.0 - m * m);  // Banerjee et al. 2005
   vec3 reflected = 1.0 + 2.0 * m * max(turned, vec3(0.0));
   return max(reflected, vec3(0.0)) * mix(vec3(1.0), exp(-k) / bessel_i0(k), max(-turned, vec3(0.0)));
 }

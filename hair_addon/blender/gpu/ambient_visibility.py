@@ -12,8 +12,8 @@ from ...core.imaging import ambient_cube
 from . import drawing, shaders, shadows, uniforms
 from .strand_textures import seen_points
 
-# Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as they can resolve. Fewer and
-# thicker strands cover places less evenly, which lets more light through.
+# Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as they can resolve.
+# Fewer and thicker strands cover places less evenly, which lets more light through.
 _SIZE = 256
 _POINT_COUNT, _LEAST_STRANDS = 11, 10_000
 _FULL_WIDTH = 0.5  # texels that a strand may be wide that is drawn for several

@@ -30,8 +30,8 @@ def azimuthal_moments(tables: lookup_tables.Tables) -> np.ndarray:
     """(4, K, 3) float32: of light from everywhere, the radiance that leaves towards theta_o, and its moments.
 
     The second row is the same integral with the weight cos(phi), phi the light's azimuth from the viewer: positive if
-    a strand sends light back. The third and fourth are the radiance in light that varies as Legendre's polynomials P1 and P2 of sin(theta_i). Columns are those of
-    `DualTables.theta`.
+    a strand sends light back. The third and fourth are the radiance in light that varies as Legendre's polynomials P1
+    and P2 of sin(theta_i). Columns are those of `DualTables.theta`.
     """
     return fibre_moments(tables.lobes, tables.settings).astype(np.float32)
 

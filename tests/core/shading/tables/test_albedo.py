@@ -21,7 +21,9 @@ def test_moments_are_those_of_the_radiance_over_all_directions(mode):
     columns = dual_scattering.light_inclinations()
     for column in (20, 64, 100):
         at = FibreAngles(*np.broadcast_arrays(theta_i[:, None], columns[column], phi))
-        measure = np.pi**2 / 256 * (weights * np.cos(theta_i))[:, None, None] * lookup_tables.sample_radiance(tables, at)
+        measure = (
+            np.pi**2 / 256 * (weights * np.cos(theta_i))[:, None, None] * lookup_tables.sample_radiance(tables, at)
+        )
         sine = np.sin(theta_i)[:, None, None]
         factors = 1.0, np.cos(phi)[:, None], sine, 1.5 * sine**2 - 0.5
         expected = [(measure * factor).sum(axis=(0, 1)) for factor in factors]
