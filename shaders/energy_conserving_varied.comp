@@ -33,10 +33,9 @@ vec3 dual(int row, float theta_i)
   return textureLod(dual_table, at, 0.0).rgb;
 }
 
-void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
 {
-  fibre_return(sin_theta_o, returned, towards);
-  towards = clamp(towards, -0.5 * returned, 0.5 * returned);
+  fibre_return(sin_theta_o, returned, towards, zonal_1, zonal_2);
 }
 
 #include "include/dual_radiance.glsl"

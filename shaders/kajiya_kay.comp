@@ -14,9 +14,11 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   return drawn_lobes.w * diffuse + drawn_lobes.x * specular;
 }
 
-void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
 {
-  returned = settings.diffuse_color + settings.specular_color * kajiya_kay_specular_albedo(settings.exponent);
+  vec3 specular = settings.specular_color * kajiya_kay_specular_albedo(settings.exponent);
+  returned = settings.diffuse_color + specular;
+  kajiya_kay_zonal(settings.diffuse_color, specular, sin_theta_o, zonal_1, zonal_2);
   towards = vec3(0.0);
 }
 

@@ -19,11 +19,13 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   return drawn_lobes.w * diffuse + drawn_lobes.x * vec3(specular);
 }
 
-void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
 {
   float exponent = this_exponent();
   float specular = highlight_peak(settings.reflectance, exponent) * kajiya_kay_specular_albedo(exponent);
-  returned = color_from_falloff(this_sigma_a(), settings.falloff) + vec3(specular);
+  vec3 diffuse = color_from_falloff(this_sigma_a(), settings.falloff);
+  returned = diffuse + vec3(specular);
+  kajiya_kay_zonal(diffuse, vec3(specular), sin_theta_o, zonal_1, zonal_2);
   towards = vec3(0.0);
 }
 

@@ -51,9 +51,9 @@ void main()
     vec3 plus = share * vec3(lessThan(light.axis.xyz, vec3(0.0)));  // lights shine along their axis
     vec3 minus = share * vec3(greaterThan(light.axis.xyz, vec3(0.0)));
     seen_x_y += vec4(plus.x, minus.x, plus.y, minus.y);
-    // Strands: through the hair behind them, and along them. Points of surfaces: over all directions without hair, and
-    // with it.
-    vec2 others = is_strand ? seen * vec2(left, -dot(T, light.axis.xyz)) : open * vec2(1.0, past_hair);
+    // Strands: through the hair behind them, and by P2 of sin(theta_i). Points of surfaces: over all directions without
+    // hair, and with it.
+    vec2 others = is_strand ? seen * vec2(left, legendre_2(dot(T, light.axis.xyz))) : open * vec2(1.0, past_hair);
     seen_z += vec4(plus.z, minus.z, others);
   }
 }

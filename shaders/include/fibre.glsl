@@ -10,6 +10,12 @@ float sin_from_cos(float cosine)
   return sqrt(max(0.0, (1.0 - cosine) * (1.0 + cosine)));
 }
 
+// Legendre's polynomial of the second degree.
+float legendre_2(float x)
+{
+  return 1.5 * x * x - 0.5;
+}
+
 // cos((theta_o - theta_i) / 2) from the sines of both inclinations: exact, by the half-angle formula.
 float cos_theta_d(float sin_theta_i, float sin_theta_o)
 {

@@ -22,8 +22,7 @@ vec3 hair_bsdf(vec3 T, vec3 L, vec3 V, float blur)
   return marschner_scattering(drawn_lobes.xyz * m, lobes.n, inner_reflection(at, lobes, T, L, V), cosine) * cos_theta_i;
 }
 
-void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
 {
-  fibre_return(sin_theta_o, returned, towards);
-  towards = clamp(towards, -0.5 * returned, 0.5 * returned);
+  fibre_return(sin_theta_o, returned, towards, zonal_1, zonal_2);
 }

@@ -27,6 +27,14 @@ float kajiya_kay_specular_albedo(float exponent)
   return 0.5 * PI * PI * sqrt(2.0 * PI / (exponent + 1.5));
 }
 
+// Response to light that varies as P1 and P2 of sin(theta_i): a diffuse cylinder's, to its sine, and a mirror cone's. Both
+// albedos are those in even light.
+void kajiya_kay_zonal(vec3 diffuse, vec3 specular, float sin_theta_o, out vec3 zonal_1, out vec3 zonal_2)
+{
+  zonal_1 = -sin_theta_o * specular;
+  zonal_2 = legendre_2(sin_theta_o) * specular - 0.125 * diffuse;
+}
+
 // Exponent of a highlight of light with an angular variance: the variance of the highlight is close to 1 / exponent.
 float blurred_exponent(float exponent, float blur)
 {

@@ -5,8 +5,9 @@
 // vec3 hair_radiance(vec3 T, vec3 L, vec3 V, float front, float behind, float blur)
 //     light leaving the fibre towards V for unit irradiance from around L outside the hair, with a mean of `front` strands
 //     between and `behind` strands beyond; blur: variance of the light's direction along an axis [rad²]
-// void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards)
-//     the fibre's response to uniform light: the integral over phi, and the same weighted with the cosine of phi
+// void hair_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
+//     the fibre's response to uniform light: the integral over phi, the same weighted with the cosine of phi, and the
+//     responses to light that varies as P1 and P2 of sin(theta_i)
 // vec3 returned_from_behind(float sin_theta_o, float behind)
 //     what `behind` strands beyond add to the first
 
@@ -26,7 +27,9 @@ vec3 strand_light()
   vec3 R = root_direction(strand_index);
   vec3 returned;
   vec3 towards;
-  hair_return(dot(T, V), returned, towards);
+  vec3 zonal_1;
+  vec3 zonal_2;
+  hair_return(dot(T, V), returned, towards, zonal_1, zonal_2);
   vec2 seen_at = seen_texel(strand_index, strand_position, view.point_count, view.seen_points, view.row_strands) /
                  vec2(textureSize(visibility_x_y, 0));
   vec4 seen_x_y = textureLod(visibility_x_y, seen_at, 0.0);
@@ -41,8 +44,9 @@ vec3 strand_light()
               view.hair_forward.rgb,
               plus,
               minus);
-  vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, returned, back));
-  world *= cone_visibility(seen_x_y, seen_z, view.seen_opacity, view.hair_forward.rgb, dot(T, V));
+  vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, back));
+  vec3 all = max(returned, vec3(1e-6));
+  world *= cone_visibility(seen_x_y, seen_z, view.seen_opacity, view.hair_forward.rgb, T, zonal_1 / all, zonal_2 / all);
   vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
   vec3 surface_light = view.surface_color.rgb * between_hair_and_surface(strands_behind);
   world += surface_light * surface_radiance(plus, minus, hidden, T, V, returned, towards);
@@ -74,7 +78,7 @@ vec3 strand_light()
         Beyond beyond = look_beyond(light, at, depth, L);
         vec2 below = light_from_below(T, V, beyond.normal);
         vec3 bounced = drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front, behind);
-        radiance += bounced * (below.x * returned + below.y * towards);
+        radiance += bounced * max(below.x * returned + below.y * towards, vec3(0.0));
       }
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
       radiance += irradiance * hair_radiance(T, L, V, front, behind, blur);

@@ -84,18 +84,22 @@ struct Beyond {
 // L: towards the light.
 Beyond look_beyond(Light light, vec3 at, float depth, vec3 L)
 {
-  Beyond beyond = Beyond(0.0, 0.0, vec3(0.0));
   vec2 slope = vec2(0.0);
+  float found = 0.0;
+  float total = 0.0;
   for (int corner = 0; corner < 4; corner++) {
     vec2 towards = 2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0;
-    vec3 near = at + vec3(BEYOND_REACH * towards, 0.0);
-    float surface = textureLod(surface_moments, near, 0.0).b;
-    // Of a surface in front of the strand this side is in the shadow.
-    float is_there = step(depth, surface + SURFACE_BIAS) * step(surface, 0.75 * FAR);
-    beyond.surface += 0.25 * is_there;
-    beyond.near += 0.25 * is_there * (1.0 - smoothstep(0.0, BOUNCE_DISTANCE, surface - depth));
+    float surface = textureLod(surface_moments, at + vec3(BEYOND_REACH * towards, 0.0), 0.0).b;
+    float is_found = step(surface, 0.75 * FAR);
+    found += 0.25 * is_found;
+    total += 0.25 * is_found * surface;
     slope += towards * surface;
   }
+  // Where the surface slopes, some of it is in front of a strand that is above it: the mean is where the strand is. Of a
+  // surface in front of the strand this side is in the shadow.
+  float surface = total / max(found, 0.25);
+  float is_there = found * step(depth, surface + SURFACE_BIAS);
+  Beyond beyond = Beyond(is_there, is_there * (1.0 - smoothstep(0.0, BOUNCE_DISTANCE, surface - depth)), vec3(0.0));
   slope *= 0.25 / BEYOND_REACH;
   vec3 right = vec3(light.world_to_shadow[0][0], light.world_to_shadow[1][0], light.world_to_shadow[2][0]);
   vec3 up = vec3(light.world_to_shadow[0][1], light.world_to_shadow[1][1], light.world_to_shadow[2][1]);

@@ -35,20 +35,22 @@ float between_ends(float value, float texel_count)
 }
 
 // Response to uniform light towards theta_o for one channel's absorption: the integral over phi, and the
-// same weighted with the cosine of phi. As `albedo.fibre_moments`.
-vec2 channel_return(float u, float sigma_a)
+// same weighted with the cosine of phi, then those to P1 and P2 of sin(theta_i). As `albedo.fibre_moments`.
+vec4 channel_return(float u, float sigma_a)
 {
   float along = (sqrt(sigma_a) - slices.low) / max(slices.high - slices.low, 1e-6);
-  return textureLod(return_slices, vec2(u, between_ends(along, float(textureSize(return_slices, 0).y))), 0.0).rg;
+  return textureLod(return_slices, vec2(u, between_ends(along, float(textureSize(return_slices, 0).y))), 0.0);
 }
 
-void fibre_return(float sin_theta_o, out vec3 returned, out vec3 towards)
+void fibre_return(float sin_theta_o, out vec3 returned, out vec3 towards, out vec3 zonal_1, out vec3 zonal_2)
 {
   float u = atan(sin_theta_o, sin_from_cos(sin_theta_o)) / PI + 0.5;
   vec3 sigma_a = this_sigma_a();
-  vec2 red = channel_return(u, sigma_a.r);
-  vec2 green = channel_return(u, sigma_a.g);
-  vec2 blue = channel_return(u, sigma_a.b);
+  vec4 red = channel_return(u, sigma_a.r);
+  vec4 green = channel_return(u, sigma_a.g);
+  vec4 blue = channel_return(u, sigma_a.b);
   returned = vec3(red.x, green.x, blue.x);
   towards = vec3(red.y, green.y, blue.y);
+  zonal_1 = vec3(red.z, green.z, blue.z);
+  zonal_2 = vec3(red.w, green.w, blue.w);
 }

@@ -3,6 +3,7 @@
 // visible part of its directions, `sphere.SIDES` as +x -x +y -y and +z -z.
 
 #include "include/fibre.glsl"
+#include "include/uneven_light.glsl"
 
 // Part of light that is left for each channel where strands of an opacity would leave a part `seen`.
 vec3 seen_through(float seen, float opacity, vec3 forward)
@@ -32,12 +33,20 @@ float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
   return -log(clamp(seen_z.z / max(all_seen(seen_x_y, seen_z), 1e-6), 1e-4, 1.0)) / opacity;
 }
 
-// Light of the world from the mirror cone of a strand, sin(theta_i) = -sin(theta_o), relative to that from everywhere: linear
-// in sin(theta_i), whose mean over what is seen is in seen_z. Light that has come through hair comes from everywhere.
-vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, float opacity, vec3 forward, float sin_theta_o)
+// Light of the world from the inclinations that a strand scatters to the viewer, relative to that from all sides. The mean
+// of P2 over what is seen is in seen_z; zonal_1, zonal_2: as in `zonal_part`. Light that has come through hair comes from
+// everywhere.
+vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, float opacity, vec3 forward, vec3 T, vec3 zonal_1, vec3 zonal_2)
 {
   float seen = max(all_seen(seen_x_y, seen_z), 1e-6);
-  float cone = clamp(1.0 - 3.0 * sin_theta_o * seen_z.w / seen, 0.0, 1.0);
+  // Sides weigh directions by squared cosines: of light that is linear in them 3/4 of its first moment.
+  vec3 uneven = vec3(seen_x_y.x - seen_x_y.y, seen_x_y.z - seen_x_y.w, seen_z.x - seen_z.y) * (4.0 / 3.0);
+  vec3 cone = zonal_part(dot(T, uneven) / seen, seen_z.w / seen, zonal_1, zonal_2);
+  // `strand_radiance` weighs sides by the sine.
+  vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
+  vec3 pairs = vec3(seen_x_y.x + seen_x_y.y, seen_x_y.z + seen_x_y.w, seen_z.x + seen_z.y);
+  float weighted = max(dot(sides, pairs) / (2.0 * dot(sides, vec3(1.0))), 1e-6);
+  cone = clamp(cone * seen / 6.0, vec3(0.0), vec3(1.0)) / weighted;
   return 1.0 + (cone - 1.0) * min(seen / 6.0 / seen_through(seen / 6.0, opacity, forward), vec3(1.0));
 }
 
@@ -59,15 +68,13 @@ vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 
   // A fibre receives light in proportion to the sine between tangent and direction.
   vec3 sides = vec3(sin_from_cos(T.x), sin_from_cos(T.y), sin_from_cos(T.z));
   float sin_theta_o = dot(T, V);
-  // sin(T, side) cos(phi) of each side: V across the strand.
-  vec3 across = (V - sin_theta_o * T) / max(sin_from_cos(sin_theta_o), 1e-4);
-  vec3 radiance = vec3(0.0);
-  for (int axis = 0; axis < 3; axis++) {
-    vec3 even = sides[axis] * returned;
-    vec3 uneven = 2.0 * across[axis] * towards;
-    radiance += plus[axis] * (even + uneven) + minus[axis] * (even - uneven);
-  }
-  return radiance / (2.0 * dot(sides, vec3(1.0)));
+  // sin(T, side) cos(phi) of each side, times the cosine of the mirror cone: V across the strand. Of light that is linear
+  // in the direction sides have 3/4 of its change.
+  vec3 across = (V - sin_theta_o * T) * (4.0 / 3.0);
+  vec3 even = (plus + minus) * sides;
+  vec3 uneven = (plus - minus) * across;
+  vec3 part = azimuthal_part(uneven / max(even, vec3(1e-12)), towards / max(returned, vec3(1e-6)));
+  return even / (2.0 * dot(sides, vec3(1.0))) * returned * part;
 }
 
 // Radiance of a strand towards V in the light of the world that white surfaces send to it. hidden: the sum of the directions
@@ -79,13 +86,12 @@ vec3 surface_radiance(mat3 plus, mat3 minus, vec4 hidden, vec3 T, vec3 V, vec3 r
   }
   vec3 N = -hidden.xyz * inversesqrt(max(dot(hidden.xyz, hidden.xyz), 1e-8));
   vec2 below = light_from_below(T, V, N);
-  return surface_irradiance(plus, minus, N) / PI * min(2.0 * hidden.w, 1.0) * (below.x * returned + below.y * towards);
+  return surface_irradiance(plus, minus, N) / PI * min(2.0 * hidden.w, 1.0) * max(below.x * returned + below.y * towards, vec3(0.0));
 }
 
 // The moment `towards` of a strand with its share of what strands behind send back: the integral of
-// (1 - |phi| / pi) / pi × cos(phi). Held to half of all, so that light from one side never takes some away.
-vec3 with_back(vec3 towards, vec3 returned, vec3 back)
+// (1 - |phi| / pi) / pi × cos(phi).
+vec3 with_back(vec3 towards, vec3 back)
 {
-  vec3 most = 0.5 * (returned + back);
-  return clamp(towards + 4.0 / (PI * PI) * back, -most, most);
+  return towards + 4.0 / (PI * PI) * back;
 }

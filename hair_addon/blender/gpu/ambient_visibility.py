@@ -12,9 +12,11 @@ from ...core.imaging import ambient_cube
 from . import drawing, shaders, shadows, uniforms
 from .strand_textures import seen_points
 
-# Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as a map can resolve.
+# Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as they can resolve.
+# Fewer and thicker strands cover places less evenly, which lets more light through.
 _SIZE = 256
-_STEPS = drawing.Steps(point_count=11, strand_count=10_000)
+_POINT_COUNT, _LEAST_STRANDS = 11, 10_000
+_FULL_WIDTH = 0.5  # texels that a strand may be wide that is drawn for several
 _DIRECTIONS_AT_ONCE = 7
 
 
@@ -33,14 +35,27 @@ def measure(hair, surfaces, opacities, clear=()):
     places = [strands.texture for strands, _ in hair] + [surface.places for surface in receivers]
     targets = [_Target(view, texture) for view, texture in zip(views, places, strict=True)]
     maps = shadows.ShadowMaps(_SIZE, _DIRECTIONS_AT_ONCE)
+    steps = _steps(hair)
     for first in range(0, len(ambient_cube.DIRECTIONS), _DIRECTIONS_AT_ONCE):
         chosen = slice(first, first + _DIRECTIONS_AT_ONCE)
         lights = _suns(ambient_cube.DIRECTIONS[chosen], ambient_cube.WEIGHTS[chosen])
-        maps.draw(lights, hair, [surface.batch for surface in surfaces], _STEPS)
+        maps.draw(lights, hair, [surface.batch for surface in surfaces], steps)
         for target in targets:
             target.add(lights, maps.samplers)
     textures = [target.textures for target in targets]
     return textures[: len(hair)], textures[len(hair) :]
+
+
+def _steps(hair):
+    """The `drawing.Steps` in which the maps are drawn of [(StrandsOnGPU, object to world)]."""
+    if not hair:
+        return drawing.Steps()
+    texel = 2.0 * drawing.bounding_sphere(hair)[1] / _SIZE
+    widths = [2.0 * strands.mean_radius * drawing.scale_of(to_world) for strands, to_world in hair]
+    wanted = max(
+        strands.strand_count * width / (_FULL_WIDTH * texel) for (strands, _), width in zip(hair, widths, strict=True)
+    )
+    return drawing.Steps(_POINT_COUNT, int(max(wanted, _LEAST_STRANDS)))
 
 
 def densest(hair):

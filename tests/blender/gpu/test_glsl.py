@@ -122,8 +122,8 @@ def test_kajiya_kay_albedo_is_the_mean_answer_to_a_uniform_surrounding(exponent,
     over_lights = 2.0 * np.pi * (reflected * np.cos(theta_i)[:, None]).reshape(180, 180, 3).sum(axis=1) * np.pi / 180
     mean = np.average(over_lights, axis=0, weights=np.cos(theta))
     returned = (
-        "vec3 returned(float sin_theta_o)\n{\n  vec3 all;\n  vec3 towards;\n"
-        "  hair_return(sin_theta_o, all, towards);\n  return all;\n}\n"
+        "vec3 returned(float sin_theta_o)\n{\n  vec3 all, towards, zonal_1, zonal_2;\n"
+        "  hair_return(sin_theta_o, all, towards, zonal_1, zonal_2);\n  return all;\n}\n"
     )
     albedo = shading_model("kajiya_kay.comp", settings, "returned(T.x)", more=returned, T=T[:1])[0]
     np.testing.assert_allclose(albedo, mean, rtol=tolerance)

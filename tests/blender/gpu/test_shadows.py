@@ -108,3 +108,17 @@ def test_the_shadow_of_an_edge_is_as_wide_as_the_light(scene, rng, radius):
     blur = max(0.5 * radius * shadows._SHADE_DISTANCE * extent, shadows._LEAST_BLUR * extent / 512)
     # A Gaussian edge rises by 1 / (sqrt(2 pi) deviation); the bound that is read off the moments has a sharper middle.
     assert 0.5 < slope * np.sqrt(2.0 * np.pi) * blur < 3.0
+
+
+def test_curls_shade_as_much_where_few_of_their_points_are_drawn(scene, rng):
+    """Chords between every seventh point are shorter than a curl, whose strand is drawn wider instead."""
+    points, radii = tuft(rng)
+    turn = np.linspace(0.0, 40.0, points.shape[1])
+    curl = 0.004 * np.stack([np.cos(turn), np.sin(turn), np.zeros_like(turn)], axis=-1)
+    hair = [(strand_textures.upload_strands((points + curl).astype(np.float32), 5.0 * radii), np.eye(4))]
+    means = []
+    for steps in (drawing.Steps(), drawing.Steps(point_count=4)):
+        maps = shadows.ShadowMaps(128, 1)
+        maps.draw(sun(0.4, 0.7), hair, [], steps)
+        means.append(np.array(maps.samplers["hair_layers"].read()).reshape(-1, 4)[:, 3].mean())
+    np.testing.assert_allclose(means[1], means[0], rtol=0.05)

@@ -25,10 +25,13 @@ LOOKS = [
 ]
 COUNT = 2000
 
-# The two results of a function as two functions.
+# The results of a function, one by one.
 RETURNS = """
-vec3 hair_return_all(float sine) { vec3 all; vec3 towards; hair_return(sine, all, towards); return all; }
-vec3 hair_return_towards(float sine) { vec3 all; vec3 towards; hair_return(sine, all, towards); return towards; }
+vec3 hair_return_part(float sine, int part) {
+  vec3 parts[4];
+  hair_return(sine, parts[0], parts[1], parts[2], parts[3]);
+  return parts[part];
+}
 """
 
 # What the rasterizer gives a model of the strand under a fragment.
@@ -259,12 +262,12 @@ def test_dual_scattering_among_strands_that_differ(rng, strands):
     np.testing.assert_allclose(shader[regular(at)], python[regular(at)], rtol=1e-2, atol=2e-4)
 
 
-@pytest.mark.parametrize("row", [0, 1])
+@pytest.mark.parametrize("row", range(4))
 def test_even_light_takes_the_colour_of_the_place(rng, tables, strands, row):
     shading = hair_shading.marschner_strand_shading(tables)
     fragment = "energy_conserving_varied.comp" if tables.settings.mode == "energy" else "marschner_varied.comp"
     theta_o = rng.uniform(-1.5, 1.5, COUNT)
-    expression = f"hair_return_{'towards' if row else 'all'}(sine)"
+    expression = f"hair_return_part(sine, {row})"
     shader = model(
         fragment, expression, settings_of(tables), shading.samplers, strands, sine=np.sin(theta_o).astype(np.float32)
     )

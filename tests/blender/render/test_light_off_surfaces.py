@@ -88,6 +88,22 @@ def test_a_plane_lights_a_strand_as_much_as_its_directions_say(scene, tilt, sour
     np.testing.assert_allclose(found, expected, rtol=0.2)
 
 
+def test_a_sun_from_the_side_is_reflected_to_strands_close_to_a_plane(scene):
+    """Along that sun the plane slopes: some of it is in front of strands that are above it."""
+    tangent, towards, height = (1.0, 0.0, 0.0), (0.0, -0.6, 0.8), 1.0
+    light = bpy.data.lights.new("Sun", "SUN")
+    light.energy, light.angle = SUN, 0.0
+    sun = bpy.data.objects.new("Sun", light)
+    sun.rotation_euler = (height, 0.0, 0.0)
+    scene.collection.objects.link(sun)
+    look(scene, towards)
+    curves = strands_over_a_plane(scene, tangent, (0.0, 0.0, 0.0), height=0.012)
+    without = mean_color()
+    curves.surface.data.materials[0].diffuse_color = (0.5, 0.5, 0.5, 1.0)
+    expected = 0.5 * SUN * np.cos(height) / np.pi * light_from_below(tangent, towards)
+    np.testing.assert_allclose(mean_color() - without, expected, rtol=0.2)
+
+
 def test_no_light_comes_through_a_plane_to_hair_behind_it(scene):
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = SUN, 0.0

@@ -27,22 +27,23 @@ def mean_parts(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> 
 
 
 def azimuthal_moments(tables: lookup_tables.Tables) -> np.ndarray:
-    """(2, K, 3) float32: of light from everywhere, the radiance that leaves towards theta_o, and its moment over phi.
+    """(4, K, 3) float32: of light from everywhere, the radiance that leaves towards theta_o, and its moments.
 
     The second row is the same integral with the weight cos(phi), phi the light's azimuth from the viewer: positive if
-    a strand sends light back. Held to half of the first, so that light from one side never takes some away. Columns are
-    those of `DualTables.theta`.
+    a strand sends light back. The third and fourth are the radiance in light that varies as Legendre's polynomials P1
+    and P2 of sin(theta_i). Columns are those of `DualTables.theta`.
     """
-    moments = fibre_moments(tables.lobes, tables.settings)
-    half = 0.5 * moments[0]
-    moments[1] = np.clip(moments[1], -half, half)
-    return moments.astype(np.float32)
+    return fibre_moments(tables.lobes, tables.settings).astype(np.float32)
 
 
 def fibre_moments(lobes: lookup_tables.Lobes, settings: lookup_tables.Settings) -> np.ndarray:
-    """`azimuthal_moments` (2, K, C) of one fibre, as they are; lobes as `azimuthal_lobes` bakes them."""
-    rows = dual_scattering.row_weights(settings, dual_scattering.light_inclinations())
+    """`azimuthal_moments` (4, K, C) of one fibre; lobes as `azimuthal_lobes` bakes them."""
+    theta = dual_scattering.light_inclinations()
+    rows = [dual_scattering.row_weights(settings, theta, degree) for degree in range(3)]
     edges = lookup_tables.phi_edges(settings)
     # The cells' integrals of 1 and of cos(phi), twice: N is even in phi.
     weights = [2.0 * np.diff(values) * np.sign(edges[-1] - edges[0]) for values in (edges, np.sin(edges))]
-    return np.stack([dual_scattering.lobe_albedos(lobes, weight, rows).sum(axis=0) for weight in weights])
+    wanted = (0, 0), (1, 0), (0, 1), (0, 2)  # of `weights`, of `rows`
+    return np.stack(
+        [dual_scattering.lobe_albedos(lobes, weights[over], rows[degree]).sum(axis=0) for over, degree in wanted]
+    )

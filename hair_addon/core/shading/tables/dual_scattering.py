@@ -102,19 +102,38 @@ def lobe_albedos(lobes: lookup_tables.Lobes, weights: np.ndarray, rows: list[np.
     return np.stack([weights_of_rows @ lobe for weights_of_rows, lobe in zip(rows, around, strict=True)])
 
 
-def row_weights(settings: lookup_tables.Settings, theta: np.ndarray) -> list[np.ndarray]:
-    """For each lobe, (T, H): weights of the rows of N in the scattering of light inclined by theta (T,)."""
+def row_weights(settings: lookup_tables.Settings, theta: np.ndarray, degree: int = 0) -> list[np.ndarray]:
+    """For each lobe, (T, H): weights of the rows of N in the scattering of light inclined by theta (T,).
+
+    degree: of Legendre's polynomial of the sine of the other inclination, by which light is weighed.
+    """
     rows = lookup_tables.row_cosines(settings)
     if settings.mode == "energy":
         # M is of unit area, whatever its width.
-        return [_interpolation(np.cos(theta)[:, None], rows, 1.0)] * 4
+        means = _legendre_means(settings, theta, degree) if degree else np.ones((4, len(theta)))
+        return [_interpolation(np.cos(theta)[:, None], rows, mean[:, None]) for mean in means]
     out = np.pi * ((np.arange(361) + 0.5) / 361 - 0.5)
     theta_h, theta_d = 0.5 * (theta[:, None] + out), 0.5 * (theta[:, None] - out)
     cosine = np.maximum(np.cos(theta_d), marschner.LEAST_COS_THETA_D)
-    measure = np.square(np.cos(out) / cosine) * np.pi / 361
+    measure = np.square(np.cos(out) / cosine) * np.pi / 361 * legendre(np.sin(out), degree)
     m = marschner.gaussian_lobes(theta_h, settings)
     weights = [_interpolation(cosine, rows, m[..., lobe] * measure) for lobe in range(3)]
     return [*weights, np.zeros_like(weights[0])]
+
+
+def legendre(x: Values, degree: int) -> np.ndarray:
+    """Legendre's polynomial of a degree at x (...)."""
+    return np.polynomial.legendre.legval(x, np.eye(degree + 1)[degree])
+
+
+def _legendre_means(settings, theta, degree):
+    """(4, T): mean of `legendre` of sin(theta_i) over M of each lobe, for viewers at theta (T,)."""
+    incoming = np.pi * ((np.arange(721) + 0.5) / 721 - 0.5)
+    m = energy_conserving.m_lobes(incoming, theta[:, None], settings) * np.cos(incoming)[:, None]  # (T, 721, 4)
+    # Narrow lobes are a mirror's; a little of it keeps them from 0 / 0.
+    mirrored = legendre(np.sin(-theta), degree)[:, None]
+    total, least = m.sum(axis=1), 1e-6
+    return ((np.einsum("tic,i->tc", m, legendre(np.sin(incoming), degree)) + least * mirrored) / (total + least)).T
 
 
 def _interpolation(cosines, rows, weights):

@@ -36,7 +36,7 @@ class StrandTables:
     slices: absorption_slices.Slices
     variation: strand_variation.Settings
     dual: np.ndarray | None  # (G, 9, T, 3), of the energy-conserving mode
-    returned: np.ndarray  # (32, T, 2)
+    returned: np.ndarray  # (32, T, 4)
     forward: np.ndarray  # (3,): passed on of even light, the mean over all strands
     backward: np.ndarray  # (3,): sent back
 
@@ -77,7 +77,7 @@ def _dual(slices, around):
 
 def _returned(slices):
     """`StrandTables.returned`."""
-    moments = albedo.fibre_moments(slices.lobes, slices.settings)  # (2, T, K)
+    moments = albedo.fibre_moments(slices.lobes, slices.settings)  # (4, T, K)
     roots = np.linspace(slices.range.low, slices.range.high, _RETURN_STEPS)
     below, fraction = absorption_slices.slice_of(np.square(roots), slices.range.low, slices.range.high, len(slices.n))
     # The second may be negative, which no geometric mean takes; slices are close enough for a plain one.
@@ -103,15 +103,15 @@ def _part_of_length(variation, gradient):
 
 def hair_return(
     tables: StrandTables, theta_o: Values, random: Values, position: Values
-) -> tuple[np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """`albedo.azimuthal_moments`, (..., 3) each, of strands seen from theta_o (...): the shader's function."""
     variation, covered = tables.variation, tables.slices.range
     roots = np.sqrt(strand_variation.strand_sigma_a(variation, random, position))
     along = np.clip((roots - covered.low) / max(covered.high - covered.low, 1e-6), 0.0, 1.0)
     v = (along * (_RETURN_STEPS - 1) + 0.5) / _RETURN_STEPS
     u = np.broadcast_to((np.asarray(theta_o) / np.pi + 0.5)[..., None], v.shape)
-    returned, towards = np.moveaxis(lookup_tables.sample(tables.returned, u, v), -1, 0)
-    return returned, np.clip(towards, -0.5 * returned, 0.5 * returned)
+    returned, towards, zonal_1, zonal_2 = np.moveaxis(lookup_tables.sample(tables.returned, u, v), -1, 0)
+    return returned, towards, zonal_1, zonal_2
 
 
 def sample_radiance(
