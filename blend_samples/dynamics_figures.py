@@ -9,7 +9,7 @@ from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
 from hair_addon.blender.data import guide_poses
-from hair_addon.blender.groom import frame_folders
+from hair_addon.blender.groom.dynamics import frame_folders
 
 _ROOTS = 4  # points of a guide that may be nearer to the skin than hair keeps
 _EVERY = 5  # frames are looked at: Blender makes the hair in each

@@ -22,9 +22,9 @@ import line_plot  # beside this file
 import ratio_plot
 
 from hair_addon.core.dynamics.air import ForceField
+from hair_addon.core.dynamics.rod.rotations import IDENTITY
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.dynamics.root_motion import RootPose
-from hair_addon.core.dynamics.rotations import IDENTITY
-from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.dynamics.simulation import Obstacle, Simulation, World
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "manual"

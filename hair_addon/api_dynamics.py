@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from .api_arguments import changed, choice, heard, mesh_of
 from .core import dynamics, lazy
-from .core.dynamics.presets import PRESETS, applied
-from .core.dynamics.settings import DynamicsSettings
+from .core.dynamics.rod.presets import PRESETS, applied
+from .core.dynamics.rod.settings import DynamicsSettings
 from .core.errors import HairError
 from .core.geometry.strands import Strands, check_strands
 from .core.long_work import Progress, no_progress, run_now

@@ -8,7 +8,7 @@ from tests.test_house import MODULES, name_of, nodes, syntax
 # What is no cache, each with who ends it.
 STATE = {
     "blender/groom/brushes.py: _fitted": "nobody: Blender's brushes outlive a file, and so does what was set in them",
-    "blender/groom/guide_baking.py: _baking": "the end of baking, on every way out",
+    "blender/groom/dynamics/guide_baking.py: _baking": "the end of baking, on every way out",
     "blender/host/cli_command.py: _command": "unregister",
     "blender/host/running.py: _job": "end",
     "blender/host/running.py: _timer": "end",
@@ -32,7 +32,7 @@ PURE = {
     "blender/gpu/uniforms.py: settings_block",
     "blender/host/paths.py: addon_version",
     "blender/settings/setting_properties.py: _settings_of",
-    "core/dynamics/stiffness_advice.py: tip_sink",
+    "core/dynamics/rod/stiffness_advice.py: tip_sink",
     "core/geometry/bspline.py: basis_matrix",
     "core/geometry/bspline.py: _device_matrix",
     "core/geometry/bspline.py: _flat_matrix",

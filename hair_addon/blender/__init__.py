@@ -12,7 +12,7 @@ from .live import first_setup, handlers, invalidation
 from .render import engine, viewport
 from .settings import preferences, properties, translations
 from .ui import engine_panels, keymap, look_previews, menus, operators, panels
-from .ui.operators import dynamics, guide_tools, styles
+from .ui.operators import dynamics, guide_tools, looks, styles, surface
 
 CLASSES = (
     preferences.VellusPreferences,
@@ -20,6 +20,8 @@ CLASSES = (
     *hair_systems.CLASSES,
     engine.VellusRenderEngine,
     *operators.CLASSES,
+    *surface.CLASSES,
+    *looks.CLASSES,
     *styles.CLASSES,
     *guide_tools.CLASSES,
     *dynamics.CLASSES,

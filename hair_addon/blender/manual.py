@@ -12,7 +12,7 @@ import bpy
 from .groom import hair_systems
 from .settings import preferences, properties, style_items
 from .ui import operators
-from .ui.operators import dynamics, guide_tools, styles
+from .ui.operators import dynamics, guide_tools, looks, styles, surface
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
 _CLASSES = {
@@ -93,7 +93,8 @@ def _properties():
 
 def _operators():
     """Of an operator's properties too, which Blender looks up by their operator."""
-    every = (*operators.CLASSES, *guide_tools.CLASSES, *styles.CLASSES, *dynamics.CLASSES)
+    folders = (operators, surface, looks, guide_tools, styles, dynamics)
+    every = [cls for folder in folders for cls in folder.CLASSES]
     labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in every}
     for page, names in _OPERATORS.items():
         for name in names:

@@ -8,8 +8,8 @@ of the help.
 import argparse
 from dataclasses import replace
 
-from ..core.dynamics.presets import PRESETS, applied
-from ..core.dynamics.settings import DynamicsSettings
+from ..core.dynamics.rod.presets import PRESETS, applied
+from ..core.dynamics.rod.settings import DynamicsSettings
 from ..core.errors import HairError
 from ..core.params import declared
 from . import setting_pairs

@@ -21,8 +21,9 @@ from scipy.spatial import ConvexHull
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
-from hair_addon.core.dynamics import root_motion, rotations, simulation
-from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics import root_motion, simulation
+from hair_addon.core.dynamics.rod import rotations
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from tests.support import rods
 
 POINTS, LENGTH, SUBSTEPS = 32, 0.15, 8

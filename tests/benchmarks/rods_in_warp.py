@@ -6,7 +6,7 @@ beside. The algebra is that of rod_newton.h and rod_back.h, without damping and 
 import numpy as np
 import warp as wp
 
-from hair_addon.core.dynamics import rod_solver
+from hair_addon.core.dynamics.rod import rod_solver
 
 wp.set_module_options({"enable_backward": False})
 

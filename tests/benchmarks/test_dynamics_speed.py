@@ -13,11 +13,13 @@ import pytest
 import warp as wp
 
 import hair_addon
-from hair_addon.blender.groom import bindings, guide_simulation
+from hair_addon.blender.groom import bindings
+from hair_addon.blender.groom.dynamics import guide_simulation
 from hair_addon.blender.live import invalidation, live_hair, simulated_hair
 from hair_addon.blender.settings import preferences
-from hair_addon.core.dynamics import rod_solver, root_motion, rotations, simulation
-from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics import root_motion, simulation
+from hair_addon.core.dynamics.rod import rod_solver, rotations
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.geometry.mesh import TriMesh
 from hair_addon.core.geometry.sampling import sample_surface
 from tests.benchmarks.rods_in_warp import NewtonStep

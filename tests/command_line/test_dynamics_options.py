@@ -11,7 +11,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.command_line import dynamics_options
-from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.files import settings_file
 from hair_addon.core.files.settings_file import GroomSettings
 from tests.command_line.test_command_line import SMALL, grown, mesh  # noqa: F401 (a fixture)

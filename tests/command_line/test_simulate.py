@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.host import memory
 from tests.support.commands import ROOT, command, run, run_here
 from tests.support.reading import evaluated_points, read_picture

@@ -4,7 +4,7 @@
 import numpy as np
 import warp as wp
 
-from hair_addon.core.dynamics.contact import PLANE, WIDTH, Contacts
+from hair_addon.core.dynamics.collision.contact import PLANE, WIDTH, Contacts
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.support.meshes import flat_grid, subdivided_sphere
 

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from hair_addon.blender.groom import guide_baking
+from hair_addon.blender.groom.dynamics import guide_baking
 from hair_addon.blender.io import groom_export, groom_sources
 from hair_addon.core.files.export_settings import ExportSettings
 from hair_addon.core.long_work import run_now

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hair_addon.core.dynamics import rod_solver
-from hair_addon.core.dynamics.rod_solver import FINISH, PREDICT, SOLVE, Surroundings
+from hair_addon.core.dynamics.rod import rod_solver
+from hair_addon.core.dynamics.rod.rod_solver import FINISH, PREDICT, SOLVE, Surroundings
 from tests.support.devices import DEVICE
 from tests.support.rods import in_lanes
 

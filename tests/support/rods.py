@@ -5,10 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from hair_addon.core.dynamics import rod_solver, rotations
-from hair_addon.core.dynamics.material import material_of
-from hair_addon.core.dynamics.rods import Rods, combed_shape, step_of
-from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.rod import rod_solver, rotations
+from hair_addon.core.dynamics.rod.material import material_of
+from hair_addon.core.dynamics.rod.rods import Rods, combed_shape, step_of
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from tests.support.devices import DEVICE
 
 FRAME = 1.0 / 24.0  # [s]

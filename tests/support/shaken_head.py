@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from hair_addon.core.dynamics import rotations
+from hair_addon.core.dynamics.rod import rotations
 from hair_addon.core.dynamics.root_motion import RigidMotion
 
 FRAME = 1.0 / 24.0  # [s]

@@ -8,7 +8,7 @@ from dataclasses import asdict
 
 import numpy as np
 
-from ...core.dynamics.collider_settings import ColliderSettings, contact_of
+from ...core.dynamics.collision.collider_settings import ColliderSettings, contact_of
 from ...core.errors import HairError
 from ...core.files import frame_manifest
 from ...core.styling.strand_wetness import mean_amount

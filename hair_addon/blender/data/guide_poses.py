@@ -65,7 +65,7 @@ class GuidePose:
         posed = self._carried(crosses.astype(np.float32)).astype(np.float64)
         axes = np.swapaxes(posed[:, 1:] - posed[:, :1], 1, 2) / size  # columns
         rotation = self._polar[0] @ _nearest_rotations(axes)
-        turns = dynamics.rotations.from_matrices(rotation)
+        turns = dynamics.rod.rotations.from_matrices(rotation)
         return dynamics.root_motion.RootPose(self._to_world(posed[:, 0]), turns, self.scale / start.scale)
 
     def to_rest(self, points: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 
 from ...core import dynamics
-from ...core.dynamics.collider_settings import ColliderSettings, contact_of
+from ...core.dynamics.collision.collider_settings import ColliderSettings, contact_of
 from ...core.errors import HairError
 from ..host import scene_time
 from ..host.notices import name_of

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from bpy.types import Curves, Depsgraph, Object
 
-from ...core.dynamics.settings import DynamicsSettings
+from ...core.dynamics.rod.settings import DynamicsSettings
 from ...core.files.settings_file import GroomSettings
 from ...core.grooming.groom import GuideSettings
 from ...core.long_work import Work

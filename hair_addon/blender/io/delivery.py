@@ -12,7 +12,8 @@ from ...core.errors import HairError
 from ...core.files.whole_file import require_place, whole_file
 from ...core.long_work import Stage
 from ..data import curves, delivered_hair, scene, simulated_guides
-from ..groom import frame_folders, selection
+from ..groom import selection
+from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of

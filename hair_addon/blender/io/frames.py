@@ -14,7 +14,7 @@ from ...core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME, PassSettings
 from ...core.long_work import no_progress
 from ...core.params import declared
 from ..data import curves, scene
-from ..groom import frame_folders
+from ..groom.dynamics import frame_folders
 from ..host import scene_time
 from ..live import live_hair
 from ..render import engine as render_engine

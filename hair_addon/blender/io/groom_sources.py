@@ -11,7 +11,8 @@ from ...core.files import groom_curves
 from ...core.files.groom_curves import GroomCurves
 from ...core.shading import strand_colors
 from ..data import attributes, curves, exported_curves, simulated_guides
-from ..groom import frame_folders, hair_systems, selection
+from ..groom import hair_systems, selection
+from ..groom.dynamics import frame_folders
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import properties

@@ -10,7 +10,8 @@ from ...core.grooming import cost
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ..data import curves, delivered_hair, scene
 from ..data.curves import followers
-from ..groom import diagnostics, frame_folders, guide_baking
+from ..groom import diagnostics
+from ..groom.dynamics import frame_folders, guide_baking
 from ..host import scene_time
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, style_items

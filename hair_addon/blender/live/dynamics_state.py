@@ -6,7 +6,8 @@ from typing import Any
 
 from ...core.errors import HairError
 from ..data import frame_animation
-from ..groom import frame_folders, guide_baking, guide_regions, staleness
+from ..groom import guide_regions, staleness
+from ..groom.dynamics import frame_folders, guide_baking
 from ..host import notices, scene_time
 from ..host.caches import Cache
 from ..settings import properties, shared_wetness

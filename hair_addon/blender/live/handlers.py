@@ -5,7 +5,8 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..data import curves_objects
-from ..groom import bindings, frame_folders, pipeline
+from ..groom import bindings, pipeline
+from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks

@@ -7,7 +7,8 @@ After an event nothing is drawn or computed from what was cached before it. Func
 
 from ..data import simulated_guides, subdivided_surfaces
 from ..gpu import lights, shaders, surface_shading, world_texture
-from ..groom import bindings, frame_folders, guide_simulation
+from ..groom import bindings
+from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
 from ..render import hair_cache, region_pictures, viewport
 from ..settings import animated

@@ -13,8 +13,9 @@ import numpy as np
 
 from ...core.errors import HairError
 from ..data import curves, scene, simulated_guides
-from ..groom import bindings, frame_folders, guide_baking, guide_simulation, hair_outside
-from ..groom.guide_simulation import GuideSimulation, simulated
+from ..groom import bindings, hair_outside
+from ..groom.dynamics import frame_folders, guide_baking, guide_simulation
+from ..groom.dynamics.guide_simulation import GuideSimulation, simulated
 from ..host import running, scene_time
 from ..host.caches import Cache
 from ..settings import properties

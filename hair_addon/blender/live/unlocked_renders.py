@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..groom import frame_folders
+from ..groom.dynamics import frame_folders
 from ..host import notices
 from ..host.caches import Cache
 

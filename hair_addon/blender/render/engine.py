@@ -12,7 +12,7 @@ from ...core.imaging import pixel_sampling
 from ...core.long_work import Stopped, no_progress
 from ..data import camera_lens, panoramic_camera, scene, view_cameras
 from ..gpu import drawing, world_texture
-from ..groom import frame_folders
+from ..groom.dynamics import frame_folders
 from ..host import scene_time
 from ..settings import setting_properties
 from ..settings.translations import error_text, interface_text

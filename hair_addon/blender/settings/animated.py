@@ -6,7 +6,7 @@ Blender animates properties without calling their `update`, so their values are 
 
 import bpy
 
-from ...core.dynamics.settings import DynamicsSettings
+from ...core.dynamics.rod.settings import DynamicsSettings
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables

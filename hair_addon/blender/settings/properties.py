@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import bpy
 
-from ...core.dynamics.collider_settings import ColliderSettings
-from ...core.dynamics.settings import DynamicsSettings
+from ...core.dynamics.collision.collider_settings import ColliderSettings
+from ...core.dynamics.rod.settings import DynamicsSettings
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.imaging.pixel_sampling import PassSettings, RenderSettings
 from ...core.shading import appearance

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...core.dynamics.settings import DynamicsSettings
+from ...core.dynamics.rod.settings import DynamicsSettings
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import declared
 from ...core.styling.base import ProfiledSettings, StyleSettings

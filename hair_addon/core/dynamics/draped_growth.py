@@ -21,8 +21,10 @@ from ..grooming.groom import GuideSettings, distribute_guides
 from ..kernels import kernel_setup
 from ..long_work import Progress, no_progress, part_of
 from ..placement.domain import Mirror
-from . import contact_queries, contact_substep, detail, draping, hair_volume, rod_solver
-from .settings import DynamicsSettings
+from . import draping, hair_volume
+from .collision import contact_queries, contact_substep
+from .rod import detail, rod_solver
+from .rod.settings import DynamicsSettings
 
 SCALP = 0.055  # [m²], of a human head
 # Loose hair, two millimetres from the skin: guides stand for wisps, whose strands lie beside them.

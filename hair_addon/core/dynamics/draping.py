@@ -9,9 +9,9 @@ import warp as wp
 
 from ..errors import HairError
 from ..geometry.mesh import TriMesh
-from . import rotations
+from .rod import rotations
+from .rod.settings import DynamicsSettings
 from .root_motion import RootPose
-from .settings import DynamicsSettings
 from .simulation import MOST_SUBSTEPS, Obstacle, Simulation, World
 
 # Of an animation's frames, as reading the surface takes a while for each.

@@ -12,9 +12,9 @@ from ..geometry import mesh as mesh_math
 from ..geometry import surface_deform
 from ..geometry.mesh import Faces, TriMesh
 from ..geometry.strands import Strands
-from . import rotations
+from .rod import rotations
+from .rod.settings import DynamicsSettings
 from .root_motion import RootPose
-from .settings import DynamicsSettings
 from .simulation import Obstacle, Simulation, World
 
 

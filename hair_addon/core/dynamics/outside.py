@@ -14,9 +14,9 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import parallel
 from ..kernels.parallel import Rows
-from .colliders import Colliders
-from .distance_grid import DistanceGrid, distance_grid, least_distance
-from .nearest_surface import Surface, nearest
+from .collision.colliders import Colliders
+from .collision.distance_grid import DistanceGrid, distance_grid, least_distance
+from .collision.nearest_surface import Surface, nearest
 from .simulation import Obstacle
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.

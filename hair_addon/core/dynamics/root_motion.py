@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import HairError
 from ..kernels.checks import require_count
-from . import rotations
+from .rod import rotations
 
 TELEPORT_ANGLE = math.radians(120.0)  # in a frame
 

@@ -16,17 +16,18 @@ import warp as wp
 from ..errors import HairError
 from ..geometry.mesh import TriMesh
 from ..kernels.checks import require_count
-from . import detail, root_motion, rotations, sag_free
+from . import root_motion
 from .air import Air, ForceField
-from .colliders import Collider, Colliders
-from .contact import Contacts
-from .contact_substep import TouchingStrands
+from .collision.colliders import Collider, Colliders
+from .collision.contact import Contacts
+from .collision.contact_substep import TouchingStrands
 from .hair_volume import LEAST_CELL, HairVolume
-from .material import material_of
-from .rod_solver import Surroundings, to_lanes
-from .rods import Rods, combed_shape, step_of
+from .rod import detail, rotations, sag_free
+from .rod.material import material_of
+from .rod.rod_solver import Surroundings, to_lanes
+from .rod.rods import Rods, combed_shape, step_of
+from .rod.settings import DynamicsSettings
 from .root_motion import RigidMotion, RootPose
-from .settings import DynamicsSettings
 
 MOST_SUBSTEPS = 64
 _LONGEST_WAY = 0.01  # [m] that roots and colliders move in a substep, less where segments are shorter,

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from ..dynamics.settings import DynamicsSettings
+from ..dynamics.rod.settings import DynamicsSettings
 from ..errors import HairError
 from ..grooming.groom import GuideSettings, HairSettings
 from ..params import Param, Settings, declared, described, given, is_text, label_of, like, require_class, unit_of

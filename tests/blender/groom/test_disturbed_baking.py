@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
 from tests.support.reading import points

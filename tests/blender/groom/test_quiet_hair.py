@@ -4,7 +4,7 @@
 import bpy
 import pytest
 
-from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import Stopped, run_now
 from tests.support.swung import simulate, swing

@@ -8,7 +8,7 @@ import bpy
 import pytest
 
 from hair_addon.blender.data import follow_nodes
-from hair_addon.blender.groom import dynamics_notes, frame_folders, guide_baking
+from hair_addon.blender.groom.dynamics import dynamics_notes, frame_folders, guide_baking
 from hair_addon.blender.host import paths
 from hair_addon.blender.io import delivery
 from hair_addon.blender.live import live_hair

@@ -9,7 +9,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.data import curves, guide_poses, scene
-from hair_addon.blender.groom import frame_folders
+from hair_addon.blender.groom.dynamics import frame_folders
 from hair_addon.blender.io import groom_export, groom_sources
 from hair_addon.core.errors import HairError
 from hair_addon.core.files.export_settings import ExportSettings

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import guide_baking
+from hair_addon.blender.groom.dynamics import guide_baking
 from hair_addon.blender.live import dynamics_state
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.long_work import run_now

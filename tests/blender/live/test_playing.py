@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import simulated_guides
-from hair_addon.blender.groom import guide_baking
+from hair_addon.blender.groom.dynamics import guide_baking
 from hair_addon.blender.live import (
     dynamics_state,
     handlers,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import guide_poses, simulated_guides
-from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.live import dynamics_state, invalidation, live_hair
 from hair_addon.core.files.frame_cache import FrameCache
 from hair_addon.core.long_work import run_now

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import frame_folders, guide_baking
+from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.render import motion_vectors
 from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import run_now

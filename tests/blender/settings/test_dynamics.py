@@ -12,9 +12,9 @@ import pytest
 
 from hair_addon.blender.groom import groom_settings, pipeline
 from hair_addon.blender.settings import properties, setting_properties
-from hair_addon.core.dynamics import presets
-from hair_addon.core.dynamics.collider_settings import ColliderSettings
-from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.collision.collider_settings import ColliderSettings
+from hair_addon.core.dynamics.rod import presets
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.params import declared
 from tests.support.reading import points

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.groom import guide_baking
+from hair_addon.blender.groom.dynamics import guide_baking
 from hair_addon.blender.settings import properties, shared_wetness, style_items
 from hair_addon.blender.ui import panels
 from tests.support.layout import draw_all

@@ -4,11 +4,11 @@
 import bpy
 import pytest
 
-from hair_addon.blender.groom import dynamics_notes
+from hair_addon.blender.groom.dynamics import dynamics_notes
 from hair_addon.blender.ui import panels
-from hair_addon.core.dynamics.collider_settings import ColliderSettings
-from hair_addon.core.dynamics.settings import DynamicsSettings
-from hair_addon.core.dynamics.stiffness_advice import bend_under_weight
+from hair_addon.core.dynamics.collision.collider_settings import ColliderSettings
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
+from hair_addon.core.dynamics.rod.stiffness_advice import bend_under_weight
 from hair_addon.core.params import declared
 from tests.support.layout import draw, draw_all
 

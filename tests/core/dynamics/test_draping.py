@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.dynamics.draping import draped
-from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from tests.support.devices import DEVICE
 from tests.support.meshes import subdivided_sphere
 

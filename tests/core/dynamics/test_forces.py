@@ -8,10 +8,10 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from hair_addon.core.dynamics import material, rod_solver
-from hair_addon.core.dynamics.rod_solver import Surroundings
-from hair_addon.core.dynamics.rods import Rods, combed_shape
-from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.rod import material, rod_solver
+from hair_addon.core.dynamics.rod.rod_solver import Surroundings
+from hair_addon.core.dynamics.rod.rods import Rods, combed_shape
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.errors import HairError
 from tests.support.devices import DEVICE
 from tests.support.rods import FIBRE, GRAVITY, Simulation, curl, in_lanes, line

@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.dynamics import rotations
+from hair_addon.core.dynamics.rod import rotations
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.dynamics.root_motion import RootPose
-from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.dynamics.simulation import Simulation, World
 
 LENGTH, SPACING, ALONG = 0.15, 0.012, 7  # [m], [m], guides along a side of the square they grow on

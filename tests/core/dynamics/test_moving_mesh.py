@@ -8,8 +8,8 @@ import pytest
 
 from hair_addon import api
 from hair_addon.core.dynamics import moving_mesh
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.dynamics.root_motion import RigidMotion
-from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.errors import HairError
 from tests.support.devices import DEVICE
 from tests.support.meshes import subdivided_sphere

@@ -4,7 +4,8 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.dynamics import root_motion, rotations
+from hair_addon.core.dynamics import root_motion
+from hair_addon.core.dynamics.rod import rotations
 from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
 from hair_addon.core.errors import HairError
 from tests.support.rods import Simulation, line

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hair_addon.core.dynamics import rotations
 from hair_addon.core.dynamics.air import ForceField
+from hair_addon.core.dynamics.rod import rotations
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
-from hair_addon.core.dynamics.settings import DynamicsSettings
 from hair_addon.core.dynamics.simulation import Obstacle, Simulation, World
 from hair_addon.core.errors import HairError
 from tests.support.devices import DEVICE

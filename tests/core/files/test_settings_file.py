@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from hair_addon.core.dynamics.settings import DynamicsSettings
+from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import settings_file
 from hair_addon.core.files.settings_file import SECTIONS, GroomSettings, declared_in

@@ -2,12 +2,7 @@
 """One file per operator: read, compute, write."""
 
 from .add_hair import VELLUS_OT_add_hair
-from .apply_preset import VELLUS_OT_apply_preset
-from .apply_saved_look import VELLUS_OT_apply_saved_look
-from .apply_scale import VELLUS_OT_apply_scale
-from .attach_to_surface import VELLUS_OT_attach_to_surface
 from .bake_tables import VELLUS_OT_bake_tables
-from .check_uvs import VELLUS_OT_check_uvs
 from .comb_guides import VELLUS_OT_comb_guides
 from .delete_hair import VELLUS_OT_delete_hair
 from .delete_system import VELLUS_OT_delete_system
@@ -15,19 +10,15 @@ from .distribute_guides import VELLUS_OT_distribute_guides
 from .export_groom import VELLUS_OT_export_groom
 from .interpolate_hair import VELLUS_OT_interpolate_hair
 from .load_groom_settings import VELLUS_OT_load_groom_settings
-from .make_uv_map import VELLUS_OT_make_uv_map
 from .pick_hair import VELLUS_OT_pick_hair
-from .remove_look import VELLUS_OT_remove_look
 from .render_picture import VELLUS_OT_render_picture
 from .restore_guides import VELLUS_OT_restore_guides
 from .save_groom_settings import VELLUS_OT_save_groom_settings
-from .save_look import VELLUS_OT_save_look
 from .select_guides import VELLUS_OT_select_guides
 from .select_hair import VELLUS_OT_select_hair
 from .toggle_composite import VELLUS_OT_toggle_composite
 from .toggle_drawing import VELLUS_OT_toggle_drawing
 from .use_as_guides import VELLUS_OT_use_as_guides
-from .use_uv_map import VELLUS_OT_use_uv_map
 
 CLASSES = (
     VELLUS_OT_add_hair,
@@ -41,16 +32,7 @@ CLASSES = (
     VELLUS_OT_delete_hair,
     VELLUS_OT_delete_system,
     VELLUS_OT_toggle_drawing,
-    VELLUS_OT_attach_to_surface,
-    VELLUS_OT_make_uv_map,
-    VELLUS_OT_use_uv_map,
-    VELLUS_OT_check_uvs,
-    VELLUS_OT_apply_scale,
     VELLUS_OT_restore_guides,
-    VELLUS_OT_apply_preset,
-    VELLUS_OT_apply_saved_look,
-    VELLUS_OT_save_look,
-    VELLUS_OT_remove_look,
     VELLUS_OT_bake_tables,
     VELLUS_OT_render_picture,
     VELLUS_OT_toggle_composite,

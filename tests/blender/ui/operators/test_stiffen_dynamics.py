@@ -5,11 +5,11 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import dynamics_notes, guide_simulation
+from hair_addon.blender.groom.dynamics import dynamics_notes, guide_simulation
 from hair_addon.blender.settings import properties
 from hair_addon.blender.ui import panels
-from hair_addon.core.dynamics.sag_free import GREENHILL
-from hair_addon.core.dynamics.stiffness_advice import weight_ratio
+from hair_addon.core.dynamics.rod.sag_free import GREENHILL
+from hair_addon.core.dynamics.rod.stiffness_advice import weight_ratio
 from tests.support.layout import draw_all
 from tests.support.reading import points
 

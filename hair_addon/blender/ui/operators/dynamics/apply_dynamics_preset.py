@@ -3,7 +3,7 @@
 
 import bpy
 
-from .....core.dynamics.presets import PRESETS, applied
+from .....core.dynamics.rod.presets import PRESETS, applied
 from ....groom import groom_settings
 from ....groom.selection import guides_of
 from ....settings import properties

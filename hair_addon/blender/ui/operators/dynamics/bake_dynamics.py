@@ -5,7 +5,7 @@ import bpy
 
 from .....core.errors import HairError
 from .....core.grooming import cost
-from ....groom import guide_baking
+from ....groom.dynamics import guide_baking
 from ....groom.selection import guides_of
 from ....host import memory, scene_time
 from ....settings import properties

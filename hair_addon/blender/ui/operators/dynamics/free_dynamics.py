@@ -4,7 +4,7 @@
 import bpy
 
 from .....core.files import frame_cache
-from ....groom import frame_folders
+from ....groom.dynamics import frame_folders
 from ....groom.selection import guides_of
 from ..base import HairOperator
 

@@ -3,11 +3,11 @@
 
 import bpy
 
-from .....core.dynamics.settings import DynamicsSettings
+from .....core.dynamics.rod.settings import DynamicsSettings
 from .....core.errors import HairError
 from .....core.params import declared
 from ....data import curves
-from ....groom import dynamics_notes, guide_simulation
+from ....groom.dynamics import dynamics_notes, guide_simulation
 from ....groom.selection import guides_of
 from ..base import HairOperator
 

@@ -5,7 +5,7 @@ import bpy
 
 from .....core.grooming.guide_tool_settings import DrapeSettings
 from ....data import scene
-from ....groom import guide_draping
+from ....groom.dynamics import guide_draping
 from ....groom.selection import guides_of, surface_of
 from ....settings import setting_properties
 from ..modal import LongOperator

@@ -1,0 +1,18 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides that are simulated, baked and draped: worlds of Blender read, frames kept in files."""
+
+from typing import TYPE_CHECKING
+
+from ....core.lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        bake_resuming,
+        dynamics_notes,
+        frame_folders,
+        guide_baking,
+        guide_draping,
+        guide_simulation,
+    )
+else:
+    __getattr__ = submodules(__name__)

@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the settings of dynamics mean for guides of the present length.
+
+Panels ask with every redraw, so geometry is not read.
+"""
+
+import math
+
+import bpy
+from bpy.types import Curves, Scene
+
+from ....core.dynamics.rod.stiffness_advice import bend_under_weight
+from ....core.errors import HairError
+from ...data import simulated_world
+from ...data.curves import is_hand_made
+from ...settings import properties
+from ...settings.translations import error_text, interface_text
+from . import frame_folders, guide_simulation
+
+LONGEST = 1.5  # [m]: longer hair is probably of a character that is not modeled to scale
+TYPICAL_LENGTH = 0.1  # [m], of hand-made guides: the setting does not apply to them
+
+
+def bend_note(guides: Curves, blender_scene: Scene) -> str:
+    """How far guides bend under their weight, as a translated sentence; empty without gravity."""
+    try:
+        settings = properties.dynamics_of(guides.vellus)
+    except HairError as error:
+        return error_text(error)
+    gravity = blender_scene.gravity.length * abs(settings.gravity) if blender_scene.use_gravity else 0.0
+    length = TYPICAL_LENGTH if is_hand_made(guides) else _length(guides, blender_scene)
+    if gravity == 0.0:
+        return ""
+    return interface_text(
+        "A {length} guide of this material bends by {sink} under its weight.",
+        length=_in_words(length, blender_scene),
+        sink=_in_words(bend_under_weight(settings, length, gravity), blender_scene),
+    )
+
+
+def stiffness_note(guides: Curves) -> str:
+    """How many guides cannot hold their shape, as a translated sentence; empty where all can, or nobody knows yet."""
+    try:
+        settings = properties.dynamics_of(guides.vellus)
+    except HairError:
+        return ""  # `bend_note` says it
+    needed = guide_simulation.known_stiffness(guides, settings)
+    if needed is None or settings.hold > 0.0:
+        return ""
+    count = int((needed > settings.bend_stiffness).sum())
+    if not count:
+        return ""
+    return interface_text(
+        "{count} of {total} guides cannot hold their shape: they need a bend stiffness of {stiffness}.",
+        count=count,
+        total=len(needed),
+        stiffness=f"{rounded_up(float(needed.max())):g}",
+    )
+
+
+def rounded_up(stiffness: float) -> float:
+    """A stiffness to two digits, and not less."""
+    unit = 10.0 ** (math.floor(math.log10(stiffness)) - 1)
+    return float(f"{math.ceil(stiffness / unit) * unit:.2g}")
+
+
+def size_note(guides: Curves, blender_scene: Scene) -> str:
+    """What to do about guides that are too long to be hair, as a translated sentence; empty where they are not."""
+    length = _length(guides, blender_scene)
+    if is_hand_made(guides) or not length > LONGEST:
+        return ""
+    return interface_text(
+        "Guides of {length} move slowly: decrease Size if the character is modeled larger than life.",
+        length=_in_words(length, blender_scene),
+    )
+
+
+def is_delivery_outdated(hair: Curves) -> bool:
+    """Whether guides were baked otherwise since their hair was delivered, as far as is known without reading files."""
+    kept = frame_folders.folder_cache.get(hair.vellus.guide_curves.session_uid)
+    manifest = None if kept is None or kept[1] is None else kept[1].manifest
+    return manifest is not None and hair.vellus.delivered_key != manifest.key
+
+
+def _length(guides, blender_scene):
+    """Of guides as they are grown [m]."""
+    return guides.vellus.guides.length * simulated_world.metres_of(blender_scene, guides.vellus.dynamics)
+
+
+def _in_words(metres, blender_scene):
+    """A length with two digits, in the units of the scene."""
+    system = blender_scene.unit_settings.system
+    return bpy.utils.units.to_string("METRIC" if system == "NONE" else system, "LENGTH", metres, precision=2)

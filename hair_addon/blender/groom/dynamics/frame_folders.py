@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where the baked frames of guides are: a folder of theirs in the cache folder that they name."""
+
+import contextlib
+from collections.abc import Iterable
+from pathlib import Path
+
+import bpy
+from bpy.types import Curves
+
+from ....core.errors import HairError
+from ....core.files import frame_cache, frame_manifest
+from ....core.files.frame_cache import FrameCache
+from ...data import attributes, delivered_hair
+from ...data.curves import followers
+from ...host import paths, scene_time
+from ...host.caches import Cache
+from ...host.notices import name_of
+
+folder_cache = Cache()  # session_uid of guide Curves → (folder, FrameCache): what was read of it
+
+
+def folder_of(guides: Curves) -> Path:
+    """The folder of the frames of some guides, whether it exists or not. Raises `HairError` if it leads nowhere.
+
+    Of linked guides it is that of the file that links them: a shot has frames of its own, also where others are saved
+    in the same folder.
+    """
+    base = paths.resolve(guides.vellus.cache_folder)
+    return frame_cache.folder_of(base, _identity_of(guides, _file_seen_from(base)))
+
+
+def _identity_of(guides, file):
+    """The name of the folder of guides that a file, as `_file_seen_from` its parent, has baked."""
+    if attributes.is_from_library(guides):  # what is stored is the library's
+        linked_from = None if guides.library is None else paths.from_open_file(guides.library)
+        return _identity_of_names(name_of(guides), linked_from, file)
+    return guides.vellus.cache_identity or _identity_of_names(name_of(guides), None, file)
+
+
+def _identity_of_names(guides, library, file):
+    """The same in every session of a file that was not saved since guides were baked, as by the command line."""
+    return frame_manifest.digest([guides, library, file])[:16]
+
+
+def _file_seen_from(base):
+    """The open file as seen from a folder of caches, so that both may be moved; "." if it was never saved."""
+    if not bpy.data.filepath:
+        return "."
+    file = Path(bpy.data.filepath)
+    return paths.relative(file.parent.resolve() / file.name, base)
+
+
+def frames_of(guides: Curves) -> FrameCache | None:
+    """The baked frames of some guides, of which there may be none; None where their folder leads nowhere.
+
+    Linked guides that are not baked in this file have those of the file that it was saved from, or else of their
+    library.
+    """
+    known = folder_cache.get(guides.session_uid)
+    try:
+        folder = folder_of(guides) if _leads_somewhere(guides) else None
+        if known is None or known[0] != folder:
+            known = folder_cache.keep(guides.session_uid, (folder, _read(guides, folder)))
+    except HairError:
+        return None
+    return known[1]
+
+
+def _leads_somewhere(guides):
+    return bool(bpy.data.filepath) or not guides.vellus.cache_folder.startswith("//")
+
+
+def _read(guides, folder):
+    """The `FrameCache` of a folder; another one that has frames, where the folder has none or None stands for it."""
+    read = None if folder is None else FrameCache(folder)
+    if read is not None and read.manifest is not None:
+        return read
+    others = map(FrameCache, _other_folders(guides, folder))
+    return next((other for other in others if other.manifest is not None), read)
+
+
+def _other_folders(guides, folder):
+    """Folders that guides have frames in before they are baked in this file; folder: `folder_of` them, or None."""
+    before = scene_time.present_scene().vellus.baked_in
+    if folder is not None and before and attributes.is_from_library(guides):
+        yield frame_cache.folder_of(folder.parent, _identity_of(guides, before))
+    if guides.library is not None:
+        base = paths.resolve(guides.vellus.cache_folder, guides.library)
+        file = paths.relative(paths.of_library(guides.library), base)
+        identity = guides.vellus.cache_identity or _identity_of_names(name_of(guides), None, file)
+        yield frame_cache.folder_of(base, identity)
+
+
+def remember() -> None:
+    """Store in the open file where its frames are, before it is saved: under another name they play, too."""
+    for guides in simulating():
+        baked = frames_of(guides)
+        with contextlib.suppress(HairError):  # the folder leads nowhere
+            if baked is None or baked.manifest is None or baked.folder != folder_of(guides):
+                continue
+            if not attributes.is_from_library(guides):
+                guides.vellus.cache_identity = baked.folder.name
+                continue
+            for scene in bpy.data.scenes:
+                if scene.library is None:
+                    scene.vellus.baked_in = _file_seen_from(baked.folder.parent)
+
+
+def new_folder(guides: Curves) -> Path:
+    """The folder to bake some guides to: theirs, or a new one where they have none or share it with other guides."""
+    folder = folder_of(guides)
+    if attributes.is_from_library(guides):
+        return folder
+    others = {other.vellus.cache_identity for other in bpy.data.hair_curves if other != guides} - {""}
+    identity = folder.name
+    guides.vellus.cache_identity = frame_cache.new_identity() if identity in others else identity
+    return folder_of(guides)
+
+
+def require_baked(numbers: Iterable[int]) -> None:
+    """Raise `HairError` unless all guides that simulate have baked frames of these numbers, from their start frame on.
+
+    Renders of sequences ask: they never simulate. Hair that plays delivered frames needs no others.
+    """
+    for guides in simulating():
+        hair = followers(guides)
+        if not hair or not all(map(delivered_hair.is_delivered, hair)):
+            require_frames(guides, numbers)
+
+
+def require_frames(guides: Curves, numbers: Iterable[int]) -> None:
+    """Raise `HairError` unless guides simulate, and have baked frames of these numbers from their start frame on."""
+    if not is_simulated(guides):
+        raise HairError('The guides "{name}" do not simulate: switch Dynamics on.', name=name_of(guides))
+    start = guides.vellus.dynamics.start_frame
+    baked = frames_of(guides)
+    is_theirs = baked is not None and baked.manifest is not None and baked.manifest.guide_count == len(guides.curves)
+    there = set(baked.frame_numbers()) if baked is not None and is_theirs else set()
+    missing = [number for number in numbers if number > start and number not in there]
+    if missing:
+        raise HairError(
+            'Frame {frame} of the guides "{name}" is not baked: bake their dynamics first.',
+            frame=missing[0],
+            name=name_of(guides),
+        )
+
+
+def simulating() -> list[Curves]:
+    """Guide Curves that are simulated, but for those of a library that this file overrides."""
+    overrides = (guides.override_library for guides in bpy.data.hair_curves)
+    replaced = {override.reference for override in overrides if override is not None}
+    return [guides for guides in bpy.data.hair_curves if is_simulated(guides) and guides not in replaced]
+
+
+def is_simulated(guides: Curves) -> bool:
+    """Whether guide Curves are simulated."""
+    state = guides.vellus
+    return state.kind == "GUIDES" and state.simulates and state.is_live
+
+
+def forget(guides: Curves) -> None:
+    """Read the folder again when it is next asked for: frames were written or removed."""
+    folder_cache.invalidate(guides.session_uid)
+
+
+def have_changed(guides: Curves) -> None:
+    """Show guides with the next update as they are baked now: frames were written or removed."""
+    forget(guides)
+    guides.vellus.is_dynamics_stale = True
+    guides.update_tag()
+
+
+def has_frames(guides: Curves) -> bool:
+    """Whether frames of some guides are known: panels ask with every redraw, so no file is read."""
+    kept = folder_cache.get(guides.session_uid)
+    return kept is not None and kept[1].manifest is not None

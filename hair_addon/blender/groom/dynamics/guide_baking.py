@@ -1,0 +1,230 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Baking: guides simulated frame by frame into files, which playing and rendering then read.
+
+Baking goes on where it was stopped, from the last state that was written, and comes to the same bits.
+"""
+
+import contextlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bpy.types import Curves, Scene
+
+from ....core.errors import HairError
+from ....core.files import array_file, frame_cache, frame_manifest
+from ....core.files.frame_cache import FrameCache
+from ....core.files.frame_manifest import Manifest
+from ....core.grooming import cost
+from ....core.long_work import Stage, Work
+from ...data import scene as scenes
+from ...data import wet_guides
+from ...host import memory, scene_time
+from ...host.datablocks import Remembered
+from ...host.notices import name_of
+from ...settings import properties
+from .. import guide_regions, quiet_hair
+from . import bake_resuming, frame_folders, guide_simulation
+from .bake_resuming import Task
+
+SOLVER_VERSION = 2  # of all that frames follow from beside settings: raised when they come out otherwise
+STATE_FRAMES = 24  # between states
+_PARTING = "parting"  # a part of `key_of`
+_BEYOND = 1  # frames after the last one, for motion blur
+
+_baking = False
+
+
+def is_baking() -> bool:
+    """Whether guides are being baked: then a change of frame is none of the artist's."""
+    return _baking
+
+
+@dataclass(frozen=True)
+class Baked:
+    """What was baked: frames simulated now, and how often strands broke and were put back to their groom."""
+
+    first: int
+    last: int
+    simulated: int
+    broken: int
+
+
+@dataclass(frozen=True)
+class BakedFrame:
+    """A frame that was simulated and written: of which guides, in how many substeps, how many strands broke."""
+
+    guides: str
+    frame: int
+    substeps: int
+    broken: int
+    folder: Path
+
+
+def memory_of(guides_list: Sequence[Curves]) -> int:
+    """Memory that baking guides takes while it runs [bytes]."""
+    counts = [(guides.vellus.dynamics.vertex_count, len(guides.curves)) for guides in guides_list]
+    return sum(cost.simulation_bytes(*count) for count in counts)
+
+
+def key_of(guides: Curves, scene: Scene) -> dict[str, str]:
+    """{part: digest} of what the frames of some guides follow from, but for the animation, of settings too.
+
+    Raises `HairError`.
+    """
+    settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
+    parts = {
+        "solver": SOLVER_VERSION,
+        "settings": guide_simulation.unkeyed(guides, settings),
+        "guides": guide_simulation.combed_points(guides),
+        "surface": guides.vellus.topology,
+        "frame rate": scene_time.animation_rate(scene),
+        "units": scene.unit_settings.scale_length,
+    }
+    regions, wetness = _regions(guides), wet_guides.unkeyed(guides, scenes.present_depsgraph())
+    found = {_PARTING: regions, "wet places": wetness}
+    return frame_manifest.digests_of(parts | {name: part for name, part in found.items() if part is not None})
+
+
+def changed_parts(guides: Curves, scene: Scene, manifest: Manifest) -> list[str]:
+    """The parts of `key_of` some guides that are otherwise than when their frames were baked. Raises `HairError`.
+
+    A part line that a deformed surface leaves behind divides guides otherwise in each frame. Nothing has changed while
+    the hair is parted as it was: guides are baked with the regions of their first frame.
+    """
+    now, baked = key_of(guides, scene), manifest.keys[-1]
+    changed = sorted(part for part in {*now, *baked} if now.get(part) != baked.get(part))
+    if _PARTING in changed and manifest.parted_by == _parted_by(guides) and not isinstance(_regions(guides), str):
+        changed.remove(_PARTING)
+    return changed
+
+
+def _parted_by(guides):
+    return frame_manifest.digest(guide_regions.parting_keys(guides))
+
+
+def _regions(guides):
+    """Regions of guides, None for one; why they cannot be read, as then frames that are baked still play."""
+    if not guide_regions.is_parted(guides):
+        return None
+    try:
+        return guide_regions.regions_of(guides, scenes.present_depsgraph())
+    except HairError as error:
+        return str(error)
+
+
+def baking(
+    guides_list: Sequence[Curves],
+    last: int,
+    scene: Scene,
+    starts_over: bool = False,
+    tell: Callable[[BakedFrame], None] = lambda _frame: None,
+) -> Work[list[Baked]]:
+    """Bake guides up to a frame, as work in steps: a computation a frame.
+
+    The scene is at the frame where it was, on every way out. starts_over: simulate frames again that are there; tell:
+    called for each frame of each guides when it is written. Raises `HairError`.
+    """
+    global _baking
+    memory.require(memory_of(guides_list))
+    present, its_scene = scene_time.frame_of(scene), Remembered(scene)
+    _baking = True
+    with contextlib.ExitStack() as stack:
+        stack.callback(_end, its_scene, present, [Remembered(guides) for guides in guides_list])
+        stack.enter_context(quiet_hair.unevaluated(guides_list, scene))
+        tasks = [_begin(guides, last, scene, starts_over, stack) for guides in guides_list]
+        yield Stage("Baking", 0.0)
+        yield from bake_resuming.going_on(tasks, its_scene)
+        first = min((task.done for task in tasks), default=last)
+        counts = [0] * len(tasks)
+        for frame in range(first + 1, last + _BEYOND + 1):
+            due = [(index, task) for index, task in enumerate(tasks) if task.done == frame - 1]
+            scene = its_scene.find()  # another one after an undo
+            scene_time.go_to(scene, frame)
+            depsgraph = scenes.present_depsgraph()
+            inputs = [_read(task, scene, depsgraph) for _, task in due]
+            part = (frame - first) / (last + _BEYOND - first)
+            yield _computing([task for _, task in due], inputs, frame, part, frame == last + _BEYOND)
+            for index, task in due:
+                task.done = frame
+                counts[index] += 1
+                tell(_baked_frame(task, frame))
+        for task in tasks:
+            task.writer.complete()
+    return [Baked(task.simulated.settings.start_frame, last, *pair) for task, pair in _results(tasks, counts)]
+
+
+def _baked_frame(task, frame):
+    simulation = task.simulated.simulation
+    return BakedFrame(task.name, frame, simulation.substeps, len(simulation.broken), task.writer.folder)
+
+
+def _results(tasks, counts):
+    return [(task, (count, task.broken)) for task, count in zip(tasks, counts, strict=True)]
+
+
+def _end(its_scene, present, baked):
+    """Go back to the frame where the scene was; guides are shown there, as baked, after the next update."""
+    global _baking
+    try:
+        with contextlib.suppress(HairError):  # the scene was deleted meanwhile
+            scene_time.go_to(its_scene.find(), present)
+    finally:
+        _baking = False
+    for remembered in baked:
+        with contextlib.suppress(HairError):  # deleted meanwhile, by a script
+            frame_folders.have_changed(remembered.find())
+
+
+def _begin(guides, last, scene, starts_over, stack):
+    """A `Task` in its first frame."""
+    start = properties.dynamics_of(guides.vellus).start_frame
+    if last < start:
+        raise HairError(
+            "The simulation begins in frame {start}, after the last frame to bake, {last}.", start=start, last=last
+        )
+    folder = frame_folders.new_folder(guides)
+    frame_folders.forget(guides)
+    if starts_over and (folder / frame_manifest.NAME).exists():
+        frame_cache.remove(folder)
+    scene_time.go_to(scene, start)
+    simulated = guide_simulation.begin(guides, scene, scenes.present_depsgraph())
+    rate = scene_time.animation_rate(scene)
+    layout = array_file.layout_of(simulated.simulation.save())
+    combed = guide_simulation.combed_points(guides)
+    guide_count, point_count = combed.shape[:2]
+    keys = (key_of(guides, scene),)
+    parted_by = _parted_by(guides)
+    manifest = Manifest(keys, guide_count, point_count, start, last, rate, "baking", layout, parted_by=parted_by)
+    writer = stack.enter_context(frame_cache.baking(folder, manifest))
+    guides_named, there = Remembered(guides), FrameCache(folder)
+    numbers = {number for number in there.state_numbers() if start < number <= last + _BEYOND}
+    digest = bake_resuming.digest_of(guides, scene, properties.dynamics_of(guides.vellus))
+    found = there.read_frame(start)
+    if found is None or (found.key, found.digest) != (manifest.key, digest):
+        numbers = set()
+        writer.write_frame(start, combed, digest)
+    return Task(name_of(guides), guides_named, simulated, writer, start, there, numbers=numbers)
+
+
+def _read(task, scene, depsgraph):
+    """(`FrameInput`, digest of the animation) of a task in the frame of a depsgraph."""
+    guides = task.guides.find()
+    settings = guide_simulation.simulated(properties.dynamics_of(guides.vellus))
+    read = guide_simulation.read(guides, scene, depsgraph, settings, task.simulated.masks)
+    return read, bake_resuming.digest_of(guides, scene, settings)
+
+
+def _computing(tasks, inputs, frame, part, is_last):
+    """A function of (progress) that simulates a frame of some guides and writes it."""
+
+    def compute(progress):
+        progress(f"Frame {frame}", part)
+        for task, (read, digest) in zip(tasks, inputs, strict=True):
+            points = task.simulated.advance(read)
+            task.broken += len(task.simulated.simulation.broken)
+            task.writer.write_frame(frame, points, digest)
+            if is_last or (frame - task.simulated.settings.start_frame) % STATE_FRAMES == 0:
+                task.writer.write_state(frame, task.simulated.simulation.save())
+
+    return compute

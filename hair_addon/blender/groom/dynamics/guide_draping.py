@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Combed guides that fall on their surface, and keep where they come to rest as their shape."""
+
+from dataclasses import replace
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ....core import dynamics, grooming
+from ....core.geometry.mesh import TriMesh
+from ....core.grooming import cost
+from ....core.grooming.guide_tool_settings import DrapeSettings
+from ....core.long_work import Work, part_of, run_now
+from ...data import simulated_world, wet_guides
+from ...host.datablocks import Remembered
+from ...settings import preferences, properties
+from .. import guide_tools
+from . import guide_simulation
+
+LEAST_STIFFNESS = 1e-3  # of dynamics' settings
+_FRAMES = 24.0  # a second, of as many substeps as the settings say
+
+
+def drape(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> int:
+    """Let guides fall on their surface as it is deformed now, until they are at rest; returns how many have changed.
+
+    Raises `HairError` before anything changes.
+    """
+    return run_now(draping(datablock, settings, depsgraph))
+
+
+def draping(datablock: Curves, settings: DrapeSettings, depsgraph: Depsgraph) -> Work[int]:
+    """`drape` as work in steps: guides stay as they are until all have come to rest."""
+    guides = guide_tools.read(datablock, settings, depsgraph)
+    dynamics_settings = _softened(datablock, settings)
+    blender_scene = depsgraph.scene
+    gravity = tuple(blender_scene.gravity) if blender_scene.use_gravity else simulated_world.NO_GRAVITY
+    metres = simulated_world.metres_of(blender_scene, dynamics_settings)
+    dynamics_settings = guide_simulation.in_metres(dynamics_settings, metres)
+    posed, surface = guides.posed(), guides.surface
+    wetness = wet_guides.of_guides(datablock, surface, depsgraph, {}, guides.roots)
+    mesh = TriMesh(surface.posed_mesh.vertices * np.float32(metres), surface.posed_mesh.triangles)
+    device, remembered, falling = preferences.device(), Remembered(datablock), guide_tools.to_shape(guides)
+
+    def compute(progress):
+        dynamics.draped_growth.load_kernels(device, part_of(progress, 0.0, 0.1))
+        settled = []
+        for index, (chosen, places) in enumerate(falling):
+            own = part_of(progress, *(0.1 + 0.9 * part / len(falling) for part in (index, index + 1)))
+
+            def tell(part, own=own):
+                own("Draping guides", part)
+
+            points = metres * posed[places].astype(np.float64)
+            given = points, mesh, dynamics_settings, gravity, settings.seconds, device, tell
+            settled.append(dynamics.draping.draped(*given, wetness=None if wetness is None else wetness[chosen]))
+        return settled
+
+    settled = yield compute
+    after = guides.points.copy()
+    for (chosen, places), points in zip(falling, settled, strict=True):
+        at_rest = guides.carried_back((points / metres).astype(np.float32), chosen)
+        after[places] = grooming.guide_segments.blended(guides.points[places], at_rest, guides.weights[chosen])
+    return guide_tools.write_shapes(replace(guides, datablock=remembered.find()), after)
+
+
+def seconds(datablock: Curves, settings: DrapeSettings, face_count: int) -> float:
+    """How long `drape` takes [s], estimated; face_count: triangles of the surface."""
+    substeps = properties.dynamics_of(datablock.vellus).substeps * _FRAMES * settings.seconds
+    return cost.drape_seconds(len(datablock.curves), face_count, round(substeps))
+
+
+def _softened(datablock, settings):
+    """`DynamicsSettings` of guides, with the stiffness that they are draped with."""
+    present = properties.dynamics_of(datablock.vellus)
+    return replace(present, bend_stiffness=max(settings.stiffness * present.bend_stiffness, LEAST_STIFFNESS))

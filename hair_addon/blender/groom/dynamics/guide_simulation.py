@@ -1,0 +1,227 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The simulation of guides of a scene: begun with their groom, and brought from frame to frame.
+
+`begin` and `read` use Blender's data; `GuideSimulation.advance` does not, and may run in another thread.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+from bpy.types import Curves, Depsgraph, Scene
+
+from ....core import dynamics
+from ....core.dynamics.rod.settings import DynamicsSettings
+from ....core.errors import HairError
+from ....core.params import given
+from ...data import attributes, curves, guide_poses, simulated_world, wet_guides
+from ...data.guide_poses import GuidePose
+from ...host import scene_time
+from ...host.caches import Cache
+from ...settings import preferences, properties
+from .. import guide_regions, staleness
+
+# session_uid of guides → ((G,) bend stiffness that each needs to hold its shape, `_load` of the settings then)
+stiffness_cache = Cache()
+
+
+@dataclass(frozen=True)
+class FrameInput:
+    """What guides follow in one frame, as read. errors: of colliders that were left out, or stay where they were.
+
+    wetness: (G,) of each guide, None where they do not differ.
+    """
+
+    frame: int
+    settings: DynamicsSettings
+    pose: GuidePose
+    world: "dynamics.simulation.World"
+    seconds: float
+    wetness: np.ndarray | None = None
+    errors: tuple[HairError, ...] = ()
+
+
+@dataclass
+class GuideSimulation:
+    """Guides that are simulated, and the frame they have come to.
+
+    digest, topology: of guides and surface; start: their pose in the first frame; obstacles: {name: as hair last
+    collided with it}; masks: {mask of wetness: (G,) its weights}; wetness: of the last frame, as in `FrameInput`.
+    """
+
+    digest: str
+    topology: str
+    settings: DynamicsSettings
+    start: GuidePose
+    roots: np.ndarray  # (G, 3) float32 at rest, local
+    simulation: "dynamics.simulation.Simulation"
+    metres: float  # in a unit of the world
+    obstacles: dict[str, "dynamics.simulation.Obstacle"] = field(default_factory=dict)
+    parted_by: tuple[str, ...] = ()  # `guide_regions.parting_keys` when regions were read
+    masks: dict[tuple[str, str, bool], np.ndarray] = field(default_factory=dict)
+    wetness: np.ndarray | None = None
+    errors: tuple[HairError, ...] = ()  # of colliders, in the last frame
+
+    def see(self, frame: FrameInput) -> FrameInput:
+        """The next frame as guides are simulated in it: where a collider has another topology, it stays as it was.
+
+        Called for each frame in turn, it need not be simulated.
+        """
+        obstacles, notes = dynamics.stopped_colliders.stopped(frame.world.obstacles, self.obstacles, frame.frame)
+        self.obstacles = {obstacle.name: obstacle for obstacle in obstacles}
+        return replace(frame, world=replace(frame.world, obstacles=obstacles), errors=(*frame.errors, *notes))
+
+    def advance(self, frame: FrameInput) -> np.ndarray:
+        """Simulate the next frame: (G, P, 3) float32 points at rest, in local coordinates."""
+        frame = self.see(frame)
+        self._change(frame)
+        self.simulation.advance(frame.pose.root_pose(self.start), frame.world, frame.seconds)
+        self.errors = (*frame.errors, *self.simulation.notes)
+        points = frame.pose.to_rest(self.simulation.points())
+        points[:, 0] = self.roots  # to the last bit, as what follows compares roots
+        return points
+
+    def _change(self, frame):
+        """Go on with the settings and the wetness of a frame."""
+        if frame.settings != self.settings or not _are_same(frame.wetness, self.wetness):
+            self.simulation.change(in_metres(frame.settings, self.metres), wetness=frame.wetness)
+            self.settings, self.wetness = frame.settings, frame.wetness
+
+    def follow_parting(self, guides: Curves, depsgraph: Depsgraph) -> bool:
+        """Divide guides as their hair is parted now; returns whether that is otherwise. Raises `HairError`."""
+        keys = guide_regions.parting_keys(guides)
+        if keys == self.parted_by:
+            return False
+        is_other = self.simulation.divide(guide_regions.regions_of(guides, depsgraph))
+        self.parted_by = keys
+        return is_other
+
+    def go_on(self, state: Mapping[str, np.ndarray], frame: FrameInput) -> None:
+        """Go on from a state that the simulation's `save` gave in a frame, as `see` returned it. Raises `HairError`."""
+        self.obstacles = {obstacle.name: obstacle for obstacle in frame.world.obstacles}
+        self._change(frame)
+        self.simulation.load(state, frame.pose.root_pose(self.start), frame.world)
+
+    def is_of(self, guides: Curves, settings: DynamicsSettings) -> bool:
+        """Whether it simulates these guides as they are combed now, with as many vertices."""
+        return (
+            self.topology == guides.vellus.topology
+            and self.settings.vertex_count == settings.vertex_count
+            and self.digest == staleness.guides_digest(guides)
+        )
+
+
+def _are_same(one, other):
+    if one is None or other is None:
+        return one is other
+    return np.array_equal(one, other)
+
+
+def begin(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> GuideSimulation:
+    """The simulation of guides from the frame that a depsgraph was evaluated for. Raises `HairError`."""
+    settings = simulated(properties.dynamics_of(guides.vellus))
+    masks: dict[tuple[str, str, bool], np.ndarray] = {}
+    frame = read(guides, scene, depsgraph, settings, masks)
+    pose, metres = frame.pose, simulated_world.metres_of(scene, settings)
+    local = combed_points(guides)
+    simulation = dynamics.simulation.Simulation(
+        pose.groom(local),
+        in_metres(settings, metres),
+        pose.root_pose(pose),
+        frame.world,
+        preferences.device(),
+        regions=guide_regions.regions_of(guides, depsgraph),
+        wetness=frame.wetness,
+    )
+    for _ in range(settings.preroll):
+        simulation.advance(pose.root_pose(pose), frame.world, frame.seconds)
+    digest, topology = staleness.guides_digest(guides), guides.vellus.topology
+    _keep_stiffness(guides, frame, local)
+    begun = GuideSimulation(digest, topology, settings, pose, local[:, 0].copy(), simulation, metres)
+    begun.parted_by = guide_regions.parting_keys(guides)
+    begun.masks, begun.wetness = masks, frame.wetness
+    begun.see(frame)
+    return begun
+
+
+def read(
+    guides: Curves,
+    scene: Scene,
+    depsgraph: Depsgraph,
+    settings: DynamicsSettings,
+    masks: dict[tuple[str, str, bool], np.ndarray],
+) -> FrameInput:
+    """What guides follow in the frame that a depsgraph was evaluated for. Raises `HairError`.
+
+    masks: as in `GuideSimulation`; those that are missing are read and added.
+    """
+    pose = guide_poses.read(guides, depsgraph, simulated_world.metres_of(scene, settings))
+    world, errors = simulated_world.read(scene, depsgraph, settings, pose, guides.surface)
+    seconds = settings.time_scale / scene_time.animation_rate(scene)
+    wetness = wet_guides.of_guides(guides, pose.pose.surface, depsgraph, masks)
+    return FrameInput(scene_time.frame_of(scene), settings, pose, world, seconds, wetness, tuple(errors))
+
+
+def simulated(settings: DynamicsSettings) -> DynamicsSettings:
+    """Settings without those that guides do not follow from, but hair: to be compared with others."""
+    return replace(settings, keeps_hair_outside=False)
+
+
+def unkeyed(guides: Curves, settings: DynamicsSettings) -> dict[str, Any]:
+    """{name: value} of the settings that are the same in all frames: keys and drivers move the others."""
+    keyed = properties.keyed_dynamics_of(guides.vellus)
+    return {name: value for name, value in given(settings).items() if name not in keyed}
+
+
+def needed_stiffness(guides: Curves, scene: Scene, depsgraph: Depsgraph) -> np.ndarray:
+    """(G,) bend stiffness with which each guide can hold its shape, 0 of those that hang. Raises `HairError`."""
+    settings = properties.dynamics_of(guides.vellus)
+    return _keep_stiffness(guides, read(guides, scene, depsgraph, settings, {}), combed_points(guides))
+
+
+def known_stiffness(guides: Curves, settings: DynamicsSettings) -> np.ndarray | None:
+    """The same from when they began to be simulated, with the settings of now; None if they never were."""
+    kept = stiffness_cache.get(guides.session_uid)
+    if kept is None or len(kept[0]) != len(guides.curves):
+        return None
+    stiffness, ratio = kept
+    return stiffness * (_load(settings) / ratio)
+
+
+def _keep_stiffness(guides, frame, local):
+    """Keep and return (G,) bend stiffnesses; frame: `FrameInput`; local: `combed_points`."""
+    settings, pose = frame.settings, frame.pose
+    groom = pose.groom(local)
+    standing = pose.root_pose(pose).carried(groom - groom[:, :1])
+    vertices = dynamics.rod.detail.vertices_of(standing, settings.vertex_count)
+    lengths = np.linalg.norm(np.diff(vertices, axis=1), axis=2)
+    material = dynamics.rod.material.material_of(settings, lengths, frame.wetness)
+    x, y, z = (settings.gravity * component for component in frame.world.gravity)
+    factors = dynamics.rod.sag_free.least_stiffnesses(vertices, material, (x, y, z))
+    needed = factors * settings.bend_stiffness
+    stiffness_cache.keep(guides.session_uid, (needed, _load(settings)))
+    return needed
+
+
+def _load(settings):
+    """A measure of how much stiffness the material needs, whatever its own is."""
+    one = replace(settings, bend_stiffness=1.0)
+    return dynamics.rod.stiffness_advice.weight_ratio(one, 1.0, abs(settings.gravity)) or 1.0
+
+
+def in_metres(settings: DynamicsSettings, metres: float) -> DynamicsSettings:
+    """Settings whose lengths are in units of the world → the same in metres."""
+    return replace(
+        settings, cell_size=metres * settings.cell_size, collision_distance=metres * settings.collision_distance
+    )
+
+
+def combed_points(guides: Curves) -> np.ndarray:
+    """(G, POINT_COUNT, 3) float32: guides as combed, local coordinates at rest."""
+    points, offsets = curves.read_points(guides), curves.curve_offsets(guides)
+    if len(offsets) < 2:
+        raise HairError('"{name}" has no guides to simulate.', name=guides.name)
+    if not np.isfinite(points).all():
+        raise HairError('"{name}" has non-finite coordinates: undo, or delete those guides.', name=guides.name)
+    return curves.even_points(points, offsets, lambda: attributes.are_smooth(guides))

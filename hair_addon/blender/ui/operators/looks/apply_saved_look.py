@@ -1,0 +1,25 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A saved look → the active hair's appearance."""
+
+import bpy
+
+from ....groom.selection import hair_of
+from ....materials import looks
+from ....settings import properties, saved_looks
+from ..base import HairOperator
+
+
+class VELLUS_OT_apply_saved_look(HairOperator, bpy.types.Operator):
+    """Apply a saved look to the active hair"""
+
+    bl_idname = "vellus.apply_saved_look"
+    bl_label = "Apply Saved Look"
+    __annotations__ = {"name": properties.text("Name", "Saved look")}
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("Select hair.")
+        return hair_of(context.object) is not None
+
+    def change(self, context):
+        looks.apply_look(hair_of(context.object), saved_looks.read(self.name))

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair and a mesh → hair attached to it."""
+
+import bpy
+
+from ....groom import edits
+from ....groom.selection import mesh_to_attach_to, parts_of
+from ..base import HairOperator
+
+
+class VELLUS_OT_attach_to_surface(HairOperator, bpy.types.Operator):
+    """Attach the active hair and its guides to their surface, or to the selected mesh"""
+
+    bl_idname = "vellus.attach_to_surface"
+    bl_label = "Attach to Surface"
+
+    @classmethod
+    def poll(cls, context):
+        cls.poll_message_set("In Object Mode, select hair or guides and a mesh.")
+        return context.mode == "OBJECT" and mesh_to_attach_to(context) is not None
+
+    def change(self, context):
+        edits.attach(parts_of(context.object), mesh_to_attach_to(context))

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes that strands collide with: distances, planes of contact, and a substep of strands that touch."""
+
+from typing import TYPE_CHECKING
+
+from ...lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        closed_parts,
+        collider_settings,
+        colliders,
+        contact,
+        contact_queries,
+        contact_substep,
+        distance_grid,
+        nearest_surface,
+        rigid_motion,
+    )
+else:
+    __getattr__ = submodules(__name__)

@@ -1,0 +1,92 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which side of a triangle mesh is outside, and where it ends in a rim."""
+
+import numpy as np
+
+from ...geometry.connected_components import connected_components
+from ...geometry.mesh import TriMesh
+
+_MOST_SAMPLES = 16  # vertices of a part that are asked whether they are inside another
+
+
+def outward(mesh: TriMesh) -> np.ndarray:
+    """(F, 3) int32: the triangles, those of closed parts wound counter-clockwise seen from outside.
+
+    A closed part of negative volume is turned, unless it is inside another one: then it bounds a cavity.
+    """
+    triangles = mesh.checked_triangles.copy()
+    parts = connected_components(mesh)
+    is_closed = _is_closed(welded(mesh), parts)
+    centred = mesh.corners - mesh.corners.reshape(-1, 3).mean(axis=0)
+    volumes = np.bincount(parts, np.linalg.det(centred) / 6.0)  # of the tetrahedra to the middle
+    for part in np.flatnonzero(is_closed & (volumes < 0.0)):
+        others = [other for other in np.flatnonzero(is_closed) if other != part]
+        if not any(_is_inside(mesh, parts == part, parts == other) for other in others):
+            turned = np.flatnonzero(parts == part)
+            triangles[turned] = triangles[turned][:, [0, 2, 1]]
+    return triangles
+
+
+def rims(mesh: TriMesh) -> np.ndarray:
+    """(F,) int32 bits of a triangle's rims.
+
+    Bit k: the edge opposite to corner k has no other triangle. Bit 3 + k: corner k is on such an edge.
+    """
+    triangles = welded(mesh)
+    edges = np.sort(np.stack([np.roll(triangles, -1 - k, axis=1)[:, :2] for k in range(3)], axis=1), axis=2)
+    of_edge, counts = _edge_kinds(edges.reshape(-1, 2))
+    is_rim = (counts == 1)[of_edge.reshape(-1, 3)]
+    is_on_rim = np.zeros(len(mesh.vertices), bool)
+    is_on_rim[edges[is_rim].ravel()] = True
+    bits = np.concatenate([is_rim, is_on_rim[triangles]], axis=1)
+    return (bits << np.arange(6)).sum(axis=1).astype(np.int32)
+
+
+def welded(mesh: TriMesh) -> np.ndarray:
+    """(F, 3) triangles of a mesh whose vertices in one place are one: seams are no rims."""
+    order = np.lexsort(mesh.vertices.T)
+    ordered = mesh.vertices[order]
+    is_new = np.ones(len(order), bool)
+    is_new[1:] = (ordered[1:] != ordered[:-1]).any(axis=1)
+    first = np.empty(len(order), np.int64)
+    first[order] = order[is_new][np.cumsum(is_new) - 1]
+    return first[mesh.checked_triangles]
+
+
+def _edge_kinds(edges):
+    """(which kind each edge is, how many there are of each kind) of edges (N, 2): those of the same vertices are one.
+
+    They are sorted as single numbers, in a fifth of the time that rows take.
+    """
+    _, kinds, counts = np.unique(
+        edges[:, 0].astype(np.int64) << 32 | edges[:, 1], return_inverse=True, return_counts=True
+    )
+    return kinds.reshape(-1), counts
+
+
+def _is_closed(triangles, parts):
+    """(parts,) whether each edge of a part has two triangles, which run along it in opposite directions."""
+    directed = np.concatenate([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    ahead = directed[:, 0] < directed[:, 1]
+    of_edge, counts = _edge_kinds(np.sort(directed, axis=1))
+    balance = np.bincount(of_edge, np.where(ahead, 1, -1), minlength=len(counts))
+    is_open = ((counts != 2) | (balance != 0))[of_edge]
+    return np.bincount(np.tile(parts, 3), is_open) == 0
+
+
+def _is_inside(mesh, inner, outer):
+    """Whether the triangles `inner` are inside the closed part of the triangles `outer`: by their winding numbers."""
+    points, shell = mesh.corners[inner].reshape(-1, 3), mesh.corners[outer]
+    low, high = shell.reshape(-1, 3).min(axis=0), shell.reshape(-1, 3).max(axis=0)
+    if (points < low).any() or (points > high).any():
+        return False
+    for point in points[:: -(-len(points) // _MOST_SAMPLES)]:
+        a, b, c = np.moveaxis(shell - point, 1, 0)
+        la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+        dots = [np.einsum("fi,fi->f", *pair) for pair in ((a, b), (b, c), (c, a))]
+        below = la * lb * lc + dots[0] * lc + dots[1] * la + dots[2] * lb
+        # Solid angles [Oosterom83]; -4π or 4π in all inside, as the outer part is wound.
+        solid = 2.0 * np.arctan2(np.linalg.det(np.stack([a, b, c], axis=1)), below).sum()
+        if abs(solid) < 2.0 * np.pi:
+            return False
+    return True

@@ -1,0 +1,382 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kernels of contact.py: the nearest surface of each sample of a strand, as a plane.
+
+A sample is a vertex, but for the root's, or the middle of a segment. Which of them look for a surface says
+contact_needs.cpp, for all lanes at once. Which rows of an array a vector or a plane takes stands in `_index`, and there
+in `row_of`.
+"""
+
+import warp as wp
+
+from ...kernels import native_code
+from .nearest_surface import BACK, Hit, Surface, crossed, nearest
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+BLOCK = 64  # threads of a GPU: of 256, which look for as long as the slowest, a multiprocessor has few at once
+wp.set_module_options({"enable_backward": False, "fuse_fp": False, "block_dim": BLOCK})
+
+PLANE = wp.constant(8)  # rows of an array that a plane takes
+WIDTH = 16  # samples that a thread of the processor takes at once
+NOWHERE = wp.constant(1e9)  # [m] from any collider
+
+MARGIN = wp.constant(1e-3)  # [m] beyond what a point keeps, for what the solver does to it
+MOST_MOTION = wp.constant(0.5)  # [m] of a point in a substep that is looked for: no farther, as it costs
+
+_AHEAD = wp.constant(0.01)  # [m] at most, looked for beyond what is needed, to spare later queries
+
+
+@wp.struct
+class Samples:
+    """Points of strands that ask for a plane, (groups, samples, lanes), and what they keep from substep to substep."""
+
+    rest: wp.array3d[float]  # [m]: the distance in the groom, negative inside, `NOWHERE` where no collider is near
+    sides: wp.array3d[int]  # ± (1 + collider) of the double-sided one nearby, 0: none
+    asked: wp.array3d[float]  # (groups, 3 samples, lanes) [m]: where it last looked for a surface, `Surface.to_rest`
+    clear: wp.array3d[float]  # [m]: how far from there it was at least, less its motion since; negative inside
+
+
+@wp.struct
+class Asking:
+    """How samples ask: as the flags of `Contacts.find` say."""
+
+    is_final: int
+    is_again: int
+    is_skipping: int
+    rise: float  # [m] in this substep, of samples that the groom has inside
+
+
+@wp.func
+def _index(row: int, per_vector: int, component: int):
+    """The row of an array of vectors that holds a component."""
+    return per_vector * row + component
+
+
+@wp.func
+def _vector(values: wp.array3d[float], group: int, row: int, lane: int):
+    x = values[group, _index(row, 3, 0), lane]
+    y = values[group, _index(row, 3, 1), lane]
+    return wp.vec3(x, y, values[group, _index(row, 3, 2), lane])
+
+
+@wp.func
+def _put_vector(values: wp.array3d[float], group: int, row: int, lane: int, vector: wp.vec3):
+    for component in range(3):
+        values[group, _index(row, 3, component), lane] = vector[component]
+
+
+@wp.func
+def _put_plane(
+    planes: wp.array3d[float],
+    group: int,
+    row: int,
+    lane: int,
+    normal: wp.vec3,
+    offset: float,
+    displacement: wp.vec3,
+    friction: float,
+):
+    for component in range(3):
+        planes[group, _index(row, PLANE, component), lane] = normal[component]
+        planes[group, _index(row, PLANE, 4 + component), lane] = displacement[component]
+    planes[group, _index(row, PLANE, 3), lane] = offset
+    planes[group, _index(row, PLANE, 7), lane] = friction
+
+
+@wp.func
+def _sample(values: wp.array3d[float], group: int, sample: int, lane: int, is_middle: int):
+    """The position of a sample: the vertex after the root, or the middle of a segment."""
+    if is_middle == 0:
+        return _vector(values, group, sample + 1, lane)
+    return 0.5 * (_vector(values, group, sample, lane) + _vector(values, group, sample + 1, lane))
+
+
+@wp.func
+def _normal(planes: wp.array3d[float], group: int, row: int, lane: int):
+    x = planes[group, _index(row, PLANE, 0), lane]
+    y = planes[group, _index(row, PLANE, 1), lane]
+    return wp.vec3(x, y, planes[group, _index(row, PLANE, 2), lane])
+
+
+@wp.func
+def _gap(planes: wp.array3d[float], group: int, row: int, lane: int, point: wp.vec3):
+    """How far a point is in front of a plane; `NOWHERE` where there is none."""
+    normal = _normal(planes, group, row, lane)
+    if wp.dot(normal, normal) < 0.5:
+        return NOWHERE
+    return wp.dot(normal, point) - planes[group, _index(row, PLANE, 3), lane]
+
+
+@wp.func_native(
+    native_code.body(
+        __file__,
+        "contact_needs.cpp",
+        WIDTH=WIDTH,
+        PLANE=PLANE,
+        MARGIN=MARGIN,
+        NEAR=0.004,
+        MOST_MOTION=MOST_MOTION,
+        SLACK=1e-5,
+        BACK=BACK,
+        STAYED=1e-7,
+    )
+)
+def _put_needs(
+    group: int,
+    sample: int,
+    first_lane: int,
+    is_middle: int,
+    asking: Asking,
+    surface: Surface,
+    positions: wp.array3d[float],
+    last_positions: wp.array3d[float],
+    middle_planes: wp.array3d[float],
+    samples: Samples,
+    out_planes: wp.array3d[float],
+) -> int: ...
+
+
+@wp.func
+def _look(
+    surface: Surface,
+    positions: wp.array3d[float],
+    last_positions: wp.array3d[float],
+    is_middle: int,
+    group: int,
+    sample: int,
+    lane: int,
+    needed: float,
+    samples: Samples,
+    out_planes: wp.array3d[float],
+):
+    """Write the plane of one sample, if there is a surface as near as `needed`."""
+    row = sample + 1 - is_middle
+    point = _sample(positions, group, sample, lane, is_middle)
+    last = _sample(last_positions, group, sample, lane, is_middle)
+    at_rest = samples.rest[group, sample, lane]
+    now = surface.motions[surface.substep]
+    out_planes[group, _index(row, PLANE, 3), lane] = 0.0
+    largest = wp.min(surface.largest_distance, at_rest)
+    entry = Hit()
+    entry.collider = -1
+    radius = needed + wp.min(0.5 * needed, _AHEAD)
+    hit = nearest(surface, point, last, radius, samples.sides[group, sample, lane])
+    if now.deformation <= BACK and at_rest >= 0.0:
+        start = now.carry * last + now.carry_shift
+        way = wp.length(point - start)
+        # Nothing was passed if no surface is as near as the way is long.
+        if hit.gap <= way + 2.0 * BACK:
+            entry = crossed(surface, point, start, largest)
+            if entry.collider >= 0:
+                needed = wp.max(needed, wp.abs(largest) + wp.min(way, MOST_MOTION) + MARGIN)
+                if needed > radius and hit.collider < 0:
+                    hit = nearest(surface, point, last, needed, samples.sides[group, sample, lane])
+    if now.deformation > BACK and at_rest >= 0.0 and hit.collider >= 0:
+        entry = crossed(surface, point, last + hit.displacement, largest)
+    samples.sides[group, sample, lane] = 0
+    _put_vector(samples.asked, group, sample, lane, now.to_rest * (point - now.moved))
+    samples.clear[group, sample, lane] = hit.gap
+    is_near = hit.collider >= 0 and hit.gap <= needed
+    if entry.collider >= 0 and not (is_near and hit.distance <= 0.0 and wp.dot(hit.normal, entry.normal) > 0.0):
+        hit = entry  # the nearest is not the front of what it came through
+    elif not is_near:
+        return
+    samples.clear[group, sample, lane] = wp.min(samples.clear[group, sample, lane], hit.distance)
+    samples.sides[group, sample, lane] = hit.side
+    settings = surface.settings[hit.collider]
+    offset = wp.dot(hit.normal, hit.place) + wp.min(settings[1], at_rest)
+    if wp.dot(hit.normal, hit.normal) > 0.5:  # not of a face without an area
+        _put_plane(out_planes, group, row, lane, hit.normal, offset, hit.displacement, settings[0])
+
+
+@wp.func
+def _choose(
+    positions: wp.array3d[float],
+    middle_planes: wp.array3d[float],
+    sample_count: int,
+    group: int,
+    vertex: int,
+    lane: int,
+    planes: wp.array3d[float],
+):
+    """Give a vertex the plane of a segment beside it whose middle is less in front of its own."""
+    point = _vector(positions, group, vertex, lane)
+    own = _normal(planes, group, vertex, lane)
+    least = _gap(planes, group, vertex, lane, point)
+    chosen = int(-1)
+    for segment in range(vertex - 1, wp.min(vertex + 1, sample_count)):
+        gap = _gap(middle_planes, group, segment, lane, _sample(positions, group, segment, lane, 1))
+        # A segment across a thin part has its ends on either side: it does not pull one through to the other.
+        if gap < least and wp.dot(own, _normal(middle_planes, group, segment, lane)) >= 0.0:
+            least = gap
+            chosen = segment
+    if chosen < 0:
+        return
+    for row in range(PLANE):
+        value = middle_planes[group, _index(chosen, PLANE, row), lane]
+        planes[group, _index(vertex, PLANE, row), lane] = value
+    # The plane through the vertex that is as far behind it as the middle is behind its own: a segment whose middle
+    # touches moves as a whole, and one that lies in the groom as it does is not turned.
+    normal = _normal(planes, group, vertex, lane)
+    planes[group, _index(vertex, PLANE, 3), lane] = wp.dot(normal, point) - least
+
+
+@wp.func
+def _look_in(
+    surface: Surface,
+    positions: wp.array3d[float],
+    last_positions: wp.array3d[float],
+    middle_planes: wp.array3d[float],
+    sample_count: int,
+    lanes_at_once: int,
+    is_middle: int,
+    group: int,
+    sample: int,
+    first_lane: int,
+    samples: Samples,
+    out_planes: wp.array3d[float],
+):
+    """Look for a surface in those lanes of which `_put_needs` said so."""
+    row = sample + 1 - is_middle
+    for lane in range(first_lane, first_lane + lanes_at_once):
+        if wp.length_sq(_normal(out_planes, group, row, lane)) > 0.0:
+            continue  # it keeps its plane
+        needed = out_planes[group, _index(row, PLANE, 3), lane]
+        is_beside = out_planes[group, _index(row, PLANE, 7), lane] > 0.0
+        if is_beside:
+            out_planes[group, _index(row, PLANE, 7), lane] = 0.0
+        if needed > 0.0:
+            _look(surface, positions, last_positions, is_middle, group, sample, lane, needed, samples, out_planes)
+        if is_beside:
+            _choose(positions, middle_planes, sample_count, group, row, lane, out_planes)
+
+
+@wp.func
+def find_in(
+    surface: Surface,
+    asking: Asking,
+    positions: wp.array3d[float],
+    last_positions: wp.array3d[float],
+    middle_planes: wp.array3d[float],
+    is_middle: int,
+    group: int,
+    first_sample: int,
+    samples_at_once: int,
+    first_lane: int,
+    lanes_at_once: int,
+    samples: Samples,
+    out_planes: wp.array3d[float],
+) -> int:
+    """Write the planes of some samples of some lanes; whether any of them looked for a surface."""
+    is_near = int(0)
+    for sample in range(first_sample, first_sample + samples_at_once):
+        is_any = _put_needs(
+            group,
+            sample,
+            first_lane,
+            is_middle,
+            asking,
+            surface,
+            positions,
+            last_positions,
+            middle_planes,
+            samples,
+            out_planes,
+        )
+        if is_any != 0:
+            is_near = 1
+            _look_in(
+                surface,
+                positions,
+                last_positions,
+                middle_planes,
+                samples.rest.shape[1],
+                lanes_at_once,
+                is_middle,
+                group,
+                sample,
+                first_lane,
+                samples,
+                out_planes,
+            )
+    return is_near
+
+
+@wp.func
+def any_moved(moved: wp.array3d[float], group: int, first_lane: int, lanes_at_once: int) -> int:
+    """Whether a strand of some lanes has moved."""
+    for lane in range(first_lane, first_lane + lanes_at_once):
+        if moved[group, 0, lane] != 0.0:
+            return 1
+    return 0
+
+
+@wp.kernel
+def find_planes(
+    surface: Surface,
+    asking: Asking,
+    positions: wp.array3d[float],
+    last_positions: wp.array3d[float],
+    middle_planes: wp.array3d[float],
+    is_middle: int,
+    moved: wp.array3d[float],
+    samples_at_once: int,
+    lanes_at_once: int,
+    first: int,
+    # outputs
+    samples: Samples,
+    out_planes: wp.array3d[float],
+):
+    thread = first + wp.tid()
+    part_count = positions.shape[2] // lanes_at_once
+    run_count = samples.rest.shape[1] // samples_at_once
+    first_lane = (thread % part_count) * lanes_at_once
+    first_sample = ((thread // part_count) % run_count) * samples_at_once
+    group = thread // (part_count * run_count)
+    if asking.is_again != 0:
+        if any_moved(moved, group, first_lane, lanes_at_once) == 0:
+            return
+    find_in(
+        surface,
+        asking,
+        positions,
+        last_positions,
+        middle_planes,
+        is_middle,
+        group,
+        first_sample,
+        samples_at_once,
+        first_lane,
+        lanes_at_once,
+        samples,
+        out_planes,
+    )
+
+
+@wp.kernel
+def measure(
+    surface: Surface,
+    positions: wp.array3d[float],
+    is_middle: int,
+    radius: float,
+    samples_at_once: int,
+    lanes_at_once: int,
+    first: int,
+    # outputs
+    samples: Samples,
+):
+    thread = first + wp.tid()
+    part_count = positions.shape[2] // lanes_at_once
+    run_count = samples.rest.shape[1] // samples_at_once
+    first_lane = (thread % part_count) * lanes_at_once
+    first_sample = ((thread // part_count) % run_count) * samples_at_once
+    group = thread // (part_count * run_count)
+    for sample in range(first_sample, first_sample + samples_at_once):
+        for lane in range(first_lane, first_lane + lanes_at_once):
+            point = _sample(positions, group, sample, lane, is_middle)
+            samples.rest[group, sample, lane] = NOWHERE
+            samples.sides[group, sample, lane] = 0
+            if wp.isfinite(wp.length(point)):
+                hit = nearest(surface, point, point, radius, 0)
+                if hit.collider >= 0:
+                    samples.rest[group, sample, lane] = hit.distance
+                    samples.sides[group, sample, lane] = hit.side

@@ -1,0 +1,170 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of the simulation of guides: material, forces, shape, collision, solver.
+
+All are in units of the SI, so a groom moves alike at any number of vertices, frame rate and number of substeps.
+"""
+
+from dataclasses import dataclass
+
+from ...params import Settings, param
+
+
+@dataclass(frozen=True)
+class DynamicsSettings(Settings):
+    """What simulated guides are made of, and what acts on them."""
+
+    bend_stiffness: float = param(
+        8.0,
+        "Stiffness of bending, as a multiple of one fiber's; a guide stands for a wisp of hair, which is stiffer the"
+        " more its fibers stick together",
+        low=1e-3,
+        high=1e4,
+        soft_high=1e3,
+    )
+    twist_stiffness: float = param(
+        1.0, "Stiffness of twisting, as a multiple of what the stiffness of bending gives", low=1e-3, high=1e3
+    )
+    stretch_stiffness: float = param(
+        1.0,
+        "Stiffness of stretching, as a multiple of hair's; at 1 hair does not stretch, lower values are for cartoons",
+        low=1e-5,
+        high=1.0,
+        precision=5,
+    )
+    tip_stiffness: float = param(
+        1.0, "Stiffness of bending and twisting at the tip, as a multiple of that at the root", low=0.0, high=4.0
+    )
+    damping: float = param(
+        0.005,
+        "Time in seconds over which bending and twisting are damped; higher values stop vibration sooner",
+        low=0.0,
+        high=0.5,
+        precision=4,
+    )
+    weight: float = param(1.0, "Weight of the hair, as a multiple of its fibers'", low=0.1, high=10.0, soft_high=4.0)
+    wetness: float = param(
+        0.0,
+        "Water in the hair: makes it heavier and softer, and lets it clump and feel less air",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    youngs_modulus: float = param(
+        4.0,
+        "Young's modulus of a fiber in GPa; higher values make hair harder to bend and stretch",
+        label="Young's modulus",
+        above=0.0,
+        high=1e3,
+        soft_high=20.0,
+    )
+    shear_modulus: float = param(
+        0.9,
+        "Shear modulus of a fiber in GPa; higher values make hair harder to twist",
+        above=0.0,
+        high=1e3,
+        soft_high=20.0,
+    )
+    fibre_radius: float = param(
+        4e-5,
+        "Radius of a fiber in meters, whatever the units of the scene; thicker fibers are stiffer for their weight",
+        label="Fiber radius",
+        low=1e-6,
+        high=1e-2,
+        soft_high=1e-3,
+        precision=6,
+    )
+    density: float = param(1300.0, "Density of a fiber in kg/m³", low=1.0, high=1e5, soft_high=4e3, precision=1)
+    gravity: float = param(1.0, "Multiple of the scene's gravity", low=-100.0, high=100.0, soft_high=2.0)
+    air_drag: float = param(1.0, "Multiple of the drag of the air", low=0.0, high=1e3, soft_high=10.0)
+    force_fields: float = param(1.0, "Multiple of the scene's force fields", low=-1e3, high=1e3, soft_high=10.0)
+    inertia: float = param(
+        1.0,
+        "Part of the surface's rigid motion that the hair feels; lower values calm hair on fast characters",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    hold: float = param(
+        0.0, "Strength of the pull back to the combed shape in 1/s²", low=0.0, high=1e4, soft_high=1e3, precision=1
+    )
+    hold_tip: float = param(
+        1.0,
+        "Strength of the pull to the combed shape at the tip, as a part of that at the root",
+        label="Tip hold",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+    sag_free: bool = param(
+        True, "Let the combed shape be at rest under gravity, so that it does not sag", label="Sag-Free"
+    )
+    pinned: float = param(
+        0.0, "Part of each guide, from the root, that only follows the surface", low=0.0, high=1.0, subtype="FACTOR"
+    )
+    collides_with_surface: bool = param(
+        True, "Keep the hair outside the surface it grows on", label="Collide with surface"
+    )
+    colliders: str = param("", "Collection of the meshes that the hair collides with")
+    keeps_hair_outside: bool = param(
+        False,
+        "Keep the hair between guides outside too, in renders and exports; while playing, hair may pass through",
+        label="Keep hair outside",
+    )
+    collision_distance: float = param(
+        1e-3,
+        "Distance that the hair keeps from colliders",
+        low=0.0,
+        high=1e3,
+        soft_high=0.02,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+    )
+    friction: float = param(0.3, "Coefficient of friction on colliders", low=0.0, high=2.0)
+    hair_friction: float = param(
+        2.0, "Friction between strands in 1/s; higher values make hair move together", low=0.0, high=1e3, soft_high=20.0
+    )
+    hair_pressure: float = param(
+        0.5, "Pressure between strands in m²/s² that keeps the volume of the hair", low=0.0, high=1e3, soft_high=10.0
+    )
+    cell_size: float = param(
+        0.0,
+        "Size of the cells in which friction and pressure between strands are found; 0 is automatic",
+        low=0.0,
+        high=1e3,
+        soft_high=0.1,
+        unit="LENGTH",
+        subtype="DISTANCE",
+        precision=4,
+    )
+    vertex_count: int = param(
+        25,
+        "Number of points of a simulated guide; curls need about 12 a turn",
+        label="Points per guide",
+        low=4,
+        high=65,
+    )
+    automatic_substeps: bool = param(True, "Take more substeps in frames of fast motion")
+    substeps: int = param(4, "Least number of steps that a frame is simulated in", low=1, high=64)
+    teleport_distance: float = param(
+        1.0,
+        "Distance in meters that a root may move in a frame; farther jumps take the hair along as it is",
+        above=0.0,
+        high=1e6,
+        soft_high=10.0,
+    )
+    time_scale: float = param(1.0, "Multiple of the speed of time", low=0.0, high=100.0, soft_high=4.0)
+    preroll: int = param(
+        0,
+        "Number of frames that are simulated before the first one, with the surface still",
+        low=0,
+        high=10_000,
+        soft_high=250,
+    )
+    start_frame: int = param(1, "First frame, which shows the hair as combed", low=-(2**20), high=2**20)
+    size: float = param(
+        1.0,
+        "Real size as a multiple of the modeled size; decrease it for characters modeled larger than life",
+        above=0.0,
+        high=1e6,
+    )
