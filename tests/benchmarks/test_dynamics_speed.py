@@ -15,6 +15,7 @@ import warp as wp
 import hair_addon
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.groom.dynamics import guide_simulation
+from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair, simulated_hair
 from hair_addon.blender.settings import preferences
 from hair_addon.core.dynamics import root_motion, simulation
@@ -330,7 +331,7 @@ def _play(monkeypatch):
     for frame, angle in ((1, 0.0), (7, 0.3), (13, -0.3), (19, 0.3)):
         bend.angle = angle
         bend.keyframe_insert("angle", frame=frame)
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     monkeypatch.setattr(preferences, "device", lambda: DEVICE)
     bpy.ops.vellus.add_hair(guide_count=1000, length=LENGTH, strand_count=100_000)
     guides, hair = (bpy.data.hair_curves[name] for name in ("Guides", "Hair"))

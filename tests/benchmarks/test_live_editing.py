@@ -14,7 +14,8 @@ import pytest
 
 import hair_addon
 from hair_addon.blender.data import curves, scene
-from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.host import running
+from hair_addon.blender.live import events, invalidation, live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture
 from tests.support.counting import counts_of
 from tests.support.meshes import HEAD
@@ -104,7 +105,7 @@ def drawing_place():
 @pytest.mark.long
 @pytest.mark.parametrize("strand_count", [30_000, 100_000])
 def test_live_editing(head, strand_count, monkeypatch):
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     bpy.ops.vellus.distribute_guides(guide_count=_GUIDE_COUNT)
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     bpy.ops.vellus.interpolate_hair(strand_count=strand_count)
@@ -118,9 +119,9 @@ def test_live_editing(head, strand_count, monkeypatch):
     edit_and_draw = median_ms(lambda: (comb(guides), view.redraw()))
     assert counts["searches"] == counts["uploads"] == counts["writes"] == 0
     monkeypatch.undo()
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     write = median_ms(lambda: (comb(guides), live_hair.write_all())) - edit
-    whole = median_ms(lambda: (invalidation.strands_made(hair), on_gpu(hair)))
+    whole = median_ms(lambda: (events.strands_made(hair), on_gpu(hair)))
 
     basis = head.shape_key_add(name="Basis")
     key = head.shape_key_add(name="Key")

@@ -13,6 +13,7 @@ import pytest
 import hair_addon
 from hair_addon import api
 from hair_addon.blender.groom import bindings
+from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.settings import style_items
 from hair_addon.core.styling import clump, curl, frizz, steps
@@ -31,7 +32,7 @@ def hair(monkeypatch):
     hair_addon.register()
     _surface, guides = hair_peers.head_with_guides()
     way = hair_peers.Ours.grown(guides, STRAND_COUNT)
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     yield way
     live_hair.cancel_writing()
     invalidation.data_replaced()

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.groom import bindings
+from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from tests.support.following import assert_follows
@@ -30,7 +31,7 @@ def update():
 @pytest.fixture
 def window(monkeypatch):
     """Act as in a window, where the picture is ahead of the Curves until `write_all`."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     yield
     live_hair.cancel_writing()
     invalidation.data_replaced()
@@ -132,7 +133,7 @@ CHANGES = [change_guide_length, comb, change_radius, change_strand_count, edit_m
 @pytest.mark.parametrize("is_window", [False, True])
 def test_emptied_hair_is_kept_after_changes(hair, monkeypatch, tmp_path, change, is_window, is_reloaded):
     """It counts as edited by hand, and says so; the operator of its button grows it again."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: is_window)
+    monkeypatch.setattr(running, "has_window", lambda: is_window)
     empty(hair)
     if is_reloaded:
         bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "emptied.blend"))

@@ -8,6 +8,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.data import curves
 from hair_addon.blender.groom import bindings, pipeline
+from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.ui import panels
@@ -47,7 +48,7 @@ def test_what_is_drawn_and_exported_is_where_the_surface_carries_it(ragged, sphe
 
 @pytest.mark.parametrize("kind", ["POLY", "CATMULL_ROM"])
 def test_strands_follow_a_stroke_as_if_made_anew(ragged, sphere, monkeypatch, kind):
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     ragged.data.set_types(type=kind)
     hair = bpy.data.objects["Hair"]
     counts = curves.point_counts(ragged.data)

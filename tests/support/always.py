@@ -9,7 +9,7 @@ import numpy as np
 
 from hair_addon.blender.data import curves as curves_door
 from hair_addon.blender.host import running
-from hair_addon.blender.live import handlers, invalidation
+from hair_addon.blender.live import events, handlers
 from hair_addon.blender.render import hair_cache, viewport
 from hair_addon.blender.ui import menus
 from hair_addon.core.errors import HairError
@@ -109,9 +109,9 @@ def what_is_drawn_is_what_is_there():
     bpy.context.view_layer.update()
     for datablock in {o.data for o in bpy.context.view_layer.objects if o.type == "CURVES"} & {*ours()}:
         kept = _drawn_points(datablock)
-        invalidation.strands_made(datablock)
+        events.strands_made(datablock)
         if datablock.surface is not None:
-            invalidation.surface_moved(datablock.surface)
+            events.surface_moved(datablock.surface)
         fresh = _drawn_points(datablock)
         assert fresh is None or _are_alike(kept, fresh), _difference(datablock, kept, fresh)
 

@@ -1,13 +1,22 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The running long operation, if any: panels show it, handlers wait for it, unregistering ends it.
+"""The running long operation, if any, and whether there is a window for one.
+
+Panels show it, handlers wait for it, unregistering ends it.
 
 There is at most one: its operator blocks all input except Esc and navigation until it has ended.
 """
 
 import contextlib
 
+import bpy
+
 _job = None
 _timer = None
+
+
+def has_window():
+    """Whether there is a window, and timers run."""
+    return not bpy.app.background
 
 
 def job():

@@ -8,10 +8,9 @@ from ...core.errors import HairError
 from ..data import frame_animation
 from ..groom import guide_regions, staleness
 from ..groom.dynamics import frame_folders, guide_baking
-from ..host import notices, scene_time
+from ..host import notices, running, scene_time
 from ..host.caches import Cache
 from ..settings import properties, shared_wetness
-from . import live_hair
 
 _OTHER = {
     frame_animation.SURFACE: "Frames from {frame} on are baked with another animation of the surface: bake again",
@@ -68,7 +67,7 @@ def check_animation(guides, frame, blender_scene, depsgraph):
     if what is None:
         changed.pop(number, None)
         return
-    if not changed and not live_hair.has_window():
+    if not changed and not running.has_window():
         notices.say(f'Guides "{notices.name_of(guides)}": {_OTHER[what].format(frame=number)}.')
     changed[number] = what
 

@@ -12,7 +12,7 @@ from ..host.notices import name_of
 from ..materials import looks
 from ..render import composite
 from ..settings import animated, style_items
-from . import every_frame, invalidation, live_hair, older_files, reported, simulated_hair, unlocked_renders
+from . import events, every_frame, invalidation, live_hair, older_files, reported, simulated_hair, unlocked_renders
 
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
 _is_opening = False
@@ -27,7 +27,7 @@ def after_depsgraph_update(scene, depsgraph):
     if not scene_time.is_shown(depsgraph):
         return
     global _is_opening, _is_undone
-    invalidation.scene_changed(is_hair_only=_is_hair_only(depsgraph))
+    events.scene_changed(is_hair_only=_is_hair_only(depsgraph))
     if any(isinstance(update.id, bpy.types.Scene) for update in depsgraph.updates):
         looks.follow_guides(depsgraph.view_layer)
         composite.follow(scene)
@@ -39,7 +39,7 @@ def after_depsgraph_update(scene, depsgraph):
         return
     changed = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
     for surface_object in _deformed(depsgraph):
-        invalidation.surface_moved(surface_object)
+        events.surface_moved(surface_object)
         # Hair waits until the surface leaves edit and paint modes.
         if surface_object.mode == "OBJECT":
             live_hair.follow_surface(surface_object, depsgraph, surface_object.data in changed)
@@ -55,13 +55,13 @@ def after_depsgraph_update(scene, depsgraph):
             if datablock.vellus.is_live and live_hair.is_left_by_undo(datablock):
                 datablock.vellus.is_stale = True
     if any(isinstance(update.id, bpy.types.Image | bpy.types.World) for update in depsgraph.updates):
-        invalidation.image_changed()
+        events.image_changed()
     painted = {update.id.original for update in depsgraph.updates if isinstance(update.id, bpy.types.Image)}
     _mark_painted(painted, depsgraph)
     combed = {}
     for datablock in changed:
         if isinstance(datablock, bpy.types.Curves):
-            invalidation.curves_reported(datablock)
+            events.curves_reported(datablock)
             if datablock.vellus.kind == "GUIDES" and reported.have_guides_moved(datablock):
                 combed[datablock] = reported.points_of(datablock)
     bindings.is_reported()
@@ -136,7 +136,7 @@ def _evaluate(depsgraph, combed):
             looks.evaluate_guides(guides)
         if guides.vellus.is_stale and guides.vellus.is_live and _is_surface_at_rest(guides):
             pipeline.evaluate(guides, depsgraph)
-            invalidation.strands_made(guides)
+            events.strands_made(guides)
             live_hair.follow_mask(guides, depsgraph)
             combed[guides] = None  # to be read
     for hair in _of_kind("HAIR"):
@@ -168,9 +168,9 @@ def before_frame_change(_scene, _depsgraph):
 def after_frame_change(scene, depsgraph):
     """Deform strands with their surfaces in this frame; regenerate animated hair, in renders too."""
     if scene_time.is_shown(depsgraph):
-        invalidation.scene_changed()
+        events.scene_changed()
         for surface_object in _deformed(depsgraph):
-            invalidation.surface_moved(surface_object)
+            events.surface_moved(surface_object)
     if scene_time.may_write(scene, depsgraph) and animated.follow(depsgraph):
         # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
         is_render = scene_time.is_rendered(depsgraph)

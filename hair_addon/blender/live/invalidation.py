@@ -54,31 +54,6 @@ PROGRAMS = (shaders.program_cache,)
 CACHES = COPIES + OTHERS + PROGRAMS
 
 
-def scene_changed(is_hair_only=False):
-    """Anything was changed, hidden or shown: viewports read their scenes again; is_hair_only: nothing but hair."""
-    viewport.invalidate(is_hair_only=is_hair_only)
-
-
-def curves_reported(datablock):
-    """Blender reports a Curves datablock as changed, which it may be: its strands, and what binds them."""
-    hair_cache.invalidate_unless_same(datablock)
-
-
-def strands_made(datablock):
-    """Guides or hair were computed again: strands of the datablock."""
-    hair_cache.strand_cache.invalidate(datablock.session_uid)
-
-
-def surface_moved(surface_object):
-    """A surface may have another shape: its pose, and by it where strands are."""
-    hair_cache.invalidate_pose(surface_object)
-
-
-def image_changed():
-    """Pixels of images, or a world, may be others: the world's light. Each render looks by itself."""
-    world_texture.check_image()
-
-
 def data_replaced():
     """Undo or redo: all copies of data."""
     for cache in COPIES:

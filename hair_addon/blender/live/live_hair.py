@@ -12,21 +12,17 @@ import bpy
 from ...core.errors import HairError
 from ..data import curves, drawn_lines, masks, simulated_guides
 from ..groom import bindings, edited_surfaces, hair_outside, painted_masks, pipeline, staleness, writing
+from ..host import running
 from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
-from . import invalidation, reported
+from . import events, reported
 
 # Seconds without a change after which an interaction is over, unless its operator still runs.
 _PAUSE = 0.3
 
 # Name prefixes of operators that move guides while a mouse button is held.
 _STROKES = ("SCULPT_CURVES_OT_", "CURVES_OT_", "TRANSFORM_OT_")
-
-
-def has_window():
-    """Whether there is a window, and timers run."""
-    return not bpy.app.background
 
 
 def follow_guides(hair, depsgraph, local=None):
@@ -59,7 +55,7 @@ def follow_guides(hair, depsgraph, local=None):
 def show_guides(guides, points, depsgraph):
     """Show guides at (G, POINT_COUNT, 3) simulated points, as `simulated_guides.show`, and let their hair follow."""
     simulated_guides.show(guides, points)
-    invalidation.strands_made(guides)
+    events.strands_made(guides)
     for hair in curves.followers(guides):
         if hair.vellus.is_live:
             follow_guides(hair, depsgraph)
@@ -77,13 +73,13 @@ def show_styles(depsgraph):
             bound = bindings.of(hair)
         if bound is not None and is_styled != (bound.straight is None):
             bound.show_styles(is_styled)
-            invalidation.strands_made(hair)
+            events.strands_made(hair)
 
 
 def _is_combed_straight(state):
     """Whether the guides of hair with styles are in Sculpt Mode, and it is to be shown without these."""
     guides = state.guide_curves
-    if guides is None or guides.vellus.shows_styles_while_combing or not len(state.styles) or not has_window():
+    if guides is None or guides.vellus.shows_styles_while_combing or not len(state.styles) or not running.has_window():
         return False
     return any(o.mode == "SCULPT_CURVES" and o.data == guides for o in bpy.data.objects)
 
@@ -93,11 +89,11 @@ def make_again(hair, depsgraph):
     if curves.follows_library(hair) and simulated_guides.is_shown(hair.vellus.guide_curves):
         _follow_linked(hair, depsgraph)
         return
-    if not has_window():
+    if not running.has_window():
         pipeline.evaluate(hair, depsgraph)
         if _follow_simulated(hair):
             _write(hair)
-        invalidation.strands_made(hair)
+        events.strands_made(hair)
         return
     try:
         curves.require_editable(hair)
@@ -114,7 +110,7 @@ def make_again(hair, depsgraph):
         hair.vellus.is_stale = False
         hair.vellus.status = str(error)
         return
-    invalidation.strands_made(hair)
+    events.strands_made(hair)
     write_soon(hair)
 
 
@@ -129,7 +125,7 @@ def _follow_linked(hair, depsgraph):
     bound.is_written = bound.has_moved_only = bound.is_map_written = True  # by its own file
     bindings.keep(hair, bound)
     _follow_simulated(hair)
-    invalidation.strands_made(hair)
+    events.strands_made(hair)
     write_soon(hair)
 
 
@@ -153,7 +149,7 @@ def _restyled(hair):
     if bindings.of(hair).is_written:  # with the same styles as before
         state.is_stale = False
         return
-    invalidation.strands_made(hair)
+    events.strands_made(hair)
     write_soon(hair)
 
 
@@ -193,7 +189,7 @@ def _write(hair):
         writing.write_hair(hair)
         bound = bindings.of(hair)
         if bound is not None and bound.free is not None:
-            invalidation.strands_made(hair)  # of which some were kept outside
+            events.strands_made(hair)  # of which some were kept outside
     except HairError as error:
         bindings.invalidate(hair)
         hair.vellus.status = str(error)
@@ -208,7 +204,7 @@ def cancel_writing():
 
 def write_soon(hair):
     """Write hair after a pause in which nothing changes, without a window at once."""
-    if not has_window():
+    if not running.has_window():
         _write(hair)
         return
     cancel_writing()  # put off with every change: a stroke brings many
@@ -248,7 +244,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
             state.status = str(error)
             continue
         if was_edited:
-            invalidation.strands_made(guides)
+            events.strands_made(guides)
             mark_followers(guides)
     for hair in bpy.data.hair_curves if is_mesh_edited else ():
         state = hair.vellus

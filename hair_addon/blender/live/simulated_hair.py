@@ -45,7 +45,7 @@ def follow_frame(blender_scene, depsgraph):
     """
     if running.job() is not None or guide_baking.is_baking():
         return
-    is_played = scene_time.is_shown(depsgraph) and live_hair.has_window()
+    is_played = scene_time.is_shown(depsgraph) and running.has_window()
     time = scene_time.time_of(blender_scene)
     shown_in = depsgraph if scene_time.is_shown(depsgraph) else scene.present_depsgraph()
     for guides in frame_folders.simulating():
@@ -86,7 +86,7 @@ def follow_settings(blender_scene, depsgraph):
 
 def follow_undo(blender_scene, depsgraph):
     """After an undo, a redo or a load, which show guides as they are combed: show them where they were simulated."""
-    for guides in frame_folders.simulating() if live_hair.has_window() else ():
+    for guides in frame_folders.simulating() if running.has_window() else ():
         try:
             live_hair.show_guides(guides, _known(guides, blender_scene), depsgraph)
         except HairError as error:

@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon.blender.data import curves, follow_nodes, scene
-from hair_addon.blender.live import invalidation
+from hair_addon.blender.live import events
 from hair_addon.core.grooming import following
 from tests.support.counting import counts_of
 from tests.support.following import assert_follows, drawn_points, grow, surface_points, update
@@ -278,5 +278,5 @@ def test_guides_that_were_told_other_roots_are_carried_from_there(sphere):
     curves.write_roots(guides.data, surface, roots[::-1])
     update()
     drawn = drawn_points(guides)
-    invalidation.strands_made(guides.data)
+    events.strands_made(guides.data)
     np.testing.assert_array_equal(drawn, drawn_points(guides))

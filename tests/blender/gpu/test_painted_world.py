@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.gpu import lights, world_texture
-from hair_addon.blender.live import invalidation
+from hair_addon.blender.live import events, invalidation
 from hair_addon.core.errors import HairError
 from tests.blender.gpu.test_world_texture import environment_node
 from tests.support.rendering import rendered
@@ -128,7 +128,7 @@ def test_an_image_that_could_not_be_read_is_read_again(dark, tmp_path, monkeypat
     environment_node(dark, image)
     _lobes, before = world_texture.light_of(lights.read_world(dark))
     paint_and_pack(image, tmp_path)
-    invalidation.image_changed()
+    events.image_changed()
 
     def fail(_world):
         raise HairError("The world's image cannot be read.")

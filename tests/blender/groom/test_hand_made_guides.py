@@ -8,6 +8,7 @@ from mathutils import Matrix
 
 from hair_addon.blender.data import curves
 from hair_addon.blender.groom import pipeline
+from hair_addon.blender.host import running
 from hair_addon.blender.live import live_hair
 from hair_addon.core.grooming.groom import GuideSettings
 from hair_addon.core.params import declared
@@ -283,7 +284,7 @@ def test_an_edited_surface_carries_them_and_they_stay_hand_made(imported, head):
 def test_hair_follows_them_while_they_are_combed(imported, monkeypatch):
     """Guides of mixed point counts, in a window: strands follow a stroke without being bound again."""
     use(imported)
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     hair = bpy.data.objects["Hair"]
     before = stored(hair)
     bound = live_hair.bindings.of(hair.data)

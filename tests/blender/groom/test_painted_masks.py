@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.groom import bindings
+from hair_addon.blender.host import running
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.settings import style_items
 from hair_addon.core.styling import curl, trim
@@ -277,7 +278,7 @@ def test_masks_need_hair_with_styles(hair):
 
 
 def test_in_a_window_hair_is_drawn_first_and_written_afterwards(styled, monkeypatch):
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     bpy.ops.vellus.paint_style_mask()
     weigh("Trim Mask", right)
     live_hair.write_all()

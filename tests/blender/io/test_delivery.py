@@ -9,9 +9,8 @@ import pytest
 
 from hair_addon.blender.data import follow_nodes
 from hair_addon.blender.groom.dynamics import dynamics_notes, frame_folders, guide_baking
-from hair_addon.blender.host import paths
+from hair_addon.blender.host import paths, running
 from hair_addon.blender.io import delivery
-from hair_addon.blender.live import live_hair
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import Stopped, run_now
 from tests.support.delivered import without_addon
@@ -270,7 +269,7 @@ def test_all_hair_of_the_guides_is_delivered_whatever_its_name_and_the_frame_rat
 def test_in_a_window_hair_is_followed_although_an_operator_runs(window, shot, monkeypatch):
     """Viewports go first there, and nothing else follows while long work runs."""
     before = live((4.0, 4.75))
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     operator = Operator(delivery.delivering(shot, delivery.path_of(shot), bpy.context.scene))
     assert drive(operator, window) == {"FINISHED"}
     monkeypatch.undo()

@@ -11,6 +11,7 @@ import pytest
 from hair_addon.blender.data import curves
 from hair_addon.blender.gpu import strand_textures
 from hair_addon.blender.groom import bindings, pipeline
+from hair_addon.blender.host import running
 from hair_addon.blender.live import handlers, invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.grooming import following
@@ -22,7 +23,7 @@ from tests.support.reading import attribute, points, write_points
 @pytest.fixture
 def window(monkeypatch):
     """Act as in a window: hair is written when an interaction is over, which the test says by `write_all`."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     yield
     live_hair.cancel_writing()
     invalidation.data_replaced()

@@ -11,8 +11,9 @@ import pytest
 
 import hair_addon
 from hair_addon.blender.data import scene as scene_door
+from hair_addon.blender.host import running
 from hair_addon.blender.host.caches import Cache
-from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.live import events, invalidation
 from hair_addon.blender.render import hair_cache, hair_picture, viewport
 from tests.blender.gpu.test_world_texture import environment_node
 from tests.blender.render.test_hair_places import view3d
@@ -161,7 +162,7 @@ def spoil():
 def undo():
     """What a window shows ahead of the hair's Curves."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(live_hair, "has_window", lambda: True)
+        patch.setattr(running, "has_window", lambda: True)
         bpy.data.objects["Hair"].data.vellus.hair.strand_count = 300
         changed("fewer strands")
         assert len(seen()["strands here"]) == 300
@@ -190,8 +191,8 @@ BROUGHT_BACK = {"data_replaced", "clear"}
 
 
 def test_each_event_has_a_scenario():
-    events = {name for name, value in vars(invalidation).items() if inspect.isfunction(value)}
-    assert events - {"end"} == {*SCENARIOS}
+    named = {name for module in (events, invalidation) for name, it in vars(module).items() if inspect.isfunction(it)}
+    assert named - {"end"} == {*SCENARIOS}
 
 
 def older_than(event, folder):
@@ -216,5 +217,6 @@ def test_nothing_older_than_an_event_is_drawn(stage, event, tmp_path):
     "event", sorted({*SCENARIOS} - {"clear"})
 )  # after which nothing has the number that it had before
 def test_something_older_is_drawn_where_an_event_is_not_told(stage, event, tmp_path, monkeypatch):
-    monkeypatch.setattr(invalidation, event, lambda *_arguments, **_options: None)
+    told = events if hasattr(events, event) else invalidation
+    monkeypatch.setattr(told, event, lambda *_arguments, **_options: None)
     assert older_than(event, tmp_path)

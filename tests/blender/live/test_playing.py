@@ -7,6 +7,7 @@ import pytest
 
 from hair_addon.blender.data import simulated_guides
 from hair_addon.blender.groom.dynamics import guide_baking
+from hair_addon.blender.host import running
 from hair_addon.blender.live import (
     dynamics_state,
     handlers,
@@ -25,7 +26,7 @@ from tests.support.swung import simulate, swing
 @pytest.fixture
 def swung(hair, tmp_path, monkeypatch):
     """(guides, hair) whose sphere swings, and that simulate, as in a window."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     guides = bpy.data.objects["Guides"]
     swing(bpy.data.objects["Sphere"])
     simulate(guides, tmp_path)
@@ -229,7 +230,7 @@ def test_a_surface_without_faces_is_said(swung):
 def test_without_a_window_nothing_is_simulated(swung, monkeypatch):
     """Farms and scripts read baked frames alone."""
     guides, _hair = swung
-    monkeypatch.setattr(live_hair, "has_window", lambda: False)
+    monkeypatch.setattr(running, "has_window", lambda: False)
     play(1, 6)
     assert np.array_equal(shown(guides), points(guides))
 

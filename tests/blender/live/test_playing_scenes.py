@@ -7,6 +7,7 @@ import pytest
 
 from hair_addon.blender.data import guide_poses, simulated_guides
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
+from hair_addon.blender.host import running
 from hair_addon.blender.live import dynamics_state, invalidation, live_hair
 from hair_addon.core.files.frame_cache import FrameCache
 from hair_addon.core.long_work import run_now
@@ -17,7 +18,7 @@ from tests.support.swung import SWINGS, simulate, swing
 @pytest.fixture
 def window(monkeypatch):
     """Guides are simulated while frames change, as in a window."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     yield
     live_hair.cancel_writing()
     invalidation.clear()

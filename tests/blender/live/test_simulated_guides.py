@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.groom import bindings
+from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from tests.support.reading import points, write_points
@@ -14,7 +15,7 @@ from tests.support.reading import points, write_points
 @pytest.fixture(params=[False, True], ids=["background", "window"])
 def followed(hair, request, monkeypatch):
     """(guides, hair), in a Blender without a window, or one that acts as if it had one."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: request.param)
+    monkeypatch.setattr(running, "has_window", lambda: request.param)
     guides = bpy.data.objects["Guides"]
     guides.data.vellus.simulates = True
     yield guides, hair

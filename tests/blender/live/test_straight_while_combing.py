@@ -7,6 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.groom import pipeline
+from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import style_items
@@ -18,7 +19,7 @@ from tests.support.reading import points, write_points
 @pytest.fixture
 def window(monkeypatch):
     """Act as in a window."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     yield
     live_hair.cancel_writing()
     invalidation.data_replaced()

@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from tests.support.reading import points, write_points
@@ -17,7 +18,7 @@ ALONG = "core/geometry/strands.py"
 @pytest.fixture
 def watched(hair, monkeypatch):
     """Hair in a window that shows it, of whose guides one was combed already."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     hair_cache.strands_on_gpu(hair.data)
     comb(1)
     hair_cache.strands_on_gpu(hair.data)

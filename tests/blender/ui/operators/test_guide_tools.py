@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves
+from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from tests.support.counting import counts_of
 from tests.support.following import update
@@ -170,7 +171,7 @@ def test_hair_follows_as_it_follows_a_brush(waved, monkeypatch, name):
 @pytest.mark.parametrize("name", TOOLS)
 def test_undo_in_a_window_keeps_hair_and_guides_together(waved, monkeypatch, name):
     """There the hair's Curves are written when an interaction is over, after the undo step was made."""
-    monkeypatch.setattr(live_hair, "has_window", lambda: True)
+    monkeypatch.setattr(running, "has_window", lambda: True)
     before = points(bpy.data.objects["Guides"]), points(waved)
     use_tool(name)
     live_hair.write_all()
