@@ -19,7 +19,6 @@ if TYPE_CHECKING:
         root_motion,
         simulation,
         stopped_colliders,
-        surface_motions,
     )
 else:
     __getattr__ = submodules(__name__)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         distance_grid,
         nearest_surface,
         rigid_motion,
+        surface_motions,
     )
 else:
     __getattr__ = submodules(__name__)

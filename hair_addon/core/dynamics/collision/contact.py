@@ -14,12 +14,12 @@ import warp as wp
 from ...errors import HairError
 from ...kernels import kernel_cache, parallel
 from ...kernels.checks import require_count
-from ..surface_motions import SurfaceMotions
 from . import contact_queries
 from .colliders import Colliders
 from .contact_queries import PLANE, WIDTH, Asking, Samples
 from .distance_grid import distance_grid
 from .nearest_surface import Surface
+from .surface_motions import SurfaceMotions
 
 RISE = 0.02  # [m/s] at most, of a point that the groom has inside
 LEAST_ROWS = 128  # times `WIDTH` strands that are worth a thread

@@ -5,8 +5,8 @@ from typing import Any
 
 import warp as wp
 
-from .collision.colliders import Colliders
-from .collision.nearest_surface import Motion
+from .colliders import Colliders
+from .nearest_surface import Motion
 
 _SUBSTEPS = 32  # that there is room for from the beginning
 
