@@ -42,29 +42,29 @@ MUTATIONS = (
     Mutation(
         "sign of the gradient",
         ("V1", "V5"),
-        (("rod_rotations.h", _GRADIENT, _OTHER_GRADIENT + "{-bend.x, -bend.y, -bend.z, -bend.w};"),),
+        (("rod/rod_rotations.h", _GRADIENT, _OTHER_GRADIENT + "{-bend.x, -bend.y, -bend.z, -bend.w};"),),
     ),
     Mutation(
         "sign of the bend in the gradient",
         ("V5",),
-        (("rod_rotations.h", _GRADIENT, _OTHER_GRADIENT + " = conjugate(bend);"),),
+        (("rod/rod_rotations.h", _GRADIENT, _OTHER_GRADIENT + " = conjugate(bend);"),),
     ),
     Mutation(
         "one-sided strain",
         ("V5",),
         (
             (
-                "rod_rotations.h",
+                "rod/rod_rotations.h",
                 "times(back, times(times(conjugate(a), b), back))",
                 "times(times(back, back), times(conjugate(a), b))",
             ),
             (
-                "rod_newton.h",
+                "rod/rod_newton.h",
                 "bend_gradient(e, times(frame_a, half))",
                 "bend_gradient(e, times(frame_a, times(half, half)))",
             ),
             (
-                "rod_newton.h",
+                "rod/rod_newton.h",
                 "bend_gradient(e_next, times(frame_b, half))",
                 "bend_gradient(e_next, times(frame_b, times(half, half)))",
             ),
@@ -73,60 +73,66 @@ MUTATIONS = (
     Mutation(
         "no geometric stiffness",
         ("V9",),
-        (("rod_newton.h", "const lanes geometric = carried *", "const lanes geometric = 0.0f * carried *"),),
+        (("rod/rod_newton.h", "const lanes geometric = carried *", "const lanes geometric = 0.0f * carried *"),),
     ),
     Mutation(
         "matrix by the identities of exact rotations",
         ("V14",),
         (
-            ("rod_newton.h", "both * dot(G.row[0], G.row[0])", "both * (1.0f - e.x * e.x)"),
-            ("rod_newton.h", "both * dot(G.row[1], G.row[0])", "both * (-e.y * e.x)"),
-            ("rod_newton.h", "both * dot(G.row[1], G.row[1])", "both * (1.0f - e.y * e.y)"),
-            ("rod_newton.h", "both * dot(G.row[2], G.row[0])", "both * (-e.z * e.x)"),
-            ("rod_newton.h", "both * dot(G.row[2], G.row[1])", "both * (-e.z * e.y)"),
-            ("rod_newton.h", "both * dot(G.row[2], G.row[2])", "both * (1.0f - e.z * e.z)"),
-            ("rod_newton.h", "turning * dot(d, d)", "turning"),
+            ("rod/rod_newton.h", "both * dot(G.row[0], G.row[0])", "both * (1.0f - e.x * e.x)"),
+            ("rod/rod_newton.h", "both * dot(G.row[1], G.row[0])", "both * (-e.y * e.x)"),
+            ("rod/rod_newton.h", "both * dot(G.row[1], G.row[1])", "both * (1.0f - e.y * e.y)"),
+            ("rod/rod_newton.h", "both * dot(G.row[2], G.row[0])", "both * (-e.z * e.x)"),
+            ("rod/rod_newton.h", "both * dot(G.row[2], G.row[1])", "both * (-e.z * e.y)"),
+            ("rod/rod_newton.h", "both * dot(G.row[2], G.row[2])", "both * (1.0f - e.z * e.z)"),
+            ("rod/rod_newton.h", "turning * dot(d, d)", "turning"),
         ),
     ),
     Mutation(
         "frames of any lightness",
         ("V14",),
-        (("rod_solver.py", '"LEAST_INERTIA": 3e-6', '"LEAST_INERTIA": 1e-8'),),
+        (("rod/rod_solver.py", '"LEAST_INERTIA": 3e-6', '"LEAST_INERTIA": 1e-8'),),
     ),
     Mutation(
         "drag after gravity",
         ("V1",),
-        (("rod_predict.h", "get(inverse_mass, i) * share", "get(inverse_mass, i)"),),
+        (("rod/rod_predict.h", "get(inverse_mass, i) * share", "get(inverse_mass, i)"),),
     ),
     Mutation(
         "multipliers missing from the state",
         ("V13",),
-        (("rods.py", '"spins", "multipliers", "slips"', '"spins", "slips"'),),
+        (("rod/rods.py", '"spins", "multipliers", "slips"', '"spins", "slips"'),),
     ),
     Mutation(
         "slips missing from the state",
         ("V13",),
-        (("rods.py", '"multipliers", "slips", "roots"', '"multipliers", "roots"'),),
+        (("rod/rods.py", '"multipliers", "slips", "roots"', '"multipliers", "roots"'),),
     ),
     Mutation(
         "one side of a notch",
         ("V12",),
-        (("rod_finish.h", "repair(is_inside, plane_rows, found_rows)", "repair(is_inside, found_rows, found_rows)"),),
+        (
+            (
+                "rod/rod_finish.h",
+                "repair(is_inside, plane_rows, found_rows)",
+                "repair(is_inside, found_rows, found_rows)",
+            ),
+        ),
     ),
     Mutation(
         "pinched strands that are torn",
         ("V12",),
-        (("rod_finish.h", "(inside < 0.0f) & (is_pinched == 0)", "inside < 0.0f"),),
+        (("rod/rod_finish.h", "(inside < 0.0f) & (is_pinched == 0)", "inside < 0.0f"),),
     ),
     Mutation(
         "contact that holds what is pulled away",
         ("V15",),
-        (("rod_contact.h", "(dot(n, n) > 0.5f) & (push > 0.0f)", "(dot(n, n) > 0.5f)"),),
+        (("rod/rod_contact.h", "(dot(n, n) > 0.5f) & (push > 0.0f)", "(dot(n, n) > 0.5f)"),),
     ),
     Mutation(
         "friction by the way that a point is moved out",
         ("V11",),
-        (("rod_contact.h", "friction * higher_of(push, lanes(0.0f))", "friction * higher_of(-gap, lanes(0.0f))"),),
+        (("rod/rod_contact.h", "friction * higher_of(push, lanes(0.0f))", "friction * higher_of(-gap, lanes(0.0f))"),),
     ),
     Mutation(
         "pressure that does not know the groom",
@@ -141,7 +147,7 @@ MUTATIONS = (
     Mutation(
         "a first frame without the multipliers of the equilibrium",
         ("V17",),
-        (("rods.py", "self._held * (step.size**2", "self._held * (0.0 * step.size**2"),),
+        (("rod/rods.py", "self._held * (step.size**2", "self._held * (0.0 * step.size**2"),),
     ),
 )
 
