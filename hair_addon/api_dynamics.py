@@ -100,7 +100,7 @@ def bake_dynamics(
     last = scene_time.scene_frames()[-1] if last_frame is None else last_frame
     last = plain_value("last_frame", last, 1, _FRAME)
     starts_over = plain_value("starts_over", starts_over, False, _SWITCH)
-    work = blender.groom.guide_baking.baking([target], last, scene_time.present_scene(), starts_over)
+    work = blender.groom.dynamics.guide_baking.baking([target], last, scene_time.present_scene(), starts_over)
     (baked,) = run_now(work, heard(progress))
     target.vellus.simulates = True
     return range(baked.first, baked.last + 1)

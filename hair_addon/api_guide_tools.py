@@ -59,6 +59,6 @@ def change_guides(
         "SMOOTH": tools.smooth,
         "LIFT": tools.lift,
         "ATTRACT": tools.attract,
-        "DRAPE": blender.groom.guide_draping.drape,
+        "DRAPE": blender.groom.dynamics.guide_draping.drape,
     }
     return functions[tool](target, wanted, depsgraph)

@@ -58,7 +58,7 @@ def run(given, console):
     numbers = list(numbers or [blender.host.scene_time.present_frame()])
     blender.io.frames.require_pattern(given.out, len(numbers))
     blender.io.frames.require_view_layer()
-    blender.groom.frame_folders.require_baked(numbers)
+    blender.groom.dynamics.frame_folders.require_baked(numbers)
     blender.io.frames.bind_simulated()
     settings = _frame_settings(given, blender.io.frames.scene_size())
     if blender.io.frames.is_sequence(given.out):

@@ -47,7 +47,9 @@ def run(given, console):
     last = scene_last if given.last_frame is None else given.last_frame
     if given.deliver is not None and last < scene_last:
         raise HairError(f"--deliver needs all frames of the scene, to {scene_last}: leave out --last-frame {last}.")
-    guides = [_named(name) for name in given.guides] if given.guides else blender.groom.frame_folders.simulating()
+    guides = (
+        [_named(name) for name in given.guides] if given.guides else blender.groom.dynamics.frame_folders.simulating()
+    )
     if not guides:
         raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")
     _warn_of_memory(guides, console)
@@ -62,7 +64,7 @@ def run(given, console):
         console.result(values, f"{baked.guides}: frame {baked.frame} in {seconds:.2f} s")
 
     scene = blender.host.scene_time.present_scene()
-    run_now(blender.groom.guide_baking.baking(guides, last, scene, given.overwrite, tell), console.progress)
+    run_now(blender.groom.dynamics.guide_baking.baking(guides, last, scene, given.overwrite, tell), console.progress)
     if given.deliver is not None:
         _deliver(given, guides, scene, console)
 
@@ -89,7 +91,7 @@ def _deliver(given, guides_list, scene, console):
 
 
 def _warn_of_memory(guides, console):
-    part = blender.host.memory.share_of_free(blender.groom.guide_baking.memory_of(guides))
+    part = blender.host.memory.share_of_free(blender.groom.dynamics.guide_baking.memory_of(guides))
     if part > blender.host.memory.MUCH:
         console.warn(f"Simulating takes {round(100.0 * part)} % of the free memory.")
 

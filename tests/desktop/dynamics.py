@@ -252,7 +252,7 @@ def stopped():
 
 
 def frames():
-    folder = addon().groom.frame_folders.folder_of(of_kind("GUIDES").data)
+    folder = addon().groom.dynamics.frame_folders.folder_of(of_kind("GUIDES").data)
     return sorted(int(path.stem) for path in folder.glob("[+-]*.npz"))
 
 
@@ -320,7 +320,7 @@ def loaded():
 def state_after_load():
     """What is wrong after a file was opened: nothing is computed, and hair is where the file has it."""
     blender = addon()
-    is_busy = blender.host.running.job() is not None or blender.groom.guide_baking.is_baking()
+    is_busy = blender.host.running.job() is not None or blender.groom.dynamics.guide_baking.is_baking()
     return [] if not is_busy and np.isfinite(strands()).all() else [state(), is_busy]
 
 
