@@ -142,7 +142,7 @@ MUTATIONS = (
     Mutation(
         "one grid for all regions",
         ("V20",),
-        (("hair_volume.py", "return ((region * grid.counts[0] + x)", "return ((0 * region * grid.counts[0] + x)"),),
+        (("hair_cells.py", "return ((region * grid.counts[0] + x)", "return ((0 * region * grid.counts[0] + x)"),),
     ),
     Mutation(
         "a first frame without the multipliers of the equilibrium",
