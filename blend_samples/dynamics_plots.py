@@ -9,7 +9,8 @@ import numpy as np
 from line_plot import COLORS, REFERENCE, Plot
 from scipy.special import j0
 
-from tests.core.dynamics import test_contact, test_equilibria, test_motion
+from tests.core.dynamics.collision import test_contact
+from tests.core.dynamics.rod import test_equilibria, test_motion
 from tests.support.rod_references import heavy_elastica, kirchhoff
 from tests.support.rods import BENDING, TWISTING, Simulation, arc, line
 
