@@ -143,3 +143,12 @@ def test_a_non_finite_camera_is_reported(lit, owner, name, value, tmp_path, capf
             draw()
     said = capfd.readouterr()
     assert "Traceback" not in said.err + said.out and not [*tmp_path.iterdir()]
+
+
+def test_hair_that_was_scaled_to_a_point_leaves_a_picture(lit, tmp_path):
+    curves = bpy.data.objects["Hair"].data
+    points = curves.attributes["position"].data
+    points.foreach_set("vector", np.full(3 * len(points), 0.2, np.float32))
+    curves.update_tag()
+    update()
+    assert np.isfinite(rendered(tmp_path)).all()

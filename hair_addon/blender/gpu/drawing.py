@@ -37,6 +37,7 @@ class Steps:
 
 
 _ALL = Steps()
+_LEAST_RADIUS = 1e-6  # [m]
 
 # A render runs beside the window, and both share programs and their uniforms: a lock serialises drawing.
 ALONE = threading.RLock()
@@ -90,14 +91,17 @@ def scale_of(object_to_world):
 
 
 def bounding_sphere(hair):
-    """Centre (3,) and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)]."""
+    """Centre (3,) and radius [m] of a sphere around all strands; hair: [(StrandsOnGPU, object to world)].
+
+    The radius is above zero, also of hair that was scaled to a point.
+    """
     corners = []
     for strands, to_world in hair:
         box = np.array(np.meshgrid(*strands.bounds.T)).reshape(3, -1).T
         corners.append(box @ to_world[:3, :3].T + to_world[:3, 3])
     corners = np.concatenate(corners)
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    return centre, float(np.linalg.norm(corners - centre, axis=1).max())
+    return centre, max(float(np.linalg.norm(corners - centre, axis=1).max()), _LEAST_RADIUS)
 
 
 def strand_record(strands, view, object_to_world, steps=_ALL):

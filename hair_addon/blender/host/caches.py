@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A cache: values that may be dropped at any time, and are made again when they are asked for.
 
-Every cache of the add-on stands in blender/live/invalidation.py, which says what makes it stale.
+blender/live/invalidation.py lists every cache of the add-on; blender/live/events.py says what makes them stale.
 """
 
 from functools import wraps

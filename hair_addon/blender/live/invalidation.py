@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What makes caches stale: every cache of the add-on by name, and a function for each event with those it concerns.
+"""Every cache of the add-on by name, and what clears many of them: undo, another file, the end of Python.
 
-After an event nothing is drawn or computed from what was cached before it. Functions of their arguments alone, under
-`functools.cache`, never become stale.
+What makes single ones stale is in `events`. Functions of their arguments alone, under `functools.cache`, never become
+stale.
 """
 
 from ..data import simulated_guides, subdivided_surfaces
