@@ -4,21 +4,34 @@
 
 #include "include/opacity.glsl"
 
+ivec2 here;
+ivec2 last;
+
+vec3 values_at(int tap)
+{
+  vec3 values = texelFetch(surface_depth, clamp(here + tap * along, ivec2(0), last), 0).rgb;
+  if (is_depth != 0) {
+    float warped = warped_depth(values.r);
+    values = vec3(warped, warped * warped, values.r);
+  }
+  return values;
+}
+
 void main()
 {
-  ivec2 here = ivec2(gl_FragCoord.xy);
-  ivec2 last = textureSize(surface_depth, 0) - 1;
-  vec3 total = vec3(0.0);
-  float weights = 0.0;
-  for (int tap = -taps; tap <= taps; tap++) {
-    vec3 values = texelFetch(surface_depth, clamp(here + tap * along, ivec2(0), last), 0).rgb;
-    if (is_depth != 0) {
-      float warped = warped_depth(values.r);
-      values = vec3(warped, warped * warped, values.r);
-    }
-    float weight = exp(-0.5 * float(tap * tap) / (deviation * deviation));
-    total += weight * values;
-    weights += weight;
+  here = ivec2(gl_FragCoord.xy);
+  last = textureSize(surface_depth, 0) - 1;
+  vec3 total = values_at(0);
+  float weights = 1.0;
+  // A Gaussian from tap to tap: the ratio of one weight to the one before falls by the same factor each time.
+  float weight = 1.0;
+  float ratio = exp(-0.5 / (deviation * deviation));
+  float factor = ratio * ratio;
+  for (int tap = 1; tap <= taps; tap++) {
+    weight *= ratio;
+    ratio *= factor;
+    total += weight * (values_at(-tap) + values_at(tap));
+    weights += 2.0 * weight;
   }
   color = vec4(total / weights, 1.0);
 }

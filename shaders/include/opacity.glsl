@@ -21,6 +21,9 @@ const float LEAST_LAYER = 1e-4;
 // Depth of unlit texels.
 const float FAR = 2.0;
 
+// Distance [texels] to which texels without strands take the ends of those around them.
+const int FILL_REACH = 2;
+
 // Depth along a light, from the near side of the hair, as a part of the hair's extent. Depths far outside are clamped
 // to just outside, as depths are averaged.
 float light_depth(int kind, vec3 light_position, vec3 axis, float near, float extent, vec3 position)

@@ -246,41 +246,6 @@ def visibility_program():
 
 
 @kept
-def shadow_fill_program():
-    """The program that fills gaps of `fronts` and `backs`, a deep opacity map's first pass."""
-    return _shadow_filter("shadow_fill.frag", "UINT_2D", ("fronts", "backs"))
-
-
-@kept
-def shadow_counts_program():
-    """The program that makes layers of `counts`, a deep opacity map's second pass where it is computed."""
-    return _shadow_filter("shadow_counts.frag", "UINT_2D", ("counts",))
-
-
-@kept
-def shadow_hidden_program():
-    """The program that finds the depth behind which strands are hidden by the surfaces of `surface_depth`."""
-    return _shadow_filter("shadow_hidden.frag", "FLOAT_2D", ("surface_depth",))
-
-
-@kept
-def shadow_moments_program():
-    """The program that blurs `surface_depth` along an axis: depths if is_depth, else its first result."""
-    constants = (("IVEC2", "along"), ("INT", "taps"), ("INT", "is_depth"), ("FLOAT", "deviation"))
-    return _shadow_filter("shadow_moments.frag", "FLOAT_2D", ("surface_depth",), constants)
-
-
-def _shadow_filter(fragment, kind, samplers, constants=()):
-    info = gpu.types.GPUShaderCreateInfo()
-    info.typedef_source(uniforms.LIGHT.source)
-    for constant in constants:
-        info.push_constant(*constant)
-    for slot, sampler in enumerate(samplers):
-        info.sampler(slot, kind, sampler)
-    return compile_drawing(info, "cover.vert", fragment)
-
-
-@kept
 def environment_program(fragment):
     """The program that draws a picture of the surroundings."""
     info = gpu.types.GPUShaderCreateInfo()

@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from . import drawing, shaders, uniforms
+from . import drawing, shaders, shadow_programs, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 
@@ -37,6 +37,7 @@ class ShadowMaps:
         self._surface_depth = gpu.types.GPUTexture((size, size), format="R32F")
         self._half_blurred = gpu.types.GPUTexture((size, size), format="RGBA32F")
         self._fronts, self._backs = (gpu.types.GPUTexture((size, size), format="R32UI") for _ in range(2))
+        self._row_ends = gpu.types.GPUTexture((size, size), format="RG32F")
         self._counts = gpu.types.GPUTexture((4 * size, size), format="R32UI") if self._in_compute else None
         self._depth = gpu.types.GPUTexture((size, size), format="DEPTH_COMPONENT32F")
 
@@ -70,8 +71,8 @@ class ShadowMaps:
             for surface in surfaces:
                 drawing.draw_surface_depth(surface, view, lights)
         self._blur(layer, _blur_of(lights["light"][layer], self._size))
-        with self._target(self._half_blurred):  # which is free again
-            self._filter(shaders.shadow_hidden_program(), {"surface_depth": self._surface_depth})
+        # The half blurred are free again.
+        self._filter(self._half_blurred, None, shadow_programs.hidden_program(), surface_depth=self._surface_depth)
         self._fronts.clear(format="UINT", value=(_NOTHING,))
         self._backs.clear(format="UINT", value=(0,))
         light_block = uniforms.uniform_buffer(lights)
@@ -92,8 +93,7 @@ class ShadowMaps:
         self._counts.clear(format="UINT", value=(0,))
         for strands, record in placed:
             drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 0})
-        with self._target(self._hair_layers, layer):
-            self._filter(shaders.shadow_counts_program(), {"counts": self._counts})
+        self._filter(self._hair_layers, layer, shadow_programs.counts_program(), counts=self._counts)
 
     def _draw_strips(self, layer, placed, lights):
         """Draw the same map with triangle strips."""
@@ -115,32 +115,38 @@ class ShadowMaps:
                 drawing.draw_strip(strands, layers, record, lights, {"hair_front": self._hair_front, **hidden})
 
     def _fill_fronts(self, layer):
-        with self._target(self._hair_front, layer):
-            self._filter(shaders.shadow_fill_program(), {"fronts": self._fronts, "backs": self._backs})
+        ends = {"fronts": self._fronts, "backs": self._backs}
+        self._filter(self._row_ends, None, shadow_programs.rows_program(), **ends)
+        self._filter(self._hair_front, layer, shadow_programs.fill_program(), **ends, row_ends=self._row_ends)
 
     def _blur(self, layer, deviation):
         """Fill a layer of the surfaces' moments from their raw depth, blurred by a deviation in texels."""
-        program = shaders.shadow_moments_program()
+        program = shadow_programs.moments_program()
         passes = (
-            (self._target(self._half_blurred), self._surface_depth, (1, 0)),
-            (self._target(self._surface_moments, layer), self._half_blurred, (0, 1)),
+            (self._half_blurred, None, self._surface_depth, (1, 0)),
+            (self._surface_moments, layer, self._half_blurred, (0, 1)),
         )
-        for target, source, along in passes:
-            with target:
-                program.bind()
-                program.uniform_int("along", along)
-                program.uniform_int("taps", int(np.ceil(2.0 * deviation)))
-                program.uniform_int("is_depth", int(source is self._surface_depth))
-                program.uniform_float("deviation", deviation)
-                self._filter(program, {"surface_depth": source})
+        for target, target_layer, source, along in passes:
+            program.bind()
+            program.uniform_int("along", along)
+            program.uniform_int("taps", int(np.ceil(2.0 * deviation)))
+            program.uniform_int("is_depth", int(source is self._surface_depth))
+            program.uniform_float("deviation", deviation)
+            self._filter(target, target_layer, program, surface_depth=source)
 
-    def _filter(self, program, sources):
-        with drawing.gpu_state("NONE", depth_writes=False):
+    def _filter(self, target, layer, program, **sources):
+        """Write all of a texture, or of its layer, with a program that reads others: nothing needs to be cleared."""
+        framebuffer = gpu.types.GPUFrameBuffer(color_slots=_slot(target, layer))
+        with framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
             drawing.draw_cover(program, {}, sources)
 
     def _target(self, texture, layer=None, value=_FAR):
-        slot = texture if layer is None else {"texture": texture, "layer": layer}
-        return drawing.cleared(gpu.types.GPUFrameBuffer(color_slots=slot, depth_slot=self._depth), (value,) * 4)
+        framebuffer = gpu.types.GPUFrameBuffer(color_slots=_slot(texture, layer), depth_slot=self._depth)
+        return drawing.cleared(framebuffer, (value,) * 4)
+
+
+def _slot(texture, layer):
+    return texture if layer is None else {"texture": texture, "layer": layer}
 
 
 def _record(strands, view, to_world, steps):
