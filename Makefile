@@ -7,6 +7,9 @@
 # Let uv use the system's certificates, as pip does: some networks have their own.
 export UV_SYSTEM_CERTS = true
 
+# Tests start many processes: without this each would compile every module again.
+unexport PYTHONDONTWRITEBYTECODE
+
 python = .venv/bin/python
 installed = .venv/installed
 peers = .venv/peers
