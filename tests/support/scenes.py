@@ -12,6 +12,7 @@ import pytest
 import hair_addon
 import tests.support.examples  # noqa: F401 (for what it sets)
 from hair_addon.blender.data import curves
+from hair_addon.blender.gpu import ambient_visibility, scene_lights
 from hair_addon.blender.host import running
 from tests.support.guide_tools import wave
 from tests.support.imported import curves_object, lines_on
@@ -109,7 +110,21 @@ def arm(scene):
 
 
 @pytest.fixture
-def lit(hair):
+def coarse_shadows(monkeypatch):
+    """Shadow maps as small as the pictures of tests, which take as long to draw as all else."""
+    monkeypatch.setattr(ambient_visibility, "_SIZE", 64)
+    monkeypatch.setattr(scene_lights, "_MAP_SIZE", 128)
+
+
+@pytest.fixture
+def fine_shadows(lit, monkeypatch):
+    """For laws of shadows themselves: maps as artists have them."""
+    monkeypatch.setattr(ambient_visibility, "_SIZE", 256)
+    monkeypatch.setattr(scene_lights, "_MAP_SIZE", 512)
+
+
+@pytest.fixture
+def lit(hair, coarse_shadows):
     """The hairy sphere with a camera in front of it and a sun over the camera's shoulder."""
     blender_scene = bpy.context.scene
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))

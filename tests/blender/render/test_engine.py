@@ -86,7 +86,7 @@ def test_a_border_between_pixels_is_rounded_as_blender_does(lit, tmp_path):
 
 
 @pytest.mark.parametrize("is_cropped", [False, True])
-def test_a_border_is_rendered_as_in_the_whole_picture(lit, tmp_path, is_cropped):
+def test_a_border_is_rendered_as_in_the_whole_picture(lit, fine_shadows, tmp_path, is_cropped):
     whole = rendered(tmp_path, film_transparent=True)["Combined"]
     border = {"border_min_x": 0.3, "border_max_x": 0.71, "border_min_y": 0.2, "border_max_y": 0.66}
     part = rendered(tmp_path, use_border=True, use_crop_to_border=is_cropped, **border)["Combined"]

@@ -57,7 +57,7 @@ def test_hair_is_drawn_where_its_strands_are(lit):
     assert not (drawn & ~near).any()
 
 
-def test_a_surface_hides_the_hair_behind_it(lit):
+def test_a_surface_hides_the_hair_behind_it(lit, fine_shadows):
     alone = picture()
     bpy.ops.mesh.primitive_plane_add(size=20.0, location=(0.0, -4.0, 0.0), rotation=(math.pi / 2, 0.0, 0.0))
     hidden = picture()

@@ -183,7 +183,7 @@ def test_surfaces_hide_hair_in_every_sample(lit):
 
 
 @pytest.mark.parametrize("per_side", [1, 2])
-def test_a_viewport_s_surfaces_are_darkened_by_what_hair_stops(lit, tmp_path, per_side):
+def test_a_viewport_s_surfaces_are_darkened_by_what_hair_stops(lit, fine_shadows, tmp_path, per_side):
     """Black over them, with the rest of the pass Hair Shadow as alpha; hair itself is as without, and nearest too."""
     bpy.ops.mesh.primitive_plane_add(size=12.0, location=(0.0, 0.0, -1.6))
     camera = bpy.context.scene.camera
