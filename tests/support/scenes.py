@@ -53,20 +53,27 @@ def sphere(scene):
 
 
 @pytest.fixture(scope="session")
-def nodes_file(tmp_path_factory):
-    """Where the nodes that carry hair are kept between tests: Blender takes 0.08 s to make them, 0.005 s to read."""
-    return tmp_path_factory.mktemp("nodes") / "nodes.blend"
+def nodes_file(blender, tmp_path_factory):
+    """The nodes that carry hair in a file: Blender takes 0.08 s to make them, 0.005 s to read."""
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.ops.mesh.primitive_plane_add()
+    bpy.ops.vellus.distribute_guides(guide_count=3)
+    path = tmp_path_factory.mktemp("nodes") / "nodes.blend"
+    bpy.data.libraries.write(str(path), {*bpy.data.node_groups})
+    return path
 
 
 @pytest.fixture
-def guides(sphere, nodes_file):
+def nodes(nodes_file, scene):
+    """The nodes that carry hair, in the scene's file."""
+    with bpy.data.libraries.load(str(nodes_file)) as (there, here):
+        here.node_groups = there.node_groups
+
+
+@pytest.fixture
+def guides(sphere, nodes):
     """60 guides on the sphere; their object is active."""
-    if nodes_file.exists():
-        with bpy.data.libraries.load(str(nodes_file)) as (there, here):
-            here.node_groups = there.node_groups
     bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5)
-    if not nodes_file.exists():
-        bpy.data.libraries.write(str(nodes_file), {*bpy.data.node_groups})
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     return bpy.data.objects["Guides"]
 
