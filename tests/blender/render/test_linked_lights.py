@@ -66,7 +66,7 @@ def test_each_is_lit_by_its_own_lights(suns, tmp_path, state):
     assert np.abs(expected["Hair"] - expected["Sphere"])[is_hair | is_surface].max() > 0.05
 
 
-def test_hair_that_is_no_blocker_casts_no_shadow(suns):
+def test_hair_that_is_no_blocker_casts_no_shadow(suns, fine_shadows):
     """On the surface: as if the hair were not there."""
     shadowed = picture()
     for sun in suns.values():
