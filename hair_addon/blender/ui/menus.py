@@ -101,6 +101,7 @@ def _in_object_menu(menu, context):
     if is_foreign(active):
         menu.layout.separator()
         menu.layout.operator("vellus.use_as_guides", icon="OUTLINER_OB_CURVES")
+        menu.layout.operator("vellus.use_as_hair", icon="CURVES")
     elif active is not None and (active.type == "MESH" or parts_of(active)):
         menu.layout.separator()
         menu.layout.menu("VELLUS_MT_hair", icon="OUTLINER_OB_CURVES")

@@ -19,12 +19,14 @@ from .select_hair import VELLUS_OT_select_hair
 from .toggle_composite import VELLUS_OT_toggle_composite
 from .toggle_drawing import VELLUS_OT_toggle_drawing
 from .use_as_guides import VELLUS_OT_use_as_guides
+from .use_as_hair import VELLUS_OT_use_as_hair
 
 CLASSES = (
     VELLUS_OT_add_hair,
     VELLUS_OT_distribute_guides,
     VELLUS_OT_interpolate_hair,
     VELLUS_OT_use_as_guides,
+    VELLUS_OT_use_as_hair,
     VELLUS_OT_comb_guides,
     VELLUS_OT_select_guides,
     VELLUS_OT_select_hair,

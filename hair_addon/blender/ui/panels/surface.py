@@ -52,6 +52,8 @@ def _draw_foreign(layout, context):
         "INFO",
     )
     layout.operator("vellus.use_as_guides", icon="OUTLINER_OB_CURVES")
+    write(layout, context, interface_text("Or keep them as the hair itself, strand by strand."), "INFO")
+    layout.operator("vellus.use_as_hair", icon="CURVES")
 
 
 def _draw_tools(layout):
