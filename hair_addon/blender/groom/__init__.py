@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         edits,
         foreign_curves,
         groom_settings,
+        groom_transfers,
         grown_guides,
         guide_additions,
         guide_regions,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
         staleness,
         style_notes,
         styled_hair,
+        transferred_names,
         writing,
     )
 else:

@@ -16,7 +16,7 @@ from bpy.types import Depsgraph, Object, ViewLayer
 from ...core import grooming, placement
 from ...core.errors import HairError
 from ...core.geometry import strands
-from ...core.geometry.mesh import TriMesh, positions
+from ...core.geometry.mesh import SurfacePoints, TriMesh, positions
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.rooted_curves import RootedCurves, reversal
 from ...core.long_work import Work, part_of, run_now
@@ -151,7 +151,7 @@ def using_as_guides(
     guides, bound = yield compute
     datablock = write(place.find(), its_surface.find(), surface, guides, seen, applies_modifiers)
     if bound is not None and is_unmasked:
-        _bind_to_group(bound, datablock.surface, positions(surface.mesh, guides.rooted.roots))
+        _bind_to_group(bound, datablock.surface, guides.rooted.roots)
     hair = None if bound is None else pipeline.write_between(datablock, bound)
     return HandMade(datablock, hair, guides.rooted)
 
@@ -200,13 +200,18 @@ def _paint(surface_object, weights):
     return group.name
 
 
+def paint_area(surface_object: Object, surface: Surface, roots: SurfacePoints) -> str:
+    """Create a vertex group of the area around roots of guides; its name, empty where they are all over the mesh."""
+    own_mesh = scene.read_own_mesh(surface_object, surface.to_world_axes)
+    weights = _coverage(own_mesh, positions(surface.mesh, roots))
+    return "" if weights is None else _paint(surface_object, weights)
+
+
 def _bind_to_group(bound, surface_object, roots):
     """Set the vertex group of the area with guides as the mask of their hair."""
-    own_mesh = scene.read_own_mesh(surface_object, bound.surface.to_world_axes)
-    weights = _coverage(own_mesh, roots)
-    if weights is None:
+    name = paint_area(surface_object, bound.surface, roots)
+    if not name:
         return
-    name = _paint(surface_object, weights)
     bound.settings = replace(bound.settings, density_group=name)
     painted = scene.read_vertex_group(surface_object, bpy.context.evaluated_depsgraph_get(), name)
     bound.root_key = staleness.root_key(bound.settings, painted)

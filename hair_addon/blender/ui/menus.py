@@ -88,6 +88,8 @@ class VELLUS_MT_hair(bpy.types.Menu):
         if parts_of(context.object):
             layout.separator()
             layout.operator("vellus.attach_to_surface")
+            if guides_of(context.object) is not None:
+                layout.operator("vellus.transfer_groom")
             layout.operator("vellus.delete_hair", icon="TRASH")
 
 

@@ -98,7 +98,7 @@ def test_regenerated_strands_stand_on_the_same_roots_and_follow_the_guides(kept)
     assert not np.array_equal(stored(kept), before)
 
 
-def test_follow_guides_is_the_same_as_regenerating_later(sphere, strands, rng):
+def test_follow_guides_is_the_same_as_regenerating_later(sphere, strands):
     use(sphere, strands, follows_guides=True)
     at_once = stored(strands).copy()
     again = curves_object(list(lines_on(sphere, np.random.Generator(np.random.PCG64(20260101)), COUNT, least=5)))
@@ -129,7 +129,7 @@ def test_kept_hair_moves_with_its_surface_when_that_is_edited(kept, sphere):
         vertex.co.z += 0.25
     sphere.data.update()
     update()
-    np.testing.assert_allclose(world(kept), before + [0.0, 0.0, 0.25], atol=1e-5)
+    np.testing.assert_allclose(world(kept), before + np.array([0.0, 0.0, 0.25]), atol=1e-5)
 
 
 def test_kept_hair_moves_once_when_the_surface_is_scaled_for_good(kept, sphere):
@@ -159,7 +159,7 @@ def test_splines_are_drawn_round(sphere):
     """A half circle of four control points is drawn as the spline through them, not as three lines at 60°."""
     angles = np.linspace(0.0, np.pi, 4)
     arc = np.stack([0.2 * np.sin(angles), np.zeros(4), 1.0 + 0.2 * (1.0 - np.cos(angles))], axis=1)
-    hair = curves_object([arc, arc + [0.0, 0.1, 0.0]], kind="CATMULL_ROM")
+    hair = curves_object([arc, arc + np.array([0.0, 0.1, 0.0])], kind="CATMULL_ROM")
     use(sphere, hair, guide_count=1)
     points = hair_cache.read_strands(hair.data)[0]
     turns = np.diff(points[0], axis=0)

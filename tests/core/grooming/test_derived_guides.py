@@ -111,7 +111,7 @@ def test_representatives_are_strands_spread_over_roots_and_shapes(mesh, hair):
 
 
 def test_two_shapes_on_the_same_roots_both_have_a_representative(mesh):
-    points, roots, up = standing(mesh, 30, np.random.Generator(np.random.PCG64(2)), spread=0.0, point_count=9)
+    points, _roots, _up = standing(mesh, 30, np.random.Generator(np.random.PCG64(2)), spread=0.0, point_count=9)
     bent = points + (np.linspace(0.0, 1.0, 9) ** 2)[None, :, None] * np.float32([1.0, 0.0, 0.0])
     found = representatives(np.concatenate([points[:1].repeat(30, axis=0), bent[:1].repeat(30, axis=0)]), 2)
     assert (found < 30).sum() == 1

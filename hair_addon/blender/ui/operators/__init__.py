@@ -18,6 +18,7 @@ from .select_guides import VELLUS_OT_select_guides
 from .select_hair import VELLUS_OT_select_hair
 from .toggle_composite import VELLUS_OT_toggle_composite
 from .toggle_drawing import VELLUS_OT_toggle_drawing
+from .transfer_groom import VELLUS_OT_transfer_groom
 from .use_as_guides import VELLUS_OT_use_as_guides
 from .use_as_hair import VELLUS_OT_use_as_hair
 
@@ -27,6 +28,7 @@ CLASSES = (
     VELLUS_OT_interpolate_hair,
     VELLUS_OT_use_as_guides,
     VELLUS_OT_use_as_hair,
+    VELLUS_OT_transfer_groom,
     VELLUS_OT_comb_guides,
     VELLUS_OT_select_guides,
     VELLUS_OT_select_hair,

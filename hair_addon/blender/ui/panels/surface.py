@@ -62,6 +62,7 @@ def _draw_tools(layout):
     line = column.row(align=True)
     line.operator("vellus.select_guides", text="Select Guides", icon="RESTRICT_SELECT_OFF")
     line.operator("vellus.select_hair", text="Select Hair", icon="RESTRICT_SELECT_OFF")
+    column.operator("vellus.transfer_groom", icon="DUPLICATE")
     column.operator("vellus.delete_hair", icon="TRASH")
 
 
