@@ -124,7 +124,7 @@ def test_names_that_the_mesh_lacks_are_cleared_and_said(hair, capfd):
     assert "which were cleared: top" in capfd.readouterr().out
     # Hair grows where guides are, in a group of its own.
     assert made.data.vellus.hair.density_group in target.vertex_groups
-    assert np.mean(curves.first_points(made.data)[:, 2] > -0.3) > 0.85
+    assert np.mean(curves.first_points(made.data)[:, 2] > -0.3) > 0.8
 
 
 def test_guides_without_a_place_are_left_out_and_said(hair, capfd):
