@@ -24,6 +24,7 @@ if TYPE_CHECKING:
         hand_made_guides,
         kept_hair,
         painted_masks,
+        particle_hair,
         pipeline,
         selection,
         staleness,

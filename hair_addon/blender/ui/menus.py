@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..groom import particle_hair
 from ..groom.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of
 from ..live import unlocked_renders
@@ -71,6 +72,8 @@ class VELLUS_MT_hair(bpy.types.Menu):
         layout.operator_context = "INVOKE_DEFAULT"
         if context.object.type == "MESH":
             layout.operator("vellus.add_hair", icon="OUTLINER_OB_CURVES")
+            if particle_hair.systems_of(context.object):
+                layout.operator("vellus.convert_particles", icon="PARTICLES")
         layout.operator("vellus.distribute_guides")
         if guides_of(context.object) is not None:
             layout.operator("vellus.interpolate_hair")

@@ -165,3 +165,41 @@ def test_splines_are_drawn_round(sphere):
     turns = np.diff(points[0], axis=0)
     turns /= np.linalg.norm(turns, axis=1, keepdims=True)
     assert np.sum(turns[1:] * turns[:-1], axis=1).min() > np.cos(np.radians(25.0))
+
+
+@pytest.fixture
+def particles(sphere):
+    """The sphere with a particle system of 40 hairs."""
+    select(sphere)
+    bpy.ops.object.particle_system_add()
+    settings = sphere.particle_systems[0].settings
+    settings.type, settings.count, settings.hair_length = "HAIR", 40, 0.3
+    update()
+    return sphere
+
+
+@pytest.mark.parametrize("use_as", ["HAIR", "GUIDES"])
+def test_particle_hair_is_converted_in_one_step(particles, use_as):
+    select(particles)
+    bpy.ops.curves.convert_from_particle_system()
+    expected = world(bpy.context.object)
+    bpy.data.objects.remove(bpy.context.object)
+    update()
+    select(particles)
+    assert bpy.ops.vellus.convert_particles(use=use_as, guide_count=12) == {"FINISHED"}
+    hair = bpy.context.object
+    kept = hair if use_as == "HAIR" else next(o for o in bpy.data.objects if o.data == guides_of(hair))
+    np.testing.assert_allclose(world(kept), expected, atol=1e-6)
+    assert (hair.data.vellus.kind, len(guides_of(hair).curves)) == ("HAIR", 12 if use_as == "HAIR" else 40)
+    assert not (particles.modifiers[0].show_viewport or particles.modifiers[0].show_render)
+
+
+def test_particle_hair_that_cannot_be_converted_leaves_nothing_behind(particles):
+    particles.particle_systems[0].settings.count = 0
+    update()
+    before = len(bpy.data.objects), len(bpy.data.hair_curves)
+    select(particles)
+    with pytest.raises(RuntimeError, match="no"):
+        bpy.ops.vellus.convert_particles()
+    assert (len(bpy.data.objects), len(bpy.data.hair_curves)) == before
+    assert particles.modifiers[0].show_viewport

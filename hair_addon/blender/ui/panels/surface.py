@@ -3,6 +3,7 @@
 
 import bpy
 
+from ...groom import particle_hair
 from ...groom.diagnostics import warnings_of
 from ...groom.foreign_curves import is_foreign
 from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
@@ -37,6 +38,8 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
             write(box, context, warning.text, "ERROR")
             if warning.operator:
                 box.operator(warning.operator)
+        if particle_hair.systems_of(context.object):
+            layout.operator("vellus.convert_particles", icon="PARTICLES")
         if parts:
             _draw_tools(layout)
             _draw_combing(layout, context)
