@@ -51,8 +51,7 @@ class TransferredGroom:
         said: list[tuple[str, dict[str, Any]]] = []
         if places.lost_count:
             sentence = (
-                "{count} of {all} guides found no place: {far} are too far from the surface, "
-                "at {other} the surface faces the other way."
+                "{count} of {all} guides found no place: {far} too far from the surface, {other} where it faces away."
             )
             values = {"all": self.guide_count, "far": places.far_count, "other": places.other_side_count}
             said.append((sentence, {"count": places.lost_count, **values}))

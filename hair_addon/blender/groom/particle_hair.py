@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair of Blender's particle systems → a Curves object, by Blender's own conversion; the system is switched off."""
 
+from collections.abc import Iterator
 from contextlib import contextmanager
 
 import bpy
@@ -28,7 +29,7 @@ def system_to_convert(surface: Object) -> ParticleSystem:
 
 
 @contextmanager
-def as_curves(surface: Object):
+def as_curves(surface: Object) -> Iterator[Object]:
     """A context with a new Curves object of a mesh object's particle hair. Raises `HairError`.
 
     If it ends well the system is switched off, else the object is gone again.

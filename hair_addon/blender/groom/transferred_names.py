@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings of a groom that came to another mesh: names of what that mesh lacks are cleared, lengths scaled."""
 
-from bpy.types import Curves, Object
+from bpy.types import Curves, Object, PropertyGroup
 
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import declared
@@ -37,7 +37,7 @@ def clear(guides: Curves, hair: Curves | None, target: Object) -> list[str]:
     return cleared
 
 
-def scale_lengths(owner, factor: float) -> None:
+def scale_lengths(owner: PropertyGroup, factor: float) -> None:
     """Multiply the lengths among the settings of guides or hair that a property group holds."""
     names = {entry.identifier for entry in owner.bl_rna.properties}
     for settings_class in (GuideSettings, HairSettings):
@@ -46,7 +46,7 @@ def scale_lengths(owner, factor: float) -> None:
                 _scale(owner, name, factor)
 
 
-def scale_style(item, factor: float) -> None:
+def scale_style(item: PropertyGroup, factor: float) -> None:
     """Multiply the lengths among the settings of a style."""
     owner = style_items.group_of(item)
     for name, _default, details in declared(KINDS[item.kind]):
