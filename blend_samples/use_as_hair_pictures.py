@@ -21,6 +21,7 @@ from hair_addon import api
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "manual" / "use_as_hair.png"
 STRANDS = 9000
+CUT = 16  # pixels off either side of a picture
 COUNTS = (None, 400, 60)  # of guides; None: the strands themselves
 
 
@@ -36,7 +37,7 @@ def main():
     for made in (guides, hair):
         bpy.data.objects.remove(made)
     light()
-    bpy.context.scene.camera.data.lens = 140.0
+    bpy.context.scene.camera.data.lens = 118.0
     pictures, words = [], []
     for count in COUNTS:
         came = curves_of(points)
@@ -46,11 +47,11 @@ def main():
         error = f"{100.0 * used.mean_error:.1f}% (95%: {100.0 * used.high_error:.1f}%)"
         words.append(f"{STRANDS} strands, as they came" if count is None else f"{count} guides: {error}")
         with tempfile.TemporaryDirectory() as folder:
-            pictures.append(drawn((skull, came), os.path.join(folder, "drawn.png")))
+            pictures.append(drawn((skull, came), os.path.join(folder, "drawn.png"))[:, CUT:-CUT])
         print(words[-1])
         bpy.data.objects.remove(came)
-    titles = [(word, WIDTH * place + 8, 17) for place, word in enumerate(words)]
-    ratio_plot.save(np.concatenate(pictures, axis=1) & 0xF0, titles, OUT)
+    titles = [(word, (WIDTH - 2 * CUT) * place + 8, 17) for place, word in enumerate(words)]
+    ratio_plot.save(np.concatenate(pictures, axis=1) & 0xF8, titles, OUT)
     compress(OUT)
 
 

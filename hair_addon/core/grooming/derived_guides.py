@@ -15,7 +15,6 @@ from . import following, groom
 from .groom import HairSettings
 
 _STEPS = 4  # of the fit: lengths that are kept, and guides that are left out, are no linear matter
-_SHARE = np.float32(0.6)  # of each step, as guides that grow stretch strands more
 _MOST_FITTED = 30_000  # strands that the fit looks at, evenly chosen
 
 
@@ -95,8 +94,7 @@ def derive(
     found = best
     for step in range(_STEPS):
         fitting("Fitting guides", step / _STEPS)
-        fitted = interpolation.guide_fitting.fitted(binding, found.weights, rooted, present, chosen, found.stretches)
-        present = present + _SHARE * (fitted - present)
+        present = interpolation.guide_fitting.fitted(binding, found.weights, rooted, present, chosen, found.stretches)
         found = _Reproduction(binding, guides_of(present), points, scale)
         if found.mean < best.mean:
             best = found

@@ -4,8 +4,9 @@
 With the weights w of a binding and guides' arms a_j (points less root) in the frames of their roots, interpolation
 without kept lengths gives strand s the arms sum_j w_sj Z_sj a_j in its own frame, Z_sj being the turn about the normal
 (interpolation.py). As complex numbers x + iy that turn is a factor e^(i phi), so both (x + iy) and z are sparse linear
-least squares with one matrix each for all points, solved by the normal equations. A part of each guide's own weight
-holds it at the shape that it has, so that guides that few strands follow are not thrown about.
+least squares with one matrix each for all points, solved by the normal equations. Each guide is held at the shape that
+it has by its own weight, as in damped least squares: repeated steps then go on while interpolation is not linear, and
+guides that few strands follow are not thrown about.
 """
 
 import numpy as np
@@ -20,7 +21,7 @@ from .hair_binding import HairBinding
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-_HOLD = 0.02  # of a guide's own weight in the normal equations
+_HOLD = 1.0  # of a guide's own weight in the normal equations
 
 
 def fitted(
