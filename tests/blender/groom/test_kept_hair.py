@@ -203,3 +203,28 @@ def test_particle_hair_that_cannot_be_converted_leaves_nothing_behind(particles)
         bpy.ops.vellus.convert_particles()
     assert (len(bpy.data.objects), len(bpy.data.hair_curves)) == before
     assert particles.modifiers[0].show_viewport
+
+
+@pytest.mark.parametrize("ending", [".usdc", ".abc"])
+def test_strands_of_a_file_stay_where_it_has_them(sphere, rng, tmp_path, ending):
+    lines = list(lines_on(sphere, rng, COUNT, least=5))
+    made, path = curves_object(lines, "Strands"), str(tmp_path / f"strands{ending}")
+    if ending == ".abc":
+        bpy.ops.wm.alembic_export(filepath=path, as_background_job=False)
+    else:
+        bpy.ops.wm.usd_export(filepath=path)
+    bpy.data.objects.remove(made)
+    before = set(bpy.data.objects)
+    (bpy.ops.wm.alembic_import if ending == ".abc" else bpy.ops.wm.usd_import)(filepath=path)
+    update()
+    for other in set(bpy.data.objects) - before:
+        if other.type == "MESH":
+            bpy.data.objects.remove(other)
+    update()
+    hair = next(o for o in bpy.data.objects if o.type == "CURVES")
+    seen = world(hair)
+    np.testing.assert_allclose(seen, np.concatenate(lines), atol=1e-5)
+    use(sphere, hair)
+    update()
+    np.testing.assert_allclose(world(hair), seen, atol=1e-6)
+    assert len(guides_of(hair).curves) == GUIDES
