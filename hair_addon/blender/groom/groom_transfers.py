@@ -194,7 +194,8 @@ def _growing(guides, hair, surface, places, made):
         if name:
             made.append((guides.surface, name))
             state.hair.density_group = name
-    state.is_stale = False
+    was_live, state.is_live = state.is_live, False  # or the update would grow it, before this does
     bpy.context.view_layer.update()
+    state.is_live, state.is_stale = was_live, False
     settings = setting_properties.to_settings(state.hair, HairSettings)
     yield from pipeline.interpolating_hair(guides, settings, scene.present_depsgraph(), hair)
