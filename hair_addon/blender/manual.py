@@ -56,6 +56,8 @@ _OPERATORS = {
     "lookup_tables": ("bake_tables",),
     "systems": ("delete_system",),
     "use_as_guides": ("use_as_guides",),
+    "use_as_hair": ("use_as_hair", "convert_particles"),
+    "transfer_groom": ("transfer_groom",),
     "rendering": ("toggle_composite",),
     "output": ("render_picture", "export_groom", "save_groom_settings", "load_groom_settings"),
 }

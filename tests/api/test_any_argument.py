@@ -148,6 +148,9 @@ CALLS = {
         (anything(d, np.eye(3)), anything(d, [[0, 1, 2]])), **changes(d, api.GuideSettings, COSTLY)
     ),
     "change_guides": change_guides,
+    "transfer_groom": lambda d: api.transfer_groom(
+        target(d, d.choice(["GUIDES", "HAIR"])), target(d, "MESH"), **changes(d, api.TransferSettings, ())
+    ),
     "points": lambda d: api.points(target(d, d.choice(["GUIDES", "HAIR"]))),
     "shade": lambda d: api.shade(
         target(d, "HAIR"),

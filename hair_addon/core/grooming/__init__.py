@@ -8,10 +8,12 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         cost,
+        derived_guides,
         flow_lines,
         following,
         groom,
         groom_defaults,
+        groom_transfer,
         guide_attraction,
         guide_copies,
         guide_count,
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
         guide_trim,
         hair_styles,
         rooted_curves,
+        strand_clusters,
+        transfer_settings,
     )
 else:
     __getattr__ = submodules(__name__)

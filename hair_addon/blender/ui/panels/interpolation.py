@@ -4,6 +4,7 @@
 import bpy
 
 from ....core.grooming import cost
+from ...data.curves import is_hand_made
 from ...data.scene import triangle_count
 from ...groom.diagnostics import parting_warnings
 from ...groom.selection import active_of_kind, guides_of, hair_of
@@ -30,6 +31,11 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
             return
         state = hair.vellus
         write_status(layout, context, state)
+        if is_hand_made(hair):
+            text = (
+                "These strands are kept as they came. Regenerate Strands replaces them with strands between the guides."
+            )
+            write(layout, context, interface_text(text), "INFO")
         setting_rows.row(layout, state, "guide_curves")
         setting_rows.strand_rows(layout, state.hair, hair.surface)
         setting_rows.row(layout, state, "is_live")
