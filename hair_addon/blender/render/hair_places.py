@@ -69,7 +69,8 @@ def _instances(depsgraph, viewport):
         hair_object, owner = instance.object.original, instance.parent.original
         if hair_object.data.vellus.kind != "HAIR":
             continue
-        if hair_object.hide_render if viewport is None else not owner.visible_in_viewport_get(viewport):
+        is_rendered = not (hair_object.hide_render or owner.hide_render)
+        if not (is_rendered if viewport is None else owner.visible_in_viewport_get(viewport)):
             continue
         matrix = np.array(instance.matrix_world, np.float64)
         yield _Instance(hair_object.session_uid, matrix, owner.session_uid)
