@@ -38,8 +38,15 @@ def test_the_interface_has_us_spelling():
     assert sorted(text for text in texts if BRITISH.search(text)) == []
 
 
-@pytest.mark.parametrize("page", sorted(manual_pages.SOURCE.glob("*.md")), ids=lambda page: page.stem)
-def test_the_manual_has_us_spelling(page):
+ROOT = spoken.ADDON.parent
+PAGES = [
+    *sorted(manual_pages.SOURCE.glob("*.md")),
+    *(ROOT / name for name in ("README.md", "CHANGELOG.md", "docs/farm/README.md", "blend_samples/README.md")),
+]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}_{page.stem}")
+def test_pages_have_us_spelling(page):
     prose = re.sub(r"`[^`]*`|\]\([^)]*\)", "", page.read_text(encoding="utf-8"))  # no identifiers, no addresses
     assert [match[0] for match in BRITISH.finditer(prose)] == []
 
