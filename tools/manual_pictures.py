@@ -186,7 +186,7 @@ class Window:
 
     def narrow(self):
         """Drag the sidebar's edge until the sidebar has its width."""
-        for _try in range(8):
+        for _try in range(30):  # a busy machine loses events
             offset = self.sidebar.width - SIDEBAR_WIDTH
             if offset == 0:
                 return

@@ -69,4 +69,4 @@ def test_hair_follows_the_comb(minutes):
 
 
 def test_pictures_settings_tables_and_grooms_are_written(minutes):
-    assert len(minutes.facts["files"]) == 5 and all(minutes.facts["files"].values())
+    assert len(minutes.facts["files"]) == 4 and all(minutes.facts["files"].values())
