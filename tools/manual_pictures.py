@@ -4,10 +4,11 @@
 Grows hair on the sample's head, opens it in a window of a desktop Blender with the built extension, and takes a picture
 of each panel in a sidebar of `SIDEBAR_WIDTH`. With the name `windows`, also build/manual/window_*.png of the whole
 window for each kind of active object, to look for labels that are cut. With the name `five_minutes`, README's pictures
-of its five minutes alone: docs/five_minutes/*.png, cut out of what `tests/desktop/test_first_minutes.py` saw in its
-window when it ran last; with `curly_hair` those of the page Curly Hair, of `tests/desktop/test_curly_hair.py`.
+of its five minutes alone: docs/five_minutes/*.png, cut out of what `tests/desktop/first_minutes.py` sees in a window;
+with `curly_hair` those of the page Curly Hair, of what `tests/desktop/test_curly_hair.py` saw when it ran last.
 """
 
+import shutil
 import subprocess
 import sys
 import time
@@ -20,7 +21,7 @@ MODULE = "bl_ext.user_default.vellus"
 
 # Step of tests/desktop/first_minutes.py → its picture in README.
 FIVE_MINUTES = {"cube_near": "new_hair_system", "head": "guide_mask", "combed": "comb_guides", "shaded": "look"}
-SEEN = ROOT / "out" / "desktop" / "first_opengl"
+FIVE_MINUTES_SAMPLES = 32  # per pixel: as an artist sees them
 
 # Steps of tests/desktop/curly_hair.py that the page Curly Hair shows.
 CURLY_HAIR = (
@@ -56,34 +57,42 @@ def start():
     sys.path.insert(0, str(ROOT))
     from tools import build_extension, compile_kernels, desktop_blender
 
-    if sys.argv[1:] == ["five_minutes"]:
-        return cut_five_minutes()
     if sys.argv[1:] == ["curly_hair"]:
         return cut_curly_hair()
     folder = ROOT / "build" / "manual"
     folder.mkdir(parents=True, exist_ok=True)
+    extension = build_extension.build(compile_kernels.this_platform())
+    blender = desktop_blender.find_or_install()
+    if sys.argv[1:] == ["five_minutes"]:
+        return take_five_minutes(blender, extension, folder / "five_minutes")
     if len(sys.argv) == 1 or not (folder / "head.blend").exists():
         save_sample(folder / "head.blend")
-    extension = build_extension.build(compile_kernels.this_platform())
     arguments = [extension, folder / "head.blend", *sys.argv[1:]]
     log = folder / "log.txt"
-    blender = desktop_blender.find_or_install()
     status = blender.run(__file__, arguments, profile=folder, limit=500, size=WINDOW_SIZE, log=log)
     errors = [line for line in log.read_text(errors="replace").splitlines() if line.startswith("Traceback")]
     return status or (f"{len(errors)} errors, see {log}" if errors else 0)
 
 
-def cut_five_minutes():
+def take_five_minutes(blender, extension, folder):
     """Write README's pictures of the five minutes; returns the exit status."""
     import bpy
 
+    profile = folder / "profile"
+    shutil.rmtree(folder, ignore_errors=True)
+    profile.mkdir(parents=True)
+    script, head = ROOT / "tests" / "desktop" / "first_minutes.py", ROOT / "blend_samples" / "head.obj"
+    arguments = [extension, head, folder, FIVE_MINUTES_SAMPLES]
+    log = folder / "log.txt"
+    status = blender.run(script, arguments, profile=profile, limit=1200, size=WINDOW_SIZE, log=log)
+    if status:
+        return f"first_minutes.py ended with status {status}, see {log}"
     left, top, right, bottom = SEEN_PART
     for step, name in FIVE_MINUTES.items():
-        seen = read(SEEN / f"first_{step}.png")[top:bottom, left:right]
+        seen = read(folder / f"first_{step}.png")[top:bottom, left:right]
         write(ROOT / "docs" / "five_minutes" / f"{name}.png", seen, SHOWN_SIZE)
-    bpy.data.images.load(str(SEEN / "first_picture.png")).save(
-        filepath=str(ROOT / "docs" / "five_minutes" / "picture.png")
-    )
+    picture = bpy.data.images.load(str(folder / "first_picture.png"))
+    picture.save(filepath=str(ROOT / "docs" / "five_minutes" / "picture.png"))
     return 0
 
 
@@ -140,6 +149,8 @@ def save_sample(path):
     bpy.ops.vellus.add_hair(density_group="scalp", length=0.1, gravity=0.8, strand_count=5000)
     bpy.data.hair_curves["Hair"].vellus.marschner.size = 64
     bpy.data.hair_curves["Guides"].vellus.simulates = True  # else its panel is gray
+    for style in ("CLUMP", "CURL"):
+        bpy.ops.vellus.add_style(style=style)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
 
 
@@ -175,7 +186,7 @@ class Window:
 
     def narrow(self):
         """Drag the sidebar's edge until the sidebar has its width."""
-        for _try in range(8):
+        for _try in range(30):  # a busy machine loses events
             offset = self.sidebar.width - SIDEBAR_WIDTH
             if offset == 0:
                 return

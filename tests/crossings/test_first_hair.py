@@ -10,8 +10,10 @@ from mathutils import Vector
 
 from hair_addon import api
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
+from hair_addon.core.kernels import kernel_cache, kernel_setup
 from hair_addon.core.params import from_surface
 from tests.support.commands import run_here
+from tests.support.devices import DEVICE
 from tests.support.reading import points
 
 FEW = {"guide_count": 40, "strand_count": 300}
@@ -80,6 +82,38 @@ def test_hair_covers_its_surface(scene, add, side):
     look_from(side)
     mean, half_covered = coverage(surface, hair)
     assert mean >= 0.7 and half_covered >= 0.7
+
+
+@pytest.fixture
+def kernel_modules(monkeypatch):
+    """(loaded, launched): names of the modules that were loaded before work began, and of those that it asked for."""
+    loaded, launched = set(), set()
+    load_together, load = kernel_setup.load, kernel_cache.load
+
+    def note_loaded(modules, *arguments, **named):
+        modules = list(modules)
+        loaded.update(module.name for module in modules)
+        load_together(modules, *arguments, **named)
+
+    def note_launched(device, *modules):
+        launched.update(module.name for module in modules)
+        load(device, *modules)
+
+    monkeypatch.setattr(kernel_setup, "load", note_loaded)
+    monkeypatch.setattr(kernel_cache, "load", note_launched)
+    return loaded, launched
+
+
+@pytest.mark.parametrize(("group", "is_draped"), [("", False), ("top", True)])
+def test_first_hair_waits_for_the_kernels_that_it_launches(sphere, kernel_modules, group, is_draped):
+    """Each takes a while to compile where it comes not compiled; others are compiled later, in the background."""
+    guides, _hair = hair_on(sphere, strand_count=300, density_group=group)
+    assert guides.vellus.guides.drape == is_draped
+    loaded, launched = kernel_modules
+    if DEVICE == "cpu":
+        assert loaded == launched
+    else:
+        assert launched <= loaded
 
 
 @pytest.mark.parametrize("scale", [0.02, 2.0])

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first ten minutes of a new artist, in a window: three clicks to hair, then README's five minutes.
 
-Run by a desktop Blender with a clean profile: first_minutes.py -- ZIP HEAD OUT. Writes a picture of the screen for each
-step to OUT, and first_minutes.json with what the tests want to know. README's pictures are made of them by
-`tools/manual_pictures.py five_minutes`.
+Run by a desktop Blender with a clean profile: first_minutes.py -- ZIP HEAD OUT [SAMPLES]. Writes a picture of the
+screen for each step to OUT, and first_minutes.json with what the tests want to know. README's pictures are made of them
+by `tools/manual_pictures.py five_minutes`, of as many samples per pixel as an artist sees.
 """
 
 import json
@@ -20,8 +20,9 @@ sys.path.insert(0, str(ROOT))
 from tests.desktop.window import drag, import_head, in_viewport, places, take_picture, viewport, wait, wait_for  # noqa: E402
 
 MODULE = "bl_ext.user_default.vellus"
-ZIP, HEAD, OUT = sys.argv[sys.argv.index("--") + 1 :]
+ZIP, HEAD, OUT, *more = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
+SAMPLES = int(more[0]) if more else 8  # few, for drivers without a GPU, which take one with each redraw
 
 # Pixels from the upper right corner of the 3D view: the arrow that opens its sidebar.
 _ARROW = (8, 86)
@@ -38,7 +39,7 @@ facts = {"steps": []}
 
 def step(name):
     """A picture of the screen after a step."""
-    take_picture(OUT / f"first_{name}.png")
+    take_picture(OUT / f"first_{name}.png", SAMPLES)
     facts["steps"].append(name)
     print(f"first_minutes: {name}", flush=True)
 
@@ -94,7 +95,7 @@ def three_clicks():
     """From the installed extension to hair on the default cube: the sidebar, the tab, the button."""
     bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
     bpy.context.preferences.system.use_region_overlap = False
-    sys.modules[f"{MODULE}.hair_addon.blender"].render.hair_picture.SAMPLE_COUNT = 8  # of 32, for drivers without a GPU
+    sys.modules[f"{MODULE}.hair_addon.blender"].render.hair_picture.SAMPLE_COUNT = SAMPLES
     area, _region = viewport()
     yield
     step("installed")
@@ -144,6 +145,7 @@ def grow_on_the_head():
     guides.guides.density_group = "scalp"
     guides.guides.length = 0.12
     guides.guides.gravity = 0.75
+    guides.guides.drape = True
     hair.vellus.hair.thickness = 0.15
     yield from wait_for(lambda: len(hair.curves) == 40_000)
     step("head")
@@ -195,7 +197,7 @@ def shade():
 
 
 def write_and_export():
-    """4., 5. Render Picture, settings, lookup tables; USD and Alembic."""
+    """4., 5. Render Picture, settings, lookup tables; Export Groom, USD and Alembic."""
     view = viewport()[0].spaces.active.region_3d
     with in_viewport():
         bpy.context.scene.camera.matrix_world = view.view_matrix.inverted()
@@ -207,13 +209,15 @@ def write_and_export():
     with in_viewport():
         bpy.ops.vellus.save_groom_settings(filepath=str(OUT / "first_groom.json"))
         bpy.ops.vellus.bake_tables(directory=str(OUT / "first_tables"), size=32)
+        bpy.ops.vellus.export_groom(filepath=str(OUT / "first_groom.abc"))
         # Not every build of Blender has these.
         if "usd_export" in dir(bpy.ops.wm):
+            bpy.ops.vellus.export_groom(filepath=str(OUT / "first_groom.usdc"))
             bpy.ops.wm.usd_export(filepath=str(OUT / "first.usdc"))
         if "alembic_export" in dir(bpy.ops.wm):
             bpy.ops.wm.alembic_export(filepath=str(OUT / "first.abc"), as_background_job=False)
     yield
-    names = ("first_picture.png", "first_groom.json", "first_tables/n_g.exr")
+    names = ("first_picture.png", "first_groom.json", "first_tables/n_g.exr", "first_groom.abc")
     facts["files"] = {name: (OUT / name).stat().st_size if (OUT / name).exists() else 0 for name in names}
 
 

@@ -68,5 +68,5 @@ def test_hair_follows_the_comb(minutes):
     assert guides_moved > 0.002 and hair_moved > 0.002
 
 
-def test_pictures_settings_and_tables_are_written(minutes):
-    assert len(minutes.facts["files"]) == 3 and all(minutes.facts["files"].values())
+def test_pictures_settings_tables_and_grooms_are_written(minutes):
+    assert len(minutes.facts["files"]) == 4 and all(minutes.facts["files"].values())

@@ -48,10 +48,10 @@ def import_head(path):
     return head
 
 
-def take_picture(path):
+def take_picture(path, redraws=7):
     """Redraw until nothing is refined any more, and write a picture of the whole screen."""
     with in_viewport():
-        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=7)
+        bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=redraws)
         # Vulkan draws and shows beside Blender, up to two pictures late.
         bpy.ops.wm.redraw_timer(type="DRAW_WIN_SWAP", iterations=3)
     time.sleep(_SHOWN)

@@ -19,11 +19,18 @@ class Layout:
         self.texts = [] if whole is None else whole.texts
         self.buttons = [] if whole is None else whole.buttons  # labels of operators
         self.picked = {} if whole is None else whole.picked  # property → the collection that it is picked from
+        self.lines = [] if whole is None else whole.lines  # [labels of the operators of a row, "" for an icon alone]
+        self._line = []
 
     def _part(self, align=False):
         return Layout(self)
 
-    row = column = box = _part
+    column = box = _part
+
+    def row(self, align=False):
+        part = self._part()
+        self.lines.append(part._line)
+        return part
 
     def split(self, factor):
         assert 0.0 < factor < 1.0
@@ -69,15 +76,17 @@ class Layout:
     def template_icon(self, icon_value, scale):
         self.drawn["template_icon"] += 1
 
-    def operator(self, name, text="", icon="NONE", icon_value=0, translate=True, depress=False):
+    def operator(self, name, text=None, icon="NONE", icon_value=0, translate=True, depress=False):
         category, operator = name.split(".")
         assert operator in dir(getattr(bpy.ops, category))
         self.drawn[name] += 1
-        self.texts.append(text)
-        self.buttons.append(text or getattr(getattr(bpy.ops, category), operator).get_rna_type().name)
+        label = getattr(getattr(bpy.ops, category), operator).get_rna_type().name if text is None else text
+        self.texts.append(text or "")
+        self.buttons.append(label)
+        self._line.append(label)
         return SimpleNamespace()
 
-    def operator_menu_enum(self, name, choice, text="", icon="NONE"):
+    def operator_menu_enum(self, name, choice, text=None, icon="NONE"):
         category, operator = name.split(".")
         choices = getattr(getattr(bpy.ops, category), operator).get_rna_type().properties[choice].enum_items
         assert len(choices) > 1

@@ -54,9 +54,9 @@ def owner_of(instance):
 
 
 def _is_surface_seen(instance, viewport):
-    if viewport is None:
-        return not instance.object.hide_render
     placed = instance.parent if instance.is_instance else instance.object
+    if viewport is None:
+        return not (instance.object.hide_render or placed.hide_render)
     return placed.original.visible_in_viewport_get(viewport) and instance.object.display_type in {"TEXTURED", "SOLID"}
 
 

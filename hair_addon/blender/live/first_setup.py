@@ -58,9 +58,10 @@ def _advance():
 
 
 def _load(progress):
-    """Kernels of the first hair, which is draped on a scalp."""
-    groom.load_kernels("cpu", part_of(progress, 0.0, 0.7), most_threads=1)
-    dynamics.draped_growth.load_kernels("cpu", part_of(progress, 0.7, 1.0), most_threads=1)
+    """Kernels of the first hair, which is draped on a scalp, then those of what comes next."""
+    groom.load_kernels("cpu", part_of(progress, 0.0, 0.5), most_threads=1)
+    dynamics.draped_growth.load_kernels("cpu", part_of(progress, 0.5, 0.8), most_threads=1)
+    groom.load_later_kernels("cpu", part_of(progress, 0.8, 1.0), most_threads=1)
 
 
 def _end():

@@ -35,11 +35,12 @@ class _Instance:
 def hair_places(view_layer, viewport, instances):
     """[`HairPlace`] of a view layer's visible hair and of instances that `read_instances` has found.
 
-    viewport: the 3-D viewport whose visibility counts, or None.
+    viewport: the 3-D viewport whose visibility counts, None for a render, which leaves out what renders do not show.
     """
     places = [
         HairPlace(o, np.array(o.matrix_world, np.float64), o.session_uid, o.select_get(view_layer=view_layer))
         for o in scene.curves_objects(view_layer, "HAIR", viewport)
+        if viewport is not None or not o.hide_render
     ]
     if not instances:
         return places
@@ -68,7 +69,8 @@ def _instances(depsgraph, viewport):
         hair_object, owner = instance.object.original, instance.parent.original
         if hair_object.data.vellus.kind != "HAIR":
             continue
-        if viewport is not None and not owner.visible_in_viewport_get(viewport):
+        is_rendered = not (hair_object.hide_render or owner.hide_render)
+        if not (is_rendered if viewport is None else owner.visible_in_viewport_get(viewport)):
             continue
         matrix = np.array(instance.matrix_world, np.float64)
         yield _Instance(hair_object.session_uid, matrix, owner.session_uid)

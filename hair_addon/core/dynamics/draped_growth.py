@@ -13,6 +13,7 @@ import numpy as np
 import warp as wp
 
 from .. import grooming
+from ..geometry import resampling
 from ..geometry.mesh import TriMesh, positions
 from ..geometry.strands import Strands, from_numpy
 from ..geometry.texture import Texture
@@ -21,9 +22,9 @@ from ..grooming.groom import GuideSettings, distribute_guides
 from ..kernels import kernel_setup
 from ..long_work import Progress, no_progress, part_of
 from ..placement.domain import Mirror
-from . import draping, hair_volume
+from . import draping
 from .collision import contact_queries, contact_substep
-from .rod import detail, rod_solver
+from .rod import detail, rod_solver, rods
 from .rod.settings import DynamicsSettings
 
 SCALP = 0.055  # [m²], of a human head
@@ -102,7 +103,7 @@ def load_kernels(
     device: wp.DeviceLike, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS
 ) -> None:
     """Load what `settled` launches, as `groom.load_kernels` does; same arguments."""
-    names = [module.__name__ for module in (contact_queries, detail, hair_volume, rod_solver)]
-    if wp.get_device(device).is_cpu:
-        names.append(contact_substep.__name__)
-    kernel_setup.load([wp.get_module(name) for name in names], device, progress, most_threads)
+    on_device = [contact_queries, detail, rods, resampling]
+    on_device += [contact_substep] if wp.get_device(device).is_cpu else [rod_solver]
+    modules = [wp.get_module(module.__name__) for module in on_device]
+    kernel_setup.load(modules, device, progress, most_threads)

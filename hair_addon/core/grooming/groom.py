@@ -347,14 +347,12 @@ def laid_lines(
 
 
 def load_kernels(device: str, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS) -> None:
-    """Load the kernels of guides and of hair, which are compiled where they never were: those that come next as well.
+    """Load the kernels that guides and hair without styles launch, which are compiled where they never were.
 
     device, progress: as in `distribute_guides`; most_threads: that compile at once. Microseconds once they are loaded.
     """
     progress(kernel_setup.LOADING, 0.0)
-
     on_device = [
-        geometry.bspline,
         placement.exact_cells,
         interpolation.guide_weights,
         grooming.guide_growth,
@@ -363,12 +361,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         placement.sampled_cells,
         placement.preconditioner,
         geometry.closest_point,
-        styling.steps,
-        styling.stack,
-    ]
-    on_device += [
         placement.voronoi,
-        interpolation.interpolation if device == "cpu" else interpolation.gpu_interpolation,
     ]
     on_processor = [
         placement.farthest,
@@ -376,14 +369,21 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         geometry.connected_components,
         interpolation.clump_centers,
         geometry.sampling,
-        geometry.transform,
-        styling.guide_lean,
     ]
     if device == "cpu":
-        _load_kernels(device, on_device + on_processor, progress, most_threads)
+        _load_kernels(device, [*on_device, interpolation.interpolation, *on_processor], progress, most_threads)
     else:
+        on_device += [interpolation.gpu_interpolation, geometry.bspline]
         _load_kernels(device, on_device, part_of(progress, 0.0, 0.8), most_threads)
         _load_kernels("cpu", on_processor, part_of(progress, 0.8, 1.0), most_threads)
+
+
+def load_later_kernels(
+    device: str, progress: Progress = no_progress, most_threads: int = kernel_setup.MOST_THREADS
+) -> None:
+    """Load the kernels that styles and moving surfaces launch, as `load_kernels` does; same arguments."""
+    later = [styling.steps, styling.stack, styling.guide_lean, geometry.transform]
+    _load_kernels(device, later, progress, most_threads)
 
 
 def _load_kernels(device, modules, progress, most_threads=kernel_setup.MOST_THREADS):

@@ -22,6 +22,7 @@ def stamp(tmp_path, monkeypatch):
     monkeypatch.setattr(first_setup, "_stamp", lambda: path)
     monkeypatch.setattr(preferences, "is_extension", lambda: True)
     monkeypatch.setattr(draped_growth, "load_kernels", lambda *_arguments, **_named: None)
+    monkeypatch.setattr(groom, "load_later_kernels", lambda *_arguments, **_named: None)
     yield path
     first_setup.unregister()
 

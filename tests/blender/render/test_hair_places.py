@@ -129,6 +129,28 @@ def test_hidden_instances_are_left_out(creature, case):
         space.show_object_viewport_curves = True
 
 
+def test_renders_leave_out_instances_of_an_instancer_that_they_do_not_show(creature):
+    one = instancer("One", creature, (3.0, 0.0, 0.0))
+    shown = [(len(drawn.hair), len(drawn.surfaces)) for drawn in (read(None), read(view3d()))]
+    assert shown == [(1, 1), (1, 1)]
+    one.hide_render = True
+    shown = [(len(drawn.hair), len(drawn.surfaces)) for drawn in (read(None), read(view3d()))]
+    assert shown == [(0, 0), (1, 1)]
+
+
+@pytest.mark.parametrize("is_instanced", [False, True])
+def test_renders_leave_out_hair_whose_camera_is_off_and_viewports_show_it(hair, is_instanced):
+    """A picture is a render: it shows what the camera in the list of systems says."""
+    if is_instanced:
+        collection = bpy.data.collections.new("Creature")
+        collection.objects.link(hair)
+        instancer("One", collection, (3.0, 0.0, 0.0))
+    count = 1 + is_instanced
+    assert [len(read(space).hair) for space in (None, view3d())] == [count, count]
+    hair.hide_render = True
+    assert [len(read(space).hair) for space in (None, view3d())] == [0, count]
+
+
 def test_an_instance_is_selected_with_its_instancer(creature):
     one, _two = instancer("One", creature), instancer("Two", creature, (5.0, 0.0, 0.0))
     one.select_set(True)

@@ -38,8 +38,15 @@ def test_the_interface_has_us_spelling():
     assert sorted(text for text in texts if BRITISH.search(text)) == []
 
 
-@pytest.mark.parametrize("page", sorted(manual_pages.SOURCE.glob("*.md")), ids=lambda page: page.stem)
-def test_the_manual_has_us_spelling(page):
+ROOT = spoken.ADDON.parent
+PAGES = [
+    *sorted(manual_pages.SOURCE.glob("*.md")),
+    *(ROOT / name for name in ("README.md", "CHANGELOG.md", "docs/farm/README.md", "blend_samples/README.md")),
+]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: f"{page.parent.name}_{page.stem}")
+def test_pages_have_us_spelling(page):
     prose = re.sub(r"`[^`]*`|\]\([^)]*\)", "", page.read_text(encoding="utf-8"))  # no identifiers, no addresses
     assert [match[0] for match in BRITISH.finditer(prose)] == []
 
@@ -47,7 +54,7 @@ def test_the_manual_has_us_spelling(page):
 # In a sidebar of 280 pixels, as a window shows it: the rows of a panel, and what a label keeps free at its sides.
 ROW_WIDTH, MARGIN = 224, 10
 FONT_SIZE = 11  # of Blender's interface, at a scale of one
-ICON_WIDTH, BUTTON_MARGIN = 20, 16
+ICON_WIDTH, BUTTON_MARGIN, SHARED_MARGIN = 20, 16, 4  # the last: of buttons side by side
 
 
 def width(text):
@@ -86,9 +93,16 @@ def test_names_fit_the_sidebar(locale):
 def test_buttons_fit_the_sidebar(hair, active, locale):
     bpy.context.view_layer.objects.active = bpy.data.objects[active]
     layouts = [draw(panel) for panel in panels.CLASSES if panel.bl_region_type == "UI"]
-    buttons = {shown_in(locale, text) for layout in layouts if layout is not None for text in layout.buttons}
+    drawn = [layout for layout in layouts if layout is not None]
+    buttons = {shown_in(locale, text) for layout in drawn for text in layout.buttons if text}
     room = ROW_WIDTH - ICON_WIDTH - BUTTON_MARGIN
     assert buttons and {text: width(text) for text in buttons if width(text) > room} == {}
+    cut = {}
+    for line in (line for layout in drawn for line in layout.lines if line):
+        labels = [shown_in(locale, text) for text in line if text]
+        room = (ROW_WIDTH - ICON_WIDTH * line.count("")) / max(len(labels), 1) - ICON_WIDTH - SHARED_MARGIN
+        cut |= {text: width(text) for text in labels if len(labels) > 1 and width(text) > room}
+    assert cut == {}
 
 
 @pytest.mark.parametrize("locale", ["en_US", *translations.dictionaries()])

@@ -4,7 +4,7 @@
 import bpy
 import pytest
 
-from hair_addon.blender.groom.dynamics import dynamics_notes
+from hair_addon.blender.groom.dynamics import dynamics_notes, frame_folders
 from hair_addon.blender.ui import panels
 from hair_addon.core.dynamics.collision.collider_settings import ColliderSettings
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
@@ -57,6 +57,14 @@ def test_settings_without_effect_are_hidden(state, case):
 
 def test_colliders_are_picked_among_collections(state):
     assert draw(bpy.types.VELLUS_PT_dynamics_collision).picked == {"colliders": bpy.data.collections}
+
+
+def test_the_panel_draws_where_no_folder_can_hold_frames(state):
+    """A new file was never saved, so its cache folder leads nowhere."""
+    assert not bpy.data.filepath and state.cache_folder.startswith("//")
+    state.simulates = True
+    assert frame_folders.frames_of(bpy.data.objects["Guides"].data) is None
+    assert drawn()["cache_folder"] == 1
 
 
 def test_only_guides_have_dynamics(sphere):

@@ -38,8 +38,9 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
         layout = split(self.layout)
         guides = guides_of(context.object)
         layout.active = guides.vellus.simulates
-        sides = layout.row(align=True)
-        sides.operator("vellus.play_dynamics", icon="PLAY")
+        column = layout.column(align=True)
+        column.operator("vellus.play_dynamics", icon="PLAY")
+        sides = column.row(align=True)
         sides.operator("vellus.bake_dynamics", text="Bake", icon="REC").starts_over = False
         if frame_folders.has_frames(guides):
             sides.operator("vellus.bake_dynamics", text="", icon="FILE_REFRESH").starts_over = True

@@ -28,9 +28,9 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         if is_on:
             setting_rows.rows(layout, state, RenderSettings, ("composite_shadow", "sample_count"))
         layout.operator("vellus.export_groom", icon="FILE_3D", text="Export Groom…")
-        row = layout.row(align=True)
-        row.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
-        row.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")
+        column = layout.column(align=True)
+        column.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
+        column.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")
         hair = hair_of(context.object)
         if hair is not None and animated.are_keyed(hair) and not context.scene.render.use_lock_interface:
             write(

@@ -62,9 +62,8 @@ def _draw_foreign(layout, context):
 def _draw_tools(layout):
     column = layout.column(align=True)
     column.operator("vellus.comb_guides", icon="SCULPTMODE_HLT")
-    line = column.row(align=True)
-    line.operator("vellus.select_guides", text="Select Guides", icon="RESTRICT_SELECT_OFF")
-    line.operator("vellus.select_hair", text="Select Hair", icon="RESTRICT_SELECT_OFF")
+    column.operator("vellus.select_guides", text="Select Guides", icon="RESTRICT_SELECT_OFF")
+    column.operator("vellus.select_hair", text="Select Hair", icon="RESTRICT_SELECT_OFF")
     column.operator("vellus.transfer_groom", icon="DUPLICATE")
     column.operator("vellus.delete_hair", icon="TRASH")
 

@@ -35,8 +35,9 @@ def write(layout, context, text, icon="NONE"):
     lines = textwrap.wrap(text, max(int(room / _CHARACTER_WIDTH), _NARROWEST)) or [""]
     column = layout.column(align=True)
     column.scale_y = 0.8 if len(lines) > 1 else 1.0
+    below = "NONE" if icon == "NONE" else "BLANK1"
     for place, line in enumerate(lines):
-        column.label(text=line, icon=icon if place == 0 else "BLANK1", translate=False)
+        column.label(text=line, icon=icon if place == 0 else below, translate=False)
 
 
 def write_status(layout, context, state, name="status"):
