@@ -173,9 +173,10 @@ function requireSettings(settings, frameCount) {
 }
 
 // The rules and sentences of --out; a test compares them.
-function requirePattern(pattern, frameCount, hasPasses) {
+function requirePattern(text, frameCount, hasPasses) {
+    const pattern = text.replace(/(\/\.?)+$/, "");
     const isWindows = !pattern.startsWith("/");
-    const name = pattern.split(isWindows ? /[\\/]/ : "/").filter((part) => part && part !== ".").pop() || "";
+    const name = pattern.split(isWindows ? /[\\/]/ : "/").pop();
     const dot = name.lastIndexOf(".");
     const suffix = dot > 0 && dot < name.length - 1 ? name.slice(dot) : "";
     if (![".png", ".exr"].includes(suffix.toLowerCase())) {

@@ -54,7 +54,8 @@ def run(given, console):
     """Open the file and render its frames, in this process or in several."""
 
     blender.io.mesh_files.require_blend(given.input)
-    blender.io.frames.require_pattern(given.out, len(given.frames) if isinstance(given.frames, range) else 1, given.passes)
+    known_count = len(given.frames) if isinstance(given.frames, range) else 1
+    blender.io.frames.require_pattern(given.out, known_count, given.passes)
     opening.open_file(given, console)
     numbers = blender.host.scene_time.scene_frames() if given.frames == "all" else given.frames
     numbers = list(numbers or [blender.host.scene_time.present_frame()])

@@ -110,8 +110,8 @@ def test_patterns_are_refused_by_the_rules_of_the_command_line(tmp_path, numbers
             refusal = frames.require_pattern(pattern, len(options.frame_range(numbers)), has_passes)
         except HairError as error:
             refusal = str(error)
-        assert sentence == refusal or refusal.startswith(sentence[:20]) and pattern.endswith(("/", "/."))
-    assert {None, *sentences.values()} != {None} and None in sentences.values()
+        assert sentence == refusal, pattern
+    assert None in sentences.values() and len({*sentences.values()}) > 3
 
 
 @pytest.mark.parametrize(

@@ -39,7 +39,7 @@ def write_blender(folder):
     path = folder / "blender"
     words = ["exec", sys.executable, "-m", "hair_addon"]
     lines = ["#!/bin/sh", '[ "$1 $2" = "--command vellus" ] || exit 64', "shift 2"]
-    lines += [f"PYTHONPATH={shlex.quote(str(ROOT))} {shlex.join(words)} \"$@\""]
+    lines += [f'PYTHONPATH={shlex.quote(str(ROOT))} {shlex.join(words)} "$@"']
     path.write_text("\n".join(lines) + "\n")
     path.chmod(0o755)
     return path

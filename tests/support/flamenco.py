@@ -77,7 +77,7 @@ class Manager:
 
     def log(self, job):
         """What all commands of a job have printed."""
-        logs = sorted(self._local.rglob(f"job-{job['id']}/task-*.txt"))
+        logs = sorted(self._local.rglob(f"{job['id']}/task-*"))
         return "\n".join(log.read_text() for log in logs)
 
 
