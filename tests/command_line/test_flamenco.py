@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The job type in a real Flamenco, whose programs are in the folder VELLUS_FLAMENCO: a manager and two workers."""
 
+from pathlib import Path
+
 import bpy
 import pytest
 
@@ -57,7 +59,7 @@ def test_the_mock_answers_as_the_manager_does(manager, given):
 def test_jobs_are_whole_after_a_lost_worker_a_second_submission_and_requeue(manager, lit, tmp_path):
     shots = [tmp_path / name / "shot.blend" for name in ("one", "two")]
     shots[0].parent.mkdir()
-    farm.save_shot(shots[0], samples=16)
+    farm.save_shot(shots[0], samples=64)
     settings = {"frames": "1..3, 4 - 6", "chunk_size": 2, "pattern": str(tmp_path / "{timestamp}" / "shot_####.exr")}
     homes = [tmp_path / name for name in flamenco.WORKERS]
     with flamenco.worker(manager, homes[0]):
@@ -91,7 +93,7 @@ def requeue_goes_on(manager, job):
 
 def folder_of(job):
     """The folder of a job's images."""
-    return farm.Path(job["settings"]["pattern"]).parent
+    return Path(job["settings"]["pattern"]).parent
 
 
 def found_in_mid_frame(home):

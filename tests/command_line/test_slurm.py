@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The steps of docs/farm on Slurm: an array job on two nodes, of which one is lost in the middle of a frame."""
 
+import os
 import re
 
 import pytest
@@ -16,19 +17,19 @@ LOST = slurm.NODES[1]
 
 
 def test_a_lost_node_costs_one_frame(lit, tmp_path):
-    shot = farm.save_shot(tmp_path / "shot.blend", samples=16)
-    path = f"{farm.write_blender(tmp_path).parent}:{farm.os.environ['PATH']}"
+    shot = farm.save_shot(tmp_path / "shot.blend", samples=64)
+    path = f"{farm.write_blender(tmp_path).parent}:{os.environ['PATH']}"
     steps = farm.documented("Slurm", {"/farm/shot.blend": shot, "1-240": "1-6", "1-8": "1-2"})
     (tmp_path / "slurm").mkdir()
     with slurm.cluster(tmp_path / "slurm") as (nodes, variables):
         farm.shell(steps, tmp_path, PATH=path, **variables)
-        lost, frame = farm.wait_for(lambda: found_in_mid_frame(shot), 60, pause=0.01)
-        farm.kill([nodes[LOST].pid, *farm.parents_of(lost), lost])
+        lost, frame = farm.wait_for(lambda: found_in_mid_frame(shot), 120, pause=0.01)
+        farm.kill([nodes[LOST].pid, *farm.parents_up_to(lost, "slurmstepd"), lost])
         assert not (tmp_path / "frames" / frame).exists()
         # The task of the lost node waits for two minutes before it starts again: long after the others are done.
-        waiting = farm.wait_for(lambda: queued(tmp_path, variables, "--states=PENDING"), 60).split()
+        waiting = farm.wait_for(lambda: queued(tmp_path, variables, "--states=PENDING"), 90).split()
         farm.shell(f"scontrol update JobId={waiting[0]} StartTime=now", tmp_path, **variables)
-        farm.wait_for(lambda: not queued(tmp_path, variables), 60)
+        farm.wait_for(lambda: not queued(tmp_path, variables), 120)
         jobs = farm.shell("scontrol show job", tmp_path, **variables)
     assert re.findall(r"JobState=(\w+)", jobs) == ["COMPLETED"] * 3
     assert sorted(re.findall(r"Restarts=(\d)", jobs)) == ["0", "0", "1"]

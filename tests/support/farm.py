@@ -68,7 +68,7 @@ def require_whole(folder, names):
 
 def frames_told(text):
     """Numbers of the frames that commands say to have rendered."""
-    return sorted(int(number) for number in re.findall(r"\bFrame (\d+) in \d", text, re.MULTILINE))
+    return sorted(int(number) for number in re.findall(r"\bFrame (\d+) in \d", text))
 
 
 def wait_for(found, seconds, pause=0.2):
@@ -99,25 +99,27 @@ def _words(path):
         return []
 
 
-def parents_of(process):
-    """Ids of a process's parent, of that one's, and so on, without the first process of the machine."""
-    while True:
-        with open(f"/proc/{process}/stat") as file:
-            process = int(file.read().rpartition(")")[2].split()[1])
-        if process <= 1:
-            return
-        yield process
+def parents_up_to(process, program):
+    """Ids of a process's parent, of that one's, and so on, up to the one of some program."""
+    parents = []
+    while not parents or Path(f"/proc/{parents[-1]}/comm").read_text().strip() != program:
+        state = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+        process = int(state[1])
+        assert process > 1, f"no {program} started it"
+        parents.append(process)
+    return parents
 
 
 def stopped_in_mid_frame(process):
     """The picture that a process was rendering when it was stopped here, or None, and it runs on."""
-    os.kill(process, signal.SIGSTOP)
-    with contextlib.suppress(OSError):
+    with contextlib.suppress(OSError):  # it has ended, or has closed a file
+        os.kill(process, signal.SIGSTOP)
         for number in os.listdir(f"/proc/{process}/fd"):
             claim = re.fullmatch(r"(.*)/\.(\w+\.exr)\.claim", os.readlink(f"/proc/{process}/fd/{number}"))
             if claim and not os.path.exists(f"{claim[1]}/{claim[2]}"):
                 return claim[2]
-    os.kill(process, signal.SIGCONT)
+    with contextlib.suppress(ProcessLookupError):
+        os.kill(process, signal.SIGCONT)
     return None
 
 
@@ -141,7 +143,7 @@ def kill(processes):
 
 def shell(text, folder, **variables):
     """Run lines of a shell in a folder; returns what they print."""
-    given = {"cwd": folder, "env": os.environ | variables, "timeout": 120}
+    given = {"cwd": folder, "env": os.environ | variables, "timeout": 300}
     done = subprocess.run(["/bin/sh", "-eu", "-c", text], capture_output=True, text=True, check=False, **given)
     assert done.returncode == 0, done.stderr
     return done.stdout
