@@ -70,7 +70,7 @@ class Manager:
         """The status of a job."""
         return self.ask(f"jobs/{job['id']}")[1]["status"]
 
-    def wait(self, job, seconds=120):
+    def wait(self, job, seconds=300):
         """Wait until a job has ended; returns its status."""
         farm.wait_for(lambda: self.status(job) in {"completed", "failed", "canceled"}, seconds)
         return self.status(job)
