@@ -60,7 +60,11 @@ def test_jobs_are_whole_after_a_lost_worker_a_second_submission_and_requeue(mana
     shots = [tmp_path / name / "shot.blend" for name in ("one", "two")]
     shots[0].parent.mkdir()
     farm.save_shot(shots[0], samples=64)
-    settings = {"frames": "1..3, 4 - 6", "chunk_size": 2, "pattern": str(tmp_path / "{timestamp}" / "shot_####.exr")}
+    settings = {
+        "frames": f"1..3, 4 - {farm.COUNT}",
+        "chunk_size": 2,
+        "pattern": str(tmp_path / "{timestamp}" / "shot_####.exr"),
+    }
     homes = [tmp_path / name for name in flamenco.WORKERS]
     with flamenco.worker(manager, homes[0]):
         status, first = manager.submit(settings | {"blendfile": str(shots[0])})

@@ -19,7 +19,7 @@ from tests.support.commands import ROOT
 from tests.support.swung import simulate, swing
 
 DOCS = ROOT / "docs" / "farm"
-COUNT = 6
+COUNT = 8
 FRAMES = [f"shot_{number:04}.exr" for number in range(1, COUNT + 1)]
 
 

@@ -23,16 +23,11 @@ SlurmUser={user}
 SlurmdUser={user}
 AuthType=auth/munge
 AuthInfo=socket={folder}/munge/socket
-CredType=cred/munge
 StateSaveLocation={folder}/state
 SlurmctldPidFile={folder}/controller.pid
 SlurmdPidFile={folder}/%n.pid
 SlurmdSpoolDir={folder}/%n
 ProctrackType=proctrack/linuxproc
-TaskPlugin=task/none
-SwitchType=switch/none
-MpiDefault=none
-JobAcctGatherType=jobacct_gather/none
 SelectType=select/cons_tres
 SelectTypeParameters=CR_CPU
 ReturnToService=2
@@ -51,7 +46,12 @@ def cluster(folder):
     for name in ("state", *NODES):
         (folder / name).mkdir()
     configuration = folder / "slurm.conf"
-    fields = {"folder": folder, "host": socket.gethostname(), "user": getpass.getuser(), "ports": farm.free_ports(3)}
+    fields = {
+        "folder": folder,
+        "host": socket.gethostname().partition(".")[0],
+        "user": getpass.getuser(),
+        "ports": farm.free_ports(3),
+    }
     configuration.write_text(_CONFIGURATION.format(**fields))
     variables = {"SLURM_CONF": str(configuration)}
     with contextlib.ExitStack() as daemons:
