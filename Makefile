@@ -1,7 +1,7 @@
 # make demo and make test work from a fresh clone: dependencies are installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
-.PHONY: help demo compare turntable dynamics test desktop bench build lint lock samples clean
+.PHONY: help demo compare turntable dynamics test farm desktop bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
 # Let uv use the system's certificates, as pip does: some networks have their own.
@@ -21,7 +21,10 @@ demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and 
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
 
 test: $(installed) ## all tests except long benchmarks and tests in a window, in up to four processes
-	$(python) -m pytest -m "not long and not desktop" --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
+	$(python) -m pytest -m "not long and not desktop and not farm" --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
+
+farm: $(installed) ## tests on a farm of this machine's own: Slurm, OpenJobDescription, Flamenco in VELLUS_FLAMENCO
+	$(python) -m pytest -m farm tests/command_line $(ARGS)
 
 desktop: $(installed) ## tests in a window of Blender, with OpenGL and Vulkan: screenshots in out/desktop
 	$(python) -m pytest -m "desktop and not long" --numprocesses 2 --dist loadfile tests/desktop $(ARGS)

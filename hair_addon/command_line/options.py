@@ -53,7 +53,12 @@ def add_common(parser):
 
 def add_scripts(parser):
     """Add the option of commands that open a .blend file."""
-    parser.add_argument("--enable-scripts", action="store_true", help="run the scripts and drivers of the .blend file")
+    parser.add_argument(
+        "--enable-scripts",
+        action=argparse.BooleanOptionalAction,
+        default=False,
+        help="run the scripts and drivers of the .blend file",
+    )
 
 
 def add_settings_file(parser):

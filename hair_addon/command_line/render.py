@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """render: a .blend → images of its frames; repeating the command resumes an interrupted run."""
 
+import argparse
 import time
 
 from ..core import lazy
@@ -11,6 +12,7 @@ from . import helpers, opening, options
 
 blender = lazy.Package("..blender", __package__)
 
+_Flag = argparse.BooleanOptionalAction  # templates of jobs have no options that may be left out
 _ENGINES = ("vellus", "cycles", "eevee")
 _SETTINGS = {"width", "height"}  # the scene's, unless they are given
 
@@ -37,8 +39,8 @@ def add(verbs):
     parser.add_argument("--width", type=int, metavar="N", help="width in pixels [from the scene]")
     parser.add_argument("--height", type=int, metavar="N", help="height in pixels [from the scene]")
     parser.add_argument("--samples", type=int, metavar="N", help="samples per pixel [from the scene]")
-    parser.add_argument("--transparent", action="store_true", help="render a transparent background")
-    parser.add_argument("--passes", action="store_true", help="write all passes as layers of the .exr")
+    parser.add_argument("--transparent", action=_Flag, default=False, help="render a transparent background")
+    parser.add_argument("--passes", action=_Flag, default=False, help="write all passes as layers of the .exr")
     parser.add_argument("--overwrite", action="store_true", help="render existing frames again")
     parser.add_argument(
         "--jobs", type=options.count, default=1, metavar="N", help="number of processes on this machine [1]"
@@ -52,7 +54,8 @@ def run(given, console):
     """Open the file and render its frames, in this process or in several."""
 
     blender.io.mesh_files.require_blend(given.input)
-    blender.io.frames.require_pattern(given.out, len(given.frames) if isinstance(given.frames, range) else 1)
+    known_count = len(given.frames) if isinstance(given.frames, range) else 1
+    blender.io.frames.require_pattern(given.out, known_count, given.passes)
     opening.open_file(given, console)
     numbers = blender.host.scene_time.scene_frames() if given.frames == "all" else given.frames
     numbers = list(numbers or [blender.host.scene_time.present_frame()])

@@ -31,6 +31,11 @@ def add(verbs):
         metavar="FILE",
         help="also write a .blend whose hair plays the frames without Vellus, and beside it the files that it plays",
     )
+    parser.add_argument(
+        "--if-needed",
+        action="store_true",
+        help="simulate only guides whose baked frames are rendered; without any, do nothing",
+    )
     parser.add_argument("--overwrite", action="store_true", help="simulate existing frames again")
     options.add_scripts(parser)
     options.add_common(parser)
@@ -47,9 +52,12 @@ def run(given, console):
     last = scene_last if given.last_frame is None else given.last_frame
     if given.deliver is not None and last < scene_last:
         raise HairError(f"--deliver needs all frames of the scene, to {scene_last}: leave out --last-frame {last}.")
-    guides = (
-        [_named(name) for name in given.guides] if given.guides else blender.groom.dynamics.frame_folders.simulating()
-    )
+    folders = blender.groom.dynamics.frame_folders
+    guides = [_named(name) for name in given.guides] if given.guides else folders.simulating()
+    if given.if_needed:
+        guides = [one for one in folders.rendered(last) if one in guides]
+        if not guides and given.deliver is None:
+            return
     if not guides:
         raise HairError(f"{given.input} has no guides that simulate: switch Dynamics on, or name them by --guides.")
     _warn_of_memory(guides, console)

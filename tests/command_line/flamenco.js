@@ -1,45 +1,44 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a manager of Flamenco 3 gives a job type, as far as ours uses it: settings (JSON) in, tasks (JSON) out.
+// What a manager of Flamenco 3 does with submitted jobs, as far as our job type can tell: jobs (JSON) in, for each its
+// tasks (JSON) out, or the status and sentence of a refusal. test_flamenco.py compares it with a real manager.
 const fs = require("fs");
+const path = require("path");
 const vm = require("vm");
 
-const [script, settings] = process.argv.slice(2);
-const tasks = [];
-
-// Ranges of at most `size` frames of a list such as "1-5, 9".
-function frameChunker(frames, size) {
-    const numbers = frames.split(",").flatMap((part) => {
-        const [first, last] = part.split("-").map(Number);
-        return Array.from({ length: (last || first) - first + 1 }, (_, index) => first + index);
-    });
-    const chunks = [];
-    for (let start = 0; start < numbers.length; start += size) {
-        const some = numbers.slice(start, start + size);
-        const ranges = [];
-        for (const number of some) {
-            const range = ranges[ranges.length - 1];
-            if (range && range[1] === number - 1) range[1] = number;
-            else ranges.push([number, number]);
-        }
-        chunks.push(ranges.map(([first, last]) => (first === last ? `${first}` : `${first}-${last}`)).join(","));
-    }
-    return chunks;
-}
+const script = process.argv[2];
+const source = fs.readFileSync(script, "utf8");
+const jobs = JSON.parse(fs.readFileSync(0, "utf8"));
 
 const author = {
     Task: (name, type) => ({
         name, type, commands: [], waits: [],
         addCommand(command) { this.commands.push(command); },
-        addDependency(task) { this.waits.push(task); },
+        addDependency(task) { this.waits.push(task.name); },
     }),
     Command: (name, parameters) => ({ name, parameters }),
 };
-const world = vm.createContext({ author, frameChunker, print: () => {} });
-vm.runInContext(fs.readFileSync(script, "utf8") + "\nthis.JOB_TYPE = JOB_TYPE;", world);
-const given = JSON.parse(settings);
-for (const setting of world.JOB_TYPE.settings) {
-    if (!(setting.key in given) && "default" in setting) given[setting.key] = setting.default;
+
+// "2006-01-02_150405" in the language of the manager, in local time.
+function formatTimestampLocal(date) {
+    const [year, month, day, ...time] = [
+        date.getFullYear(), date.getMonth() + 1, date.getDate(), date.getHours(), date.getMinutes(), date.getSeconds(),
+    ].map((part) => String(part).padStart(2, "0"));
+    return `${year}-${month}-${day}_${time.join("")}`;
 }
-world.compileJob({ settings: given, addTask: (task) => tasks.push(task) });
-const told = tasks.map((task) => ({ ...task, waits: task.waits.map((other) => other.name) }));
-console.log(JSON.stringify({ type: world.JOB_TYPE, tasks: told }));
+
+// A task is added as it is by then. The manager fills in no defaults of settings: only Blender's add-on does.
+function submitted({ settings, created, jobID }) {
+    const tasks = [];
+    const addTask = (task) => tasks.push(JSON.parse(JSON.stringify(task)));
+    const world = vm.createContext({ author, formatTimestampLocal, print: () => {} });
+    vm.runInContext(`"use strict";${source}\nglobalThis.JOB_TYPE = JOB_TYPE; globalThis.compileJob = compileJob;`, world);
+    try {
+        world.compileJob({ name: "a job", jobID, created: new Date(created), settings, addTask });
+        return { status: 200, tasks, settings, type: world.JOB_TYPE };
+    } catch (error) {
+        // As the manager's engine writes what was thrown, and where.
+        return { status: 400, message: `${error} at refuse (${path.basename(script)}:1:1(2))` };
+    }
+}
+
+console.log(JSON.stringify(jobs.map(submitted)));

@@ -73,6 +73,20 @@ def test_files_without_simulated_guides_are_refused(shot):
     bpy.ops.wm.save_mainfile()
     ended = run_here("simulate", shot)
     assert ended.status == 1 and "no guides that simulate" in ended.errors
+    needless = run_here("simulate", shot, "--if-needed", "--json")
+    assert (needless.status, needless.results) == (0, [])
+    delivered = run_here("simulate", shot, "--if-needed", "--deliver", shot.with_name("delivered.blend"))
+    assert delivered.status == 1 and "no guides that simulate" in delivered.errors
+
+
+def test_only_what_is_rendered_is_simulated_if_needed(shot):
+    """As render says itself: guides that start after the last frame need no frames, nor those of delivered hair."""
+    assert run_here("simulate", shot, "--if-needed", "--last-frame", "1", "--json").results == []
+    frame_folders.require_baked([1])
+    assert [line["frame"] for line in run_here("simulate", shot, "--if-needed", "--json").results] == [*range(2, 8)]
+    out = shot.with_name("delivered.blend")
+    assert run_here("simulate", shot, "--deliver", out).status == 0
+    assert run_here("simulate", out, "--if-needed", "--overwrite", "--json").results == []
 
 
 def test_what_is_baked_is_told(shot):

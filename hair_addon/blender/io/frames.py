@@ -49,12 +49,16 @@ def is_sequence(pattern):
     return _number_width(Path(pattern)) > 0
 
 
-def require_pattern(pattern, frame_count):
-    """Raise `HairError` unless a number of frames can be written to a pattern."""
+def require_pattern(pattern, frame_count, has_passes=False):
+    """Raise `HairError` unless a number of frames, with passes or without, can be written to a pattern.
+
+    docs/farm/vellus-render.js refuses the same patterns when a job is submitted.
+    """
     pattern = Path(pattern)
     if pattern.suffix.lower() not in _FORMATS:
         ending = pattern.suffix or "a file without an extension"
         raise HairError(f"Pictures are saved as {' or '.join(_FORMATS)}, not as {ending}.")
+    _require_layers(pattern, has_passes)
     if os.sep == "/" and "\\" in str(pattern.absolute()):
         raise HairError(f"{pattern} has a backslash, which Blender treats as a path separator: choose another path.")
     if frame_count > 1 and not _number_width(pattern):
@@ -64,6 +68,11 @@ def require_pattern(pattern, frame_count):
     except UnicodeEncodeError as error:
         raise HairError(f"{str(pattern)!a} cannot be written: Blender accepts only UTF-8 paths.") from error
     require_place(path_of(pattern, 1))
+
+
+def _require_layers(path, has_passes):
+    if has_passes and path.suffix.lower() != ".exr":
+        raise HairError(f"Passes are layers of an .exr file: change the extension of {path}.")
 
 
 def require_view_layer():
@@ -101,8 +110,7 @@ def write_frame(path, frame, engine, settings, partial=None, progress=no_progres
     if not FIRST_FRAME <= frame <= LAST_FRAME:
         raise HairError(f"There is no frame {frame}: Blender's frames range from {FIRST_FRAME} to {LAST_FRAME}.")
     require_view_layer()
-    if settings.has_passes and path.suffix.lower() != ".exr":
-        raise HairError(f"Passes are layers of an .exr file: change the extension of {path}.")
+    _require_layers(path, settings.has_passes)
     if blender_scene.camera is None:
         raise HairError("The scene has no camera: add one.")
     with whole_file(path, partial) as partial, _rendering(blender_scene, partial, engine, settings):

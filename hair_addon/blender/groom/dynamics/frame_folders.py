@@ -123,10 +123,20 @@ def require_baked(numbers: Iterable[int]) -> None:
 
     Renders of sequences ask: they never simulate. Hair that plays delivered frames needs no others.
     """
-    for guides in simulating():
+    numbers = list(numbers)
+    for guides in rendered(max(numbers)):
+        require_frames(guides, numbers)
+
+
+def rendered(last: int) -> list[Curves]:
+    """Guides that simulate and whose baked frames are rendered up to a frame: not those whose hair plays others."""
+
+    def is_read(guides):
         hair = followers(guides)
-        if not hair or not all(map(delivered_hair.is_delivered, hair)):
-            require_frames(guides, numbers)
+        is_all_delivered = bool(hair) and all(map(delivered_hair.is_delivered, hair))
+        return guides.vellus.dynamics.start_frame < last and not is_all_delivered
+
+    return [guides for guides in simulating() if is_read(guides)]
 
 
 def require_frames(guides: Curves, numbers: Iterable[int]) -> None:
