@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         curvature,
         fingerprint,
         hash_grid,
+        landmark_warp,
         mesh,
         resampling,
         root_frames,

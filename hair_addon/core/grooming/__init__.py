@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         following,
         groom,
         groom_defaults,
+        groom_transfer,
         guide_attraction,
         guide_copies,
         guide_count,
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
         guide_trim,
         hair_styles,
         rooted_curves,
+        transfer_settings,
     )
 else:
     __getattr__ = submodules(__name__)
