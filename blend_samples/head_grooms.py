@@ -116,7 +116,7 @@ def coily(head_object, strand_count):
     """Tight coils in a round shape."""
     guides, roots, normals, rng = _placed(head_object, 420)
     skull = Solid(head_object)
-    outward = unit(roots - (_CENTER + [0.0, 0.015, 0.0]))
+    outward = unit(roots - (_CENTER + np.array([0.0, 0.015, 0.0])))
     outward = unit(outward + columns(0.0, 0.25 * part(-roots[:, 1], 0.06, 0.14), 0.10))
     above = part(head.above_hairline(roots), 0.0, 0.03)
     lengths = (0.075 + 0.060 * above) * rng.uniform(0.92, 1.06, len(roots))

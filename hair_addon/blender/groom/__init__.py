@@ -21,6 +21,7 @@ if TYPE_CHECKING:
         hair_styles,
         hair_systems,
         hand_made_guides,
+        library_groom,
         painted_masks,
         pipeline,
         selection,

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
         following,
         groom,
         groom_defaults,
+        groom_passage,
         groom_transfer,
         guide_attraction,
         guide_copies,

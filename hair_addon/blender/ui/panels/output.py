@@ -31,6 +31,9 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         row = layout.row(align=True)
         row.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
         row.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")
+        row = layout.row(align=True)
+        row.operator("vellus.save_groom", icon="ASSET_MANAGER", text="Save Groom…")
+        row.operator("vellus.apply_groom", icon="IMPORT", text="Apply Groom…")
         hair = hair_of(context.object)
         if hair is not None and animated.are_keyed(hair) and not context.scene.render.use_lock_interface:
             write(
