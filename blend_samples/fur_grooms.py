@@ -83,7 +83,7 @@ def short_fur(monkey, strand_count):
     """Sleek fur of a centimetre that lies along the body."""
     guides, roots, normals, rng = _placed(monkey, 700)
     near_face = _near_face(roots)
-    lengths = (0.006 + 0.010 * near_face) * rng.uniform(0.9, 1.1, len(roots))
+    lengths = (0.007 + 0.008 * near_face) * rng.uniform(0.9, 1.1, len(roots))
     combing.write(guides, _flowing(monkey, roots, normals, lengths, lift=0.45, fall=0.35))
     styles = [
         api.Trim(random=0.25, undercoat=0.4, undercoat_length=0.6, seed=1),
@@ -91,7 +91,7 @@ def short_fur(monkey, strand_count):
         api.Frizz(amplitude=0.0003, wavelength=0.01, seed=3),
     ]
     look = {"melanin": 0.30, "redness": 0.75, "random_color": 0.2, "tip_absorption": 0.4, "roughness": 0.32}
-    return _hair(guides, styles, strand_count, look, point_count=13, tip_taper=0.8)
+    return _hair(guides, styles, strand_count, look, point_count=13, tip_taper=0.6)
 
 
 def long_fur(monkey, strand_count):

@@ -26,7 +26,7 @@ def pixie(head_object, strand_count):
     guides, roots, normals, rng = _placed(head_object, 480)
     top = part(roots[:, 2] - 0.25 * roots[:, 1], 0.80, 0.845)
     front = part(-roots[:, 1], 0.07, 0.12) * top
-    lengths = (0.026 + 0.040 * top + 0.034 * front) * rng.uniform(0.85, 1.1, len(roots))
+    lengths = (0.028 + 0.040 * top + 0.044 * front) * rng.uniform(0.85, 1.1, len(roots))
     height = 0.0025 + 0.009 * top + 0.002 * front
     skull = Solid(head_object)
 
@@ -34,7 +34,7 @@ def pixie(head_object, strand_count):
         _near, normal = skull.nearest(place)
         away = place - _WHORL
         flow = unit(away - np.einsum("ni,ni->n", away, normal)[:, None] * normal)
-        flow = mixed(flow, columns(0.75, -0.75 + 0.7 * gone, -0.15 - 0.75 * gone), 0.9 * front)
+        flow = mixed(flow, columns(0.70, -0.75 + 0.75 * gone, -0.15 - 0.85 * gone), 0.9 * front)
         return flow + 1.2 * skull.toward(place, height * part(gone, 0.0, 0.4), 0.01)
 
     def clear(place, gone):

@@ -90,7 +90,7 @@ def _styled(given, settings, surface):
 
 def _from_library(given, surface, console):
     """Return (guides, hair) of a saved groom with the settings that options give."""
-    path, name = blender.io.groom_library.path_and_name(given.from_library)
+    path, name = blender.io.groom_library.path_and_name(str(given.from_library))
     groom = blender.io.groom_library.read(path, name)
 
     def changed(settings):

@@ -8,7 +8,7 @@ object carries it exactly.
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import bpy
 import numpy as np
@@ -19,7 +19,6 @@ from ...core.errors import HairError
 from ...core.files import library_settings
 from ...core.files.settings_file import GroomSettings
 from ...core.geometry.mesh import SurfacePoints, TriMesh, interpolate
-from ...core.grooming.groom_transfer import Ground
 from ...core.long_work import Work
 from ..data import attributes, curves, groom_assets, scene
 from ..host.datablocks import Remembered
@@ -27,6 +26,9 @@ from ..host.notices import name_of
 from ..settings import setting_properties
 from . import groom_settings, pipeline
 from .hand_made_guides import HandMade
+
+if TYPE_CHECKING:
+    from ...core.grooming.groom_transfer import Ground
 
 _GUIDE_RADIUS = 1.0 / 300.0  # of guides in viewports, by their length
 _UNEQUAL = 1e-4  # weights that differ by less are of the same mask
@@ -42,7 +44,7 @@ class LibraryGroom:
     """
 
     name: str
-    ground: Ground
+    ground: "Ground"
     roots: SurfacePoints
     points: np.ndarray
     counts: np.ndarray
@@ -86,7 +88,7 @@ def take(hair: Curves, name: str, depsgraph: Depsgraph) -> LibraryGroom:
     if attributes.are_smooth(guides).any():
         points, counts = read.numpy().reshape(-1, 3), np.full(len(counts), read.point_count)
     rotation = _rotation(surface)
-    ground = Ground(_turned_mesh(surface.mesh, rotation.T), surface.corner_uvs)
+    ground = grooming.groom_transfer.Ground(_turned_mesh(surface.mesh, rotation.T), surface.corner_uvs)
     masks, regions = {}, {}
     for mask in library_settings.masks_of(settings):
         if mask in surface_object.vertex_groups:
@@ -152,7 +154,7 @@ def adding_groom(
     curves.require_editable(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
     rotation = _rotation(surface)
-    target = Ground(_turned_mesh(surface.posed_mesh, rotation.T), surface.corner_uvs)
+    target = grooming.groom_transfer.Ground(_turned_mesh(surface.posed_mesh, rotation.T), surface.corner_uvs)
     found = grooming.groom_passage.passage(groom.ground, target, groom.roots, method)
     places = found.places
     points = grooming.groom_transfer.carried(
@@ -164,7 +166,7 @@ def adding_groom(
     painted = _painted(surface_object, surface, groom, target, found, depsgraph)
     settings = library_settings.renamed(settings, {mask: name for mask, (name, _is_new) in painted.items()})
     place = Remembered(surface_object)
-    drawn = _drawn(groom, surface_object, places.kept, surface.to_local(_turned(points, rotation)))
+    drawn = _drawn(groom, surface_object, places.kept, surface.to_local(_turned(points, rotation)[None])[0])
     its_place = Remembered(drawn)
     try:
         bpy.context.view_layer.update()

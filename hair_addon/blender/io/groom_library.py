@@ -12,12 +12,11 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core import geometry, grooming
 from ...core.errors import HairError, cause_of
 from ...core.files import settings_file
 from ...core.files.whole_file import require_place, whole_file
-from ...core.geometry.closest_point import SurfaceQuery
 from ...core.geometry.mesh import SurfacePoints, check_mesh
-from ...core.grooming.groom_transfer import Ground
 from ...core.long_work import Stage, Work
 from ..data import attributes, curves, groom_assets, scene
 from ..groom import library_groom, selection
@@ -209,7 +208,7 @@ def _groom(asset, name, path):
         raise HairError('"{name}" in {path} is not a groom saved by Vellus.', name=name, path=path)
     surface_object = asset.data.surface
     try:
-        ground = Ground(*groom_assets.read_surface(surface_object))
+        ground = grooming.groom_transfer.Ground(*groom_assets.read_surface(surface_object))
         check_mesh(ground.mesh)
         points, counts = curves.read_points(asset.data), np.diff(curves.curve_offsets(asset.data))
         settings = settings_file.from_object(settings_file.object_of_text(text, path), path)
@@ -239,4 +238,4 @@ def _roots(datablock, mesh, first_points):
         is_known = (triangle >= 0).all() and (triangle < len(mesh.triangles)).all()
         if is_known and np.isfinite(barycentric).all() and (np.abs(barycentric.sum(axis=1) - 1.0) < 1e-3).all():
             return SurfacePoints(triangle, barycentric)
-    return SurfaceQuery(mesh).nearest(first_points)
+    return geometry.closest_point.SurfaceQuery(mesh).nearest(first_points)

@@ -4,7 +4,7 @@
 import bpy
 
 from ..groom.selection import surface_of
-from ..settings.translations import interface_text
+from ..settings.translations import CONTEXT
 
 
 class VELLUS_AST_grooms(bpy.types.AssetShelf):
@@ -29,7 +29,7 @@ def _in_asset_menu(menu, context):
     asset = getattr(context, "asset", None)
     if asset is not None and VELLUS_AST_grooms.asset_poll(asset):
         menu.layout.separator()
-        menu.layout.operator("vellus.apply_groom", text=interface_text("Apply Groom to Active Mesh"), translate=False)
+        menu.layout.operator("vellus.apply_groom", text="Apply Groom to Active Mesh", text_ctxt=CONTEXT)
 
 
 CLASSES = (VELLUS_AST_grooms,)
