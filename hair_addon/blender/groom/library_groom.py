@@ -170,7 +170,9 @@ def adding_groom(
     its_place = Remembered(drawn)
     try:
         bpy.context.view_layer.update()
-        made = yield from groom_settings.using_as_guides(drawn, surface_object, settings, scene.present_depsgraph())
+        # Attributes of guides are found when these are written.
+        unparted = replace(settings, hair=replace(settings.hair, region_attribute=""))
+        made = yield from groom_settings.using_as_guides(drawn, surface_object, unparted, scene.present_depsgraph())
     except BaseException:
         with contextlib.suppress(HairError):  # they are gone
             _remove(its_place.find())
@@ -229,8 +231,12 @@ def _keep_settings(made, settings):
     setting_properties.assign(made.guides.vellus.guides, settings.guides)
     if settings.hair.density_group == settings.guides.density_group:
         made.hair.vellus.hair.density_group = ""  # that of the guides, which are written now
+    if settings.hair.region_attribute:
+        made.hair.vellus.hair.region_attribute = settings.hair.region_attribute
+        pipeline.evaluate(made.hair, scene.present_depsgraph())
     for target in (made.guides, made.hair):
-        target.vellus.is_stale, target.vellus.status = False, ""
+        target.vellus.is_stale = False
+    made.guides.vellus.status = ""
 
 
 def _remove(drawn):

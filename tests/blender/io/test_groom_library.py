@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon import api
-from hair_addon.blender.data import groom_assets
+from hair_addon.blender.data import attributes, groom_assets
 from hair_addon.blender.io import asset_catalogs, groom_library
 from hair_addon.core.errors import HairError
 from tests.support.following import update
@@ -75,6 +75,20 @@ def test_a_turned_and_scaled_copy_gets_it_exactly(groom, library, sphere, is_app
     group = copy.vertex_groups["top"]
     weights = [next((g.weight for g in v.groups if g.group == group.index), 0.0) for v in mesh.vertices]
     np.testing.assert_allclose(weights, vertex_positions(sphere)[:, 2] > 0.0, atol=1e-4)
+
+
+def test_regions_of_guides_come_along(groom, sphere, tmp_path):
+    guides, hair = groom
+    parts = (api.points(guides)[:, 0, 0] > 0.0).astype(np.int32)
+    attributes.write(guides, "part", "INT", "CURVE", parts)
+    hair.vellus.hair.region_attribute = "part"
+    update()
+    file = api.save_groom(hair, tmp_path, name="Parted", catalog="", picture=PICTURE)
+    its_guides, its_hair = api.apply_groom(sphere, file)
+    np.testing.assert_array_equal(attributes.read(its_guides, "part", "INT", "CURVE"), parts)
+    assert api.settings_of(its_hair) == api.settings_of(hair) and its_hair.vellus.status == ""
+    update()
+    np.testing.assert_allclose(api.points(its_hair), api.points(hair), atol=1e-4)
 
 
 def test_another_mesh_gets_it_and_says_what_fell_off(library):
