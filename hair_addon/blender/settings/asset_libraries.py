@@ -9,7 +9,7 @@ from ...core.errors import HairError
 from .translations import CONTEXT
 
 # Of operators that Blender calls for an asset: its own numbers.
-_KINDS = (("LOCAL", 1), ("ALL", 2), ("ESSENTIALS", 3), ("CUSTOM", 100))
+_KINDS = (("LOCAL", 1), ("ALL", 2), ("ESSENTIALS", 3), ("ONLINE_ESSENTIALS", 4), ("CUSTOM", 100))
 
 
 def library_name(name, description):
