@@ -22,7 +22,7 @@ In the installed extension this is bl_ext.user_default.vellus.hair_addon.api.
 """
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -30,7 +30,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from .api_arguments import are_arrays, changed, choice, curves_object_of, heard, mesh_of, path_of, require_no_names
+from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
 from .api_dynamics import (
     DynamicsSettings,
     bake_dynamics,
@@ -43,6 +43,7 @@ from .api_dynamics import (
 from .api_export import ExportSettings, export_groom
 from .api_guide_tools import change_guides
 from .api_library import apply_groom, groom_names, save_groom
+from .api_import import DerivationSettings, TransferSettings, transfer_groom, use_as_guides, use_as_hair
 from .api_styles import (
     Bend,
     Braid,
@@ -60,13 +61,12 @@ from .api_styles import (
     styles_of,
 )
 from .api_tables import bake_tables, table_settings
-from .core import dynamics, geometry, grooming, imaging, lazy
+from .core import dynamics, imaging, lazy
 from .core.errors import HairError
 from .core.files import settings_file
 from .core.files.settings_file import GroomSettings, require_styles
 from .core.geometry.mesh import TriMesh
-from .core.geometry.strands import Strands, check_strands, curve_offsets, from_numpy
-from .core.grooming import groom
+from .core.geometry.strands import Strands, check_strands
 from .core.grooming.groom import GuideSettings, HairSettings
 from .core.long_work import Progress, no_progress, run_now
 from .core.params import Param, plain_value, require_class
@@ -87,6 +87,7 @@ __all__ = [
     "Braid",
     "Clump",
     "Curl",
+    "DerivationSettings",
     "DynamicsSettings",
     "ExportSettings",
     "Frizz",
@@ -96,6 +97,7 @@ __all__ = [
     "HairSettings",
     "Lean",
     "Smooth",
+    "TransferSettings",
     "Trim",
     "Wet",
     "add_hair",
@@ -126,7 +128,9 @@ __all__ = [
     "simulate",
     "styles_of",
     "table_settings",
+    "transfer_groom",
     "use_as_guides",
+    "use_as_hair",
 ]
 _FRAMES = Param("")  # availability in this Blender is checked later
 
@@ -159,51 +163,6 @@ def distribute_guides(
     return run_now(
         blender.groom.pipeline.distributing_guides(_surface_object(surface), settings, _depsgraph()), progress
     )
-
-
-def use_as_guides(
-    curves: Curves | Iterable[ArrayLike],
-    surface: MeshObject | Arrays | None = None,
-    *,
-    every: int = 1,
-    applies_modifiers: bool = True,
-    progress: Progress = no_progress,
-) -> Curves | Strands:
-    """Use curves not created by Vellus as guides; every n-th of them is kept.
-
-    curves: a curves object, which becomes guide Curves in place and is returned: with its modifiers applied, or the
-    original curves; surface: the mesh object that they grow on, None for their own. Or arrays (P, 3) [m], one per
-    curve, with surface (vertices, triangles): their `Strands`. The root is the end nearer to the surface; curves with
-    zero length or non-finite points are removed. Points do not move.
-
-    >>> bpy.ops.object.curves_random_add()
-    {'FINISHED'}
-    >>> guides = api.use_as_guides(bpy.context.object, bpy.data.objects["Scalp"], every=10)
-    >>> len(guides.curves)
-    50
-    >>> mesh = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
-    >>> lines = [[(0.2, 0.2, 0.0), (0.2, 0.2, 0.1)], [(0.3, 0.2, 0.0), (0.3, 0.3, 0.1), (0.4, 0.3, 0.1)]]
-    >>> api.use_as_guides(lines, mesh).numpy().shape
-    (2, 41, 3)
-    """
-    if are_arrays(surface):
-        return _guides_of_arrays(curves, mesh_of(surface), every)
-
-    curves_object = curves_object_of(curves)
-    if surface is None:
-        surface = blender.groom.hand_made_guides.find_surface(curves_object, _depsgraph().view_layer)
-    work = blender.groom.hand_made_guides.using_as_guides(
-        curves_object, _surface_object(surface), _depsgraph(), every=every, applies_modifiers=applies_modifiers
-    )
-    return run_now(work, progress).guides
-
-
-def _guides_of_arrays(curves, mesh, every):
-    points, starts = grooming.rooted_curves.polylines(curves)
-    rooted = grooming.rooted_curves.root(mesh, points, starts, every)
-    points = points[rooted.point_order(starts)]
-    starts = curve_offsets(np.diff(starts)[rooted.kept])
-    return from_numpy(geometry.resampling.resample(points, starts, groom.POINT_COUNT), rooted.roots)
 
 
 def interpolate_hair(

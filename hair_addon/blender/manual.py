@@ -57,6 +57,8 @@ _OPERATORS = {
     "systems": ("delete_system",),
     "groom_library": ("save_groom", "apply_groom"),
     "use_as_guides": ("use_as_guides",),
+    "use_as_hair": ("use_as_hair", "convert_particles"),
+    "transfer_groom": ("transfer_groom",),
     "rendering": ("toggle_composite",),
     "output": ("render_picture", "export_groom", "save_groom_settings", "load_groom_settings"),
 }

@@ -7,6 +7,7 @@ from dataclasses import replace
 from .. import api
 from ..core import lazy
 from ..core.errors import HairError
+from ..core.grooming.derived_guides import DerivationSettings
 from ..core.grooming.groom import GuideSettings, HairSettings
 from ..core.long_work import run_now
 from ..core.params import declared
@@ -30,7 +31,10 @@ def add(verbs):
     parser.add_argument(
         "--guides-from", metavar="FILE", help="use the curves of a .blend, .usd*, .abc or .npz as guides"
     )
-    parser.add_argument("--guides-object", default="", metavar="NAME", help="curves object in that file")
+    parser.add_argument(
+        "--hair-from", metavar="FILE", help="use the curves of such a file as hair, as they are, and derive --guides"
+    )
+    parser.add_argument("--guides-object", default="", metavar="NAME", help="curves object in either file")
     parser.add_argument(
         "--from-library", metavar="FILE[:NAME]", help="put on a groom that was saved to an asset library's .blend"
     )
@@ -48,12 +52,17 @@ def run(given, console):
         look = replace(PRESETS[given.preset][1], mode=settings.appearance.mode)
         settings = options.changed_groom(replace(settings, appearance=look), given)
 
-    if given.guides_object and not given.guides_from:
-        raise HairError("--guides-object needs --guides-from.")
-    if given.guides_from:
-        blender.io.curve_files.require_readable(given.guides_from)
-    if given.from_library and (given.guides_from or given.settings):
-        raise HairError("--from-library brings guides and settings: leave out --guides-from and --settings.")
+    came_from = given.guides_from or given.hair_from
+    if given.guides_from and given.hair_from:
+        raise HairError("--guides-from and --hair-from exclude each other.")
+    if given.guides_object and not came_from:
+        raise HairError("--guides-object needs --guides-from or --hair-from.")
+    if came_from:
+        blender.io.curve_files.require_readable(came_from)
+    if given.from_library and (came_from or given.settings):
+        raise HairError(
+            "--from-library brings guides and settings: leave out --guides-from, --hair-from and --settings."
+        )
     blender.io.mesh_files.require_readable(given.input)
     blender.io.groom_files.require_writable(given.out)
     file_axes = opening.open_file(given, console)
@@ -64,6 +73,8 @@ def run(given, console):
         guides, hair = _from_library(given, surface, console)
     elif given.guides_from:
         guides, hair = _follow_curves(given, surface, settings, file_axes, console)
+    elif given.hair_from:
+        guides, hair = _keep_curves(given, surface, settings, file_axes, console)
     else:
         guides, hair = api.add_hair(surface, settings, progress=console.progress)
     seconds = time.perf_counter() - started
@@ -112,8 +123,7 @@ def _follow_curves(given, surface, settings, file_axes, console):
     useless = [name for name in vars(given) if name in _OF_GUIDES]
     if useless:
         console.warn(f"Guides come from {given.guides_from}: {', '.join(sorted(useless))} have no effect.")
-    is_open = given.guides_from.resolve() == given.input.resolve()
-    with blender.io.curve_files.curves_of(given.guides_from, given.guides_object, file_axes, is_open) as curves_object:
+    with _curves_of(given.guides_from, given, file_axes) as curves_object:
         work = blender.groom.groom_settings.using_as_guides(
             curves_object, surface, settings, blender.data.scene.present_depsgraph()
         )
@@ -121,3 +131,27 @@ def _follow_curves(given, surface, settings, file_axes, console):
     for sentence, values in made.notes():
         console.warn(sentence.format(**values))
     return made.guides, made.hair
+
+
+def _keep_curves(given, surface, settings, file_axes, console):
+    """Return (guides, hair): the curves in another file, or in the open one, as hair, and guides derived from them."""
+    with _curves_of(given.hair_from, given, file_axes) as curves_object:
+        work = blender.groom.kept_hair.using_as_hair(
+            curves_object,
+            surface,
+            blender.data.scene.present_depsgraph(),
+            DerivationSettings(guide_count=settings.guides.guide_count),
+        )
+        made = run_now(work, console.progress)
+    for sentence, values in made.notes():
+        console.warn(sentence.format(**values))
+    error, high = 100.0 * made.mean_error, 100.0 * made.high_error
+    console.warn(f"The guides reproduce the strands to {error:.1f}% (95%: {high:.1f}%) of their length.")
+    blender.groom.groom_settings.assign_look(made.hair, settings.appearance)
+    return made.guides, made.hair
+
+
+def _curves_of(path, given, file_axes):
+    """A context with the curves object of a file, which may be the open one."""
+    is_open = path.resolve() == given.input.resolve()
+    return blender.io.curve_files.curves_of(path, given.guides_object, file_axes, is_open)

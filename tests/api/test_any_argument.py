@@ -148,6 +148,12 @@ CALLS = {
         (anything(d, np.eye(3)), anything(d, [[0, 1, 2]])), **changes(d, api.GuideSettings, COSTLY)
     ),
     "change_guides": change_guides,
+    "transfer_groom": lambda d: api.transfer_groom(
+        target(d, d.choice(["GUIDES", "HAIR"])), target(d, "MESH"), **changes(d, api.TransferSettings, ())
+    ),
+    "use_as_hair": lambda d: api.use_as_hair(
+        target(d, d.choice(["NONE", "HAIR"])), target(d, "MESH"), **changes(d, api.DerivationSettings, COSTLY)
+    ),
     "points": lambda d: api.points(target(d, d.choice(["GUIDES", "HAIR"]))),
     "shade": lambda d: api.shade(
         target(d, "HAIR"),

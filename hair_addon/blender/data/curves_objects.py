@@ -25,14 +25,14 @@ def link_object(name, curves, surface_object, is_rendered=True):
     curves_object.parent = surface_object
     render(curves_object, is_rendered)
     if is_rendered:
-        _draw_thin(bpy.context.scene)
+        show_thin(bpy.context.scene)
     collections = surface_object.users_collection or (bpy.context.scene.collection,)
     collections[0].objects.link(curves_object)
     follow_nodes.add_modifier(curves_object)
     return curves_object
 
 
-def _draw_thin(blender_scene):
+def show_thin(blender_scene):
     """Let EEVEE draw strands as thin as they are: by Blender's default it draws lines a pixel wide or wider."""
     if blender_scene.render.hair_type == "STRAND":
         blender_scene.render.hair_type = "STRIP"

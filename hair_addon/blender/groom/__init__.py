@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         edits,
         foreign_curves,
         groom_settings,
+        groom_transfers,
         grown_guides,
         guide_additions,
         guide_regions,
@@ -22,12 +23,15 @@ if TYPE_CHECKING:
         hair_systems,
         hand_made_guides,
         library_groom,
+        kept_hair,
         painted_masks,
+        particle_hair,
         pipeline,
         selection,
         staleness,
         style_notes,
         styled_hair,
+        transferred_names,
         writing,
     )
 else:

@@ -11,11 +11,11 @@ from . import bindings
 
 
 def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.ndarray | None = None) -> bool:
-    """Carry guides, combed or not, with a surface that was edited; whether it was. Raises `HairError`.
+    """Carry guides, combed or not, or hair that is kept as it came, with an edited surface; whether it was edited.
 
     axes_before: `to_world_axes` of the surface before the edit, None if unknown. Shape keys and modifiers are not
     edits: strands are stored on the surface at rest. If faces were added or removed, roots move to the nearest
-    points.
+    points. Raises `HairError`.
     """
     state = guide_curves.vellus
     surface = scene.read_surface(guide_curves.surface, depsgraph)
@@ -23,7 +23,8 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
     stored = curves.stored_roots(guide_curves, surface)
     if state.topology != surface.topology or roots is None or stored is None:
         _root_again(guide_curves, surface)
-        state.status = f'The faces of "{surface.name}" have changed: guides are rooted at the nearest points.'
+        what = "strands" if state.kind == "HAIR" else "guides"
+        state.status = f'The faces of "{surface.name}" have changed: {what} are rooted at the nearest points.'
         return True
     before = curves.stood_on(guide_curves)
     if before is None or before.shape != surface.rest.shape or np.array_equal(before, surface.rest):
@@ -32,7 +33,8 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
     applied = None if axes_before is None else np.linalg.solve(surface.to_world_axes, axes_before)
     if applied is not None and np.allclose(before @ applied.T, surface.rest, rtol=0.0, atol=1e-5 * surface.extent):
         # The object's rotation or scale was applied: nothing has moved in world space.
-        for target in (guide_curves, *curves.followers(guide_curves)):
+        followers = [hair for hair in curves.followers(guide_curves) if not curves.is_hand_made(hair)]
+        for target in (guide_curves, *followers):
             curves.transform(target, applied)
             bindings.invalidate(target)
     else:

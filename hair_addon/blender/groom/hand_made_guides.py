@@ -16,11 +16,12 @@ from bpy.types import Depsgraph, Object, ViewLayer
 from ...core import grooming, placement
 from ...core.errors import HairError
 from ...core.geometry import strands
-from ...core.geometry.mesh import TriMesh, positions
+from ...core.geometry.mesh import SurfacePoints, TriMesh, positions
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.rooted_curves import RootedCurves, reversal
 from ...core.long_work import Work, part_of, run_now
 from ..data import attributes, curves, curves_objects, follow_nodes, masks, posed_strands, scene
+from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences
@@ -54,8 +55,8 @@ class HandMade:
 
 
 @dataclass(frozen=True)
-class _Guides:
-    """Guides as they are to be written: (N, 3) float32 local points at rest, (G,) point counts, (G,) bool."""
+class PlacedCurves:
+    """Curves as they are to be written: (N, 3) float32 local points at rest, (C,) point counts, (C,) bool."""
 
     points: np.ndarray
     counts: np.ndarray
@@ -63,8 +64,13 @@ class _Guides:
     rooted: RootedCurves
 
     @property
-    def starts(self):
+    def starts(self) -> np.ndarray:
+        """(C+1,) where each curve's points begin."""
         return strands.curve_offsets(self.counts)
+
+    def even(self, surface: Surface) -> np.ndarray:
+        """(C, POINT_COUNT, 3) float32 [m]: the curves with as many points each, along what is drawn of them."""
+        return curves.even_points(surface.from_local(self.points), self.starts, lambda: self.is_smooth)
 
 
 def find_surface(
@@ -120,7 +126,7 @@ def using_as_guides(
     are not all over the surface, it becomes a new one that is painted where curves are. Raises `HairError` before
     anything changes.
     """
-    _require_usable(curves_object, surface_object)
+    require_usable(curves_object, surface_object)
     curves_objects.keep_rest(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
     seen = foreign_curves.read(curves_object, applies_modifiers)
@@ -133,25 +139,25 @@ def using_as_guides(
 
     def compute(progress):
         progress("Rooting guides", 0.0)
-        guides = _on_surface(surface, seen, to_surface, every)
+        guides = on_surface(surface, seen, to_surface, every)
         if grow is None:
             return guides, None
-        points = curves.even_points(surface.from_local(guides.points), guides.starts, lambda: guides.is_smooth)
-        there = strands.from_numpy(points, guides.rooted.roots, device)
+        there = strands.from_numpy(guides.even(surface), guides.rooted.roots, device)
         density = None
         if is_unmasked:
             density = _coverage(surface.mesh, positions(surface.mesh, guides.rooted.roots))
         return guides, grow(there, part_of(progress, 0.2, 1.0), density)
 
     guides, bound = yield compute
-    datablock = _write(place.find(), its_surface.find(), surface, guides, seen, applies_modifiers)
+    datablock = write(place.find(), its_surface.find(), surface, guides, seen, applies_modifiers)
     if bound is not None and is_unmasked:
-        _bind_to_group(bound, datablock.surface, positions(surface.mesh, guides.rooted.roots))
+        _bind_to_group(bound, datablock.surface, guides.rooted.roots)
     hair = None if bound is None else pipeline.write_between(datablock, bound)
     return HandMade(datablock, hair, guides.rooted)
 
 
-def _require_usable(curves_object, surface_object):
+def require_usable(curves_object: Object, surface_object: Object) -> None:
+    """Raise `HairError` unless an object's curves may be put on a mesh object."""
     foreign_curves.require_editable(curves_object)
     curves.require_editable(surface_object)
     ancestor = surface_object
@@ -161,8 +167,8 @@ def _require_usable(curves_object, surface_object):
         ancestor = ancestor.parent
 
 
-def _on_surface(surface, seen: SeenCurves, to_surface, every):
-    """`_Guides` of curves whose coordinates a (4, 4) matrix takes to the surface's."""
+def on_surface(surface: Surface, seen: SeenCurves, to_surface: np.ndarray, every: int = 1) -> PlacedCurves:
+    """`PlacedCurves` of curves whose coordinates a (4, 4) matrix takes to the surface's."""
 
     points = seen.points
     if not np.allclose(to_surface, np.eye(4), rtol=0.0, atol=1e-6):  # else they stay as they are, to the last bit
@@ -178,7 +184,7 @@ def _on_surface(surface, seen: SeenCurves, to_surface, every):
     if surface.is_deformed:
         motion = posed_strands.pose_of(surface).motion
         points = posed_strands.carried(points, motion, surface.places(rooted.roots), counts, is_back=True)
-    return _Guides(points, counts, seen.is_smooth[rooted.kept], rooted)
+    return PlacedCurves(points, counts, seen.is_smooth[rooted.kept], rooted)
 
 
 def _coverage(mesh, roots):
@@ -194,32 +200,46 @@ def _paint(surface_object, weights):
     return group.name
 
 
+def paint_area(surface_object: Object, surface: Surface, roots: SurfacePoints) -> str:
+    """Create a vertex group of the area around roots of guides; its name, empty where they are all over the mesh."""
+    own_mesh = scene.read_own_mesh(surface_object, surface.to_world_axes)
+    weights = _coverage(own_mesh, positions(surface.mesh, roots))
+    return "" if weights is None else _paint(surface_object, weights)
+
+
 def _bind_to_group(bound, surface_object, roots):
     """Set the vertex group of the area with guides as the mask of their hair."""
-    own_mesh = scene.read_own_mesh(surface_object, bound.surface.to_world_axes)
-    weights = _coverage(own_mesh, roots)
-    if weights is None:
+    name = paint_area(surface_object, bound.surface, roots)
+    if not name:
         return
-    name = _paint(surface_object, weights)
     bound.settings = replace(bound.settings, density_group=name)
     painted = scene.read_vertex_group(surface_object, bpy.context.evaluated_depsgraph_get(), name)
     bound.root_key = staleness.root_key(bound.settings, painted)
 
 
-def _write(curves_object, surface_object, surface, guides, seen, applies_modifiers):
+def write(
+    curves_object: Object,
+    surface_object: Object,
+    surface: Surface,
+    placed: PlacedCurves,
+    seen: SeenCurves,
+    applies_modifiers: bool,
+    kind: str = "GUIDES",
+) -> bpy.types.Curves:
+    """Make an object's curves GUIDES or HAIR that settings do not change; returns its Curves. Raises `HairError`."""
     datablock = foreign_curves.take(curves_object, applies_modifiers)
     if len(datablock.points) != seen.starts[-1]:
         raise HairError('"{name}" was changed while its guides were being computed.', name=name_of(curves_object))
-    rooted = guides.rooted
+    rooted = placed.rooted
     if len(rooted.kept) < len(datablock.curves):
         unused = np.setdiff1d(np.arange(len(datablock.curves)), rooted.kept)
         datablock.remove_curves(indices=unused.tolist())
     if rooted.reversed_count:
-        attributes.reorder_points(datablock, reversal(guides.counts, rooted.is_reversed))
-    _put_on(curves_object, surface_object)
+        attributes.reorder_points(datablock, reversal(placed.counts, rooted.is_reversed))
+    _put_on(curves_object, surface_object, is_rendered=kind == "HAIR")
     datablock.surface = surface_object
-    datablock.vellus.kind = "GUIDES"
-    attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", guides.points)
+    datablock.vellus.kind = kind
+    attributes.write(datablock, "position", "FLOAT_VECTOR", "POINT", placed.points)
     datablock.vellus.written = curves.BY_HAND
     curves.write_roots(datablock, surface, rooted.roots)
     # Distance in local units up to which first points are up to date (`curves.read_roots`).
@@ -228,7 +248,7 @@ def _write(curves_object, surface_object, surface, guides, seen, applies_modifie
     return datablock
 
 
-def _put_on(curves_object, surface_object):
+def _put_on(curves_object, surface_object, is_rendered):
     """Parent an object to its surface, with the surface's coordinates and no other transforms."""
     curves_object.parent, curves_object.parent_type = surface_object, "OBJECT"
     curves_object.matrix_parent_inverse.identity()
@@ -238,5 +258,5 @@ def _put_on(curves_object, surface_object):
     curves_object.matrix_basis.identity()  # last, as Blender takes what deltas do away from it
     for constraint in curves_object.constraints:
         constraint.enabled = False
-    curves_objects.render(curves_object, is_rendered=False)
+    curves_objects.render(curves_object, is_rendered=is_rendered)
     follow_nodes.add_modifier(curves_object)

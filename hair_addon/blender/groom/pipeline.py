@@ -346,6 +346,8 @@ def require_uncombed(target: Curves) -> None:
     if not curves.is_combed(target):
         return
     if target.vellus.kind == "HAIR":
+        if curves.is_hand_made(target):
+            raise HairError("Kept as it came: these settings do not apply. Regenerate Strands replaces the strands.")
         raise HairError("Hand-edited: these settings no longer apply. Regenerate Strands discards the edits.")
     if curves.is_hand_made(target):
         raise HairError("Hand-made: these settings do not apply. Regenerate Guides replaces the guides.")

@@ -7,6 +7,7 @@ from concurrent.futures import Future
 import numpy as np
 from bpy.types import Curves, Object
 
+from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import attributes, curves, curves_objects
@@ -45,6 +46,20 @@ def write_guides(
     points.set_result(surface.to_local(guides.numpy()))
     curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
     curves.write_points(target, points)
+    curves.keep_surface(target, surface)
+    return target
+
+
+def write_hand_made(surface_object: Object, surface: Surface, guides: Strands) -> Curves:
+    """The Curves of a new object with guides that settings do not change, such as those derived from hair."""
+    target = curves_objects.new_object("Guides", surface_object, is_rendered=False).data
+    points = guides.numpy()
+    length = float(np.median(lengths(points)))
+    radii = np.full(points.shape[1], _GUIDE_RADIUS * length / surface.scale, np.float32)
+    target.vellus.kind = "GUIDES"
+    curves.make_strands(target, surface, guides.roots, radii, surface.identities(guides.roots))
+    attributes.write_positions(target, surface.to_local(points))
+    target.vellus.written = curves.BY_HAND
     curves.keep_surface(target, surface)
     return target
 

@@ -233,7 +233,7 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
     axes_before = reported.axes_cache.get(surface_object.session_uid)
     for guides in bpy.data.hair_curves:
         state = guides.vellus
-        if guides.surface != surface_object or state.kind != "GUIDES" or not state.is_live:
+        if guides.surface != surface_object or not _is_carried(guides) or not state.is_live:
             continue
         try:
             curves.require_editable(guides)
@@ -257,6 +257,12 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
                 state.is_stale = True
         except HairError as error:
             state.status = str(error)
+
+
+def _is_carried(datablock):
+    """Whether an edited surface carries Curves: guides, and hair that is kept as it came; other hair grows again."""
+    kind = datablock.vellus.kind
+    return kind == "GUIDES" or (kind == "HAIR" and curves.is_hand_made(datablock))
 
 
 def _may_be_painted(target, depsgraph):

@@ -13,13 +13,15 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+from ...core import geometry
 from ...core.errors import HairError
 from ...core.files import table_cache, table_exr
 from ...core.geometry import strands
+from ...core.grooming import groom
 from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables, strand_tables
-from ..data import curves, posed_strands, simulated_guides
+from ..data import attributes, curves, posed_strands, simulated_guides
 from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
 from ..host import paths
@@ -250,19 +252,21 @@ def read_strands(datablock):
     """(S, P, 3) points, (S, P) radii in local coordinates, (S,) random numbers and (S,) wetness of Curves.
 
     Stored or evaluated ones; the wetness is None where strands do not differ in it. Curves of fewer points than the
-    longest are resampled to as many. Raises `HairError`.
+    longest are resampled to as many, and Catmull-Rom splines to the points that strands have. Raises `HairError`.
     """
     counts = curves.point_counts(datablock)
     if not len(counts):
         raise HairError(f'"{name_of(datablock)}" has no strands to draw.')
     points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
     wetness = curves.read_wetness(datablock)
-    most = int(counts.max())
+    most, is_smooth = int(counts.max()), attributes.are_smooth(datablock)
+    if is_smooth.any():
+        most = max(most, groom.POINT_COUNT)
     if (counts == most).all():
         return points.reshape(-1, most, 3), radii.reshape(-1, most), randoms, wetness
     starts = curves.curve_offsets(datablock)
-    mean_radii = np.add.reduceat(radii, starts[:-1]) / counts
-    return strands.resample(points, starts, most), np.repeat(mean_radii[:, None], most, axis=1), randoms, wetness
+    even = geometry.resampling.resample(points, starts, most, is_smooth)
+    return even, strands.resample_values(radii, points, starts, most), randoms, wetness
 
 
 def shading_of(datablock, strands=None):

@@ -3,6 +3,7 @@
 
 import bpy
 
+from ..groom import particle_hair
 from ..groom.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of
 from ..live import unlocked_renders
@@ -71,6 +72,8 @@ class VELLUS_MT_hair(bpy.types.Menu):
         layout.operator_context = "INVOKE_DEFAULT"
         if context.object.type == "MESH":
             layout.operator("vellus.add_hair", icon="OUTLINER_OB_CURVES")
+            if particle_hair.systems_of(context.object):
+                layout.operator("vellus.convert_particles", icon="PARTICLES")
         layout.operator("vellus.distribute_guides")
         if guides_of(context.object) is not None:
             layout.operator("vellus.interpolate_hair")
@@ -88,6 +91,8 @@ class VELLUS_MT_hair(bpy.types.Menu):
         if parts_of(context.object):
             layout.separator()
             layout.operator("vellus.attach_to_surface")
+            if guides_of(context.object) is not None:
+                layout.operator("vellus.transfer_groom")
             layout.operator("vellus.delete_hair", icon="TRASH")
 
 
@@ -101,6 +106,7 @@ def _in_object_menu(menu, context):
     if is_foreign(active):
         menu.layout.separator()
         menu.layout.operator("vellus.use_as_guides", icon="OUTLINER_OB_CURVES")
+        menu.layout.operator("vellus.use_as_hair", icon="CURVES")
     elif active is not None and (active.type == "MESH" or parts_of(active)):
         menu.layout.separator()
         menu.layout.menu("VELLUS_MT_hair", icon="OUTLINER_OB_CURVES")

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Maps of space: affine ones, and thin-plate splines through pairs of landmarks ([Bookstein89], [Carr01]).
+"""Maps of space: affine ones, and thin-plate splines through pairs of landmarks [Bookstein89].
 
 In three dimensions the spline that bends least has the kernel |r|. It is fitted to what the best similarity [Umeyama91]
 leaves over, so that landmarks that were only turned, scaled and moved are mapped by exactly that.

@@ -106,6 +106,33 @@ def lengths(points: np.ndarray) -> np.ndarray:
     return segment_lengths(points).sum(axis=1)
 
 
+def places_along(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """(N,) float32: where each point of ragged polylines is along its own, 0 at its root and 1 at its tip.
+
+    points (N, 3) and starts (S+1,) as of `resample`; every polyline has points.
+    """
+    points, starts = np.asarray(points, np.float64), np.asarray(starts, np.int64)
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    first, last = along[starts[:-1]], along[starts[1:] - 1]
+    spans = np.where(last > first, last - first, 1.0)
+    counts = np.diff(starts)
+    return ((along - np.repeat(first, counts)) / np.repeat(spans, counts)).astype(np.float32)
+
+
+def resample_values(values: np.ndarray, points: np.ndarray, starts: np.ndarray, point_count: int) -> np.ndarray:
+    """Values (N,) at the points of ragged polylines → (S, point_count) float32, equally spaced along each.
+
+    points (N, 3) and starts (S+1,) as of `resample`; every polyline has points.
+    """
+    starts = np.asarray(starts, np.int64)
+    # Polylines one behind the other, each two long.
+    places = places_along(points, starts).astype(np.float64) + 2.0 * np.repeat(
+        np.arange(len(starts) - 1), np.diff(starts)
+    )
+    wanted = 2.0 * np.arange(len(starts) - 1)[:, None] + np.linspace(0.0, 1.0, point_count)
+    return np.interp(wanted, places, values).astype(np.float32)
+
+
 def resample(points: np.ndarray, starts: np.ndarray, point_count: int) -> np.ndarray:
     """Ragged polylines → (S, point_count, 3) float32 [m], equally spaced along each, ends kept.
 

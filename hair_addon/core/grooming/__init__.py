@@ -8,6 +8,7 @@ from ..lazy import submodules
 if TYPE_CHECKING:
     from . import (
         cost,
+        derived_guides,
         flow_lines,
         following,
         groom,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
         guide_trim,
         hair_styles,
         rooted_curves,
+        strand_clusters,
         transfer_settings,
     )
 else:

@@ -10,6 +10,7 @@ if TYPE_CHECKING:
         clump_centers,
         cpu_weights,
         gpu_interpolation,
+        guide_fitting,
         guide_regions,
         guide_weights,
         hair_binding,

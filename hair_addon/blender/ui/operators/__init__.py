@@ -4,6 +4,7 @@
 from .add_hair import VELLUS_OT_add_hair
 from .bake_tables import VELLUS_OT_bake_tables
 from .comb_guides import VELLUS_OT_comb_guides
+from .convert_particles import VELLUS_OT_convert_particles
 from .delete_hair import VELLUS_OT_delete_hair
 from .delete_system import VELLUS_OT_delete_system
 from .distribute_guides import VELLUS_OT_distribute_guides
@@ -18,13 +19,18 @@ from .select_guides import VELLUS_OT_select_guides
 from .select_hair import VELLUS_OT_select_hair
 from .toggle_composite import VELLUS_OT_toggle_composite
 from .toggle_drawing import VELLUS_OT_toggle_drawing
+from .transfer_groom import VELLUS_OT_transfer_groom
 from .use_as_guides import VELLUS_OT_use_as_guides
+from .use_as_hair import VELLUS_OT_use_as_hair
 
 CLASSES = (
     VELLUS_OT_add_hair,
     VELLUS_OT_distribute_guides,
     VELLUS_OT_interpolate_hair,
     VELLUS_OT_use_as_guides,
+    VELLUS_OT_use_as_hair,
+    VELLUS_OT_convert_particles,
+    VELLUS_OT_transfer_groom,
     VELLUS_OT_comb_guides,
     VELLUS_OT_select_guides,
     VELLUS_OT_select_hair,

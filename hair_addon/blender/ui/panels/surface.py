@@ -3,6 +3,7 @@
 
 import bpy
 
+from ...groom import particle_hair
 from ...groom.diagnostics import warnings_of
 from ...groom.foreign_curves import is_foreign
 from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
@@ -37,6 +38,8 @@ class VELLUS_PT_surface(HairTab, bpy.types.Panel):
             write(box, context, warning.text, "ERROR")
             if warning.operator:
                 box.operator(warning.operator)
+        if particle_hair.systems_of(context.object):
+            layout.operator("vellus.convert_particles", icon="PARTICLES")
         if parts:
             _draw_tools(layout)
             _draw_combing(layout, context)
@@ -52,6 +55,8 @@ def _draw_foreign(layout, context):
         "INFO",
     )
     layout.operator("vellus.use_as_guides", icon="OUTLINER_OB_CURVES")
+    write(layout, context, interface_text("Or keep them as the hair itself, strand by strand."), "INFO")
+    layout.operator("vellus.use_as_hair", icon="CURVES")
 
 
 def _draw_tools(layout):
@@ -60,6 +65,7 @@ def _draw_tools(layout):
     line = column.row(align=True)
     line.operator("vellus.select_guides", text="Select Guides", icon="RESTRICT_SELECT_OFF")
     line.operator("vellus.select_hair", text="Select Hair", icon="RESTRICT_SELECT_OFF")
+    column.operator("vellus.transfer_groom", icon="DUPLICATE")
     column.operator("vellus.delete_hair", icon="TRASH")
 
 

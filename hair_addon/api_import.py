@@ -1,0 +1,149 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python interface's functions of hair that comes from elsewhere, or goes to another mesh; api.py offers them."""
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .api_arguments import are_arrays, changed, curves_object_of, heard, mesh_of
+from .core import geometry, grooming, lazy
+from .core.geometry.mesh import TriMesh
+from .core.geometry.strands import Strands, curve_offsets, from_numpy
+from .core.grooming import groom
+from .core.grooming.derived_guides import DerivationSettings
+from .core.grooming.transfer_settings import TransferSettings
+from .core.long_work import Progress, no_progress, run_now
+
+if TYPE_CHECKING:
+    from .blender.groom.groom_transfers import TransferredGroom
+    from .blender.groom.kept_hair import KeptHair
+
+blender = lazy.Package(".blender", __package__)
+
+Curves = Any
+MeshObject = Any
+Arrays = TriMesh | tuple[ArrayLike, ArrayLike]
+
+__all__ = ["DerivationSettings", "TransferSettings", "transfer_groom", "use_as_guides", "use_as_hair"]
+
+
+def use_as_guides(
+    curves: Curves | Iterable[ArrayLike],
+    surface: MeshObject | Arrays | None = None,
+    *,
+    every: int = 1,
+    applies_modifiers: bool = True,
+    progress: Progress = no_progress,
+) -> Curves | Strands:
+    """Use curves not created by Vellus as guides; every n-th of them is kept.
+
+    curves: a curves object, which becomes guide Curves in place and is returned: with its modifiers applied, or the
+    original curves; surface: the mesh object that they grow on, None for their own. Or arrays (P, 3) [m], one per
+    curve, with surface (vertices, triangles): their `Strands`. The root is the end nearer to the surface; curves with
+    zero length or non-finite points are removed. Points do not move.
+
+    >>> bpy.ops.object.curves_random_add()
+    {'FINISHED'}
+    >>> guides = api.use_as_guides(bpy.context.object, bpy.data.objects["Scalp"], every=10)
+    >>> len(guides.curves)
+    50
+    >>> mesh = [(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]
+    >>> lines = [[(0.2, 0.2, 0.0), (0.2, 0.2, 0.1)], [(0.3, 0.2, 0.0), (0.3, 0.3, 0.1), (0.4, 0.3, 0.1)]]
+    >>> api.use_as_guides(lines, mesh).numpy().shape
+    (2, 41, 3)
+    """
+    if are_arrays(surface):
+        return _guides_of_arrays(curves, mesh_of(surface), every)
+
+    curves_object = curves_object_of(curves)
+    if surface is None:
+        surface = blender.groom.hand_made_guides.find_surface(
+            curves_object, blender.data.scene.present_depsgraph().view_layer
+        )
+    work = blender.groom.hand_made_guides.using_as_guides(
+        curves_object,
+        blender.data.arguments.surface_object(surface),
+        blender.data.scene.present_depsgraph(),
+        every=every,
+        applies_modifiers=applies_modifiers,
+    )
+    return run_now(work, progress).guides
+
+
+def _guides_of_arrays(curves, mesh, every):
+    points, starts = grooming.rooted_curves.polylines(curves)
+    rooted = grooming.rooted_curves.root(mesh, points, starts, every)
+    points = points[rooted.point_order(starts)]
+    starts = curve_offsets(np.diff(starts)[rooted.kept])
+    return from_numpy(geometry.resampling.resample(points, starts, groom.POINT_COUNT), rooted.roots)
+
+
+def use_as_hair(
+    curves: Curves,
+    surface: MeshObject | None = None,
+    settings: DerivationSettings | None = None,
+    *,
+    applies_modifiers: bool = True,
+    follows_guides: bool = False,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> "KeptHair":
+    """Use curves not created by Vellus as hair, as they are, and derive guides that reproduce them.
+
+    curves, surface and applies_modifiers: as of `use_as_guides`; settings: `DerivationSettings`; changes: its fields by
+    name; follows_guides: replace the strands with strands on the same roots that follow the guides. Returns what has
+    `hair` and `guides`, the Curves, and `mean_error` and `high_error`: how far strands are from their reproduction as a
+    part of their length, the root mean square and what 95 % stay below. No point moves.
+
+    >>> bpy.ops.object.curves_random_add()
+    {'FINISHED'}
+    >>> used = api.use_as_hair(bpy.context.object, bpy.data.objects["Scalp"], guide_count=50)
+    >>> len(used.hair.curves), len(used.guides.curves), used.mean_error < used.high_error
+    (500, 50, True)
+    """
+    wanted, progress = changed(DerivationSettings, settings, changes), heard(progress)
+    curves_object = curves_object_of(curves)
+    depsgraph = blender.data.scene.present_depsgraph()
+    if surface is None:
+        surface = blender.groom.hand_made_guides.find_surface(curves_object, depsgraph.view_layer)
+    work = blender.groom.kept_hair.using_as_hair(
+        curves_object,
+        blender.data.arguments.surface_object(surface),
+        depsgraph,
+        wanted,
+        applies_modifiers=applies_modifiers,
+        follows_guides=follows_guides,
+    )
+    return run_now(work, progress)
+
+
+def transfer_groom(
+    hair: Curves,
+    surface: MeshObject,
+    settings: TransferSettings | None = None,
+    *,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> "TransferredGroom":
+    """Copy hair and its guides, or guides alone, to another mesh object of any topology.
+
+    settings: `TransferSettings`; changes: its fields by name: method "UV", "NEAREST" or "LANDMARKS", alignment, reach,
+    scale_lengths. Returns what has `guides` and `hair`, the new Curves, `places` with `kept` and `lost_count`, and
+    `cleared`, the names of masks that the mesh does not have.
+
+    >>> bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, radius=2.0)
+    {'FINISHED'}
+    >>> made = api.transfer_groom(bpy.data.objects["Hair"], bpy.context.object)
+    >>> len(made.guides.curves), made.places.lost_count, round(made.places.scale, 1)
+    (75, 0, 2.0)
+    """
+    wanted, progress = changed(TransferSettings, settings, changes), heard(progress)
+    given = blender.data.arguments.curves_of(hair)
+    is_hair = given.vellus.kind == "HAIR"
+    guides = blender.groom.pipeline.inputs_of(given)[0] if is_hair else blender.data.arguments.guides_of(given)
+    target = blender.data.arguments.surface_object(surface)
+    depsgraph = blender.data.scene.present_depsgraph()
+    work = blender.groom.groom_transfers.transferring(guides, given if is_hair else None, target, wanted, depsgraph)
+    return run_now(work, progress)

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides derived from hair: strands that stand for the others, fitted so that interpolation reproduces the hair."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from .. import grooming, interpolation
+from ..geometry.mesh import SurfacePoints, TriMesh, positions
+from ..geometry.strands import Strands, from_numpy, lengths
+from ..interpolation.hair_binding import HairBinding
+from ..long_work import Progress, no_progress, part_of
+from ..params import Settings, param
+from . import following, groom
+from .groom import HairSettings
+
+_STEPS = 4  # of the fit: lengths that are kept, and guides that are left out, are no linear matter
+_MOST_FITTED = 30_000  # strands that the fit looks at, evenly chosen
+
+
+@dataclass(frozen=True)
+class DerivationSettings(Settings):
+    """Guides for hair that is there."""
+
+    guide_count: int = param(
+        400,
+        "Number of guides derived from the strands; more guides reproduce them more closely",
+        label="Guide count",
+        low=1,
+        high=4000,
+        soft_high=2000,
+    )
+
+
+@dataclass(frozen=True)
+class DerivedGuides:
+    """Guides of some hair, and how closely they reproduce it.
+
+    guides: `Strands` (G, P) on the processor; sources: (G,) the strands that they stand at; binding: of all strands to
+    them; guide_map: (S, k) int32 guides, -1 for none, and float32 weights of each strand; errors: (S,) root mean square
+    distance between the points of a strand and of its reproduction, as a part of the strand's length.
+    """
+
+    guides: Strands
+    sources: np.ndarray
+    binding: HairBinding
+    guide_map: tuple[np.ndarray, np.ndarray]
+    errors: np.ndarray
+
+    @property
+    def mean_error(self) -> float:
+        """The root mean square of all errors."""
+        return float(np.sqrt(np.mean(np.square(self.errors))))
+
+    @property
+    def high_error(self) -> float:
+        """The error that 95 % of the strands stay below."""
+        return float(np.percentile(self.errors, 95.0))
+
+
+def derive(
+    mesh: TriMesh,
+    points: np.ndarray,
+    roots: SurfacePoints,
+    settings: HairSettings,
+    guide_count: int,
+    *,
+    is_mirrored: bool = False,
+    progress: Progress = no_progress,
+) -> DerivedGuides:
+    """`DerivedGuides` of strands (S, P, 3) float32 [m] with a length, rooted at S `SurfacePoints` of a checked mesh.
+
+    settings: completed, by which hair is interpolated; is_mirrored: as of `groom.bind_hair`. Strands that begin off the
+    surface are reproduced from their roots on it.
+    """
+    groom.load_kernels("cpu", part_of(progress, 0.0, 0.1))
+    progress("Choosing guides", 0.1)
+    sources = grooming.strand_clusters.representatives(points, guide_count)
+    at_roots = positions(mesh, roots)
+    arms = points - at_roots[:, None]
+    guide_arms = arms[sources] - arms[sources, :1]
+    own = roots[sources]
+
+    def guides_of(its_arms):
+        return from_numpy((at_roots[sources][:, None] + its_arms).astype(np.float32), own, "cpu")
+
+    progress("Finding guides", 0.3)
+    binding = groom.bind_hair(mesh, guides_of(guide_arms), settings, roots=roots, is_mirrored=is_mirrored)
+    scale = lengths(points)
+    chosen = np.unique(np.linspace(0, len(points) - 1, min(len(points), _MOST_FITTED)).astype(np.int64))
+    fitting = part_of(progress, 0.5, 1.0)
+    best = _Reproduction(binding, guides_of(guide_arms), points, scale)
+    rooted, present = arms - arms[:, :1], guide_arms
+    found = best
+    for step in range(_STEPS):
+        fitting("Fitting guides", step / _STEPS)
+        present = interpolation.guide_fitting.fitted(binding, found.weights, rooted, present, chosen, found.stretches)
+        found = _Reproduction(binding, guides_of(present), points, scale)
+        if found.mean < best.mean:
+            best = found
+    return DerivedGuides(best.guides, sources, binding, best.guide_map, best.errors)
+
+
+class _Reproduction:
+    """What interpolation makes of guides, beside the strands (S, P, 3) that it is to be; scale: (S,) their lengths."""
+
+    def __init__(self, binding, guides, strands, scale):
+        self._binding, self.guides = binding, guides
+        self.weights = following.weights_now(binding, guides)
+        self.points = following.strands_now(binding, guides, self.weights).numpy()
+        apart = np.sqrt(np.mean(np.sum(np.square(self.points - strands), axis=2), axis=1))
+        self.errors = apart / scale
+        self.mean = float(np.mean(np.square(self.errors)))
+
+    @property
+    def stretches(self):
+        """(S,) float64: how much longer strands are for their kept lengths."""
+        binding = replace(self._binding, keep_length=0.0)
+        plain = lengths(following.strands_now(binding, self.guides, self.weights).numpy())
+        return lengths(self.points) / np.maximum(plain, 1e-3 * lengths(self.points))
+
+    @property
+    def guide_map(self):
+        shares = self.weights.weights.numpy()
+        return np.where(shares > 0.0, self.weights.indices.numpy(), -1), shares

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides between which interpolation reproduces given strands: linear least squares.
+
+With the weights w of a binding and guides' arms a_j (points less root) in the frames of their roots, interpolation
+without kept lengths gives strand s the arms sum_j w_sj Z_sj a_j in its own frame, Z_sj being the turn about the normal
+(interpolation.py). As complex numbers x + iy that turn is a factor e^(i phi), so both (x + iy) and z are sparse linear
+least squares with one matrix each for all points, solved by the normal equations. Each guide is held at the shape that
+it has by its own weight, as in damped least squares: repeated steps then go on while interpolation is not linear, and
+guides that few strands follow are not thrown about.
+"""
+
+import numpy as np
+import warp as wp
+
+from ..kernels import parallel
+from ..kernels.checks import require_count
+from ..kernels.parallel import Rows
+from .guide_weights import GuideWeights, frame
+from .hair_binding import HairBinding
+
+# Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+_HOLD = 1.0  # of a guide's own weight in the normal equations
+
+
+def fitted(
+    binding: HairBinding,
+    guide_weights: GuideWeights,
+    arms: np.ndarray,
+    guide_arms: np.ndarray,
+    chosen: np.ndarray,
+    stretches: np.ndarray | None = None,
+) -> np.ndarray:
+    """(G, P, 3) float32 [m]: arms of guides by which interpolation comes nearest to strands.
+
+    binding: on the processor, of the S strands to G guides; guide_weights: of the same, as `guide_weights.limited`
+    leaves them; arms (S, P, 3) float32 [m]: points less root of the strands; guide_arms (G, P, 3) float32 [m]: the
+    guides' present ones; chosen: (M,) indices of the strands that count; stretches (S,): factors by which kept lengths
+    make strands longer than the sums, None for no factors.
+    """
+    require_count("strands", len(arms), len(binding.positions))
+    require_count("guides", len(guide_arms), guide_weights.guide_count)
+    indices = guide_weights.indices.numpy()[chosen].astype(np.int64)
+    weights = np.where(indices >= 0, guide_weights.weights.numpy()[chosen], 0.0).astype(np.float64)
+    if stretches is not None:
+        require_count("stretches", len(stretches), len(arms))
+        weights *= stretches[chosen][:, None]
+    turns = guide_weights.turns.numpy()[chosen].astype(np.float64)
+    indices = np.where(indices >= 0, indices, 0)
+    own = _in_frames(np.ascontiguousarray(arms[chosen]), binding.normals.numpy()[chosen]).astype(np.float64)
+    before = _in_frames(guide_arms, binding.guide_normals.numpy()).astype(np.float64)
+    level = _solved(indices, weights * (turns[..., 0] + 1j * turns[..., 1]), _complex(own), _complex(before))
+    upright = _solved(indices, weights, own[..., 2], before[..., 2])
+    made = np.stack([level.real, level.imag, upright], axis=2).astype(np.float32)
+    return _out_of_frames(made, binding.guide_normals.numpy())
+
+
+def _complex(arms):
+    return arms[..., 0] + 1j * arms[..., 1]
+
+
+def _solved(indices, factors, wanted, before):
+    """(G, P): the least squares of sum_k factors_sk x_(indices_sk) = wanted (M, P), held at `before` (G, P)."""
+    count, slot_count = len(before), indices.shape[1]
+    matrix = np.zeros(count * count, factors.dtype)
+    right = np.zeros(before.shape, factors.dtype)
+    for slot in range(slot_count):
+        for other in range(slot_count):
+            places = indices[:, slot] * count + indices[:, other]
+            matrix += _summed(places, factors[:, slot].conj() * factors[:, other], count * count)
+        order = np.argsort(indices[:, slot], kind="stable")
+        rows, starts = np.unique(indices[order, slot], return_index=True)
+        terms = factors[order, slot, None].conj() * wanted[order]
+        right[rows] += np.add.reduceat(terms, starts, axis=0)
+    matrix = matrix.reshape(count, count)
+    diagonal = matrix.diagonal().real
+    hold = _HOLD * diagonal + 1e-9 * max(float(diagonal.max()), 1e-30)
+    matrix[np.arange(count), np.arange(count)] += hold
+    return np.linalg.solve(matrix, right + hold[:, None] * before)
+
+
+def _summed(places, values, count):
+    """(count,): sums of values (M,), which may be complex, by place."""
+    if np.iscomplexobj(values):
+        return np.bincount(places, values.real, count) + 1j * np.bincount(places, values.imag, count)
+    return np.bincount(places, values, count)
+
+
+def _in_frames(arms, normals):
+    """(N, P, 3) float32: arms in the frames of unit normals (N, 3)."""
+    return _turned(arms, normals, _to_frames)
+
+
+def _out_of_frames(arms, normals):
+    """(N, P, 3) float32: arms in the frames of unit normals (N, 3) → in the axes of the scene."""
+    return _turned(arms, normals, _from_frames)
+
+
+def _turned(arms, normals, kernel):
+    given = wp.array(np.ascontiguousarray(arms, np.float32), dtype=wp.vec3, device="cpu", copy=False)
+    ups = wp.array(np.ascontiguousarray(normals, np.float32), dtype=wp.vec3, device="cpu", copy=False)
+    made = parallel.empty_vectors(given.shape, "cpu")
+    parallel.launch(kernel, len(given), inputs=[Rows(given), Rows(ups)], outputs=[made], device="cpu", least_rows=256)
+    return made.numpy()
+
+
+@wp.kernel
+def _to_frames(
+    arms: wp.array2d[wp.vec3],
+    normals: wp.array[wp.vec3],
+    # outputs
+    out_arms: wp.array2d[wp.vec3],
+):
+    strand = wp.tid()
+    normal = normals[strand]
+    tangent, bitangent = frame(normal)
+    for point in range(arms.shape[1]):
+        arm = arms[strand, point]
+        out_arms[strand, point] = wp.vec3(wp.dot(tangent, arm), wp.dot(bitangent, arm), wp.dot(normal, arm))
+
+
+@wp.kernel
+def _from_frames(
+    arms: wp.array2d[wp.vec3],
+    normals: wp.array[wp.vec3],
+    # outputs
+    out_arms: wp.array2d[wp.vec3],
+):
+    strand = wp.tid()
+    normal = normals[strand]
+    tangent, bitangent = frame(normal)
+    for point in range(arms.shape[1]):
+        arm = arms[strand, point]
+        out_arms[strand, point] = arm[0] * tangent + arm[1] * bitangent + arm[2] * normal
