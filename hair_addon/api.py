@@ -42,8 +42,8 @@ from .api_dynamics import (
 )
 from .api_export import ExportSettings, export_groom
 from .api_guide_tools import change_guides
-from .api_library import apply_groom, groom_names, save_groom
 from .api_import import DerivationSettings, TransferSettings, transfer_groom, use_as_guides, use_as_hair
+from .api_library import apply_groom, groom_names, save_groom
 from .api_styles import (
     Bend,
     Braid,
