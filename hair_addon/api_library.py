@@ -63,7 +63,7 @@ def apply_groom(
 
     >>> guides, hair = api.apply_groom(bpy.data.objects["Scalp"], "library/Bob.asset.blend")
     >>> len(guides.curves)
-    50
+    75
     """
     choice(method, "method", grooming.groom_passage.METHODS)
     target = blender.data.arguments.surface_object(surface)
