@@ -12,6 +12,7 @@ from .api_arguments import choice, heard, path_of
 from .core import grooming, lazy
 from .core.errors import HairError
 from .core.long_work import Progress, no_progress, run_now
+from .core.params import described, is_text
 
 blender = lazy.Package(".blender", __package__)
 
@@ -32,18 +33,35 @@ def save_groom(
     strands, which grow again.
 
     >>> file = api.save_groom(bpy.data.objects["Hair"], "library", name="Bob")
-    >>> file.name, api.groom_names(file)
-    ('Bob.asset.blend', ['Bob'])
+    >>> file.name
+    'Bob.asset.blend'
     """
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    pixels = None if picture is None else np.asarray(picture, np.float32)
-    if pixels is not None and (pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size):
+    for given in (name, catalog):
+        if not isinstance(given, str) or not is_text(given):
+            raise HairError(f"name and catalog must be strings, not {described(given)}.")
+    return run_now(blender.io.groom_library.saving(target, path_of(path), name, catalog, _pixels(picture)))
+
+
+def _pixels(picture):
+    """A picture as (height, width, 4) float32, None for None. Raises `HairError`."""
+    if picture is None:
+        return None
+    try:
+        pixels = np.asarray(picture, np.float32)
+    except (TypeError, ValueError, OverflowError):
+        pixels = np.zeros(0)
+    if pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size:
         raise HairError("picture must be an array (height, width, 4).")
-    return run_now(blender.io.groom_library.saving(target, path_of(path), name, catalog, pixels))
+    return pixels
 
 
 def groom_names(path: str | os.PathLike) -> list[str]:
-    """Names of the assets in a .blend file, in alphabetical order."""
+    """Names of the assets in a .blend file, in alphabetical order.
+
+    >>> api.groom_names("library/Bob.asset.blend")
+    ['Bob']
+    """
     return blender.io.groom_library.names_in(path_of(path))
 
 
@@ -66,6 +84,8 @@ def apply_groom(
     75
     """
     choice(method, "method", grooming.groom_passage.METHODS)
+    if not isinstance(name, str):
+        raise HairError(f"name must be a string, not {described(name)}.")
     target = blender.data.arguments.surface_object(surface)
     groom = blender.io.groom_library.read(path_of(path), name)
     work = blender.groom.library_groom.adding_groom(target, groom, blender.data.scene.present_depsgraph(), method)

@@ -212,6 +212,14 @@ def test_operators_save_with_a_picture_and_apply_and_undo(groom, sphere, tmp_pat
     assert pixels.shape == (256, 256, 4) and 0.1 < (pixels[..., 3] > 0.5).mean() < 0.9
 
 
+def test_arguments_of_scripts_are_refused_in_one_sentence(groom, tmp_path):
+    before = datablocks()
+    for wrong in ({"name": 1}, {"name": "a\0b"}, {"catalog": None}, {"picture": "red"}, {"picture": np.zeros((4, 4))}):
+        with pytest.raises(HairError):
+            api.save_groom(groom[1], tmp_path, **({"picture": PICTURE} | wrong))
+    assert datablocks() == before and not list(tmp_path.iterdir())
+
+
 def test_names_that_are_no_file_names(groom, tmp_path):
     path = api.save_groom(groom[1], tmp_path, name="a/b: é", catalog="", picture=PICTURE)
     assert path.parent == tmp_path and api.groom_names(path) == ["a/b: é"]
