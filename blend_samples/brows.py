@@ -43,6 +43,14 @@ def build(head_object, openings):
     )
 
 
+def guides_on_skin(head_object):
+    """(G, P, 3) guides of both brows, whose roots are on the skin."""
+    skin = BVHTree.FromObject(head_object, bpy.context.evaluated_depsgraph_get())
+    lines = np.concatenate([_brow(skin, side)[1].reshape(-1, _POINTS, 3) for side in (1.0, -1.0)])
+    lines[:, 0] += (lines[:, 1] - lines[:, 0]) * (_DEPTH / np.linalg.norm(lines[:, 1] - lines[:, 0], axis=1))[:, None]
+    return lines
+
+
 def _brow(skin, side):
     """(grid (R, C, 3) of roots, their (R, C, P, 3) guides) of the brow on a side."""
     along = np.linspace(0.0, 1.0, _BROW_STEPS)

@@ -13,6 +13,7 @@ import dynamics_scene
 import head
 import parting
 import portrait
+import ten_grooms
 
 import hair_addon
 
@@ -49,7 +50,10 @@ SAMPLES = {"head": build_head, "parting": build_parting, "dynamics": build_dynam
 def main():
     """Build the samples named on the command line, or all."""
     hair_addon.register()
-    for name in sys.argv[1:] or SAMPLES:
+    for name in sys.argv[1:] or [*SAMPLES, "grooms"]:
+        if name == "grooms":  # an asset library, a file each
+            ten_grooms.build_library(FOLDER / "grooms")
+            continue
         SAMPLES[name]()
         path = FOLDER / f"{name}.blend"
         bpy.ops.wm.save_as_mainfile(filepath=str(path), compress=True)

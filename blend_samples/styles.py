@@ -50,9 +50,9 @@ def main():
     chosen = [name for name in GALLERY if not given.names or name in given.names]
     pictures = [_drawn_style(hair, name) for name in chosen]
     if pictures:
-        _save(_rows(pictures, COLUMNS), out / "styles.png")
+        save(rows(pictures, COLUMNS), out / "styles.png")
     if not given.names or "wet" in given.names:
-        _save(_rows([_drawn_wet(hair, wetness) for wetness in WETNESS], len(WETNESS)), out / "wet.png")
+        save(rows([_drawn_wet(hair, wetness) for wetness in WETNESS], len(WETNESS)), out / "wet.png")
 
 
 def build(strand_count=STRAND_COUNT):
@@ -93,12 +93,12 @@ def _drawn_wet(hair, wetness):
     return drawn()
 
 
-def drawn():
+def drawn(size=SIZE, sample_count=SAMPLE_COUNT):
     """(height, width, 3) uint8 through the scene's view transform, the top row first."""
     render = bpy.context.scene.render
-    render.resolution_x, render.resolution_y = SIZE
+    render.resolution_x, render.resolution_y = size
     with tempfile.TemporaryDirectory() as folder:
-        path = api.render(Path(folder) / "picture.png", width=SIZE[0], height=SIZE[1], sample_count=SAMPLE_COUNT)
+        path = api.render(Path(folder) / "picture.png", width=size[0], height=size[1], sample_count=sample_count)
         image = bpy.data.images.load(str(path))
         pixels = np.empty((image.size[1], image.size[0], image.channels), np.float32)
         image.pixels.foreach_get(pixels.ravel())
@@ -106,12 +106,14 @@ def drawn():
     return np.round(255.0 * pixels[::-1, :, :3]).astype(np.uint8)
 
 
-def _rows(pictures, columns):
+def rows(pictures, columns):
+    """One picture of several of the same size, row after row."""
     rows = [pictures[first : first + columns] for first in range(0, len(pictures), columns)]
     return np.concatenate([np.concatenate(row, axis=1) for row in rows if len(row) == len(rows[0])])
 
 
-def _save(pixels, path):
+def save(pixels, path):
+    """Write (height, width, 3) uint8, the top row first, as a small PNG."""
     height, width, _ = pixels.shape
     image = bpy.data.images.new(path.stem, width, height)
     opaque = np.ones((height, width, 4), np.float32)

@@ -43,6 +43,7 @@ from .api_dynamics import (
 from .api_export import ExportSettings, export_groom
 from .api_guide_tools import change_guides
 from .api_import import DerivationSettings, TransferSettings, transfer_groom, use_as_guides, use_as_hair
+from .api_library import apply_groom, groom_names, save_groom
 from .api_styles import (
     Bend,
     Braid,
@@ -101,6 +102,7 @@ __all__ = [
     "Wet",
     "add_hair",
     "add_style",
+    "apply_groom",
     "apply_settings",
     "apply_style_preset",
     "bake_dynamics",
@@ -111,11 +113,13 @@ __all__ = [
     "draw",
     "dynamics_of",
     "export_groom",
+    "groom_names",
     "interpolate_hair",
     "load_settings",
     "points",
     "remove_delivery",
     "render",
+    "save_groom",
     "save_settings",
     "set_dynamics",
     "set_styles",
@@ -156,7 +160,6 @@ def distribute_guides(
     if are_arrays(surface):
         require_no_names(settings)
         return dynamics.draped_growth.grow(mesh_of(surface), settings, progress=progress)
-
     return run_now(
         blender.groom.pipeline.distributing_guides(_surface_object(surface), settings, _depsgraph()), progress
     )
@@ -213,7 +216,6 @@ def add_hair(
     >>> len(guides.curves), len(hair.curves)
     (30, 900)
     """
-
     settings = GroomSettings() if settings is None else settings
     require_class(settings, GroomSettings, "settings")
     work = blender.groom.groom_settings.adding_hair(_surface_object(surface), settings, _depsgraph())
@@ -231,7 +233,6 @@ def points(strands: Curves | Strands) -> np.ndarray:
     if isinstance(strands, Strands):
         check_strands(strands)
         return strands.numpy()
-
     return blender.io.strand_arrays.world_points(_curves(strands))
 
 
@@ -295,7 +296,6 @@ def render(
     >>> api.render("frame_####.png", frame=3, width=64, height=48).name
     'frame_0003.png'
     """
-
     path, engine, progress = path_of(path), choice(engine, "engine", blender.io.frames.ENGINES), heard(progress)
     sampling, settings = imaging.pixel_sampling, blender.io.frames.scene_size() | settings
     wanted = changed(sampling.PictureSettings, None, settings, sampling.DRAWING_FIELDS)

@@ -11,8 +11,8 @@ from .host import running
 from .live import first_setup, handlers, invalidation
 from .render import engine, viewport
 from .settings import preferences, properties, translations
-from .ui import engine_panels, keymap, look_previews, menus, operators, panels
-from .ui.operators import dynamics, guide_tools, looks, styles, surface
+from .ui import asset_shelf, engine_panels, keymap, look_previews, menus, operators, panels
+from .ui.operators import dynamics, guide_tools, library, looks, styles, surface
 
 CLASSES = (
     preferences.VellusPreferences,
@@ -25,9 +25,11 @@ CLASSES = (
     *styles.CLASSES,
     *guide_tools.CLASSES,
     *dynamics.CLASSES,
+    *library.CLASSES,
     *panels.LISTS,
     *panels.CLASSES,
     *menus.CLASSES,
+    *asset_shelf.CLASSES,
 )
 
 
@@ -45,6 +47,7 @@ def register():
     properties.register()
     hair_systems.register()
     menus.register()
+    asset_shelf.register()
     engine_panels.register()
     keymap.register()
     manual.register()
@@ -66,6 +69,7 @@ def unregister():
     manual.unregister()
     keymap.unregister()
     engine_panels.unregister()
+    asset_shelf.unregister()
     menus.unregister()
     hair_systems.unregister()
     properties.unregister()

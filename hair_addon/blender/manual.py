@@ -12,7 +12,7 @@ import bpy
 from .groom import hair_systems
 from .settings import preferences, properties, style_items
 from .ui import operators
-from .ui.operators import dynamics, guide_tools, looks, styles, surface
+from .ui.operators import dynamics, guide_tools, library, looks, styles, surface
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
 _CLASSES = {
@@ -55,6 +55,7 @@ _OPERATORS = {
     "shading": ("apply_preset", "apply_saved_look", "save_look", "remove_look", "toggle_drawing"),
     "lookup_tables": ("bake_tables",),
     "systems": ("delete_system",),
+    "groom_library": ("save_groom", "apply_groom"),
     "use_as_guides": ("use_as_guides",),
     "use_as_hair": ("use_as_hair", "convert_particles"),
     "transfer_groom": ("transfer_groom",),
@@ -95,7 +96,7 @@ def _properties():
 
 def _operators():
     """Of an operator's properties too, which Blender looks up by their operator."""
-    folders = (operators, surface, looks, guide_tools, styles, dynamics)
+    folders = (operators, surface, looks, guide_tools, styles, dynamics, library)
     every = [cls for folder in folders for cls in folder.CLASSES]
     labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in every}
     for page, names in _OPERATORS.items():

@@ -35,6 +35,9 @@ def add(verbs):
         "--hair-from", metavar="FILE", help="use the curves of such a file as hair, as they are, and derive --guides"
     )
     parser.add_argument("--guides-object", default="", metavar="NAME", help="curves object in either file")
+    parser.add_argument(
+        "--from-library", metavar="FILE[:NAME]", help="put on a groom that was saved to an asset library's .blend"
+    )
     style_options.add_styles(parser, has_surface=True)
     options.add_scripts(parser)
     options.add_groom_settings(parser)
@@ -56,13 +59,19 @@ def run(given, console):
         raise HairError("--guides-object needs --guides-from or --hair-from.")
     if came_from:
         blender.io.curve_files.require_readable(came_from)
+    if given.from_library and (came_from or given.settings):
+        raise HairError(
+            "--from-library brings guides and settings: leave out --guides-from, --hair-from and --settings."
+        )
     blender.io.mesh_files.require_readable(given.input)
     blender.io.groom_files.require_writable(given.out)
     file_axes = opening.open_file(given, console)
     surface = blender.io.mesh_files.find_surface(given.surface)
     settings = _styled(given, settings, surface)
     started = time.perf_counter()
-    if given.guides_from:
+    if given.from_library:
+        guides, hair = _from_library(given, surface, console)
+    elif given.guides_from:
         guides, hair = _follow_curves(given, surface, settings, file_axes, console)
     elif given.hair_from:
         guides, hair = _keep_curves(given, surface, settings, file_axes, console)
@@ -88,6 +97,24 @@ def _styled(given, settings, surface):
         raise HairError("--no-style-fit needs --style or --style-preset.")
     styled = style_options.styled(given, settings, None if given.no_style_fit else fit)
     return options.changed_groom(styled, given)
+
+
+def _from_library(given, surface, console):
+    """Return (guides, hair) of a saved groom with the settings that options give."""
+    path, name = blender.io.groom_library.path_and_name(str(given.from_library))
+    groom = blender.io.groom_library.read(path, name)
+
+    def changed(settings):
+        if given.preset:
+            settings = replace(settings, appearance=replace(PRESETS[given.preset][1], mode=settings.appearance.mode))
+        return _styled(given, settings, surface)
+
+    depsgraph = blender.data.scene.present_depsgraph()
+    work = blender.groom.library_groom.adding_groom(surface, groom, depsgraph, changed=changed)
+    applied = run_now(work, console.progress)
+    for sentence, values in applied.notes():
+        console.warn(sentence.format(**values))
+    return applied.made.guides, applied.made.hair
 
 
 def _follow_curves(given, surface, settings, file_axes, console):

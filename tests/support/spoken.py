@@ -22,13 +22,15 @@ _SPEAKING = {
     "Warning",
 }
 
+_WITHOUT_LABEL = (bpy.types.PropertyGroup, bpy.types.AddonPreferences, bpy.types.UIList, bpy.types.AssetShelf)
+
 
 def strings_of_classes():
     """{string: where it stands} of labels, tooltips and choices of all registered classes."""
     found = {}
     for cls in blender.CLASSES:
         where = cls.__name__
-        if not issubclass(cls, (bpy.types.PropertyGroup, bpy.types.AddonPreferences, bpy.types.UIList)):
+        if not issubclass(cls, _WITHOUT_LABEL):
             found[cls.bl_label] = found[cls.__doc__] = where
         for entry in properties_of(cls):
             if entry.is_hidden or entry.name == entry.identifier:  # of the latter, no name was given

@@ -279,12 +279,12 @@ def read_vertex_group(surface_object, depsgraph, name):
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:
-        return _weights_in_group(mesh, group.index)
+        return weights_in_group(mesh, group.index)
     finally:
         evaluated.to_mesh_clear()
 
 
-def _weights_in_group(mesh, index):
+def weights_in_group(mesh, index):
     """(V,) float32. Blender offers no array access to vertex groups; by BMesh it takes a quarter of the time."""
     edited = bmesh.new()
     try:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
         hair_systems,
         hand_made_guides,
         kept_hair,
+        library_groom,
         painted_masks,
         particle_hair,
         pipeline,

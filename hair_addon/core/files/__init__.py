@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         frame_cache,
         frame_manifest,
         groom_curves,
+        library_settings,
         ogawa,
         plain_file,
         settings_file,

@@ -259,10 +259,17 @@ def read_object(path: str | Path) -> dict[str, Any]:
             raise HairError("{path} does not exist or is not a file.", path=path)
         if path.stat().st_size > _LARGEST_FILE:
             raise HairError("{path} is too large for a settings file.", path=path)
-        text = path.read_text(encoding="utf-8")
-        found = json.loads(text, object_pairs_hook=_once, parse_constant=_refuse_constant)
+        return object_of_text(path.read_text(encoding="utf-8"), path)
     except OSError as error:
         raise HairError("{path} cannot be read: {cause}.", path=path, cause=error.strerror) from error
+    except UnicodeDecodeError as error:
+        raise HairError("{path} cannot be read: invalid JSON ({cause}).", path=path, cause=error) from error
+
+
+def object_of_text(text: str, path: str | Path) -> dict[str, Any]:
+    """The JSON object in a text, {name: value}. Raises `HairError`, which names the file that it is from."""
+    try:
+        found = json.loads(text, object_pairs_hook=_once, parse_constant=_refuse_constant)
     except (ValueError, RecursionError) as error:
         raise HairError("{path} cannot be read: invalid JSON ({cause}).", path=path, cause=error) from error
     if not isinstance(found, dict):

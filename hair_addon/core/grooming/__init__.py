@@ -13,6 +13,7 @@ if TYPE_CHECKING:
         following,
         groom,
         groom_defaults,
+        groom_passage,
         groom_transfer,
         guide_attraction,
         guide_copies,

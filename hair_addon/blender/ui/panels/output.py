@@ -31,6 +31,9 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         column = layout.column(align=True)
         column.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
         column.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")
+        column = layout.column(align=True)
+        column.operator("vellus.save_groom", icon="ASSET_MANAGER", text="Save Groom…")
+        column.operator("vellus.apply_groom", icon="IMPORT", text="Apply Groom…")
         hair = hair_of(context.object)
         if hair is not None and animated.are_keyed(hair) and not context.scene.render.use_lock_interface:
             write(

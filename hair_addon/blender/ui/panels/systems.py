@@ -47,6 +47,7 @@ class VELLUS_PT_systems(HairTab, bpy.types.Panel):
         layout = self.layout
         if not systems_of(surface_of(context.object), context.view_layer):
             layout.operator("vellus.add_hair", icon="ADD")
+            layout.operator("vellus.apply_groom", icon="ASSET_MANAGER", text="Apply Groom…")
             return
         row = layout.row()
         row.template_list(

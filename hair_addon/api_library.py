@@ -1,0 +1,93 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python interface's functions of grooms in asset libraries; api.py offers them."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from .api_arguments import choice, heard, path_of
+from .core import grooming, lazy
+from .core.errors import HairError
+from .core.long_work import Progress, no_progress, run_now
+from .core.params import described, is_text
+
+blender = lazy.Package(".blender", __package__)
+
+Curves = Any
+MeshObject = Any
+
+__all__ = ["apply_groom", "groom_names", "save_groom"]
+
+
+def save_groom(
+    hair: Curves, path: str | os.PathLike, *, name: str = "", catalog: str = "Hair", picture: ArrayLike | None = None
+) -> Path:
+    """Save hair Curves and their guides as an asset; returns the file.
+
+    path: the folder of an asset library, or a .blend file, which is replaced; name: of the groom, the hair's for none;
+    catalog: of the library, such as "Hair/Short", empty for none; picture: (height, width, 4), sRGB, the first row at
+    the bottom, drawn by Vellus for None. The file holds the guides at rest, their surface, masks and settings; not the
+    strands, which grow again.
+
+    >>> file = api.save_groom(bpy.data.objects["Hair"], "library", name="Bob")
+    >>> file.name
+    'Bob.asset.blend'
+    """
+    target = blender.data.arguments.curves_of(hair, "HAIR")
+    for given in (name, catalog):
+        if not isinstance(given, str) or not is_text(given):
+            raise HairError(f"name and catalog must be strings, not {described(given)}.")
+    return run_now(blender.io.groom_library.saving(target, path_of(path), name, catalog, _pixels(picture)))
+
+
+def _pixels(picture):
+    """A picture as (height, width, 4) float32, None for None. Raises `HairError`."""
+    if picture is None:
+        return None
+    try:
+        pixels = np.asarray(picture, np.float32)
+    except (TypeError, ValueError, OverflowError):
+        pixels = np.zeros(0)
+    if pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size:
+        raise HairError("picture must be an array (height, width, 4).")
+    return pixels
+
+
+def groom_names(path: str | os.PathLike) -> list[str]:
+    """Names of the assets in a .blend file, in alphabetical order.
+
+    >>> api.groom_names("library/Bob.asset.blend")
+    ['Bob']
+    """
+    return blender.io.groom_library.names_in(path_of(path))
+
+
+def apply_groom(
+    surface: MeshObject,
+    path: str | os.PathLike,
+    name: str = "",
+    *,
+    method: str = "AUTO",
+    progress: Progress = no_progress,
+) -> tuple[Curves, Curves]:
+    """Put a saved groom on a mesh object as new guides and hair; returns the Curves of both.
+
+    path: a .blend file with grooms; name: which one, if there are several; method: "UV" carries guides by UV
+    coordinates, "NEAREST" to the nearest surface, "AUTO" takes a copy of the saved surface as it is, then UV maps that
+    agree, then the nearest surface. Lengths follow the surface's size.
+
+    >>> guides, hair = api.apply_groom(bpy.data.objects["Scalp"], "library/Bob.asset.blend")
+    >>> len(guides.curves)
+    75
+    """
+    choice(method, "method", grooming.groom_passage.METHODS)
+    if not isinstance(name, str):
+        raise HairError(f"name must be a string, not {described(name)}.")
+    target = blender.data.arguments.surface_object(surface)
+    groom = blender.io.groom_library.read(path_of(path), name)
+    work = blender.groom.library_groom.adding_groom(target, groom, blender.data.scene.present_depsgraph(), method)
+    applied = run_now(work, heard(progress))
+    return applied.made.guides, applied.made.hair

@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The picture of a groom in an asset library: its hair and its surface in a scene of their own, under three lights."""
+
+import math
+import tempfile
+from collections.abc import Generator
+from contextlib import contextmanager
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Vector
+
+from ...core.imaging.pixel_sampling import PictureSettings
+from ..data import groom_assets
+from . import offscreen
+
+SIZE = 256  # pixels
+_SAMPLES_PER_SIDE = 3  # of each pixel
+_LENS, _SENSOR = 85.0, 36.0  # [mm]
+_VIEW = Vector((0.48, -0.87, 0.10))  # from the hair to the camera: a face that looks to -Y is seen from its left
+_MARGIN = 1.1
+# Direction from the hair, power [W] where hair has a radius of one metre, size by that radius.
+_LIGHTS = (
+    ((-0.25, -0.85, 0.65), 550.0, 1.5),
+    ((-0.60, 0.65, 0.45), 700.0, 2.0),
+    ((0.90, -0.70, 0.20), 220.0, 4.0),
+)
+_LIGHT_DISTANCE = 6.0  # radii
+_WORLD = (0.030, 0.033, 0.038, 1.0)
+
+
+def draw(hair_object: bpy.types.Object, points: np.ndarray) -> np.ndarray:
+    """(SIZE, SIZE, 4) float32, sRGB, the first row at the bottom: hair, its surface and what is parented to that.
+
+    points: (N, 3) [m] of the hair in the world. Raises `HairError` where nothing can be drawn.
+    """
+    with _studio(hair_object, points) as studio, tempfile.TemporaryDirectory() as folder:
+        with bpy.context.temp_override(scene=studio, view_layer=studio.view_layers[0]):
+            studio.view_layers[0].update()
+            settings = PictureSettings(width=SIZE, height=SIZE, samples_per_side=_SAMPLES_PER_SIDE, is_transparent=True)
+            pixels = offscreen.draw_picture(settings)
+        path = Path(folder) / "picture.png"
+        offscreen.write_picture(pixels, path, studio)
+        image = bpy.data.images.load(str(path))
+        try:
+            return groom_assets.read_pixels(image)
+        finally:
+            bpy.data.images.remove(image)
+
+
+@contextmanager
+def _studio(hair_object, points) -> Generator[bpy.types.Scene]:
+    """A scene with the hair, its surface and what else is parented to that, a camera and lights."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, radius = Vector((0.5 * (low + high)).tolist()), 0.5 * float(np.linalg.norm(high - low))
+    studio = bpy.data.scenes.new("Vellus picture")
+    made = []
+    try:
+        surface = hair_object.data.surface
+        for shown in {hair_object, *_seen(surface)}:
+            studio.collection.objects.link(shown)
+        camera = bpy.data.cameras.new("Vellus picture")
+        camera.lens, camera.sensor_width, camera.clip_start = _LENS, _SENSOR, 0.01 * radius
+        distance = _MARGIN * radius / math.sin(math.atan(0.5 * _SENSOR / _LENS))
+        camera.clip_end = 3.0 * distance
+        made.append(camera)
+        studio.camera = _placed(studio, camera, middle, distance * _VIEW.normalized())
+        for direction, watts, size in _LIGHTS:
+            lamp = bpy.data.lights.new("Vellus picture", "AREA")
+            made.append(lamp)
+            lamp.energy, lamp.size = watts * radius**2, size * radius
+            _placed(studio, lamp, middle, _LIGHT_DISTANCE * radius * Vector(direction).normalized())
+        studio.world = bpy.data.worlds.new("Vellus picture")
+        made.append(studio.world)
+        background = next(node for node in studio.world.node_tree.nodes if node.type == "BACKGROUND")
+        background.inputs["Color"].default_value = _WORLD
+        yield studio
+    finally:
+        placed = [o for o in studio.collection.objects if o.data in made]
+        bpy.data.batch_remove([studio, *placed, *made])
+
+
+def _seen(surface):
+    """A surface and the meshes that are parented to it and rendered."""
+    return [o for o in (surface, *surface.children_recursive) if o.type == "MESH" and not o.hide_render]
+
+
+def _placed(studio, data, middle, away):
+    placed = bpy.data.objects.new("Vellus picture", data)
+    placed.location = middle + away
+    placed.rotation_euler = (-away).to_track_quat("-Z", "Y").to_euler()
+    studio.collection.objects.link(placed)
+    return placed

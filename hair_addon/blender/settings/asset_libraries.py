@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Asset libraries of the user's preferences, by name."""
+
+from pathlib import Path
+
+import bpy
+
+from ...core.errors import HairError
+from .translations import CONTEXT
+
+# Of operators that Blender calls for an asset: its own numbers.
+_KINDS = (("LOCAL", 1), ("ALL", 2), ("ESSENTIALS", 3), ("ONLINE_ESSENTIALS", 4), ("CUSTOM", 100))
+
+
+def library_name(name, description):
+    """The name of an asset library, offered by name."""
+    return bpy.props.StringProperty(
+        name=name, description=description, translation_context=CONTEXT, search=_names, search_options=set()
+    )
+
+
+def _names(_owner, _context, typed):
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    return [library.name for library in libraries if typed.casefold() in library.name.casefold()]
+
+
+def first_name():
+    """The name of the first asset library, empty where there is none."""
+    libraries = bpy.context.preferences.filepaths.asset_libraries
+    return libraries[0].name if len(libraries) else ""
+
+
+def folder_of(name):
+    """The folder of an asset library. Raises `HairError`."""
+    library = bpy.context.preferences.filepaths.asset_libraries.get(name)
+    if library is None or not library.path:
+        raise HairError('There is no asset library "{name}": add one in Preferences ▸ File Paths.', name=name)
+    return Path(bpy.path.abspath(library.path))
+
+
+def reference():
+    """{name: property} by which Blender tells an operator of an asset."""
+    hidden = {"options": {"HIDDEN", "SKIP_SAVE"}}
+    kinds = [(kind, kind.title(), "", number) for kind, number in _KINDS]
+    return {
+        "asset_library_type": bpy.props.EnumProperty(items=kinds, default="LOCAL", **hidden),
+        "asset_library_identifier": bpy.props.StringProperty(**hidden),
+        "relative_asset_identifier": bpy.props.StringProperty(**hidden),
+    }
+
+
+def referenced(operator):
+    """(file, name) of the asset that an operator with `reference` was called for; None for none. Raises `HairError`."""
+    relative = operator.relative_asset_identifier.replace("\\", "/")
+    if not relative:
+        return None
+    file, separator, rest = relative.partition(".blend/")
+    if operator.asset_library_type != "CUSTOM" or not separator:
+        raise HairError("This asset is in no asset library of the preferences: pick its file.")
+    return folder_of(operator.asset_library_identifier) / f"{file}.blend", rest.partition("/")[2]

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of a groom that leaves its scene: for a surface of another size, and with what comes along only."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ..params import Settings, declared
+from .settings_file import GroomSettings
+
+# Settings that name an object or an image of the scene, by their section; those of styles are looked up in each style.
+_NAMES_OF_OTHERS = {"guides": ("density_image", "flow_lines"), "hair": ("density_image", "part_lines")}
+_NAMES_OF_OTHERS_IN_STYLES = ("mask_image", "cutter", "target")
+_MASKS = {"guides": ("density_group",), "hair": ("density_group", "region_group")}
+
+
+def scaled(settings: GroomSettings, factor: float) -> GroomSettings:
+    """`GroomSettings` with all lengths of guides, strands, styles and dynamics multiplied by a factor."""
+    if factor == 1.0:
+        return settings
+    sections = {name: _scaled(getattr(settings, name), factor) for name in ("guides", "hair", "dynamics")}
+    return replace(settings, **sections, styles=tuple(_scaled(style, factor) for style in settings.styles))
+
+
+def _scaled[S: Settings](settings: S, factor: float) -> S:
+    lengths = {
+        name: min(max(value * factor, details.low), details.high)
+        for name, details, value in ((n, d, getattr(settings, n)) for n, _default, d in declared(type(settings)))
+        if details.unit == "LENGTH" and value is not None
+    }
+    return replace(settings, **lengths)
+
+
+def alone(settings: GroomSettings) -> tuple[GroomSettings, list[str]]:
+    """`GroomSettings` without names of other objects and images of the scene, and these names."""
+    left: list[str] = []
+    sections = {
+        section: _without(getattr(settings, section), names, left) for section, names in _NAMES_OF_OTHERS.items()
+    }
+    styles = tuple(_without(style, _NAMES_OF_OTHERS_IN_STYLES, left) for style in settings.styles)
+    return replace(settings, **sections, styles=styles), left
+
+
+def _without(settings, names, left):
+    present = [name for name in names if getattr(settings, name, "")]
+    left += [getattr(settings, name) for name in present]
+    return replace(settings, **dict.fromkeys(present, "")) if present else settings
+
+
+def masks_of(settings: GroomSettings) -> list[str]:
+    """Names of the masks of `GroomSettings`: vertex groups, and of styles also attributes; each once."""
+    found = [getattr(getattr(settings, section), name) for section, names in _MASKS.items() for name in names]
+    found += [style.mask for style in settings.styles]
+    return list(dict.fromkeys(filter(None, found)))
+
+
+def renamed(settings: GroomSettings, names: Mapping[str, str]) -> GroomSettings:
+    """`GroomSettings` whose masks have other names; {present: other} of those that change, an empty one for no mask."""
+    sections = {section: _renamed(getattr(settings, section), masks, names) for section, masks in _MASKS.items()}
+    return replace(settings, **sections, styles=tuple(_renamed(style, ("mask",), names) for style in settings.styles))
+
+
+def _renamed(settings, masks, names):
+    return replace(settings, **{mask: names.get(getattr(settings, mask), getattr(settings, mask)) for mask in masks})

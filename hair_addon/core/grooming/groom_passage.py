@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How a groom passes from the surface that it was saved with to another one: which way suits the two, and its masks.
+
+A copy of the surface, turned, scaled and moved, takes its guides exactly. Otherwise roots keep their UV coordinates,
+where both surfaces have a UV map and these agree about what is where; or they go to the nearest surface when the boxes
+around both are laid over each other.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .. import geometry
+from ..errors import HairError
+from ..geometry.landmark_warp import Warp
+from ..geometry.mesh import SurfacePoints, TriMesh, interpolate, positions
+from . import groom_transfer
+from .groom_transfer import Ground, Places
+
+METHODS = ("AUTO", "UV", "NEAREST")
+
+_SAME = 1e-3  # of the surface's size: how far vertices of a copy may be from where a similarity takes them
+_LEAST_KEPT = 0.9  # part of the guides that UV maps of the same layout place
+_MOST_STRETCH = 0.25  # of the roots' spread: how far they may be from any similarity where the layouts agree
+_REACH = 0.05  # of the surface's size: how far a root, or a mask, may be from it
+_OUTSIDE = 1e-3  # of a UV layout's size
+
+
+@dataclass(frozen=True)
+class Passage:
+    """The `Places` of guides on another surface, and how they were found.
+
+    method: "COPY", "UV" or "NEAREST"; warp: of space, from the source to the target, None by UV.
+    """
+
+    method: str
+    places: Places
+    warp: Warp | None
+
+
+def passage(source: Ground, target: Ground, roots: SurfacePoints, method: str = "AUTO") -> Passage:
+    """The `Passage` of guides with roots (G) on the source; method: one of `METHODS`. Raises `HairError`.
+
+    "AUTO" takes the first that applies: a copy, UV maps that agree, the nearest surface.
+    """
+    if method not in METHODS:
+        raise HairError(f"method must be one of {', '.join(METHODS)}, not {method}.")
+    if method == "UV":
+        return Passage("UV", groom_transfer.places_by_uv(source, target, roots), None)
+    if method == "AUTO":
+        found = _copied(source, target, roots) or _by_agreeing_uv(source, target, roots)
+        if found is not None:
+            return found
+    warp = geometry.landmark_warp.between_boxes(source.mesh.vertices, target.mesh.vertices)
+    places = groom_transfer.places_by_warp(source.mesh, target.mesh, roots, warp, _REACH)
+    return Passage("NEAREST", places, warp)
+
+
+def _copied(source, target, roots):
+    """The `Passage` to a mesh of the same triangles that is turned, scaled and moved; None to any other."""
+    if not np.array_equal(source.mesh.triangles, target.mesh.triangles):
+        return None
+    if len(source.mesh.vertices) != len(target.mesh.vertices):
+        return None
+    warp = Warp(
+        *geometry.landmark_warp.similarity(*(m.vertices.astype(np.float64) for m in (source.mesh, target.mesh)))
+    )
+    apart = np.abs(warp.places(source.mesh.vertices) - target.mesh.vertices).max()
+    if not apart <= _SAME * np.ptp(target.mesh.vertices, axis=0).max():  # also refuses NaN
+        return None
+    return Passage("COPY", groom_transfer.places_by_warp(source.mesh, target.mesh, roots, warp, _REACH), warp)
+
+
+def _by_agreeing_uv(source, target, roots):
+    """The `Passage` by UV maps; None where there is none, or they are of unlike layouts."""
+    if source.corner_uvs is None or target.corner_uvs is None:
+        return None
+    try:
+        places = groom_transfer.places_by_uv(source, target, roots)
+    except HairError:
+        return None
+    if len(places.kept) < max(_LEAST_KEPT * len(roots), 3):
+        return None
+    before = positions(source.mesh, roots[places.kept]).astype(np.float64)
+    after = positions(target.mesh, places.roots).astype(np.float64)
+    warp = Warp(*geometry.landmark_warp.similarity(before, after))
+    apart = np.sqrt(np.mean(np.sum((warp.places(before) - after) ** 2, axis=1)))
+    spread = np.sqrt(np.mean(np.sum((after - after.mean(axis=0)) ** 2, axis=1)))
+    return Passage("UV", places, None) if apart <= _MOST_STRETCH * spread else None
+
+
+def carried_weights(source: Ground, target: Ground, weights: np.ndarray, found: Passage) -> np.ndarray:
+    """(W, K) float32 in [0, 1]: masks (V, K) of the source's vertices at the target's W vertices, 0 off the source."""
+    if found.warp is None:
+        wanted, ground = _uv_places(target), _layout(source)
+        reach = _OUTSIDE * float(np.ptp(ground.vertices[:, :2], axis=0).max())
+        weights = weights[source.mesh.triangles.ravel()]
+    else:
+        wanted = target.mesh.vertices
+        ground = TriMesh(found.warp.places(source.mesh.vertices).astype(np.float32), source.mesh.triangles)
+        reach = _REACH * float(np.ptp(target.mesh.vertices, axis=0).max())
+    nearest = geometry.closest_point.SurfaceQuery(ground).nearest(wanted)
+    is_near = np.linalg.norm(positions(ground, nearest) - wanted, axis=1) <= reach
+    there = interpolate(weights.astype(np.float32), ground, nearest)
+    return np.clip(np.where(is_near[:, None], there, 0.0), 0.0, 1.0).astype(np.float32)
+
+
+def _layout(ground):
+    """The UV map as a flat `TriMesh` with corners of its own."""
+    flat = np.zeros((3 * len(ground.corner_uvs), 3), np.float32)
+    flat[:, :2] = ground.corner_uvs.reshape(-1, 2)
+    return TriMesh(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
+
+
+def _uv_places(ground):
+    """(V, 3) float32: the UV coordinates of a corner of each vertex, flat; far away for vertices of no face."""
+    places = np.full((len(ground.mesh.vertices), 3), 1e6, np.float32)
+    places[ground.mesh.triangles.ravel(), :2] = ground.corner_uvs.reshape(-1, 2)
+    places[ground.mesh.triangles.ravel(), 2] = 0.0
+    return places

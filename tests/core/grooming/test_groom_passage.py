@@ -1,0 +1,104 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A saved groom finds its way to a surface: exactly to a copy, by UV maps that agree, else by the nearest surface."""
+
+import numpy as np
+import pytest
+
+from hair_addon.core.errors import HairError
+from hair_addon.core.files import library_settings
+from hair_addon.core.files.settings_file import GroomSettings
+from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh, positions
+from hair_addon.core.grooming.groom import GuideSettings, HairSettings
+from hair_addon.core.grooming.groom_passage import carried_weights, passage
+from hair_addon.core.grooming.groom_transfer import Ground
+from hair_addon.core.styling import clump, trim
+from tests.support.meshes import subdivided_sphere
+
+TURN = np.linalg.qr(np.array([[0.4, -0.8, 0.3], [0.9, 0.2, -0.1], [0.1, 0.5, 0.9]]))[0]
+TURN *= np.sign(np.linalg.det(TURN))
+
+
+@pytest.fixture
+def head(rng):
+    """(the mesh of an uneven egg, 40 roots on it)."""
+    sphere = subdivided_sphere(3)
+    mesh = TriMesh((sphere.vertices * [1.0, 1.3, 1.6]).astype(np.float32), sphere.triangles)
+    barycentric = rng.dirichlet(np.ones(3), 40).astype(np.float32)
+    return mesh, SurfacePoints(rng.integers(0, len(mesh.triangles), 40).astype(np.int32), barycentric)
+
+
+def seen_from_above(mesh):
+    """UV coordinates of corners: x and y, which are the same in all meshes of this shape."""
+    return mesh.vertices[mesh.triangles][..., :2] * 0.2 + 0.5
+
+
+def test_a_turned_and_scaled_copy_needs_no_uv_map(head):
+    mesh, roots = head
+    copy = TriMesh((mesh.vertices @ (2.5 * TURN).T + [3.0, 0.0, -1.0]).astype(np.float32), mesh.triangles)
+    found = passage(Ground(mesh), Ground(copy), roots)
+    assert (found.method, found.places.lost_count) == ("COPY", 0)
+    assert found.places.scale == pytest.approx(2.5, abs=1e-5)
+    np.testing.assert_allclose(positions(copy, found.places.roots), positions(copy, roots), atol=2e-6)
+    np.testing.assert_allclose(found.places.turns, np.broadcast_to(TURN, (40, 3, 3)), atol=1e-4)
+
+
+def test_uv_maps_count_where_they_agree(head):
+    mesh, roots = head
+    up = SurfacePoints(*(part[positions(mesh, roots)[:, 2] > 0.3] for part in (roots.triangle, roots.barycentric)))
+    upper = np.flatnonzero(mesh.vertices[mesh.triangles][..., 2].min(axis=1) > -0.2)
+    there = subdivided_sphere(4)
+    there = TriMesh((there.vertices * [1.0, 1.3, 1.6] + [0.0, 0.0, 0.4]).astype(np.float32), there.triangles)
+    cap = there.triangles[there.vertices[there.triangles][..., 2].min(axis=1) > 0.2]
+    bald = TriMesh(there.vertices, np.ascontiguousarray(cap))
+    own = TriMesh(mesh.vertices, np.ascontiguousarray(mesh.triangles[upper]))
+    rooted = SurfacePoints(np.searchsorted(upper, up.triangle).astype(np.int32), up.barycentric)
+    ground = Ground(own, seen_from_above(own))
+    found = passage(ground, Ground(bald, seen_from_above(bald)), rooted)
+    assert found.method == "UV"
+    moved = positions(bald, found.places.roots)
+    np.testing.assert_allclose(moved[:, :2], positions(own, rooted)[found.places.kept][:, :2], atol=1e-3)
+    shuffled = seen_from_above(bald)[np.random.default_rng(1).permutation(len(cap))]
+    assert passage(ground, Ground(bald, shuffled), rooted).method == "NEAREST"
+
+
+def test_another_shape_takes_guides_to_its_nearest_surface(head):
+    mesh, roots = head
+    other = subdivided_sphere(4)
+    found = passage(Ground(mesh), Ground(other), roots)
+    assert found.method == "NEAREST"
+    extent = np.ptp(other.vertices, axis=0) / np.ptp(mesh.vertices, axis=0)
+    wanted = positions(mesh, roots)[found.places.kept] * extent
+    assert np.linalg.norm(positions(other, found.places.roots) - wanted, axis=1).max() < 0.03
+
+
+def test_masks_come_along(head):
+    mesh, roots = head
+    weights = np.clip(mesh.vertices[:, 2:], 0.0, 1.0)
+    copy = TriMesh((mesh.vertices @ (0.1 * TURN).T).astype(np.float32), mesh.triangles)
+    for target in (Ground(mesh, seen_from_above(mesh)), Ground(copy, seen_from_above(mesh))):
+        found = passage(Ground(mesh, seen_from_above(mesh)), target, roots)
+        carried = carried_weights(Ground(mesh, seen_from_above(mesh)), target, weights, found)
+        np.testing.assert_allclose(carried, weights, atol=2e-5)
+
+
+def test_an_unknown_method_is_refused(head):
+    mesh, roots = head
+    with pytest.raises(HairError, match="AUTO, UV, NEAREST"):
+        passage(Ground(mesh), Ground(mesh), roots, "MAGIC")
+
+
+def test_settings_follow_the_size_of_the_surface_and_forget_the_scene():
+    settings = GroomSettings(
+        GuideSettings(length=0.2, flow_lines="Lines"),
+        HairSettings(radius=1e-4, influence_distance=0.03, density_group="scalp"),
+        styles=(clump.Settings(size=0.02, mask="top"), trim.Settings(cutter="Knife", to_length=0.1)),
+    )
+    twice = library_settings.scaled(settings, 2.0)
+    assert (twice.guides.length, twice.hair.radius, twice.styles[0].size, twice.styles[1].to_length) == (
+        *(0.4, 2e-4, 0.04, 0.2),
+    )
+    assert library_settings.scaled(twice, 0.5) == settings
+    alone, left = library_settings.alone(settings)
+    assert (left, alone.guides.flow_lines, alone.styles[1].cutter) == (["Lines", "Knife"], "", "")
+    assert library_settings.masks_of(settings) == ["scalp", "top"]
+    assert library_settings.masks_of(library_settings.renamed(settings, {"top": "top.001"})) == ["scalp", "top.001"]
