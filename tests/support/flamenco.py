@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Flamenco on this machine [Flamenco26]: what its manager makes of a job, as our mock has it or as it is; and its workers."""
+"""Flamenco on this machine [Flamenco26]: what its manager makes of a job, by our mock or by itself; and its workers."""
 
 import contextlib
 import datetime
