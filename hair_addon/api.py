@@ -125,6 +125,7 @@ __all__ = [
     "use_as_guides",
 ]
 _FRAMES = Param("")  # availability in this Blender is checked later
+_EVERY, _SWITCH = Param("", low=1), Param("")
 
 
 # Growing.
@@ -183,6 +184,8 @@ def use_as_guides(
     >>> api.use_as_guides(lines, mesh).numpy().shape
     (2, 41, 3)
     """
+    every, progress = plain_value("every", every, 1, _EVERY), heard(progress)
+    applies_modifiers = plain_value("applies_modifiers", applies_modifiers, True, _SWITCH)
     if are_arrays(surface):
         return _guides_of_arrays(curves, mesh_of(surface), every)
 

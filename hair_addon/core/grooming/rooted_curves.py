@@ -126,8 +126,9 @@ def _run_backwards(at_first, at_last, sizes):
 def polylines(curves: Iterable[ArrayLike]) -> tuple[np.ndarray, np.ndarray]:
     """(N, 3) float32 points and (C+1,) starts of a sequence of (P, 3) arrays. Raises `HairError`."""
     try:
-        lines: list[np.ndarray] = [np.asarray(line, np.float32) for line in curves]
-    except (TypeError, ValueError):
+        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+            lines: list[np.ndarray] = [np.asarray(line, np.float32) for line in curves]
+    except (TypeError, ValueError, OverflowError):
         lines = [np.empty(0)]
     if not lines or any(line.ndim != 2 or line.shape[1] != 3 for line in lines):
         raise HairError("Curves must be a non-empty sequence of arrays (P, 3), one per curve.")
