@@ -116,7 +116,8 @@ class Operations:
         self.say(f"empty hair on {surface.name}")
         bpy.ops.object.curves_empty_hair_add()
         curves = bpy.context.object
-        curves.data.add_curves([self.random.choice([1, 2, 9]) for _ in range(self.random.choice([0, 1, 20]))])
+        for _ in range(self.random.choice([0, 1, 20])):  # Blender ends where curves are added with no counts
+            curves.data.add_curves([self.random.choice([1, 2, 9])])
         for point in curves.data.points:
             point.position = [self.random.uniform(-1.0, 1.0) for _ in range(3)]
         self._call("use_as_guides", strand_count=200)
