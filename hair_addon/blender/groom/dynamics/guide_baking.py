@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-import bpy
 from bpy.types import Curves, Scene
 
 from ....core.errors import HairError
@@ -172,8 +171,6 @@ def _end(its_scene, present, baked):
             scene_time.go_to(its_scene.find(), present)
     finally:
         _baking = False
-    if not hasattr(bpy.types.Curves, "vellus"):  # the add-on was disabled meanwhile
-        return
     for remembered in baked:
         with contextlib.suppress(HairError):  # deleted meanwhile, by a script
             frame_folders.have_changed(remembered.find())

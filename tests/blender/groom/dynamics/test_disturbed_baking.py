@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 
-import hair_addon
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
+from hair_addon.blender.host import running
 from hair_addon.core.errors import HairError
-from hair_addon.core.long_work import no_progress, run_now
+from hair_addon.core.long_work import run_now
+from tests.support.modal import TIMER, Operator
 from tests.support.reading import points
 from tests.support.swung import simulate, swing
 
@@ -125,25 +126,21 @@ def test_baking_goes_on_whatever_becomes_of_a_collider(guides, ball, disturb):
     assert np.isfinite(points(guides)).all()
 
 
-def test_baking_ends_with_the_addon(guides):
-    """Blender closes the work of an operator after its add-on was disabled: settings are gone then."""
-    work = guide_baking.baking([guides.data], LAST, bpy.context.scene)
-    run_some(work)
-    hair_addon.unregister()
-    try:
-        work.close()
-    finally:
-        hair_addon.register()
-    assert bpy.context.scene.frame_current == PRESENT and not guide_baking.is_baking()
-    (baked,), _told = bake(bpy.data.objects["Guides"])
-    assert baked.last == LAST
+def test_baking_ends_with_the_addon(guides, window):
+    """Disabling it ends what runs, while its settings are there still: the scene is at its frame again."""
+    folder, operator = frame_folders.folder_of(guides.data), Operator(guide_baking.baking([guides.data], 500, scene()))
+    assert operator.begin(window) == {"RUNNING_MODAL"}
+    while len([*folder.glob("+*.npz")]) < 4:
+        running.job().wait()
+        operator.modal(window, TIMER)
+    assert guide_baking.is_baking() and scene().frame_current != PRESENT
+    running.end(window)
+    assert scene().frame_current == PRESENT and not guide_baking.is_baking()
+    assert window.status[-1] is None
 
 
-def run_some(work, count=4):
-    """The first steps of some work."""
-    compute = next(work)
-    for _ in range(count):
-        compute = work.send(compute(no_progress))
+def scene():
+    return bpy.context.scene
 
 
 def delete():
