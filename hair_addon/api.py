@@ -125,7 +125,6 @@ __all__ = [
     "use_as_guides",
 ]
 _FRAMES = Param("")  # availability in this Blender is checked later
-_EVERY, _SWITCH = Param("", low=1), Param("")
 
 
 # Growing.
@@ -184,8 +183,6 @@ def use_as_guides(
     >>> api.use_as_guides(lines, mesh).numpy().shape
     (2, 41, 3)
     """
-    every, progress = plain_value("every", every, 1, _EVERY), heard(progress)
-    applies_modifiers = plain_value("applies_modifiers", applies_modifiers, True, _SWITCH)
     if are_arrays(surface):
         return _guides_of_arrays(curves, mesh_of(surface), every)
 
@@ -195,7 +192,7 @@ def use_as_guides(
     work = blender.groom.hand_made_guides.using_as_guides(
         curves_object, _surface_object(surface), _depsgraph(), every=every, applies_modifiers=applies_modifiers
     )
-    return run_now(work, progress).guides
+    return run_now(work, heard(progress)).guides
 
 
 def _guides_of_arrays(curves, mesh, every):

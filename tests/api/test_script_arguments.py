@@ -37,6 +37,14 @@ def elsewhere():
     return other
 
 
+def foreign():
+    """Curves that no one has made guides of."""
+    curves = bpy.data.hair_curves.new("Lines")
+    curves.add_curves([3])
+    curves.surface = bpy.data.objects["Sphere"]
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Lines", curves))
+
+
 def mesh(vertices=None, triangles=TRIANGLE):
     return api.distribute_guides((np.eye(3) if vertices is None else vertices, triangles), guide_count=3)
 
@@ -173,10 +181,10 @@ REFUSED = {
     "removed curves": (lambda: api.use_as_guides(removed()), "was removed from the file"),
     "an array for curves": (lambda: api.use_as_guides(np.zeros((2, 2))), "type ndarray is not a curves object"),
     "guides for curves": (lambda: api.use_as_guides(data("Guides")), "'Guides' is already guides or hair"),
-    "text for every": (lambda: api.use_as_guides(data("Guides"), every="2"), "every must be a whole number"),
-    "every of none": (lambda: lines_of_arrays(every=0), "every must be at least 1"),
-    "no progress of curves": (lambda: api.use_as_guides(data("Guides"), progress=None), "progress must be a function"),
-    "no modifiers": (lambda: api.use_as_guides(data("Guides"), applies_modifiers=None), "must be True or False"),
+    "text for every": (lambda: api.use_as_guides(data("Lines"), every="2"), "Keep Every must be a whole number"),
+    "every of none": (lambda: lines_of_arrays(every=0), "Keep Every must be at least 1"),
+    "no progress of curves": (lambda: api.use_as_guides(data("Lines"), progress=None), "progress must be a function"),
+    "no modifiers": (lambda: api.use_as_guides(data("Lines"), applies_modifiers=None), "must be True or False"),
     # Arrays.
     "a number for masks": (lambda: masked(3), "masks must be a dictionary"),
     "text for a mask": (lambda: masked({"top": "top"}), "must have a finite weight"),
@@ -239,7 +247,7 @@ def assert_all_goes_on(folder):
 
 def test_wrong_arguments_are_one_sentence_and_change_nothing(lit, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    elsewhere(), bpy.data.objects.new("Empty", None)
+    elsewhere(), bpy.data.objects.new("Empty", None), foreign()
     model, before = lit.data.vellus.model, everything()
     for name, (call, said) in REFUSED.items():
         with pytest.raises(api.HairError) as refused:
