@@ -60,14 +60,8 @@ def redo():
     assert bpy.ops.ed.redo() == {"FINISHED"}
 
 
-def edit():
-    bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
-    bpy.ops.object.mode_set(mode="EDIT")
-
-
-@pytest.mark.parametrize("disturb", [rename, duplicate, undo, redo, edit])
-def test_baking_goes_on_to_the_same_frames(guides, disturb, request):
-    request.addfinalizer(leave_edit_mode)
+@pytest.mark.parametrize("disturb", [rename, duplicate, undo, redo])
+def test_baking_goes_on_to_the_same_frames(guides, disturb):
     bake(guides)
     folder = frame_folders.folder_of(guides.data)
     whole = {path.name: path.read_bytes() for path in folder.glob("*.npz")}
