@@ -173,5 +173,5 @@ def have_changed(guides: Curves) -> None:
 
 def has_frames(guides: Curves) -> bool:
     """Whether frames of some guides are known: panels ask with every redraw, so no file is read."""
-    kept = folder_cache.get(guides.session_uid)
-    return kept is not None and kept[1] is not None and kept[1].manifest is not None
+    _folder, baked = folder_cache.get(guides.session_uid) or (None, None)
+    return baked is not None and baked.manifest is not None
