@@ -87,7 +87,7 @@ def heard(progress: object) -> Progress:
 def curves_object_of(given: Any) -> Any:
     """Return a curves object that is neither guides nor hair, given as such or as its Curves. Raises `HairError`."""
     view_layer = blender.data.scene.present_depsgraph().view_layer
-    curves_object = given if hasattr(given, "matrix_world") else blender.groom.selection.object_of(given, view_layer)
+    curves_object = blender.data.arguments.object_with_curves(given, view_layer)
     if not blender.groom.foreign_curves.is_foreign(curves_object):
-        raise HairError(f"{getattr(given, 'name', given)!r} is not a curves object, or is already guides or hair.")
+        raise HairError(f"{blender.host.notices.name_of(curves_object)!r} is already guides or hair.")
     return curves_object

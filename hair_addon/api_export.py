@@ -38,9 +38,16 @@ def export_groom(
     wanted, target = changed(ExportSettings, settings, changes), path_of(path)
     if hair is None:
         chosen = blender.io.groom_sources.all_hair()
-    elif isinstance(hair, Iterable) and not isinstance(hair, str):
-        chosen = list(dict.fromkeys(blender.data.arguments.curves_of(one, "HAIR") for one in hair))
     else:
-        raise HairError("hair must be a list of hair Curves, or None for all.")
+        chosen = list(dict.fromkeys(blender.data.arguments.curves_of(one, "HAIR") for one in _listed(hair)))
     work = blender.io.groom_export.exporting(target, chosen, wanted, blender.host.scene_time.present_scene())
     return [str(note) for note in run_now(work, heard(progress)).notes]
+
+
+def _listed(hair):
+    try:
+        if not isinstance(hair, str):
+            return [*hair]
+    except TypeError:  # also an array without dimensions, which has the method of iterables
+        pass
+    raise HairError("hair must be a list of hair Curves, or None for all.")

@@ -69,7 +69,7 @@ def use_as_guides(
         every=every,
         applies_modifiers=applies_modifiers,
     )
-    return run_now(work, progress).guides
+    return run_now(work, heard(progress)).guides
 
 
 def _guides_of_arrays(curves, mesh, every):

@@ -17,7 +17,7 @@ from .core.geometry.strands import Strands
 from .core.grooming import following, groom, hair_styles
 from .core.grooming.groom import HairSettings
 from .core.long_work import Progress
-from .core.params import Param, declared, plain_value
+from .core.params import Param, declared, described, plain_value
 from .core.styling.base import StyleSettings
 from .core.styling.bend import Settings as Bend
 from .core.styling.braid import Settings as Braid
@@ -130,6 +130,8 @@ def styled_strands(
 ) -> Strands:
     """Strands between guides on a mesh of arrays, with styles; arguments as in `api.interpolate_hair`."""
     styles, _names = require_styles(styles)
+    if not isinstance(masks, Mapping | None):
+        raise HairError(f"masks must be a dictionary of weights by their names, not {described(masks)}.")
     inputs = Inputs({key: _mask(mesh, masks or {}, key) for key in mask_keys(styles)})
     for style in styles:
         _require_arrays(style)
@@ -145,7 +147,11 @@ def _mask(mesh, masks, key):
         raise HairError("Images mask styles in Blender only: pass weights of vertices as masks={name: weights}.")
     if name not in masks:
         raise HairError(f"There is no mask {name!r}: pass weights of vertices as masks={{name: weights}}.")
-    weights = np.asarray(masks[name], np.float32)
+    try:
+        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+            weights = np.asarray(masks[name], np.float32)
+    except (TypeError, ValueError, OverflowError):
+        weights = np.empty(0)
     if weights.shape != (len(mesh.vertices),) or not np.isfinite(weights).all():
         raise HairError(f"The mask {name!r} must have a finite weight for each of {len(mesh.vertices)} vertices.")
     return Mask(weights[mesh.triangles], is_inverted=is_inverted)

@@ -11,6 +11,7 @@ STATE = {
     "blender/groom/dynamics/guide_baking.py: _baking": "the end of baking, on every way out",
     "blender/host/cli_command.py: _command": "unregister",
     "blender/host/running.py: _job": "end",
+    "blender/host/running.py: _work": "end",
     "blender/host/running.py: _timer": "end",
     "blender/live/first_setup.py: _job": "unregister",
     "blender/live/handlers.py: _is_opening": "the first update after a file was opened",

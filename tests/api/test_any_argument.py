@@ -23,6 +23,8 @@ from hair_addon.core.styling.kinds import KINDS, OFFERS
 from tests.support.following import update
 from tests.support.reading import everything, points
 
+FOREIGN = "Foreign"  # curves not created by Vellus
+
 STEPS = int(os.environ.get("VELLUS_TEST_STEPS", "60"))
 
 NUMBERS = [0, 1, -1, 2, 7, 0.5, 1e-300, 1e-30, 1e-9, 1e6, 1e30, 1e300, -1e300, 2**31 - 1, 2**31, 10**400, math.pi]
@@ -68,6 +70,8 @@ COSTLY = {
     "samples_per_side": 2,
     "sample_count": 2,
     "factor": 1.5,
+    "vertex_count": 9,
+    "preroll": 2,
 }
 
 
@@ -140,7 +144,71 @@ def anything(dice, *often):
     return dice.choice(OTHERS + NUMBERS) if dice.random() < 0.15 else dice.choice(often)
 
 
+def simulate(dice):
+    """All frames of a mesh of arrays."""
+    mesh = np.eye(3), [[0, 1, 2]]
+    guides = anything(dice, api.distribute_guides(mesh, guide_count=3))
+    poses = anything(dice, [np.eye(3)] * 2, [np.eye(3), anything(dice, 2.0 * np.eye(3))])
+    details = {"gravity": anything(dice, (0, 0, -1)), "regions": anything(dice, None, [0, 1, 1])}
+    changed = changes(dice, api.DynamicsSettings, ("vertex_count", "preroll"))
+    return [*api.simulate(poses, mesh[1], guides, frame_rate=anything(dice, 24), **(details | changed))]
+
+
+def hair_of_arrays(dice):
+    """Strands on a mesh of arrays, with styles."""
+    mesh = np.eye(3), [[0, 1, 2]]
+    guides = anything(dice, api.distribute_guides(mesh, guide_count=3))
+    masks = anything(dice, None, {"top": anything(dice, [0, 1, 1])})
+    styles = anything(dice, [style(dice)], [api.Clump(mask="top"), api.Curl()])
+    return api.interpolate_hair(
+        guides, mesh=anything(dice, mesh), styles=styles, masks=masks, **changes(dice, api.HairSettings, COSTLY)
+    )
+
+
+def bake(dice):
+    """Few frames: a million are no error."""
+    guides = target(dice, "GUIDES")
+    if isinstance(guides, bpy.types.Object) and guides.type == "CURVES" and guides.data.vellus.dynamics.start_frame < 0:
+        guides.data.vellus.dynamics.start_frame = 1
+    last = anything(dice, None, 2, 3)
+    return api.bake_dynamics(guides, last, starts_over=anything(dice, False, True), progress=anything(dice, print))
+
+
+def require_foreign_curves():
+    """Curves of another hand, for `use_as_guides`, which makes them guides."""
+    shown = bpy.data.objects.get(FOREIGN)
+    if shown is not None and shown.data.vellus.kind == "NONE":
+        return
+    if shown is not None:
+        shown.name = "Used"
+    curves = bpy.data.hair_curves.new(FOREIGN)
+    curves.add_curves([4, 4])
+    curves.attributes["position"].data.foreach_set("vector", np.linspace(0.0, 1.0, 24, dtype=np.float32))
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new(FOREIGN, curves))
+    update()
+
+
+def use_as_guides(dice):
+    """Curves of another hand, in Blender or as arrays."""
+    if dice.random() < 0.5:
+        lines = [[(0.2, 0.2, 0.0), (0.2, 0.2, 0.1)], anything(dice, [(0.1, 0.1, 0.0), (0.1, 0.3, 0.1)])]
+        return api.use_as_guides(anything(dice, lines), (np.eye(3), [[0, 1, 2]]), every=anything(dice, 1, 2))
+    return api.use_as_guides(
+        anything(dice, bpy.data.objects[FOREIGN], target(dice, "GUIDES")),
+        anything(dice, None, target(dice, "MESH")),
+        every=anything(dice, 1),
+        applies_modifiers=anything(dice, True),
+        progress=anything(dice, print),
+    )
+
+
 CALLS = {
+    "simulate": simulate,
+    "hair_of_arrays": hair_of_arrays,
+    "use_as_guides": use_as_guides,
+    "bake_dynamics": bake,
+    "deliver_dynamics": lambda d: api.deliver_dynamics(target(d, "GUIDES"), progress=anything(d, print)),
+    "remove_delivery": lambda d: api.remove_delivery(target(d, "GUIDES")),
     "distribute_guides": lambda d: api.distribute_guides(target(d, "MESH"), **changes(d, api.GuideSettings, COSTLY)),
     "interpolate_hair": lambda d: api.interpolate_hair(target(d, "GUIDES"), **changes(d, api.HairSettings, COSTLY)),
     "add_hair": lambda d: api.add_hair(target(d, "MESH"), settings(d)),
@@ -219,7 +287,7 @@ MADE = ("objects", "hair_curves", "materials", "node_groups")
 def assert_whole():
     """No curves are half made, and each hair has what it needs."""
     for shown in bpy.data.objects:
-        if shown.type == "CURVES":
+        if shown.type == "CURVES" and not shown.name.startswith(FOREIGN):
             assert shown.data.vellus.kind != "NONE" and len(shown.data.curves) > 0
             assert np.isfinite(points(shown)).all()
     assert all(curves.users for curves in bpy.data.hair_curves)
@@ -229,9 +297,12 @@ def assert_whole():
 def test_any_argument_works_or_is_refused(lit, tmp_path, monkeypatch, capfd):
     monkeypatch.chdir(tmp_path)
     dice = random.Random(int(os.environ.get("VELLUS_TEST_SEED", "5")))
+    bpy.data.hair_curves["Guides"].vellus.cache_folder = "haircache"
+    bpy.context.scene.frame_end = 3
     refusals = 0
     for step in range(STEPS):
         name = dice.choice([*CALLS, "property", "property", "undo"])
+        require_foreign_curves()
         before = everything()
         state = dice.getstate()
         try:

@@ -37,6 +37,14 @@ def elsewhere():
     return other
 
 
+def foreign():
+    """Curves that no one has made guides of."""
+    curves = bpy.data.hair_curves.new("Lines")
+    curves.add_curves([3])
+    curves.surface = bpy.data.objects["Sphere"]
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Lines", curves))
+
+
 def mesh(vertices=None, triangles=TRIANGLE):
     return api.distribute_guides((np.eye(3) if vertices is None else vertices, triangles), guide_count=3)
 
@@ -47,6 +55,14 @@ def strands():
 
 def hair_of_arrays(guides, arrays=None):
     return api.interpolate_hair(guides, mesh=(np.eye(3), TRIANGLE) if arrays is None else arrays, strand_count=5)
+
+
+def masked(masks):
+    return api.interpolate_hair(strands(), mesh=(np.eye(3), TRIANGLE), styles=[api.Clump(mask="top")], masks=masks)
+
+
+def lines_of_arrays(line=TRIANGLE, **changes):
+    return api.use_as_guides([line], (np.eye(3), TRIANGLE), **changes)
 
 
 def simulate(poses, guides=None, triangles=TRIANGLE, **changes):
@@ -123,6 +139,7 @@ REFUSED = {
     "no delivery to remove": (lambda: api.remove_delivery(data("Guides")), "plays delivered frames"),
     "a name for hair": (lambda: api.export_groom("a.abc", "Hair"), "hair must be a list"),
     "hair without a list": (lambda: api.export_groom("a.abc", data("Hair")), "hair must be a list"),
+    "an array of nothing for hair": (lambda: api.export_groom("a.abc", np.array(None)), "hair must be a list"),
     "guides to export": (lambda: api.export_groom("a.abc", [data("Guides")]), "'Guides' is not Vellus hair"),
     "a mesh's format": (lambda: api.export_groom("a.obj"), "exported as .abc"),
     "a number for hair in a file": (lambda: api.export_groom("a.abc", has_hair=1), "Hair must be True or"),
@@ -130,6 +147,10 @@ REFUSED = {
     "a number for poses": (lambda: simulate(3), "poses must be an iterable"),
     "flat poses": (lambda: simulate([np.arange(9.0)]), "A mesh is vertices"),
     "an infinite pose": (lambda: simulate([np.full((3, 3), np.inf)]), "non-finite"),
+    "a pose that single precision cannot hold": (
+        lambda: [*simulate([np.eye(3), 1e300 * np.eye(3)])],
+        "Pose 1 must be",
+    ),
     "guides of an object": (lambda: simulate([np.eye(3)], data("Guides")), "guides must be Strands"),
     "guides of another mesh": (lambda: simulate([np.eye(3)], strands(), [[0, 1, 9]]), "uses vertex 9"),
     "no frame rate": (lambda: simulate([np.eye(3)], frame_rate=0), "frame_rate must be"),
@@ -157,7 +178,18 @@ REFUSED = {
     ),
     "what modifiers made": (lambda: api.points(evaluated_curves("Hair")), "is not Vellus guides or hair"),
     "an object without data": (lambda: api.points(data("Empty")), "is not Vellus guides or hair"),
+    "removed curves": (lambda: api.use_as_guides(removed()), "was removed from the file"),
+    "an array for curves": (lambda: api.use_as_guides(np.zeros((2, 2))), "type ndarray is not a curves object"),
+    "guides for curves": (lambda: api.use_as_guides(data("Guides")), "'Guides' is already guides or hair"),
+    "text for every": (lambda: api.use_as_guides(data("Lines"), every="2"), "Keep Every must be a whole number"),
+    "every of none": (lambda: lines_of_arrays(every=0), "Keep Every must be at least 1"),
+    "no progress of curves": (lambda: api.use_as_guides(data("Lines"), progress=None), "progress must be a function"),
+    "no modifiers": (lambda: api.use_as_guides(data("Lines"), applies_modifiers=None), "must be True or False"),
     # Arrays.
+    "a number for masks": (lambda: masked(3), "masks must be a dictionary"),
+    "text for a mask": (lambda: masked({"top": "top"}), "must have a finite weight"),
+    "a mask that single precision cannot hold": (lambda: masked({"top": [0, 1, 1e300]}), "must have a finite weight"),
+    "lines that single precision cannot hold": (lambda: lines_of_arrays(1e300 * np.eye(3)), "nothing to use"),
     "one array": (lambda: api.distribute_guides([np.eye(3)]), "pair of arrays"),
     "three arrays": (lambda: api.distribute_guides((1, 2, 3)), "pair of arrays"),
     "fractions of vertices": (lambda: mesh(triangles=[[0, 1, 1.5]]), "must be whole numbers"),
@@ -215,7 +247,7 @@ def assert_all_goes_on(folder):
 
 def test_wrong_arguments_are_one_sentence_and_change_nothing(lit, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    elsewhere(), bpy.data.objects.new("Empty", None)
+    elsewhere(), bpy.data.objects.new("Empty", None), foreign()
     model, before = lit.data.vellus.model, everything()
     for name, (call, said) in REFUSED.items():
         with pytest.raises(api.HairError) as refused:

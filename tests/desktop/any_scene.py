@@ -24,6 +24,8 @@ def build(folder):
             bpy.context.scene.collection.objects.link(linked)
         sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
         bpy.context.scene.collection.objects.link(sun)
+        bpy.ops.curve.primitive_bezier_curve_add(radius=0.8, location=(-5.0, 0.0, 1.0))
+        bpy.context.object.name = "Line"
         bpy.ops.ed.undo_push(message="Scene")
     view = viewport()[0].spaces.active.region_3d
     view.view_location, view.view_distance = (0.0, 0.0, 0.0), 16.0

@@ -22,10 +22,11 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop import any_scene  # noqa: E402
+from tests.desktop.any_operation import Operations  # noqa: E402
 from tests.desktop.window import MODULE, in_viewport, install, viewport, wait  # noqa: E402
 
 
-class Artist:
+class Artist(Operations):
     """Takes random steps; each is printed before it is taken, so that the log ends with what ended Blender."""
 
     def __init__(self, seed, folder):
@@ -81,6 +82,7 @@ class Artist:
                 assert "Traceback" not in str(refusal), refusal
             self.step_count += 1
             yield
+            self.stop_playing()
             if self.step_count % 2 == 0:
                 self.look()
             yield
@@ -150,11 +152,12 @@ class Artist:
             "density_group": ["", "half", "missing"],
             "region_group": ["", "half", "missing"],
             "region_attribute": ["", "sharp_face", "missing"],
-            "part_lines": ["", "Sun", "missing"],
+            "part_lines": ["", "Sun", "Line", "missing"],
             "density_image": ["", "missing"],
             "mask": ["", "half", "missing"],
             "mask_image": ["", "missing"],
-            **{key: ["", "Sun", "missing"] for key in ("cutter", "target")},
+            **{key: ["", "Sun", "Plain", "missing"] for key in ("cutter", "source", "target")},
+            "colliders": ["", "Collection", "Colliders", "missing"],
         }
         if declared.type == "STRING":
             return self.random.choice(names.get(name, [""]))
@@ -164,7 +167,7 @@ class Artist:
             return self.random.choice([item.identifier for item in declared.enum_items])
         if declared.is_array:
             return [self.random.random() for _ in range(declared.array_length)]
-        most = {"guide_count": 300, "strand_count": 5000, "relax_iterations": 20, "size": 64, "levels": 2}
+        most = {"guide_count": 300, "strand_count": 5000, "relax_iterations": 20, "size": 64, "levels": 2, "preroll": 3}
         # Smaller locks are tens of thousands.
         least = {"size": 0.1, "lock": 0.1} if declared.type == "FLOAT" else {}
         low, high = least.get(name, declared.hard_min), min(declared.hard_max, most.get(name, declared.soft_max))

@@ -295,6 +295,50 @@ def disabled():
     yield from wait(0.5)
 
 
+def begin_to_bake(override):
+    """Bake in a window's context until some frames are there."""
+    scene().frame_current, scene().frame_end = 1, 1000
+    with override:
+        bpy.ops.vellus.bake_dynamics("INVOKE_DEFAULT")
+    yield from more_frames()
+
+
+def more_frames():
+    before = len(frames())
+    yield from wait_for(lambda: len(frames()) > before + 3, 60.0)
+
+
+def is_busy():
+    return addon().host.running.job() is not None or addon().groom.dynamics.guide_baking.is_baking()
+
+
+def ended():
+    """While it is baked: undo and redo; its window is closed; the add-on is disabled."""
+    with in_viewport():
+        bpy.ops.ed.undo_push(message="Before")
+    bpy.ops.wm.window_new()
+    yield from wait(1.0)
+    second = bpy.context.window_manager.windows[-1]
+    yield from begin_to_bake(bpy.context.temp_override(window=second, area=second.screen.areas[0]))
+    with in_viewport():
+        bpy.ops.ed.undo()
+        bpy.ops.ed.redo()
+    yield from more_frames()
+    facts["ended"] = {"redo": is_busy()}
+    with bpy.context.temp_override(window=bpy.context.window_manager.windows[-1]):
+        bpy.ops.wm.window_close()
+    yield from wait(1.0)
+    facts["ended"]["window closed"] = [is_busy(), scene().frame_current]
+    yield from begin_to_bake(in_viewport())
+    bpy.ops.preferences.addon_disable(module=MODULE)
+    facts["ended"]["add-on disabled"] = scene().frame_current
+    bpy.ops.preferences.addon_enable(module=MODULE)
+    yield from wait(1.0)
+    facts["ended"]["add-on enabled"] = [is_busy(), scene().frame_current]
+    with in_viewport():
+        bpy.ops.vellus.free_dynamics("EXEC_DEFAULT")
+
+
 def loaded():
     """Another file is opened while it plays, and while it is baked."""
     activate(of_kind("GUIDES"))
@@ -303,29 +347,22 @@ def loaded():
     yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
     yield from go_on()
     facts["load"] = {"while it plays": state_after_load()}
-    scene().frame_end = 1000
-    with in_viewport():
-        bpy.ops.vellus.bake_dynamics("INVOKE_DEFAULT")
-    yield from wait_for(lambda: len(frames()) > 4, 60.0)
+    yield from begin_to_bake(in_viewport())
     yield from go_on()
     facts["load"]["while it is baked"] = state_after_load()
     play()
     yield from wait_for(lambda: scene().frame_current >= 6, 60.0)
     stop()
     facts["load"]["plays"] = scene().frame_current >= 6 and bool(np.isfinite(strands()).all())
-    with in_viewport():
-        bpy.ops.vellus.free_dynamics("EXEC_DEFAULT")
 
 
 def state_after_load():
     """What is wrong after a file was opened: nothing is computed, and hair is where the file has it."""
-    blender = addon()
-    is_busy = blender.host.running.job() is not None or blender.groom.dynamics.guide_baking.is_baking()
-    return [] if not is_busy and np.isfinite(strands()).all() else [state(), is_busy]
+    return [] if not is_busy() and np.isfinite(strands()).all() else [state(), is_busy()]
 
 
 PARTS = {"play": (hair_on_a_swinging_ball, played, jumped_back, undone), "bake": (baked, stopped)}
-PARTS["end"] = (loaded, deleted, disabled)
+PARTS["end"] = (loaded, ended, deleted, disabled)
 
 
 def go_on():

@@ -115,3 +115,9 @@ def test_the_addon_is_disabled_while_it_plays(dynamics):
 
 def test_another_file_is_opened_while_it_plays_and_while_it_is_baked(dynamics):
     assert dynamics.facts["load"] == {"while it plays": [], "while it is baked": [], "plays": True}
+
+
+def test_baking_goes_on_after_a_redo_and_ends_with_its_window_and_the_addon(dynamics):
+    """The scene is at its frame again at once."""
+    ended = {"redo": True, "window closed": [False, 1], "add-on disabled": 1, "add-on enabled": [False, 1]}
+    assert dynamics.facts["ended"] == ended

@@ -25,6 +25,19 @@ def curves_of(given, kind=None):
     return found
 
 
+def object_with_curves(given, view_layer):
+    """Return an object with curves, given as such or as its Curves, which an object of the view layer shows.
+
+    For an evaluated copy, the original. Raises `HairError`.
+    """
+    found = _original(given)
+    if isinstance(found, bpy.types.Curves | bpy.types.Curve):
+        found = next((o for o in view_layer.objects if o is not None and o.data == found), None)
+    if not isinstance(found, bpy.types.Object) or found.type not in {"CURVE", "CURVES"}:
+        raise HairError(f"{_called(given)} is not a curves object.")
+    return found
+
+
 def guides_of(given):
     """Return guide Curves as `curves_of` does, if their surface is evaluated."""
     guides = curves_of(given, "GUIDES")

@@ -82,7 +82,7 @@ def _rounded(value):
 
 def _vertices(mesh_object, depsgraph, metres):
     """(V, 3) float64 [m] in the world, of an evaluated mesh object."""
-    local = scene.vertex_positions(mesh_object.evaluated_get(depsgraph).data)
+    local = scene.evaluated_positions(mesh_object, depsgraph)
     matrix = metres * _matrix(mesh_object, depsgraph)
     return local @ matrix[:, :3].T + matrix[:, 3]
 

@@ -267,6 +267,17 @@ def vertex_positions(mesh):
     return vertices
 
 
+def evaluated_positions(mesh_object, depsgraph):
+    """(V, 3) float32 of an evaluated mesh object, in its own coordinates."""
+    evaluated = mesh_object.evaluated_get(depsgraph)
+    if "position" in evaluated.data.attributes or not len(evaluated.data.vertices):
+        return vertex_positions(evaluated.data)
+    try:  # in Edit Mode, where the evaluated mesh has no attributes
+        return vertex_positions(evaluated.to_mesh())
+    finally:
+        evaluated.to_mesh_clear()
+
+
 def read_vertex_group(surface_object, depsgraph, name):
     """(V,) float32 weights of a vertex group on the evaluated mesh, or None for the empty name."""
     if not name:

@@ -20,6 +20,7 @@ from ...core.geometry.mesh import SurfacePoints, TriMesh, positions
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.rooted_curves import RootedCurves, reversal
 from ...core.long_work import Work, part_of, run_now
+from ...core.params import Param, plain_value
 from ..data import attributes, curves, curves_objects, follow_nodes, masks, posed_strands, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
@@ -28,6 +29,7 @@ from ..settings import preferences
 from . import foreign_curves, pipeline, staleness
 from .foreign_curves import SeenCurves
 
+_SWITCH = Param("")
 _GROUP = "Hair"  # the vertex group of the area with guides
 
 
@@ -126,6 +128,8 @@ def using_as_guides(
     are not all over the surface, it becomes a new one that is painted where curves are. Raises `HairError` before
     anything changes.
     """
+    every = grooming.rooted_curves.checked_every(every)
+    applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
     require_usable(curves_object, surface_object)
     curves_objects.keep_rest(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)

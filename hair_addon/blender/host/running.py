@@ -11,6 +11,7 @@ import contextlib
 import bpy
 
 _job = None
+_work = None
 _timer = None
 
 
@@ -24,10 +25,10 @@ def job():
     return _job
 
 
-def begin(context, started):
-    """Take note of a `Job`, and have its window send timer events for as long as it runs."""
-    global _job, _timer
-    _job = started
+def begin(context, started, work):
+    """Take note of a `Job`, a step of some work, and have its window send timer events for as long as it runs."""
+    global _job, _work, _timer
+    _job, _work = started, work
     if _timer is None:
         _timer = context.window_manager.event_timer_add(0.05, window=context.window)
 
@@ -44,12 +45,19 @@ def set_aside():
 
 
 def end(context):
-    """Stop the job if it still runs, wait for it, and leave no timer behind."""
-    global _job, _timer
+    """Stop the job if it still runs, wait for it, close its work, and leave no timer and no status behind.
+
+    What was stopped leaves all as it was: now, not when Python comes to the generator, as the add-on may be disabled.
+    """
+    global _job, _work, _timer
     if _job is not None:
         _job.stop()
         _job.wait()
         _job = None
     if _timer is not None:
         context.window_manager.event_timer_remove(_timer)
+        context.workspace.status_text_set(None)
         _timer = None
+    if _work is not None:
+        closing, _work = _work, None
+        closing.close()

@@ -84,7 +84,9 @@ def delivering(guides, path, blender_scene):
             byte_count = partial.stat().st_size
             delivered_hair.close_files(path)
     cache_file = delivered_hair.open_file(path)
-    key = frame_folders.frames_of(its_guides.find()).manifest.key
+    baked = frame_folders.frames_of(its_guides.find())
+    # None are needed where guides begin to move after the last frame.
+    key = "" if baked is None or baked.manifest is None else baked.manifest.key
     for task in tasks:
         hair = task.hair.find()
         delivered_hair.deliver(hair, cache_file, task.path)

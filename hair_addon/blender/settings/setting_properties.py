@@ -147,9 +147,19 @@ def plain(value, default, details):
 
 
 def as_stored(settings):
-    """`Settings` as properties give them back, in single precision."""
-    values = {n: plain(getattr(settings, n), default, details) for n, default, details in declared(type(settings))}
+    """`Settings` as properties give them back: within Blender's limits, in single precision."""
+    values = {
+        name: plain(_limited(getattr(settings, name), default, details), default, details)
+        for name, default, details in declared(type(settings))
+    }
     return replace(settings, **values)
+
+
+def _limited(value, default, details):
+    """A number as Blender stores it: the least above zero that it knows, where single precision has zero."""
+    if isinstance(default, tuple):
+        return tuple(_limited(part, meant, details) for part, meant in zip(value, default, strict=True))
+    return max(value, _limits(details, False).get("min", value)) if isinstance(default, float) else value
 
 
 def shortest(value):

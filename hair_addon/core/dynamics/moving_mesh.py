@@ -68,7 +68,8 @@ def require(mesh: TriMesh, guides: Strands) -> None:
 def _checked(given, number, vertex_count):
     """(V, 3) float32 of a pose. Raises `HairError`, which names it."""
     try:
-        vertices = np.asarray(given, np.float32)
+        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+            vertices = np.asarray(given, np.float32)
     except (TypeError, ValueError, OverflowError):
         vertices = np.empty(0)
     if vertices.shape != (vertex_count, 3) or not np.isfinite(vertices).all():

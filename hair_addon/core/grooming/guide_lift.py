@@ -13,7 +13,8 @@ def lifted(points: np.ndarray, normals: np.ndarray, settings: LiftSettings, weig
     points (S, P, 3) [m]; normals (S, 3): unit, at the roots; weights (S,) in [0, 1].
     """
     directions, lengths = split(points)
-    fade = np.clip(1.0 - arc_shares(lengths) / settings.reach, 0.0, 1.0)
+    with np.errstate(over="ignore"):  # of the least reach
+        fade = np.clip(1.0 - arc_shares(lengths) / settings.reach, 0.0, 1.0)
     # Smooth at both ends, so that guides bend without a kink.
     shares = settings.amount * np.asarray(weights, np.float64)[:, None] * fade * fade * (3.0 - 2.0 * fade)
     upward = np.broadcast_to(np.asarray(normals, np.float64)[:, None], directions.shape)

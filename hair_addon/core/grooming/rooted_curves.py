@@ -11,11 +11,13 @@ from .. import geometry
 from ..errors import HairError
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, positions
 from ..geometry.strands import curve_offsets
+from ..params import Param, plain_value
 
 # If the ends' distances to the surface differ by less than this part of the curve's size, its direction is ambiguous.
 _CLEAR = 0.1
 # Of the surface's size: a root further away than this is probably on the wrong surface, or in the wrong units.
 _FAR = 0.02
+_EVERY = Param("", low=1)
 
 
 @dataclass(frozen=True)
@@ -66,8 +68,7 @@ def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) 
     `HairError` where the mesh cannot carry hair or no curve can be a guide.
     """
     check_mesh(mesh)
-    if every < 1:
-        raise HairError(f"Keep Every must be at least 1, not {every}.")
+    every = checked_every(every)
     points, starts = np.asarray(points, np.float32), np.asarray(starts, np.int64)
     usable = _usable(points, starts)
     if not len(usable):
@@ -86,6 +87,11 @@ def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) 
     distances = distances[chosen]
     is_far = distances > _FAR * float(np.ptp(mesh.vertices, axis=0).max())
     return RootedCurves(kept, is_reversed, found[chosen], distances, is_far, len(starts) - 1 - len(usable))
+
+
+def checked_every(every: int) -> int:
+    """A whole number of at least 1, of whatever type. Raises `HairError`."""
+    return plain_value("Keep Every", every, 1, _EVERY)
 
 
 def _usable(points, starts):
@@ -126,8 +132,9 @@ def _run_backwards(at_first, at_last, sizes):
 def polylines(curves: Iterable[ArrayLike]) -> tuple[np.ndarray, np.ndarray]:
     """(N, 3) float32 points and (C+1,) starts of a sequence of (P, 3) arrays. Raises `HairError`."""
     try:
-        lines: list[np.ndarray] = [np.asarray(line, np.float32) for line in curves]
-    except (TypeError, ValueError):
+        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+            lines: list[np.ndarray] = [np.asarray(line, np.float32) for line in curves]
+    except (TypeError, ValueError, OverflowError):
         lines = [np.empty(0)]
     if not lines or any(line.ndim != 2 or line.shape[1] != 3 for line in lines):
         raise HairError("Curves must be a non-empty sequence of arrays (P, 3), one per curve.")

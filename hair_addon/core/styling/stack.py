@@ -87,15 +87,20 @@ class Styling:
             return
         require_count("clump levels", len(centres), len(self.levels))
         for level, (its_points, rows) in zip(self.levels, centres, strict=True):
-            steps.apply_steps(its_points, level.steps, level.data, self.axes, _there(rows, points.device))
+            its_rows = _there(rows, len(level.data.normals), points.device)
+            steps.apply_steps(its_points, level.steps, level.data, self.axes, its_rows)
             self._keep_centres(its_points, np.arange(len(its_points)) if rows is None else rows, level.first)
-        steps.apply_steps(points, self.program, self.data, self.axes, _there(chosen, points.device))
+        steps.apply_steps(
+            points, self.program, self.data, self.axes, _there(chosen, len(self.data.normals), points.device)
+        )
 
     def centres_of(self, chosen: np.ndarray) -> list[np.ndarray]:
         """For each level, indices of the centres that some strands (M,) are gathered around, themselves or others.
 
-        A centre is styled as a strand is, so it reads the centres of levels before its own.
+        A centre is styled as a strand is, so it reads the centres of levels before its own. Raises `HairError` for
+        strands that are not there.
         """
+        require_indices("strands", chosen, len(self.data.normals))
         members = self.data.members.numpy()[:, chosen]
         read = [_present(members[row]) for row in range(len(self.levels))]
         for row in range(len(self.levels) - 1, 0, -1):
@@ -168,8 +173,12 @@ class Styling:
         return strand_wetness.of_strands(self.styles, masks, self.data.identities.numpy())
 
 
-def _there(rows, device):
-    return None if rows is None else wp.array(rows, dtype=int, device=device)
+def _there(rows, count, device):
+    """Indices of some of so many strands on a device, None for all. Raises `HairError` for strands that are not."""
+    if rows is None:
+        return None
+    require_indices("strands", rows, count)
+    return wp.array(rows, dtype=int, device=device)
 
 
 def _present(members):

@@ -6,6 +6,7 @@ whole numbers (`CHOICES`) and numbers (`NUMBERS`), as program_rows.py says. prog
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import warp as wp
@@ -43,6 +44,12 @@ class StrandData:
     centre_points: "wp.array2d[wp.vec4]"  # (K, P) x, y, z [m] and the arc length [m]
     centre_normals: "wp.array[wp.vec3]"  # (K,)
     centre_identities: "wp.array[int]"  # (K,)
+
+    @cached_property
+    def member_limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """(levels,) least, at most 0, and greatest of the members of each level, -1 where no strand has a centre."""
+        members = self.members.numpy()
+        return members.min(axis=1, initial=0), members.max(axis=1, initial=-1)
 
 
 @dataclass(frozen=True)
@@ -198,9 +205,15 @@ def _check(points, program, data, chosen, most_points):
     require_indices("kinds of steps", kinds, WEAVE + 1)
     require_indices("masks", masks[masks >= 0], len(data.masks))
     require_indices("clump levels", levels[levels >= 0], len(data.members))
+    least, greatest = data.member_limits
+    require_indices("clump members", least + 1, centre_count + 1)
+    last_centres = first_centres + np.maximum(greatest[levels], 0) if len(data.members) else first_centres
+    has_centres = levels >= 0
+    has_centres[has_centres] = greatest[levels[has_centres]] >= 0
+    require_indices("clump centres", last_centres[has_centres], centre_count)
     needs_points = (kinds == CLUMP) | (kinds == WEAVE)
     require_indices("clump levels", levels[needs_points], len(data.members))
     if needs_points.any():
         # The last centres may be guides, which have no points here.
-        require_indices("clump centres", first_centres[needs_points], min(len(data.centre_points), centre_count))
+        require_indices("clump centres", last_centres[needs_points], min(len(data.centre_points), centre_count))
         require_count("points of a centre strand", data.centre_points.shape[1], point_count)

@@ -12,6 +12,7 @@ from hair_addon.blender.groom.dynamics import dynamics_notes, frame_folders, gui
 from hair_addon.blender.host import paths, running
 from hair_addon.blender.io import delivery
 from hair_addon.core.errors import HairError
+from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import Stopped, run_now
 from tests.support.delivered import without_addon
 from tests.support.following import grow
@@ -198,6 +199,15 @@ def test_what_cannot_be_delivered_is_refused(shot, tmp_path):
     refuse(shot, "do not simulate")
     shot.vellus.simulates = True
     assert not [*tmp_path.glob(".vellus*"), *tmp_path.glob("*.usdc")]
+
+
+def test_guides_that_begin_after_the_last_frame_need_none(shot):
+    """They are as combed in all frames, also where nothing was ever baked."""
+    frame_cache.remove(frame_folders.folder_of(shot))
+    frame_folders.have_changed(shot)
+    shot.vellus.dynamics.start_frame = LAST + 10
+    made = deliver(shot)
+    assert made.path.exists() and (made.first, made.last) == (1, LAST)
 
 
 def test_a_blender_without_usd_is_told_at_once(shot, monkeypatch):

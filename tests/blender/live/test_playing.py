@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import simulated_guides
-from hair_addon.blender.groom.dynamics import guide_baking
+from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.host import running
 from hair_addon.blender.live import (
     dynamics_state,
@@ -93,6 +93,17 @@ def test_the_present_frame_is_shown_as_it_is_baked_and_as_combed_when_freed(swun
     assert np.array_equal(shown(guides), points(guides))
     np.testing.assert_allclose(drawn(hair), combed, atol=1e-6)
     assert "Not simulated" in dynamics_state.state_of(guides.data)[0]
+
+
+def test_a_file_that_was_never_saved_has_no_frames_to_free(swung):
+    """Its folder for frames, beside the .blend, is nowhere yet. Panels ask with every redraw."""
+    guides, _hair = swung
+    assert not bpy.data.filepath
+    guides.data.vellus.cache_folder = "//haircache"
+    play(1, 3)
+    bpy.context.view_layer.objects.active = guides
+    assert frame_folders.frames_of(guides.data) is None and not frame_folders.has_frames(guides.data)
+    assert not bpy.ops.vellus.free_dynamics.poll()
 
 
 def test_a_jump_simulates_nothing(swung, monkeypatch):

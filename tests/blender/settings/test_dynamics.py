@@ -33,12 +33,13 @@ def others_of(default, details):
     """Values of a setting besides its default: the ends of its range."""
     if isinstance(default, bool | str):
         return [not default] if isinstance(default, bool) else ["Body", "Köpfe"]
-    return [v for v in (details.low, details.high, details.soft_high) if math.isfinite(v) and v != default]
+    least = [math.nextafter(details.above, math.inf)] if math.isfinite(details.above) else []
+    return [v for v in (details.low, details.high, details.soft_high, *least) if math.isfinite(v) and v != default]
 
 
 @pytest.mark.parametrize("settings_class", [DynamicsSettings, ColliderSettings])
 def test_the_ends_of_all_ranges_come_back(state, settings_class):
-    """Rounded to single precision they are within the range still."""
+    """Rounded to single precision they are within the range still, also what is zero in it."""
     group = state.dynamics if settings_class is DynamicsSettings else bpy.data.objects["Sphere"].vellus
     assert setting_properties.to_settings(group, settings_class) == settings_class()
     for name, default, details in declared(settings_class):

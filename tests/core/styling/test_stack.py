@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 
 from hair_addon.core import placement
 from hair_addon.core.errors import HairError
@@ -216,6 +217,21 @@ def test_arrays_that_do_not_fit_are_refused(hair):
         strands = from_numpy(np.zeros((500, point_count, 3), np.float32), hair.binding.roots, hair.device)
         with pytest.raises(HairError, match="points"):
             steps.apply_steps(strands.points, bound.program, bound.data, np.eye(3))
+
+
+@pytest.mark.parametrize("stack", ["levels", "no clump"])
+@pytest.mark.parametrize("member", [-2, 10**6])
+def test_strands_and_centres_that_are_not_there_are_refused(hair, stack, member):
+    """Members of the first level of clumps, or of the guides, which are the clumps of styles without any."""
+    bound = hair.bound(*STACKS[stack])
+    points = from_numpy(np.zeros((500, 41, 3), np.float32), hair.binding.roots, hair.device).points
+    members = bound.data.members.numpy().copy()
+    members[0, 3] = member
+    data = replace(bound.data, members=wp.array(members, dtype=int, device=hair.device))
+    with pytest.raises(HairError, match="clump"):
+        steps.apply_steps(points, bound.program, data, np.eye(3))
+    with pytest.raises(HairError, match="strands"):
+        hair.styled(*STACKS[stack], chosen=np.array([3, member]))
 
 
 def test_a_mask_of_guides_is_mixed_as_strands_are(hair, rng):

@@ -71,7 +71,7 @@ class LongOperator(HairOperator):
             if running.job() is not None:
                 raise HairError("Hair is being computed: wait until it is done, or press Esc to cancel.")
             self._work = self.work(context)
-            running.begin(context, Job(next(self._work)))
+            running.begin(context, Job(next(self._work)), self._work)
         except HairError as error:
             return self.refuse(error)
         context.window_manager.modal_handler_add(self)
@@ -97,7 +97,7 @@ class LongOperator(HairOperator):
 
     def _advance(self, context, job):
         try:
-            running.begin(context, Job(self._work.send(job.result())))
+            running.begin(context, Job(self._work.send(job.result())), self._work)
             self._show(context)
             return {"RUNNING_MODAL"}
         except StopIteration as end:
@@ -120,8 +120,6 @@ class LongOperator(HairOperator):
 
     def _end(self, context, outcome):
         running.end(context)
-        self._work.close()  # now, not when Python comes to it: what was stopped leaves all as it was
-        context.workspace.status_text_set(None)
         _redraw(context)
         return outcome
 

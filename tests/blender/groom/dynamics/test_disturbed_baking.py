@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
+from hair_addon.blender.host import running
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
+from tests.support.modal import TIMER, Operator
 from tests.support.reading import points
 from tests.support.swung import simulate, swing
 
@@ -53,7 +55,12 @@ def undo():
     assert bpy.ops.ed.undo() == {"FINISHED"}
 
 
-@pytest.mark.parametrize("disturb", [rename, duplicate, undo])
+def redo():
+    undo()
+    assert bpy.ops.ed.redo() == {"FINISHED"}
+
+
+@pytest.mark.parametrize("disturb", [rename, duplicate, undo, redo])
 def test_baking_goes_on_to_the_same_frames(guides, disturb):
     bake(guides)
     folder = frame_folders.folder_of(guides.data)
@@ -66,6 +73,68 @@ def test_baking_goes_on_to_the_same_frames(guides, disturb):
     assert told == list(range(2, LAST + 2))
     assert {path.name: path.read_bytes() for path in folder.glob("*.npz")} == whole
     assert bpy.context.scene.frame_current == PRESENT
+
+
+def leave_edit_mode():
+    if bpy.context.mode != "OBJECT":
+        bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.fixture
+def ball(guides):
+    """What the guides collide with."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=0.5, location=(0.9, 0.0, 0.0))
+    body = bpy.data.collections.new("Body")
+    body.objects.link(bpy.context.object)
+    guides.data.vellus.dynamics.colliders = "Body"
+    return bpy.context.object
+
+
+@pytest.mark.parametrize("name", ["Sphere", "Icosphere"])
+def test_meshes_may_be_edited_while_guides_bake_and_play(guides, ball, name, request, capfd):
+    """Blender's evaluated mesh has no attributes then."""
+    request.addfinalizer(leave_edit_mode)
+    bpy.context.view_layer.objects.active = guides.data.surface if name == "Sphere" else ball
+    bpy.ops.object.mode_set(mode="EDIT")
+    bake(guides)
+    for frame in (2, 3):
+        bpy.context.scene.frame_set(frame)
+    assert guides.data.vellus.dynamics_status == "" and "Traceback" not in "".join(capfd.readouterr())
+
+
+@pytest.mark.parametrize(
+    "disturb",
+    [
+        lambda ball: setattr(ball, "hide_viewport", True),
+        lambda ball: bpy.data.objects.remove(ball),
+        lambda ball: ball.data.clear_geometry(),
+        lambda ball: setattr(ball.location, "x", math.nan),
+        lambda ball: bpy.data.collections.remove(bpy.data.collections["Body"]),
+    ],
+    ids=["hidden", "deleted", "without faces", "nowhere", "no collection"],
+)
+def test_baking_goes_on_whatever_becomes_of_a_collider(guides, ball, disturb):
+    (_baked,), told = bake(guides, lambda: disturb(ball))
+    assert told == list(range(2, LAST + 2))
+    bpy.context.scene.frame_set(LAST)
+    assert np.isfinite(points(guides)).all()
+
+
+def test_baking_ends_with_the_addon(guides, window):
+    """Disabling it ends what runs, while its settings are there still: the scene is at its frame again."""
+    folder, operator = frame_folders.folder_of(guides.data), Operator(guide_baking.baking([guides.data], 500, scene()))
+    assert operator.begin(window) == {"RUNNING_MODAL"}
+    while len([*folder.glob("+*.npz")]) < 4:
+        running.job().wait()
+        operator.modal(window, TIMER)
+    assert guide_baking.is_baking() and scene().frame_current != PRESENT
+    running.end(window)
+    assert scene().frame_current == PRESENT and not guide_baking.is_baking()
+    assert window.status[-1] is None
+
+
+def scene():
+    return bpy.context.scene
 
 
 def delete():
