@@ -14,7 +14,7 @@ import gpu
 import numpy as np
 
 from . import shaders, uniforms
-from .strand_textures import TEXTURE_WIDTH, bare_vertices, places_texture, vertex_count
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, bare_vertices, places_texture, vertex_count
 
 
 @dataclass(frozen=True)
@@ -150,10 +150,6 @@ def draw_strip(strands, program, record, lights, samplers=None):
     _draw(strands.batch, program, record, lights, {"strands": strands.texture, **(samplers or {})}, count)
 
 
-# Work groups along an axis: every driver takes as many.
-_MOST_GROUPS = 65535
-
-
 def walk_strands(strands, program, record, lights, samplers, images, constants):
     """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
 
@@ -161,7 +157,7 @@ def walk_strands(strands, program, record, lights, samplers, images, constants):
     """
     runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
     groups = -(-int(record["drawn_strands"]) * runs // shaders.RUN_GROUP_SIZE)
-    rows = -(-groups // _MOST_GROUPS)
+    rows = -(-groups // MOST_GROUPS)
     blocks = {"view": uniforms.uniform_buffer(record), "lights": lights}
     with bound(program, blocks, {"strands": strands.texture, **samplers}):
         for name, texture in images.items():

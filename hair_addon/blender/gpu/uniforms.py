@@ -137,6 +137,7 @@ MOTION = Block(
         "now_to_clip": "mat4",
         "after_to_clip": "mat4",
         "size": "vec4",  # width and height of the whole picture [pixels]
+        "moved_row_strands": "int",  # of the texture of combed strands' points before, 0 without
     },
 )
 

@@ -13,8 +13,8 @@ from ..gpu import drawing, render_programs, uniforms
 class Places:
     """Transforms and points of everything drawn at one time.
 
-    world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world)}; surfaces: {owner:
-    (texture of corners, how many)}. Owners are keys of `_told_apart`.
+    world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world, how these were moved)};
+    surfaces: {owner: (texture of corners, how many)}. Owners are keys of `_told_apart`.
     """
 
     world_to_clip: np.ndarray
@@ -32,7 +32,14 @@ class Places:
 
 
 def _is_unmoved(hair, other):
-    return hair[0] is other[0] and np.array_equal(hair[2], other[2])
+    return hair[0] is other[0] and hair[3] is other[3] and np.array_equal(hair[2], other[2])
+
+
+def _combed(before, now):
+    """The `strand_textures.Moved` that took hair from one place to the other; None where more or less happened."""
+    moved = now[3]
+    is_next = moved is not None and moved.turn == 1 + (before[3].turn if before[3] else 0)
+    return moved if is_next and before[0] is now[0] else None
 
 
 @dataclass(frozen=True)
@@ -53,7 +60,12 @@ class Motion:
             moment.world_to_clip @ place[2]
             for moment, place in zip((self.before, self.now, self.after), (before, now, after), strict=True)
         ]
-        return self._record(matrices), {"strands_before": before[0], "strands_after": after[0]}
+        record, samplers = self._record(matrices), {"strands_before": before[0], "strands_after": after[0]}
+        combed = _combed(before, now)
+        if combed is not None:
+            record["moved_row_strands"] = combed.row_strands
+        rows, points = (now[0], now[0]) if combed is None else (combed.rows, combed.points)
+        return record, {**samplers, "moved_rows": rows, "moved_points": points}
 
     def surface(self, owner):
         """The same of a surface."""
@@ -87,7 +99,7 @@ def draw(drawn, motion, view, buffer):
 def places(drawn, world_to_view, view_to_clip):
     """Return the `Places` of a `DrawnScene`, also one read without lighting."""
     hair = {
-        owner: (strands.texture, (strands.strand_count, strands.point_count), to_world)
+        owner: (strands.texture, (strands.strand_count, strands.point_count), to_world, strands.moved)
         for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _told_apart(drawn.owners), strict=True)
     }
     surfaces = {

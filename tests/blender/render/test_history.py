@@ -7,7 +7,10 @@ import pytest
 from scipy.ndimage import binary_dilation
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.render import drawn_scene, hair_picture, view_film
+from hair_addon.blender.gpu import drawing, strand_textures
+from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
+from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture, motion_vectors, view_film
+from tests.support.reading import points, write_points
 
 SIZE = 80
 FRAMES, WARM_UP = 8, 6
@@ -125,6 +128,49 @@ def test_another_look_is_shown_at_once(lit):
     lit.data.vellus.appearance.melanin = 0.9
     shown = move(picture, read_drawn(), camera())
     np.testing.assert_array_equal(shown, picture.read())
+
+
+def comb(guides, way):
+    """Move the guides by their parts of a way, from root to tip."""
+    combed = points(guides)
+    combed += np.linspace(0.0, 1.0, combed.shape[1])[None, :, None] * np.float32(way)
+    write_points(guides, combed)
+    bpy.context.view_layer.update()
+
+
+def seen(drawn, view):
+    """(record of a pass over a scene, buffer that hair was found for)."""
+    buffer, record = VisibilityBuffer(SIZE, SIZE), drawing.pass_record(*view, (SIZE, SIZE))
+    with buffer.surfaces():
+        drawn_scene.draw_hiding(drawn, record)
+    drawn_scene.find_hair(drawn, record, buffer)
+    return record, buffer
+
+
+def test_combed_strands_know_where_they_were(lit, monkeypatch):
+    """Where some strands are brought to their places, motion vectors are those of strands that are all uploaded."""
+    monkeypatch.setattr(strand_textures, "MOST_GROUPS", 7)
+    guides, view = bpy.data.objects["Guides"], camera()
+    vectors = {}
+    for is_uploaded in (False, True):
+        comb(guides, (0.0, 0.0, 0.0))
+        hair_cache.strand_cache.clear()
+        before = motion_vectors.places(read_drawn(), *view)
+        for way in ((0.1, 0.0, 0.0), (0.0, 0.0, 0.15)):
+            comb(guides, way)
+            if is_uploaded:
+                hair_cache.strand_cache.clear()
+            earlier, drawn = before, read_drawn()
+            before = motion_vectors.places(drawn, *view)
+            assert (drawn.hair[0][0].moved is None) == is_uploaded
+            assert not before.are_where(earlier)
+            motion = motion_vectors.Motion(earlier, before, before, (SIZE, SIZE))
+            found = np.array(motion_vectors.draw(drawn, motion, *seen(drawn, view)).read(), np.float32)
+            vectors.setdefault(is_uploaded, []).append(found)
+        comb(guides, (-0.1, 0.0, -0.15))
+    for one, other in zip(vectors[False], vectors[True], strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-3)
+    assert np.abs(vectors[False]).max() > 1.0
 
 
 def test_hair_is_carried_where_its_surface_takes_it(lit):
