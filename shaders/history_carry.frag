@@ -5,7 +5,6 @@
 
 #include "include/history_blocks.glsl"
 
-const uint NO_SEGMENT = 0x7FFFFFFFu;
 const float MOST_PASSES = 24.0;
 const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
 const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
@@ -15,8 +14,7 @@ const float TOLERANCE = 2.0;
 
 float nearest_at(ivec2 place)
 {
-  bool is_hair = texelFetch(segments, place, 0).r < NO_SEGMENT;
-  return is_hair ? uintBitsToFloat(texelFetch(depths, place, 0).r) : texelFetch(surface_depth, place, 0).r;
+  return min(uintBitsToFloat(texelFetch(depths, place, 0).r), texelFetch(surface_depth, place, 0).r);
 }
 
 void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
@@ -96,9 +94,6 @@ void main()
   vec4 mean = textureLod(now_mean, here, 0.0);
   color = vec4(0.0);
   passes = 0.0;
-  if (mean.a == 0.0) {
-    return;  // nothing is near
-  }
   bool is_background;
   vec2 place = place_before(pixel, is_background);
   if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
@@ -110,8 +105,7 @@ void main()
   // Half floats resolve a thousandth.
   vec4 bound = (TOLERANCE / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
-  bool is_flat = all(lessThan(deviation, 1e-3 * mean + 1e-6));
-  vec4 light = is_flat ? textureLod(before, place / history.size.xy, 0.0) : previous_at(place);
+  vec4 light = previous_at(place);
   // In proportion: what is black beside a bright edge remains so.
   light *= clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
   vec4 excess = abs(mean_before - mean) / bound;

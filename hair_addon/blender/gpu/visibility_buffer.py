@@ -16,6 +16,7 @@ from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
 _NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
+_FAR = int(np.float32(1.0).view(np.uint32))  # bits of the greatest depth
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class VisibilityBuffer:
     """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
 
     color: linear light, premultiplied; segments: of strands, what is nearest; surface_depth: of surfaces, from 0 to 1;
-    depths: of hair where there is any, the bits of floats from 0 to 1.
+    depths: of hair where there is any, the bits of floats from 0 to 1; elsewhere of surfaces, or 1.
     """
 
     def __init__(self, width, height):
@@ -156,6 +157,7 @@ class VisibilityBuffer:
 
     def _draw_strips(self):
         """The nearest segments, as strips of triangles that the graphics driver draws."""
+        self.depths.clear(format="UINT", value=(_FAR,))
         program = shaders.strip_segments_program()
         with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             for placed in self._hair:
