@@ -5,6 +5,7 @@
 
 #include "include/history_blocks.glsl"
 
+const uint NO_SEGMENT = 0x7FFFFFFFu;
 const float MOST_PASSES = 24.0;
 const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
 const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
@@ -12,15 +13,10 @@ const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as 
 // Standard errors by which the means of two blocks may differ.
 const float TOLERANCE = 2.0;
 
-float nearest_at(ivec2 place)
-{
-  return min(uintBitsToFloat(texelFetch(depths, place, 0).r), texelFetch(surface_depth, place, 0).r);
-}
-
 void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
 {
   place = clamp(place, ivec2(0), ivec2(history.size.xy) * history.samples_per_side - 1);
-  float depth = nearest_at(place);
+  float depth = uintBitsToFloat(texelFetch(depths, place, 0).r);
   if (depth < nearest) {
     nearest = depth;
     nearest_place = place;
@@ -54,7 +50,8 @@ vec2 place_before(ivec2 pixel, out bool is_background)
   }
   is_background = nearest == 1.0;
   vec2 at = vec2(pixel) + 0.5;
-  if (history.has_motion != 0 && nearest < 1.0) {
+  bool is_hair = texelFetch(segments, nearest_place, 0).r < NO_SEGMENT;
+  if (is_hair ? history.has_hair_motion != 0 : history.has_surface_motion != 0 && !is_background) {
     return at + texelFetch(motion, nearest_place, 0).xy;
   }
   vec4 clip = history.now_to_before * vec4(2.0 * at / history.size.xy - 1.0, 2.0 * nearest - 1.0, 1.0);

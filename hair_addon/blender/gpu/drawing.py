@@ -120,6 +120,26 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     return record
 
 
+def window_of(strands, record, size):
+    """(left, bottom, width, height) [samples] of the part of a picture that `StrandsOnGPU` may cover.
+
+    record: of `strand_record`; size: (width, height) of the picture [samples].
+    """
+    corners = np.array(np.meshgrid(*strands.bounds.T)).reshape(3, -1)
+    clip = record["object_to_clip"].T.astype(np.float64) @ np.vstack([corners, np.ones(8)])
+    w = clip[3].min()
+    if not (clip[2] + clip[3]).min() > 0.0 or not w > 0.0:
+        return 0, 0, *size  # in part behind the viewer
+    half_width = max(float(record["object_scale"] * record["thickness"]) * strands.greatest_radius / w, 0.0)
+    half_width = max(half_width, float(record["least_half_width"])) * float(record["pixels_per_unit"])
+    # A strip is up to the root of two wider across its columns than across its axis.
+    margin = 1.5 * half_width + 1.0
+    places = (0.5 * clip[:2] / clip[3] + 0.5) * np.array(size)[:, None]
+    low = np.clip(np.floor(places.min(axis=1) - margin), 0, size).astype(int)
+    high = np.clip(np.ceil(places.max(axis=1) + margin), 0, size).astype(int)
+    return (*low.tolist(), *(high - low).tolist())
+
+
 # Strands in a part: with their stride they are multiplied in a shader, whose integers have 32 bits.
 _LARGEST_PART = 32_768
 

@@ -21,9 +21,10 @@ def carry_program():
     info.typedef_source(uniforms.HISTORY.source)
     info.uniform_buf(0, "History", "history")
     of_blocks = ("before_mean", "before_deviation", "now_mean", "now_deviation")
-    names = ("depths", "before", "before_passes", *of_blocks, "surface_depth", "motion")
-    for slot, name in enumerate(names):
-        info.sampler(slot, "UINT_2D" if name == "depths" else "FLOAT_2D", name)
+    for slot, name in enumerate(("depths", "segments")):
+        info.sampler(slot, "UINT_2D", name)
+    for slot, name in enumerate(("before", "before_passes", *of_blocks, "motion"), start=2):
+        info.sampler(slot, "FLOAT_2D", name)
     return shaders.compile_drawing(info, "history_carry.vert", "history_carry.frag", _PICTURE)
 
 

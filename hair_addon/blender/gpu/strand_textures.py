@@ -49,6 +49,7 @@ class StrandsOnGPU:
     bounds: np.ndarray  # (2, 3): least and greatest coordinates
     mean_length: float  # of strands, in the coordinate system of the points
     mean_radius: float
+    greatest_radius: float
     moved: Moved | None = None  # None where all points are as uploaded
 
 
@@ -84,6 +85,7 @@ def upload_strands(points, radii, randoms=None, wetness=None):
         bounds,
         mean_length,
         float(radii[some].mean()),
+        float(radii.max()),
     )
 
 

@@ -147,7 +147,8 @@ HISTORY = Block(
         "now_to_before": "mat4",  # clip space of a view → that of the view before
         "size": "vec4",  # width and height of the picture [pixels]
         "samples_per_side": "int",
-        "has_motion": "int",  # whether more than the view has moved: by the texture of motion vectors
+        "has_hair_motion": "int",  # whether it has moved, and not only the view: by the texture of motion vectors
+        "has_surface_motion": "int",
     },
 )
 

@@ -122,12 +122,12 @@ class History:
         record = uniforms.HISTORY.record()
         record["now_to_before"] = (before.world_to_clip @ np.linalg.inv(now.world_to_clip)).T
         record["size"][:2], record["samples_per_side"] = self.size, self._per_side
-        record["has_motion"] = not now.places.are_where(before.places)
+        record["has_surface_motion"] = has_surfaces = not now.places.has_still_surfaces(before.places)
+        record["has_hair_motion"] = has_hair = not now.places.has_still_hair(before.places)
         motion = light[0]
-        if record["has_motion"]:
-            motion = motion_vectors.draw(
-                drawn, motion_vectors.Motion(before.places, now.places, now.places, self.size), view, buffer
-            )
+        if has_hair or has_surfaces:
+            steps = motion_vectors.Motion(before.places, now.places, now.places, self.size)
+            motion = motion_vectors.draw(drawn, steps, view, buffer, has_surfaces)
         program = history_programs.blocks_program()
         for blocks, of in zip(self._blocks, ((self._before.textures[0], 1.0), light), strict=True):
             blocks.fill(program, {"picture": of[0]}, weight=of[1])
@@ -139,9 +139,9 @@ class History:
             "before_deviation": before_blocks.textures[1],
             "now_mean": now_blocks.textures[0],
             "now_deviation": now_blocks.textures[1],
-            "surface_depth": buffer.surface_depth,
             "motion": motion,
             "depths": buffer.depths,
+            "segments": buffer.segments,
         }
         self._carried.draw(self._block_batch, history_programs.carry_program(), samplers, {"history": record})
 

@@ -21,13 +21,16 @@ class Places:
     hair: dict
     surfaces: dict
 
-    def are_where(self, others):
-        """Whether everything is where it is in other `Places`, whatever the camera does."""
-        return (
-            self.hair.keys() == others.hair.keys()
-            and self.surfaces.keys() == others.surfaces.keys()
-            and all(_is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items())
-            and all(place[0] is others.surfaces[owner][0] for owner, place in self.surfaces.items())
+    def has_still_hair(self, others):
+        """Whether all hair is where it is in other `Places`, whatever the camera does."""
+        return self.hair.keys() == others.hair.keys() and all(
+            _is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items()
+        )
+
+    def has_still_surfaces(self, others):
+        """The same of surfaces."""
+        return self.surfaces.keys() == others.surfaces.keys() and all(
+            place[0] is others.surfaces[owner][0] for owner, place in self.surfaces.items()
         )
 
 
@@ -82,10 +85,14 @@ class Motion:
         return record
 
 
-def draw(drawn, motion, view, buffer):
-    """Return a texture of motion vectors [pixels] for the `VisibilityBuffer` that a `DrawnScene` was drawn into."""
+def draw(drawn, motion, view, buffer, has_surfaces=True):
+    """Return a texture of motion vectors [pixels] for the `VisibilityBuffer` that a `DrawnScene` was drawn into.
+
+    has_surfaces: whether those of surfaces are in it.
+    """
+    surfaces = zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True) if has_surfaces else ()
     with buffer.surfaces_of_part(render_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, _parts), owner in zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True):
+        for (surface, _parts), owner in surfaces:
             record, samplers = motion.surface(owner)
             placed = view.copy()
             placed["row_strands"] = surface.row_corners

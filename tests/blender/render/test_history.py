@@ -163,7 +163,7 @@ def test_combed_strands_know_where_they_were(lit, monkeypatch):
             earlier, drawn = before, read_drawn()
             before = motion_vectors.places(drawn, *view)
             assert (drawn.hair[0][0].moved is None) == is_uploaded
-            assert not before.are_where(earlier)
+            assert not before.has_still_hair(earlier)
             motion = motion_vectors.Motion(earlier, before, before, (SIZE, SIZE))
             found = np.array(motion_vectors.draw(drawn, motion, *seen(drawn, view)).read(), np.float32)
             vectors.setdefault(is_uploaded, []).append(found)
