@@ -6,7 +6,6 @@
 #include "include/history_blocks.glsl"
 
 const uint NO_SEGMENT = 0x7FFFFFFFu;
-const float MOST_PASSES = 24.0;
 const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
 const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
 
@@ -109,6 +108,6 @@ void main()
   float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
   color = light;
   passes = textureLod(before_passes, place / history.size.xy, 0.0).r;
-  passes = min(passes, is_background ? MOST_OF_BACKGROUND : MOST_PASSES) / max(0.5 * most, 1.0);
+  passes = min(passes, is_background ? MOST_OF_BACKGROUND : history.most_passes) / max(0.5 * most, 1.0);
   passes /= max(distance(place, vec2(pixel) + 0.5) / SLOW, 1.0);
 }

@@ -149,6 +149,7 @@ HISTORY = Block(
         "samples_per_side": "int",
         "has_hair_motion": "int",  # whether it has moved, and not only the view: by the texture of motion vectors
         "has_surface_motion": "int",
+        "most_passes": "float",  # that the picture before may be worth
     },
 )
 

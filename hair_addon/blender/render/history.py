@@ -16,6 +16,9 @@ from . import motion_vectors
 
 _COLOR, _PASSES = "RGBA16F", "R16F"
 
+# Passes that the picture before may be worth: of the same strands, and of others, with which noise would hide a change.
+_MOST_PASSES, _MOST_OF_OTHERS = 24.0, 2.0
+
 
 class _Targets:
     """Textures and their framebuffer, which does not own them."""
@@ -124,6 +127,8 @@ class History:
         record["size"][:2], record["samples_per_side"] = self.size, self._per_side
         record["has_surface_motion"] = has_surfaces = not now.places.has_still_surfaces(before.places)
         record["has_hair_motion"] = has_hair = not now.places.has_still_hair(before.places)
+        has_same_strands = now.places.has_same_strands(before.places)
+        record["most_passes"] = _MOST_PASSES if has_same_strands else _MOST_OF_OTHERS
         motion = light[0]
         if has_hair or has_surfaces:
             steps = motion_vectors.Motion(before.places, now.places, now.places, self.size)

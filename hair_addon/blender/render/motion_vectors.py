@@ -27,6 +27,12 @@ class Places:
             _is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items()
         )
 
+    def has_same_strands(self, others):
+        """Whether all hair has as many strands and points as in other `Places`."""
+        return self.hair.keys() == others.hair.keys() and all(
+            place[1] == others.hair[owner][1] for owner, place in self.hair.items()
+        )
+
     def has_still_surfaces(self, others):
         """The same of surfaces."""
         return self.surfaces.keys() == others.surfaces.keys() and all(

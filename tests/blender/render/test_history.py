@@ -13,7 +13,7 @@ from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture, mot
 from tests.support.reading import points, write_points
 
 SIZE = 80
-FRAMES, WARM_UP = 8, 6
+FRAMES, WARM_UP = 4, 2
 
 
 def read_drawn():
@@ -25,9 +25,9 @@ def camera():
     return scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE)
 
 
-def new_picture(kind):
+def new_picture(kind, size=SIZE):
     if kind == "HAIR":
-        return hair_picture.HairPicture((SIZE, SIZE), 1)
+        return hair_picture.HairPicture((size, size), 1)
     return view_film.ViewFilm((SIZE, SIZE), 1, is_transparent=True)
 
 
@@ -54,6 +54,20 @@ def turn_camera(degrees):
     bpy.context.scene.camera.rotation_euler.z = angle
 
 
+def comb(guides, way):
+    """Move the guides by their parts of a way, from root to tip."""
+    combed = points(guides)
+    combed += np.linspace(0.0, 1.0, combed.shape[1])[None, :, None] * np.float32(way)
+    write_points(guides, combed)
+    bpy.context.view_layer.update()
+
+
+def comb_to(hundredths):
+    """Comb all guides to the side, by a hundredth of their length a frame."""
+    if hundredths:
+        comb(bpy.data.objects["Guides"], (0.005, 0.0, 0.0))
+
+
 def biggest_change(frames):
     """The 99th percentile of how far a pixel with hair changes from frame to frame, as a display shows it on grey."""
     frames = np.array(frames)
@@ -62,9 +76,12 @@ def biggest_change(frames):
     return np.quantile(np.abs(np.diff(shown, axis=0)).max(axis=-1)[:, is_hair], 0.99)
 
 
-@pytest.mark.parametrize(("kind", "turn"), [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera)])
-def test_what_turns_changes_no_more_than_pictures_at_rest(lit, kind, turn):
-    """A degree a frame, one sample a pixel: at most 1.2 times as much, and as bright."""
+MOVEMENTS = [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera), ("HAIR", comb_to)]
+
+
+@pytest.mark.parametrize(("kind", "turn"), MOVEMENTS)
+def test_what_moves_changes_no_more_than_pictures_at_rest(lit, kind, turn):
+    """From rest, a degree or a hundredth of the hair a frame, one sample a pixel: at most 1.2 times as much."""
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
     moving, shown, still = new_picture(kind), [], []
     turn_camera(0.0)
@@ -73,7 +90,7 @@ def test_what_turns_changes_no_more_than_pictures_at_rest(lit, kind, turn):
         turn(float(frame))
         bpy.context.view_layer.update()
         drawn, view = drawn if turn is turn_camera else read_drawn(), camera()
-        shown.append(move(moving, drawn, view))
+        shown.append(move(moving, drawn, view) if frame else rest(moving, drawn, view))
         if frame >= WARM_UP:
             still.append(rest(new_picture(kind), drawn, view))
     assert biggest_change(shown[WARM_UP:]) <= 1.2 * biggest_change(still)
@@ -130,14 +147,6 @@ def test_another_look_is_shown_at_once(lit):
     np.testing.assert_array_equal(shown, picture.read())
 
 
-def comb(guides, way):
-    """Move the guides by their parts of a way, from root to tip."""
-    combed = points(guides)
-    combed += np.linspace(0.0, 1.0, combed.shape[1])[None, :, None] * np.float32(way)
-    write_points(guides, combed)
-    bpy.context.view_layer.update()
-
-
 def seen(drawn, view):
     """(record of a pass over a scene, buffer that hair was found for)."""
     buffer, record = VisibilityBuffer(SIZE, SIZE), drawing.pass_record(*view, (SIZE, SIZE))
@@ -187,3 +196,27 @@ def test_hair_is_carried_where_its_surface_takes_it(lit):
     columns = np.arange(SIZE)
     middles = [(of[..., 3].sum(axis=0) * columns).sum() / of[..., 3].sum() for of in (shown, still)]
     assert abs(middles[0] - middles[1]) < 0.5
+
+
+def test_the_first_pass_is_as_bright_as_the_last(thin):
+    """With one sample a pixel of strands that are thinner: the mean, and as far as noise allows each part's."""
+    picture, drawn, view = new_picture("HAIR", 3 * SIZE), read_drawn(), camera()
+    picture.add_pass(drawn, *view)
+    first, last = picture.read(), rest(picture, drawn, view)
+    np.testing.assert_allclose(first.mean(axis=(0, 1)), last.mean(axis=(0, 1)), rtol=0.02)
+    side = SIZE // 4
+    parts = [of[..., 3].reshape(12, side, 12, side).mean(axis=(1, 3)) for of in (first, last)]
+    noise = np.sqrt(parts[1] * (1.0 - parts[1])) / side
+    assert np.abs(parts[0] - parts[1]).max() <= 3.0 * noise.max()
+
+
+def test_strands_that_are_left_out_leave_no_trace(thin):
+    """From 4000 to 1000 of them: the picture of the change is as bright as the one at rest in a few frames."""
+    picture = new_picture("HAIR")
+    before = rest(picture, read_drawn(), camera())
+    thin.data.vellus.hair.strand_count = 1000
+    bpy.context.view_layer.update()
+    drawn, view = read_drawn(), camera()
+    still = rest(new_picture("HAIR"), drawn, view)
+    left = [move(picture, drawn, view).mean() - still.mean() for _ in range(4)]
+    assert abs(left[-1]) < 0.1 * abs(before.mean() - still.mean())
