@@ -120,6 +120,19 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     return record
 
 
+# Samples across hair from which its thinnest strands are drawn a sample wide. That makes all hair half a sample larger on
+# each side: twice as large where it is seen in two.
+_FULL_EXTENT = 48.0
+
+
+def least_width_of(strands, record):
+    """The least half width of `StrandsOnGPU` as the view of their `strand_record` has it, less where all are small."""
+    centre = record["object_to_clip"].T.astype(np.float64) @ np.append(strands.bounds.mean(axis=0), 1.0)
+    diameter = float(np.linalg.norm(np.ptp(strands.bounds, axis=0)) * record["object_scale"])
+    extent = diameter * float(record["pixels_per_unit"]) / max(float(centre[3]), 1e-9)
+    return float(record["least_half_width"]) * min(extent / _FULL_EXTENT, 1.0)
+
+
 def window_of(strands, record, size):
     """(left, bottom, width, height) [samples] of the part of a picture that `StrandsOnGPU` may cover.
 
