@@ -120,8 +120,8 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     return record
 
 
-# Samples across hair from which its thinnest strands are drawn a sample wide. That makes all hair half a sample larger on
-# each side: twice as large where it is seen in two.
+# Samples across hair from which its thinnest strands are drawn a sample wide. That makes hair half a sample larger on
+# each side: twice as large where it is seen in one.
 _FULL_EXTENT = 48.0
 
 
