@@ -97,7 +97,10 @@ void main()
   }
   vec2 there = block_place(place, blocks);
   vec4 mean_before = textureLod(before_mean, there, 0.0);
-  vec4 deviation = max(textureLod(now_deviation, here, 0.0), textureLod(before_deviation, there, 0.0));
+  vec4 deviation = textureLod(now_deviation, here, 0.0);
+  if (!is_background) {  // where hair has gone, its own noise is no reason to keep some of it
+    deviation = max(deviation, textureLod(before_deviation, there, 0.0));
+  }
   // Half floats resolve a thousandth.
   vec4 bound = (TOLERANCE / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
