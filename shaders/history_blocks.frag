@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Mean and standard deviation of each block of pixels.
+// Mean and standard deviation of each block of pixels; of an even one that is zero.
 
 #include "include/history_blocks.glsl"
 
@@ -21,4 +21,6 @@ void main()
   float count = extent.x * extent.y;
   mean = sum / count;
   deviation = sqrt(max(squares / count - mean * mean, vec4(0.0)));
+  // Less is rounding, not noise.
+  deviation *= step(1e-3 * abs(mean) + 1e-6, deviation);
 }

@@ -6,23 +6,16 @@
 #include "include/history_blocks.glsl"
 
 const uint NO_SEGMENT = 0x7FFFFFFFu;
-const float MOST_PASSES = 24.0;
 const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
 const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
 
 // Standard errors by which the means of two blocks may differ.
 const float TOLERANCE = 2.0;
 
-float nearest_at(ivec2 place)
-{
-  bool is_hair = texelFetch(segments, place, 0).r < NO_SEGMENT;
-  return is_hair ? uintBitsToFloat(texelFetch(depths, place, 0).r) : texelFetch(surface_depth, place, 0).r;
-}
-
 void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
 {
   place = clamp(place, ivec2(0), ivec2(history.size.xy) * history.samples_per_side - 1);
-  float depth = nearest_at(place);
+  float depth = uintBitsToFloat(texelFetch(depths, place, 0).r);
   if (depth < nearest) {
     nearest = depth;
     nearest_place = place;
@@ -56,7 +49,8 @@ vec2 place_before(ivec2 pixel, out bool is_background)
   }
   is_background = nearest == 1.0;
   vec2 at = vec2(pixel) + 0.5;
-  if (history.has_motion != 0 && nearest < 1.0) {
+  bool is_hair = texelFetch(segments, nearest_place, 0).r < NO_SEGMENT;
+  if (is_hair ? history.has_hair_motion != 0 : history.has_surface_motion != 0 && !is_background) {
     return at + texelFetch(motion, nearest_place, 0).xy;
   }
   vec4 clip = history.now_to_before * vec4(2.0 * at / history.size.xy - 1.0, 2.0 * nearest - 1.0, 1.0);
@@ -96,9 +90,6 @@ void main()
   vec4 mean = textureLod(now_mean, here, 0.0);
   color = vec4(0.0);
   passes = 0.0;
-  if (mean.a == 0.0) {
-    return;  // nothing is near
-  }
   bool is_background;
   vec2 place = place_before(pixel, is_background);
   if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
@@ -106,18 +97,20 @@ void main()
   }
   vec2 there = block_place(place, blocks);
   vec4 mean_before = textureLod(before_mean, there, 0.0);
-  vec4 deviation = max(textureLod(now_deviation, here, 0.0), textureLod(before_deviation, there, 0.0));
+  vec4 deviation = textureLod(now_deviation, here, 0.0);
+  if (!is_background) {  // where hair has gone, its own noise is no reason to keep some of it
+    deviation = max(deviation, textureLod(before_deviation, there, 0.0));
+  }
   // Half floats resolve a thousandth.
   vec4 bound = (TOLERANCE / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
-  bool is_flat = all(lessThan(deviation, 1e-3 * mean + 1e-6));
-  vec4 light = is_flat ? textureLod(before, place / history.size.xy, 0.0) : previous_at(place);
+  vec4 light = previous_at(place);
   // In proportion: what is black beside a bright edge remains so.
   light *= clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
   vec4 excess = abs(mean_before - mean) / bound;
   float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
   color = light;
   passes = textureLod(before_passes, place / history.size.xy, 0.0).r;
-  passes = min(passes, is_background ? MOST_OF_BACKGROUND : MOST_PASSES) / max(0.5 * most, 1.0);
+  passes = min(passes, is_background ? MOST_OF_BACKGROUND : history.most_passes) / max(0.5 * most, 1.0);
   passes /= max(distance(place, vec2(pixel) + 0.5) / SLOW, 1.0);
 }

@@ -1,18 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Copies the points of some strands into the texture of all: changes by combing.
+// Exchanges the points of some strands with those in the texture of all: changes by combing. Where they were before is
+// left for motion vectors.
 
 #include "include/strand.glsl"
 
 void main()
 {
-  int place = int(gl_GlobalInvocationID.x);
+  int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
+  int place = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
   int moved = place / point_count;
   if (moved >= moved_count) {
     return;
   }
   int point = place - moved * point_count;
   // Each strand has one texel more than points: the first is its index.
-  int strand = int(texelFetch(moved_strands, strand_texel(moved, 0, point_count + 1, moved_row_strands), 0).x);
-  vec4 value = texelFetch(moved_strands, strand_texel(moved, point + 1, point_count + 1, moved_row_strands), 0);
-  imageStore(strands, strand_texel(strand, point, point_count, row_strands), value);
+  int strand = int(imageLoad(moved_strands, strand_texel(moved, 0, point_count + 1, moved_row_strands)).x);
+  ivec2 there = strand_texel(moved, point + 1, point_count + 1, moved_row_strands);
+  ivec2 here = strand_texel(strand, point, point_count, row_strands);
+  vec4 after = imageLoad(moved_strands, there);
+  imageStore(moved_strands, there, imageLoad(strands, here));
+  imageStore(strands, here, after);
+  if (point == 0) {
+    imageStore(moved_rows, ivec2(strand % row_strands, strand / row_strands), vec4(float(moved + 1)));
+  }
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The main of programs that fill the samples of a picture in which a strand of this hair is nearest: needs the sampler
-// segments and the image picture.
+// segments and the image picture. They run over a window of it that holds all of this hair.
 
 #include "include/this_place.glsl"
 #include "include/whole_samples.glsl"
@@ -10,7 +10,7 @@ vec4 sample_value();
 
 void main()
 {
-  ivec2 place = ivec2(gl_GlobalInvocationID.xy);
+  ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(window_left, window_bottom);
   ivec2 size = textureSize(segments, 0);
   if (any(greaterThanEqual(place, size))) {
     return;

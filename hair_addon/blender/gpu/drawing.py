@@ -14,7 +14,7 @@ import gpu
 import numpy as np
 
 from . import shaders, uniforms
-from .strand_textures import TEXTURE_WIDTH, bare_vertices, places_texture, vertex_count
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, bare_vertices, places_texture, vertex_count
 
 
 @dataclass(frozen=True)
@@ -120,6 +120,39 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     return record
 
 
+# Samples across hair from which its thinnest strands are drawn a sample wide. That makes hair half a sample larger on
+# each side: twice as large where it is seen in one.
+_FULL_EXTENT = 48.0
+
+
+def least_width_of(strands, record):
+    """The least half width of `StrandsOnGPU` as the view of their `strand_record` has it, less where all are small."""
+    centre = record["object_to_clip"].T.astype(np.float64) @ np.append(strands.bounds.mean(axis=0), 1.0)
+    diameter = float(np.linalg.norm(np.ptp(strands.bounds, axis=0)) * record["object_scale"])
+    extent = diameter * float(record["pixels_per_unit"]) / max(float(centre[3]), 1e-9)
+    return float(record["least_half_width"]) * min(extent / _FULL_EXTENT, 1.0)
+
+
+def window_of(strands, record, size):
+    """(left, bottom, width, height) [samples] of the part of a picture that `StrandsOnGPU` may cover.
+
+    record: of `strand_record`; size: (width, height) of the picture [samples].
+    """
+    corners = np.array(np.meshgrid(*strands.bounds.T)).reshape(3, -1)
+    clip = record["object_to_clip"].T.astype(np.float64) @ np.vstack([corners, np.ones(8)])
+    w = clip[3].min()
+    if not (clip[2] + clip[3]).min() > 0.0 or not w > 0.0:
+        return 0, 0, *size  # in part behind the viewer
+    half_width = max(float(record["object_scale"] * record["thickness"]) * strands.greatest_radius / w, 0.0)
+    half_width = max(half_width, float(record["least_half_width"])) * float(record["pixels_per_unit"])
+    # A strip is up to the root of two wider across its columns than across its axis.
+    margin = 1.5 * half_width + 1.0
+    places = (0.5 * clip[:2] / clip[3] + 0.5) * np.array(size)[:, None]
+    low = np.clip(np.floor(places.min(axis=1) - margin), 0, size).astype(int)
+    high = np.clip(np.ceil(places.max(axis=1) + margin), 0, size).astype(int)
+    return (*low.tolist(), *(high - low).tolist())
+
+
 # Strands in a part: with their stride they are multiplied in a shader, whose integers have 32 bits.
 _LARGEST_PART = 32_768
 
@@ -150,10 +183,6 @@ def draw_strip(strands, program, record, lights, samplers=None):
     _draw(strands.batch, program, record, lights, {"strands": strands.texture, **(samplers or {})}, count)
 
 
-# Work groups along an axis: every driver takes as many.
-_MOST_GROUPS = 65535
-
-
 def walk_strands(strands, program, record, lights, samplers, images, constants):
     """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
 
@@ -161,7 +190,7 @@ def walk_strands(strands, program, record, lights, samplers, images, constants):
     """
     runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
     groups = -(-int(record["drawn_strands"]) * runs // shaders.RUN_GROUP_SIZE)
-    rows = -(-groups // _MOST_GROUPS)
+    rows = -(-groups // MOST_GROUPS)
     blocks = {"view": uniforms.uniform_buffer(record), "lights": lights}
     with bound(program, blocks, {"strands": strands.texture, **samplers}):
         for name, texture in images.items():

@@ -20,12 +20,12 @@ def carry_program():
     info = gpu.types.GPUShaderCreateInfo()
     info.typedef_source(uniforms.HISTORY.source)
     info.uniform_buf(0, "History", "history")
-    samplers = ("before", "before_passes", "before_mean", "before_deviation", "now_mean", "now_deviation")
-    for slot, name in enumerate((*samplers, "surface_depth", "motion")):
-        info.sampler(slot, "FLOAT_2D", name)
-    for slot, name in enumerate(("depths", "segments"), start=len(samplers) + 2):
+    of_blocks = ("before_mean", "before_deviation", "now_mean", "now_deviation")
+    for slot, name in enumerate(("depths", "segments")):
         info.sampler(slot, "UINT_2D", name)
-    return shaders.compile_drawing(info, "cover.vert", "history_carry.frag", _PICTURE)
+    for slot, name in enumerate(("before", "before_passes", *of_blocks, "motion"), start=2):
+        info.sampler(slot, "FLOAT_2D", name)
+    return shaders.compile_drawing(info, "history_carry.vert", "history_carry.frag", _PICTURE)
 
 
 @shaders.kept

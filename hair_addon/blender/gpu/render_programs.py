@@ -57,7 +57,8 @@ MOTION_FORMAT = "RGBA32F"  # of how far things move
 @shaders.kept
 def strand_motion_program():
     """The compute program of motion vectors of strands: see strand_motion.comp."""
-    samplers = (("strands_before", "FLOAT_2D"), ("strands_after", "FLOAT_2D"))
+    names = ("strands_before", "strands_after", "moved_rows", "moved_points")
+    samplers = tuple((name, "FLOAT_2D") for name in names)
     info = shaders.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT)
     info.uniform_buf(2, "Motion", "motion")
     return shaders.compile_compute(info, "strand_motion.comp")

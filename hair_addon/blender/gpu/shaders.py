@@ -191,7 +191,7 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, 
     for slot, (name, kind) in enumerate((("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *samplers), start=first):
         info.sampler(slot, kind, name)
     info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"} if is_mixed else {"WRITE"})
-    for name in ("first_segment", "segment_count"):
+    for name in ("first_segment", "segment_count", "window_left", "window_bottom"):
         info.push_constant("INT", name)
     return info
 

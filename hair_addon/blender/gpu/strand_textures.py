@@ -4,7 +4,7 @@
 A change costs one upload, or only that of the moved strands; a redraw costs none.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gpu
 import numpy as np
@@ -14,9 +14,22 @@ from . import shaders
 # Widest row of the strand texture; every driver takes 16384 texels.
 TEXTURE_WIDTH = 16384
 
+# Work groups along an axis: every driver takes as many.
+MOST_GROUPS = 65535
+
 _AT_ONCE = 400  # strands that are brought into the order of texels
 
 _MOVE_GROUP_SIZE = 64  # points that one work group of `_move_program` brings to their places
+
+
+@dataclass(frozen=True)
+class Moved:
+    """What the last `move_strands` did: where the strands that it moved were before."""
+
+    points: gpu.types.GPUTexture  # of each moved strand a texel that means nothing, and its points
+    row_strands: int  # of that texture
+    rows: gpu.types.GPUTexture  # of each of all strands: which of the moved it is, counted from one; 0: none
+    turn: int  # how many such changes there were
 
 
 @dataclass(frozen=True)
@@ -36,6 +49,8 @@ class StrandsOnGPU:
     bounds: np.ndarray  # (2, 3): least and greatest coordinates
     mean_length: float  # of strands, in the coordinate system of the points
     mean_radius: float
+    greatest_radius: float
+    moved: Moved | None = None  # None where all points are as uploaded
 
 
 def upload_strands(points, radii, randoms=None, wetness=None):
@@ -70,6 +85,7 @@ def upload_strands(points, radii, randoms=None, wetness=None):
         bounds,
         mean_length,
         float(radii[some].mean()),
+        float(radii.max()),
     )
 
 
@@ -110,10 +126,10 @@ def seen_points(point_count):
 
 
 def move_strands(strands, moved, points):
-    """Move some of the strands on the GPU; uploads no others. Their arrays on this side are moved too.
+    """Move some of the strands on the GPU, and return the `StrandsOnGPU` in place of these; uploads no others.
 
-    strands: `StrandsOnGPU`; moved: (M,) distinct indices; points: (M, P, 3) float32. Bounds only grow: they are exact
-    again after the next `upload_strands`.
+    Their arrays on this side are moved too. strands: `StrandsOnGPU`; moved: (M,) distinct indices; points: (M, P, 3)
+    float32. Bounds only grow: they are exact again after the next `upload_strands`.
     """
     strands.points[moved] = points
     flat = points.reshape(-1, 3)
@@ -125,24 +141,34 @@ def move_strands(strands, moved, points):
     texture = places_texture(
         np.concatenate([heads, points], axis=1), np.pad(strands.radii[moved], ((0, 0), (1, 0))), row_strands
     )
+    turn, rows = (strands.moved.turn, strands.moved.rows) if strands.moved else (0, _no_rows(strands))
+    rows.clear(format="FLOAT", value=(0.0,))
     program = _move_program()
     program.bind()
-    program.image("strands", strands.texture)
-    program.uniform_sampler("moved_strands", texture)
+    for name, image in (("strands", strands.texture), ("moved_strands", texture), ("moved_rows", rows)):
+        program.image(name, image)
     program.uniform_int("moved_count", len(moved))
     program.uniform_int("point_count", strands.point_count)
     program.uniform_int("row_strands", strands.row_strands)
     program.uniform_int("moved_row_strands", row_strands)
-    gpu.compute.dispatch(program, -(-len(moved) * strands.point_count // _MOVE_GROUP_SIZE), 1, 1)
+    groups = -(-len(moved) * strands.point_count // _MOVE_GROUP_SIZE)
+    rows_of_groups = -(-groups // MOST_GROUPS)
+    gpu.compute.dispatch(program, -(-groups // rows_of_groups), rows_of_groups, 1)
+    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1))
+
+
+def _no_rows(strands):
+    return _numbers_texture(np.zeros(strands.strand_count), strands.row_strands)
 
 
 @shaders.kept
 def _move_program():
-    """The compute program that writes the points of some strands into the texture of all."""
+    """The compute program that exchanges the points of some strands with those in the texture of all."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_MOVE_GROUP_SIZE)
-    info.sampler(0, "FLOAT_2D", "moved_strands")
-    info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
+    for slot, name in enumerate(("strands", "moved_strands")):
+        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers={"READ", "WRITE"})
+    info.image(2, "R32F", "FLOAT_2D", "moved_rows", qualifiers={"WRITE"})
     for name in ("moved_count", "point_count", "row_strands", "moved_row_strands"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "move_strands.comp")

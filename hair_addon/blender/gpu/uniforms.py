@@ -137,6 +137,7 @@ MOTION = Block(
         "now_to_clip": "mat4",
         "after_to_clip": "mat4",
         "size": "vec4",  # width and height of the whole picture [pixels]
+        "moved_row_strands": "int",  # of the texture of combed strands' points before, 0 without
     },
 )
 
@@ -146,7 +147,9 @@ HISTORY = Block(
         "now_to_before": "mat4",  # clip space of a view → that of the view before
         "size": "vec4",  # width and height of the picture [pixels]
         "samples_per_side": "int",
-        "has_motion": "int",  # whether more than the view has moved: by the texture of motion vectors
+        "has_hair_motion": "int",  # whether it has moved, and not only the view: by the texture of motion vectors
+        "has_surface_motion": "int",
+        "most_passes": "float",  # that the picture before may be worth
     },
 )
 

@@ -28,6 +28,7 @@ class _Placed:
     samplers: dict
     first: int
     lights: gpu.types.GPUUniformBuf
+    window: tuple  # `drawing.window_of` it
 
     @property
     def segment_count(self):
@@ -41,7 +42,7 @@ class VisibilityBuffer:
     """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
 
     color: linear light, premultiplied; segments: of strands, what is nearest; surface_depth: of surfaces, from 0 to 1;
-    depths: of hair where there is any, the bits of floats from 0 to 1.
+    depths: of what is nearest, the bits of floats from 0 to 1.
     """
 
     def __init__(self, width, height):
@@ -78,12 +79,14 @@ class VisibilityBuffer:
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
         for index, (strands, shading, to_world, surface_color, samplers, steps) in enumerate(hair):
             record = drawing.strand_record(strands, view, to_world, steps)
+            record["least_half_width"] = drawing.least_width_of(strands, record)
             record["seen_points"] = seen_points(strands.point_count)
             record["seen_opacity"] = shading.opacity
             record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
             record["surface_color"][:3] = surface_color
             light_block = light_blocks[index if lights.shape else 0]
-            self._hair.append(_Placed(strands, shading, record, samplers, first, light_block))
+            window = drawing.window_of(strands, record, self.size)
+            self._hair.append(_Placed(strands, shading, record, samplers, first, light_block, window))
             first += self._hair[-1].segment_count
         if first > _NO_SEGMENT:
             self._hair = []
@@ -143,16 +146,19 @@ class VisibilityBuffer:
 
     def _find(self):
         """Find the nearest segments by a compute program: first depths, then indices."""
-        program = shaders.surface_depths_program()
-        with drawing.bound(program, {}, {"surface_depth": self.surface_depth}):
-            program.image("depths", self.depths)
-            drawing.dispatch_over(program, self.size)
+        self._copy_depths()
         program = shaders.segments_program()
         images = {"depths": self.depths, "segments": self.segments}
         for is_depth in (1, 0):
             for placed in self._hair:
                 constants = {"first_segment": placed.first, "is_depth": is_depth}
                 drawing.walk_strands(placed.strands, program, placed.record, placed.lights, {}, images, constants)
+
+    def _copy_depths(self):
+        program = shaders.surface_depths_program()
+        with drawing.bound(program, {}, {"surface_depth": self.surface_depth}):
+            program.image("depths", self.depths)
+            drawing.dispatch_over(program, self.size)
 
     def _draw_strips(self):
         """The nearest segments, as strips of triangles that the graphics driver draws."""
@@ -162,6 +168,7 @@ class VisibilityBuffer:
                 program.bind()
                 program.uniform_int("first_segment", placed.first)
                 drawing.draw_strip(placed.strands, program, placed.record, placed.lights)
+        self._copy_depths()  # which the strips were drawn into
 
     def _shade(self, placed, picture, parts=None):
         """Fill the samples in which a strand of a hair is nearest with its light, or with parts of it.
@@ -188,6 +195,9 @@ class VisibilityBuffer:
 
     def _fill(self, placed, program, picture, blocks, textures, record=None):
         """Run a program on the samples in which a strand of a hair is nearest; record: in place of the hair's own."""
+        left, bottom, *size = placed.window
+        if not all(size):
+            return
         record = placed.record if record is None else record
         blocks = {"view": uniforms.uniform_buffer(record), "lights": placed.lights, **blocks}
         textures = {"segments": self.segments, "strands": placed.strands.texture, **placed.samplers, **textures}
@@ -195,4 +205,6 @@ class VisibilityBuffer:
             program.image("picture", picture)
             program.uniform_int("first_segment", placed.first)
             program.uniform_int("segment_count", placed.segment_count)
-            drawing.dispatch_over(program, self.size)
+            program.uniform_int("window_left", left)
+            program.uniform_int("window_bottom", bottom)
+            drawing.dispatch_over(program, size)

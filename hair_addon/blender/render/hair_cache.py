@@ -103,7 +103,7 @@ def strands_on_gpu(datablock):
     elif moved:
         chosen = np.unique(np.concatenate(moved))
         require_indices("strands", chosen, len(kept.points))
-        strand_textures.move_strands(kept.on_gpu, chosen, _carried(kept, pose, chosen))
+        kept.on_gpu = strand_textures.move_strands(kept.on_gpu, chosen, _carried(kept, pose, chosen))
     return kept.on_gpu
 
 

@@ -11,10 +11,13 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from ..gpu import drawing, history_programs, uniforms
+from ..gpu import drawing, history_programs, strand_textures, uniforms
 from . import motion_vectors
 
 _COLOR, _PASSES = "RGBA16F", "R16F"
+
+# Passes that the picture before may be worth: of the same strands, and of others, with which noise would hide a change.
+_MOST_PASSES, _MOST_OF_OTHERS = 24.0, 2.0
 
 
 class _Targets:
@@ -28,21 +31,28 @@ class _Targets:
             texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
         self._framebuffer = gpu.types.GPUFrameBuffer(color_slots=tuple(self.textures))
 
-    def fill(self, program, samplers, blocks=None, **constants):
-        """Run a program on every texel; blocks: {instance: record}; constants: numbers."""
+    def fill(self, program, samplers, **constants):
+        """Run a program on every texel; constants: numbers."""
         with self._framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
-            blocks = {name: uniforms.uniform_buffer(record) for name, record in (blocks or {}).items()}
-            with drawing.bound(program, blocks, samplers):
+            with drawing.bound(program, {}, samplers):
                 for name, value in constants.items():
                     program.uniform_float(name, value)
                 drawing.cover(program)
+
+    def draw(self, batch, program, samplers, blocks):
+        """Draw a batch over nothing; blocks: {instance: record}."""
+        blocks = {name: uniforms.uniform_buffer(record) for name, record in blocks.items()}
+        with self._framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
+            self._framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0))
+            with drawing.bound(program, blocks, samplers):
+                batch.draw(program)
 
 
 @dataclass(frozen=True)
 class _Seen:
     """What a picture was of."""
 
-    looks: tuple  # `Shading` of each of the hair: pictures of one history have the same ones
+    looks: tuple  # `Shading`s of all hair: pictures of one history have the same ones
     places: motion_vectors.Places
     world_to_clip: np.ndarray
 
@@ -53,7 +63,7 @@ class History:
     def __init__(self, size, per_side):
         self.size, self._per_side = size, per_side
         self._shown = self._before = None  # _Targets: the picture, and how many passes it is worth
-        self._carried = self._blocks = None
+        self._carried = self._blocks = self._block_batch = None
         self._seen = None
         self._is_carried = False
 
@@ -85,6 +95,7 @@ class History:
         self._shown, self._before, self._carried = (_Targets(self.size, formats, True) for _ in range(3))
         blocks = tuple(-(-length // history_programs.BLOCK_SIDE) for length in self.size)
         self._blocks = [_Targets(blocks, (_COLOR, _COLOR), True) for _ in range(2)]
+        self._block_batch = strand_textures.bare_vertices(6 * blocks[0] * blocks[1], "TRIS")
 
     def add(self, drawn, camera, view, buffer, light, pass_count, part_left):
         """Take note of a pass, the pass_count-th of a picture.
@@ -102,7 +113,8 @@ class History:
 
     def _turn_to(self, drawn, camera, view, buffer, light):
         before, world_to_clip = self._seen, camera[1] @ camera[0]
-        looks = tuple(shading for _strands, shading, *_ in drawn.hair)
+        # Of hair that is wet in places, which may be mixed in other ways than before.
+        looks = tuple(layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers)
         self._seen = _Seen(looks, motion_vectors.places(drawn, *camera), world_to_clip)
         self._is_carried = before is not None and _are_same(before.looks, looks)
         if self._is_carried:
@@ -113,12 +125,14 @@ class History:
         record = uniforms.HISTORY.record()
         record["now_to_before"] = (before.world_to_clip @ np.linalg.inv(now.world_to_clip)).T
         record["size"][:2], record["samples_per_side"] = self.size, self._per_side
-        record["has_motion"] = not now.places.are_where(before.places)
+        record["has_surface_motion"] = has_surfaces = not now.places.has_still_surfaces(before.places)
+        record["has_hair_motion"] = has_hair = not now.places.has_still_hair(before.places)
+        has_same_strands = now.places.has_same_strands(before.places)
+        record["most_passes"] = _MOST_PASSES if has_same_strands else _MOST_OF_OTHERS
         motion = light[0]
-        if record["has_motion"]:
-            motion = motion_vectors.draw(
-                drawn, motion_vectors.Motion(before.places, now.places, now.places, self.size), view, buffer
-            )
+        if has_hair or has_surfaces:
+            steps = motion_vectors.Motion(before.places, now.places, now.places, self.size)
+            motion = motion_vectors.draw(drawn, steps, view, buffer, has_surfaces)
         program = history_programs.blocks_program()
         for blocks, of in zip(self._blocks, ((self._before.textures[0], 1.0), light), strict=True):
             blocks.fill(program, {"picture": of[0]}, weight=of[1])
@@ -130,12 +144,11 @@ class History:
             "before_deviation": before_blocks.textures[1],
             "now_mean": now_blocks.textures[0],
             "now_deviation": now_blocks.textures[1],
-            "surface_depth": buffer.surface_depth,
             "motion": motion,
             "depths": buffer.depths,
             "segments": buffer.segments,
         }
-        self._carried.fill(history_programs.carry_program(), samplers, {"history": record})
+        self._carried.draw(self._block_batch, history_programs.carry_program(), samplers, {"history": record})
 
     def _mix(self, light, pass_count, part_left):
         sums, weight = light

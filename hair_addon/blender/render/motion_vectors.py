@@ -13,26 +13,42 @@ from ..gpu import drawing, render_programs, uniforms
 class Places:
     """Transforms and points of everything drawn at one time.
 
-    world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world)}; surfaces: {owner:
-    (texture of corners, how many)}. Owners are keys of `_told_apart`.
+    world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world, how these were moved)};
+    surfaces: {owner: (texture of corners, how many)}. Owners are keys of `_told_apart`.
     """
 
     world_to_clip: np.ndarray
     hair: dict
     surfaces: dict
 
-    def are_where(self, others):
-        """Whether everything is where it is in other `Places`, whatever the camera does."""
-        return (
-            self.hair.keys() == others.hair.keys()
-            and self.surfaces.keys() == others.surfaces.keys()
-            and all(_is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items())
-            and all(place[0] is others.surfaces[owner][0] for owner, place in self.surfaces.items())
+    def has_still_hair(self, others):
+        """Whether all hair is where it is in other `Places`, whatever the camera does."""
+        return self.hair.keys() == others.hair.keys() and all(
+            _is_unmoved(place, others.hair[owner]) for owner, place in self.hair.items()
+        )
+
+    def has_same_strands(self, others):
+        """Whether all hair has as many strands and points as in other `Places`."""
+        return self.hair.keys() == others.hair.keys() and all(
+            place[1] == others.hair[owner][1] for owner, place in self.hair.items()
+        )
+
+    def has_still_surfaces(self, others):
+        """The same of surfaces."""
+        return self.surfaces.keys() == others.surfaces.keys() and all(
+            place[0] is others.surfaces[owner][0] for owner, place in self.surfaces.items()
         )
 
 
 def _is_unmoved(hair, other):
-    return hair[0] is other[0] and np.array_equal(hair[2], other[2])
+    return hair[0] is other[0] and hair[3] is other[3] and np.array_equal(hair[2], other[2])
+
+
+def _combed(before, now):
+    """The `strand_textures.Moved` that took hair from one place to the other; None where more or less happened."""
+    moved = now[3]
+    is_next = moved is not None and moved.turn == 1 + (before[3].turn if before[3] else 0)
+    return moved if is_next and before[0] is now[0] else None
 
 
 @dataclass(frozen=True)
@@ -53,7 +69,12 @@ class Motion:
             moment.world_to_clip @ place[2]
             for moment, place in zip((self.before, self.now, self.after), (before, now, after), strict=True)
         ]
-        return self._record(matrices), {"strands_before": before[0], "strands_after": after[0]}
+        record, samplers = self._record(matrices), {"strands_before": before[0], "strands_after": after[0]}
+        combed = _combed(before, now)
+        if combed is not None:
+            record["moved_row_strands"] = combed.row_strands
+        rows, points = (now[0], now[0]) if combed is None else (combed.rows, combed.points)
+        return record, {**samplers, "moved_rows": rows, "moved_points": points}
 
     def surface(self, owner):
         """The same of a surface."""
@@ -70,10 +91,14 @@ class Motion:
         return record
 
 
-def draw(drawn, motion, view, buffer):
-    """Return a texture of motion vectors [pixels] for the `VisibilityBuffer` that a `DrawnScene` was drawn into."""
+def draw(drawn, motion, view, buffer, has_surfaces=True):
+    """Return a texture of motion vectors [pixels] for the `VisibilityBuffer` that a `DrawnScene` was drawn into.
+
+    has_surfaces: whether those of surfaces are in it.
+    """
+    surfaces = zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True) if has_surfaces else ()
     with buffer.surfaces_of_part(render_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, _parts), owner in zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True):
+        for (surface, _parts), owner in surfaces:
             record, samplers = motion.surface(owner)
             placed = view.copy()
             placed["row_strands"] = surface.row_corners
@@ -87,7 +112,7 @@ def draw(drawn, motion, view, buffer):
 def places(drawn, world_to_view, view_to_clip):
     """Return the `Places` of a `DrawnScene`, also one read without lighting."""
     hair = {
-        owner: (strands.texture, (strands.strand_count, strands.point_count), to_world)
+        owner: (strands.texture, (strands.strand_count, strands.point_count), to_world, strands.moved)
         for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _told_apart(drawn.owners), strict=True)
     }
     surfaces = {

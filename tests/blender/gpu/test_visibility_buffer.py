@@ -117,3 +117,23 @@ def test_a_strand_behind_a_surface_is_hidden(shading):
         found, _depths = drawn(strand, PERSPECTIVE, shading, in_compute, hiding_at=1.1)
         left, right = np.split(found >= 0, 2, axis=1)
         assert left.any() and right.any()
+
+
+@pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
+def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
+    """Small tufts in the picture, over its edges and beyond; `drawn` compares what is found with what is shaded."""
+    points, radii = tuft(rng, strand_count=12, thickness=0.02)
+    points -= points.mean(axis=(0, 1))
+    for x, y in ((0.0, 0.0), (0.3, 0.1), (-0.33, -0.2), (0.0, 0.19), (2.0, 0.0)):
+        to_world = np.diag([0.15, 0.1, 0.1, 1.0])
+        to_world[:3, 3] = x, y, -1.0
+        segments, _depths = drawn([(points, radii, to_world)], view_to_clip, shading, True)
+        is_there = np.argwhere(segments >= 0)[:, ::-1]
+        assert is_there.size or x == 2.0
+        on_gpu, view = (
+            strand_textures.upload_strands(points, radii),
+            drawing.view_record(np.eye(4), view_to_clip, SIZE[1], least_width=1.0),
+        )
+        left, bottom, width, height = drawing.window_of(on_gpu, drawing.strand_record(on_gpu, view, to_world), SIZE)
+        assert ((is_there >= (left, bottom)) & (is_there < (left + width, bottom + height))).all()
+        assert width * height < 0.5 * SIZE[0] * SIZE[1]

@@ -101,7 +101,7 @@ def test_only_strands_of_moved_guides_are_uploaded(hair, window, monkeypatch):
     drawn(hair)
     moved, real = [], strand_textures.move_strands
     monkeypatch.setattr(
-        strand_textures, "move_strands", lambda s, chosen, p: (moved.append(chosen), real(s, chosen, p))
+        strand_textures, "move_strands", lambda s, chosen, p: (moved.append(chosen), real(s, chosen, p))[1]
     )
     before = points(hair)
     for _ in stroke(guides, [7], steps=1):

@@ -7,10 +7,13 @@ import pytest
 from scipy.ndimage import binary_dilation
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.render import drawn_scene, hair_picture, view_film
+from hair_addon.blender.gpu import drawing, strand_textures
+from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
+from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture, motion_vectors, view_film
+from tests.support.reading import points, write_points
 
 SIZE = 80
-FRAMES, WARM_UP = 8, 6
+FRAMES, WARM_UP = 4, 2
 
 
 def read_drawn():
@@ -22,9 +25,9 @@ def camera():
     return scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE)
 
 
-def new_picture(kind):
+def new_picture(kind, size=SIZE):
     if kind == "HAIR":
-        return hair_picture.HairPicture((SIZE, SIZE), 1)
+        return hair_picture.HairPicture((size, size), 1)
     return view_film.ViewFilm((SIZE, SIZE), 1, is_transparent=True)
 
 
@@ -51,6 +54,14 @@ def turn_camera(degrees):
     bpy.context.scene.camera.rotation_euler.z = angle
 
 
+def comb(guides, way):
+    """Move the guides by their parts of a way, from root to tip."""
+    combed = points(guides)
+    combed += np.linspace(0.0, 1.0, combed.shape[1])[None, :, None] * np.float32(way)
+    write_points(guides, combed)
+    bpy.context.view_layer.update()
+
+
 def biggest_change(frames):
     """The 99th percentile of how far a pixel with hair changes from frame to frame, as a display shows it on grey."""
     frames = np.array(frames)
@@ -59,9 +70,12 @@ def biggest_change(frames):
     return np.quantile(np.abs(np.diff(shown, axis=0)).max(axis=-1)[:, is_hair], 0.99)
 
 
-@pytest.mark.parametrize(("kind", "turn"), [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera)])
-def test_what_turns_changes_no_more_than_pictures_at_rest(lit, kind, turn):
-    """A degree a frame, one sample a pixel: at most 1.2 times as much, and as bright."""
+MOVEMENTS = [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera)]
+
+
+@pytest.mark.parametrize(("kind", "turn"), MOVEMENTS)
+def test_what_moves_changes_no_more_than_pictures_at_rest(lit, kind, turn):
+    """From rest, a degree a frame, one sample a pixel: at most 1.2 times as much, and as bright."""
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
     moving, shown, still = new_picture(kind), [], []
     turn_camera(0.0)
@@ -70,7 +84,7 @@ def test_what_turns_changes_no_more_than_pictures_at_rest(lit, kind, turn):
         turn(float(frame))
         bpy.context.view_layer.update()
         drawn, view = drawn if turn is turn_camera else read_drawn(), camera()
-        shown.append(move(moving, drawn, view))
+        shown.append(move(moving, drawn, view) if frame else rest(moving, drawn, view))
         if frame >= WARM_UP:
             still.append(rest(new_picture(kind), drawn, view))
     assert biggest_change(shown[WARM_UP:]) <= 1.2 * biggest_change(still)
@@ -127,17 +141,88 @@ def test_another_look_is_shown_at_once(lit):
     np.testing.assert_array_equal(shown, picture.read())
 
 
-def test_hair_is_carried_where_its_surface_takes_it(lit):
+def seen(drawn, view):
+    """(record of a pass over a scene, buffer that hair was found for)."""
+    buffer, record = VisibilityBuffer(SIZE, SIZE), drawing.pass_record(*view, (SIZE, SIZE))
+    with buffer.surfaces():
+        drawn_scene.draw_hiding(drawn, record)
+    drawn_scene.find_hair(drawn, record, buffer)
+    return record, buffer
+
+
+def test_combed_strands_know_where_they_were(lit, monkeypatch):
+    """Where some strands are brought to their places, motion vectors are those of strands that are all uploaded."""
+    monkeypatch.setattr(strand_textures, "MOST_GROUPS", 7)
+    guides, view = bpy.data.objects["Guides"], camera()
+    vectors = {}
+    for is_uploaded in (False, True):
+        comb(guides, (0.0, 0.0, 0.0))
+        hair_cache.strand_cache.clear()
+        before = motion_vectors.places(read_drawn(), *view)
+        for way in ((0.1, 0.0, 0.0), (0.0, 0.0, 0.15)):
+            comb(guides, way)
+            if is_uploaded:
+                hair_cache.strand_cache.clear()
+            earlier, drawn = before, read_drawn()
+            before = motion_vectors.places(drawn, *view)
+            assert (drawn.hair[0][0].moved is None) == is_uploaded
+            assert not before.has_still_hair(earlier)
+            motion = motion_vectors.Motion(earlier, before, before, (SIZE, SIZE))
+            found = np.array(motion_vectors.draw(drawn, motion, *seen(drawn, view)).read(), np.float32)
+            vectors.setdefault(is_uploaded, []).append(found)
+        comb(guides, (-0.1, 0.0, -0.15))
+    for one, other in zip(vectors[False], vectors[True], strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-3)
+    assert np.abs(vectors[False]).max() > 1.0
+
+
+def push_surface(frame):
+    push = bpy.data.objects["Sphere"].modifiers.get("Push")
+    if push is None:
+        push = bpy.data.objects["Sphere"].modifiers.new("Push", "DISPLACE")
+        push.direction, push.mid_level = "X", 0.0
+    push.strength = 0.2 * frame
+
+
+def comb_aside(frame):
+    if frame:
+        comb(bpy.data.objects["Guides"], (0.2, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("push", [push_surface, comb_aside])
+def test_hair_is_carried_where_it_moves(lit, push):
     """Strands of which the points move, not the object: without their motion the picture would lag behind them."""
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
-    push = bpy.data.objects["Sphere"].modifiers.new("Push", "DISPLACE")
-    push.direction, push.mid_level = "X", 0.0
     picture = new_picture("HAIR")
     for frame in range(4):
-        push.strength = 0.2 * frame
+        push(frame)
         drawn, view = read_drawn(), camera()
         shown = move(picture, drawn, view)
     still = rest(new_picture("HAIR"), drawn, view)
     columns = np.arange(SIZE)
     middles = [(of[..., 3].sum(axis=0) * columns).sum() / of[..., 3].sum() for of in (shown, still)]
     assert abs(middles[0] - middles[1]) < 0.5
+
+
+def test_the_first_pass_is_as_bright_as_the_last(thin):
+    """With one sample a pixel of strands that are thinner: the mean, and as far as noise allows each part's."""
+    picture, drawn, view = new_picture("HAIR", 3 * SIZE), read_drawn(), camera()
+    picture.add_pass(drawn, *view)
+    first, last = picture.read(), rest(picture, drawn, view)
+    np.testing.assert_allclose(first.mean(axis=(0, 1)), last.mean(axis=(0, 1)), rtol=0.02)
+    side = SIZE // 4
+    parts = [of[..., 3].reshape(12, side, 12, side).mean(axis=(1, 3)) for of in (first, last)]
+    noise = np.sqrt(parts[1] * (1.0 - parts[1])) / side
+    assert np.abs(parts[0] - parts[1]).max() <= 3.0 * noise.max()
+
+
+def test_strands_that_are_left_out_leave_no_trace(thin):
+    """From 4000 to 1000 of them: the picture of the change is as bright as the one at rest in a few frames."""
+    picture = new_picture("HAIR")
+    before = rest(picture, read_drawn(), camera())
+    thin.data.vellus.hair.strand_count = 1000
+    bpy.context.view_layer.update()
+    drawn, view = read_drawn(), camera()
+    still = rest(new_picture("HAIR"), drawn, view)
+    left = [move(picture, drawn, view).mean() - still.mean() for _ in range(4)]
+    assert abs(left[-1]) < 0.1 * abs(before.mean() - still.mean())
