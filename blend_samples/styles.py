@@ -50,9 +50,9 @@ def main():
     chosen = [name for name in GALLERY if not given.names or name in given.names]
     pictures = [_drawn_style(hair, name) for name in chosen]
     if pictures:
-        _save(_rows(pictures, COLUMNS), out / "styles.png")
+        save(_rows(pictures, COLUMNS), out / "styles.png")
     if not given.names or "wet" in given.names:
-        _save(_rows([_drawn_wet(hair, wetness) for wetness in WETNESS], len(WETNESS)), out / "wet.png")
+        save(_rows([_drawn_wet(hair, wetness) for wetness in WETNESS], len(WETNESS)), out / "wet.png")
 
 
 def build(strand_count=STRAND_COUNT):
@@ -111,7 +111,7 @@ def _rows(pictures, columns):
     return np.concatenate([np.concatenate(row, axis=1) for row in rows if len(row) == len(rows[0])])
 
 
-def _save(pixels, path):
+def save(pixels, path):
     height, width, _ = pixels.shape
     image = bpy.data.images.new(path.stem, width, height)
     opaque = np.ones((height, width, 4), np.float32)

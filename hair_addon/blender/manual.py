@@ -57,6 +57,7 @@ _OPERATORS = {
     "systems": ("delete_system",),
     "use_as_guides": ("use_as_guides",),
     "rendering": ("toggle_composite",),
+    "cards": ("hair_cards", "hair_tubes"),
     "output": ("render_picture", "export_groom", "save_groom_settings", "load_groom_settings"),
 }
 

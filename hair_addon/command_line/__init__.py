@@ -9,10 +9,10 @@ import sys
 
 from ..core.errors import HairError
 from ..core.long_work import Stopped
-from . import console, export, groom, info, interruption, paths, render, settings, simulate, tables
+from . import cards, console, export, groom, info, interruption, paths, render, settings, simulate, tables, tubes
 from .options import Parser
 
-_VERBS = (groom, tables, simulate, render, export, info, settings)
+_VERBS = (groom, tables, simulate, render, export, cards, tubes, info, settings)
 
 
 def main(arguments, program):

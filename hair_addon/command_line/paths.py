@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..core.errors import HairError
 
-_OPTIONS = ("out", "settings", "guides_from", "deliver")
+_OPTIONS = ("out", "settings", "guides_from", "deliver", "textures")
 
 
 def resolve(given):

@@ -4,7 +4,6 @@
 import re
 from dataclasses import dataclass
 
-import bpy
 import numpy as np
 
 from ...core.cards import atlas, clusters, outlines, ribbons, texels
@@ -12,7 +11,6 @@ from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.files.whole_file import require_place
 from ...core.long_work import Stage
 from ..data import card_images, made_meshes
-from ..groom import selection
 from ..materials import card_material
 from ..render import card_pictures
 from . import hair_meshes
@@ -53,12 +51,12 @@ def making_cards(hair, settings, folder=None):
     levels = settings.levels(len(read.points))
     drawn = []
     for index, level in enumerate(levels):
-        drawn.append((yield from _drawing(read, level, settings.cell_count, index / len(levels))))
+        drawn.append((yield from _drawing(read, level, settings.picture_count, index / len(levels))))
     return _written(read, drawn, folder)
 
 
-def _drawing(read, level, cell_count, part):
-    mesh, placed, picture_count = yield lambda progress: _flat_cards(read, level, cell_count, progress)
+def _drawing(read, level, picture_count, part):
+    mesh, placed, drawn_count = yield lambda progress: _flat_cards(read, level, picture_count, progress)
     yield Stage("Drawing cards", part)
     picture = card_pictures.CardPicture(placed, level.texture_size)
     sums = texels.TexelSums(level.texture_size)
@@ -67,14 +65,14 @@ def _drawing(read, level, cell_count, part):
             yield Stage("Drawing cards", part)
             segments, shift = picture.segments(rows, turn)
             yield _adding(sums, segments, placed, shift, rows)
-    return _Drawn(mesh, sums.maps(), level.card_count, picture_count)
+    return _Drawn(mesh, sums.maps(), level.card_count, drawn_count)
 
 
 def _adding(sums, segments, placed, shift, rows):
     return lambda _progress: sums.add(segments, placed, card_pictures.PER_SIDE, shift, rows)
 
 
-def _flat_cards(read, level, cell_count, progress):
+def _flat_cards(read, level, picture_count, progress):
     """(mesh in local coordinates, `PlacedStrands`, number of pictures)."""
     count = level.card_count
     labels = clusters.clusters(clusters.strand_features(read.points), count, progress)
@@ -82,7 +80,7 @@ def _flat_cards(read, level, cell_count, progress):
     axes = ribbons.axes_of(read.points, labels, count, level.segment_count, read.surface)
     flat = ribbons.flattened(read.points, labels, axes)
     found = outlines.outlines(flat, read.radii, labels, axes)
-    places = atlas.atlas(found, np.bincount(labels, minlength=count), cell_count, level.texture_size)
+    places = atlas.atlas(found, np.bincount(labels, minlength=count), picture_count, level.texture_size)
     strands, points, radii = places.placed(flat, read.radii, labels, found.boxes)
     heights = float(points[..., 2].min()), float(points[..., 2].max())
     ids = np.random.default_rng(0).permutation(len(strands)) / max(len(strands) - 1, 1)
@@ -107,5 +105,4 @@ def _written(read, drawn, folder):
             made_meshes.hide(mesh_object)
         counts = level.card_count, level.picture_count, level.mesh.triangle_count
         made.append(CardLevel(mesh_object, its, *counts))
-    selection.make_active(made[0].mesh_object, bpy.context.view_layer)
     return made

@@ -3,7 +3,6 @@
 
 from dataclasses import dataclass, replace
 
-import bpy
 import numpy as np
 
 from ...core.cards import tubes
@@ -14,7 +13,6 @@ from ...core.long_work import Stage
 from ...core.shading import strand_colors
 from ...core.shading.appearance import Appearance
 from ..data import curves, exported_curves, made_meshes, scene
-from ..groom import selection
 from ..host import scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -100,7 +98,6 @@ def making_tubes(hair, settings):
     collection = made_meshes.new_collection(name, surface_object)
     material = card_material.new_material(name, read.look)
     mesh_object = made_meshes.new_object(name, made, surface_object, collection, material)
-    selection.make_active(mesh_object, bpy.context.view_layer)
     return MadeTubes(mesh_object, settings.count_of(len(read.points)), made.triangle_count)
 
 

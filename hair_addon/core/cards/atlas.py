@@ -93,7 +93,7 @@ def _features(found, strand_counts):
 
 
 def _shelves(sizes, border):
-    """((K, 2) corners, scale) of rectangles on shelves, the longest first, as large as they fit into the unit square."""
+    """((K, 2) corners, scale) of rectangles on shelves, the longest first, as large as the unit square takes."""
     order = np.argsort(-sizes[:, 1], kind="stable")
     low, high = 0.0, min(1.0 / np.sqrt(sizes.prod(axis=1).sum()), *((1.0 - 2.0 * border) / sizes.max(axis=0)))
     best = None

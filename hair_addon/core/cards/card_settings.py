@@ -45,7 +45,7 @@ class CardSettings(Settings):
         low=1,
         high=8,
     )
-    cell_count: int = param(
+    picture_count: int = param(
         0,
         "Number of pictures in the textures; similar cards share one. With zero each card has its own",
         label="Pictures",

@@ -74,8 +74,8 @@ def _angles(points, labels, count, axes, away):
 def flattened(points: np.ndarray, labels: np.ndarray, axes: Axes) -> np.ndarray:
     """(S, P, 3) strands → (S, P, 3) float32 on the ribbons of their clumps: across, along, and above them.
 
-    Each point goes to the nearest of the ribbon's middle line, not far from its own part of the length; beyond the ends,
-    and at the outside of bends, it goes on straight.
+    Each point goes to the nearest of the ribbon's middle line, not far from its own part of the length;
+    beyond the ends, and at the outside of bends, it goes on straight.
     """
     distances, parts = axes.distances, np.linspace(0.0, 1.0, points.shape[1])
     lengths = np.maximum(distances[:, -1], _TINY)

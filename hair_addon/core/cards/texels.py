@@ -46,7 +46,7 @@ class TexelSums:
         y += rows.start * per_side
         texels = (y // per_side) * self.size + x // per_side
         centres = (np.stack([x, y], axis=1) + 0.5 - shift) / wide
-        values = _sampled(strands, shown, centres)
+        values = _sampled(strands, shown, centres, 1.0 / self.size)
         self._covered += np.bincount(texels, minlength=len(self._covered))
         for sums, value in zip(self._sums, values, strict=True):
             sums += np.bincount(texels, weights=value, minlength=len(self._covered))
@@ -65,8 +65,11 @@ class TexelSums:
         return {"color": means[..., :3], "alpha": alpha, "normal": 0.5 * normals + 0.5, **shades}
 
 
-def _sampled(strands, segments, centres):
-    """(9, N) color, normal, depth, part from root to tip and identity of samples at (N, 2) centres."""
+def _sampled(strands, segments, centres, texel):
+    """(9, N) color, normal, depth, part from root to tip and identity of samples at (N, 2) centres.
+
+    texel: the width of one. Strands thinner than that are flat: their two sides fall into one texel.
+    """
     pieces = strands.places.shape[1] - 1
     strand, piece = np.divmod(segments, pieces)
     first, second = strands.places[strand, piece], strands.places[strand, piece + 1]
@@ -79,7 +82,8 @@ def _sampled(strands, segments, centres):
     colors = strands.colors[strand, piece] * (1.0 - mix) + strands.colors[strand, piece + 1] * mix
     across = (offset[:, 1] * flat[:, 0] - offset[:, 0] * flat[:, 1]) / np.sqrt(square)
     radius = strands.radii[strand, piece] * (1.0 - part) + strands.radii[strand, piece + 1] * part
-    normals = _normals(edge, np.clip(across / np.maximum(radius, 1e-12), -1.0, 1.0))
+    roundness = np.minimum(2.0 * radius / texel, 1.0)
+    normals = _normals(edge, roundness * np.clip(across / np.maximum(radius, 1e-12), -1.0, 1.0))
     low, high = strands.heights
     depth = (first[:, 2] + part * edge[:, 2] - low) / max(high - low, 1e-12)
     return np.stack([*colors.T, *normals.T, depth, (piece + part) / pieces, strands.ids[strand]])
