@@ -80,12 +80,14 @@ def _flat_cards(read, level, picture_count, progress):
     axes = ribbons.axes_of(read.points, labels, count, level.segment_count, read.surface)
     flat = ribbons.flattened(read.points, labels, axes)
     found = outlines.outlines(flat, read.radii, labels, axes)
+    lifted = outlines.heights(flat, labels, found)
+    flat = outlines.levelled(flat, labels, found, lifted)
     places = atlas.atlas(found, np.bincount(labels, minlength=count), picture_count, level.texture_size)
     strands, points, radii = places.placed(flat, read.radii, labels, found.boxes)
     heights = float(points[..., 2].min()), float(points[..., 2].max())
     ids = np.random.default_rng(0).permutation(len(strands)) / max(len(strands) - 1, 1)
     placed = texels.PlacedStrands(points, radii, read.colors()[strands], ids.astype(np.float32), heights)
-    mesh = outlines.ribbon_mesh(axes, found, places.uvs(found))
+    mesh = outlines.ribbon_mesh(axes, found, places.uvs(found), lifted)
     return read.local(mesh), placed, len(places.shown)
 
 

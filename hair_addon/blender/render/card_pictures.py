@@ -53,5 +53,6 @@ class CardPicture:
             view = drawing.pass_record(np.eye(4), self._view_to_clip, (self._side, self._side), turn, tile)
             hair = [(self._strands, _Opaque(), np.eye(4), np.zeros(3), {}, drawing.Steps())]
             buffer.find_hair(hair, uniforms.LIGHTS.record(), view)
-            found = np.array(buffer.segments.read()).reshape(tile[3], tile[2])
-        return np.where(found == NO_SEGMENT, NO_STRAND, found.astype(np.int64)), drawing.pass_shift(turn)
+            found = np.asarray(buffer.segments.read()).astype(np.int32).reshape(tile[3], tile[2])
+        found[found == NO_SEGMENT] = NO_STRAND
+        return found, drawing.pass_shift(turn)

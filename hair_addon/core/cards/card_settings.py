@@ -80,7 +80,7 @@ class TubeSettings(Settings):
         2000, "Number of strands to convert, evenly chosen; zero converts all", label="Tubes", low=0, soft_high=20_000
     )
     side_count: int = param(4, "Sides of each tube", label="Sides", low=3, high=32)
-    point_count: int = param(12, "Points along each tube", label="Points", low=2, high=128)
+    point_count: int = param(12, "Points along each tube", label="Points", low=2, high=512)
     thickness: float = param(
         1.0, "Thickness of tubes as a multiple of the strands' thickness", above=0.0, soft_high=20.0
     )

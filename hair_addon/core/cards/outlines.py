@@ -65,10 +65,49 @@ def _at_places(of_segments, farther):
     return np.concatenate([of_segments[:, :1], inner, of_segments[:, -1:]], axis=1)
 
 
-def ribbon_mesh(axes: Axes, found: Outlines, uvs: np.ndarray) -> PolygonMesh:
+_NEARNESS = 4  # power of how near a point is to a place: others would pull the ends off their strands
+
+
+def heights(flat: np.ndarray, labels: np.ndarray, found: Outlines) -> np.ndarray:
+    """(C, n) mean heights of flattened strands above the middle line at each place of the outlines.
+
+    Where only some strands of a clump are, as at the roots of those that stand behind the others, the mean of all of
+    them is not where these are: a ribbon there would cut into the surface.
+    """
+    count, last = found.along.shape[0], found.along.shape[1] - 1
+    made, onward = np.zeros(found.along.shape), flat[..., 1].astype(np.float64)
+    for place in range(last + 1):
+        nearness = _nearness(found.along[labels], onward, place) ** _NEARNESS
+        weights = np.bincount(labels, weights=nearness.sum(axis=1), minlength=count)
+        sums = np.bincount(labels, weights=(nearness * flat[..., 2]).sum(axis=1), minlength=count)
+        made[:, place] = np.where(weights > 1e-9, sums / np.maximum(weights, 1e-9), 0.0)
+    return made
+
+
+def levelled(flat: np.ndarray, labels: np.ndarray, found: Outlines, lifted: np.ndarray) -> np.ndarray:
+    """Flattened strands with heights above ribbons that were lifted by `heights`."""
+    above, onward = flat.copy(), flat[..., 1].astype(np.float64)
+    for place in range(lifted.shape[1]):
+        above[..., 2] -= lifted[labels, place][:, None] * _nearness(found.along[labels], onward, place)
+    return above
+
+
+def _nearness(along, onward, place):
+    """(S, P) from 1 at a place to 0 at those beside it, of points at (S, P); along (S, n): the places."""
+    here, near = along[:, place, None], np.ones(onward.shape)
+    if place:
+        before = along[:, place - 1, None]
+        near = np.minimum(near, (onward - before) / np.maximum(here - before, 1e-12))
+    if place < along.shape[1] - 1:
+        after = along[:, place + 1, None]
+        near = np.minimum(near, (after - onward) / np.maximum(after - here, 1e-12))
+    return np.maximum(near, 0.0)
+
+
+def ribbon_mesh(axes: Axes, found: Outlines, uvs: np.ndarray, lifted: np.ndarray) -> PolygonMesh:
     """The mesh of all ribbons, two vertices at each place of a ribbon, low and high; uvs: (C, n, 2, 2) of them.
 
-    Faces look along the normals of the axes.
+    Faces look along the normals of the axes; lifted: (C, n) how far along them.
     """
     count, places, _ = axes.centres.shape
     centres = axes.centres.copy()
@@ -76,6 +115,7 @@ def ribbon_mesh(axes: Axes, found: Outlines, uvs: np.ndarray) -> PolygonMesh:
     for end in (0, -1):
         beyond = found.along[:, end] - distances[:, end]
         centres[:, end] += beyond[:, None] * axes.tangents[:, end]
+    centres += lifted[..., None] * axes.normals
     edges = np.stack([found.low, found.high], axis=-1)
     vertices = centres[:, :, None] + edges[..., None] * axes.binormals[:, :, None]
     ring = 2 * np.arange(places - 1)

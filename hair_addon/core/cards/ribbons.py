@@ -77,36 +77,47 @@ def flattened(points: np.ndarray, labels: np.ndarray, axes: Axes) -> np.ndarray:
     Each point goes to the nearest of the ribbon's middle line, not far from its own part of the length;
     beyond the ends, and at the outside of bends, it goes on straight.
     """
-    distances, parts = axes.distances, np.linspace(0.0, 1.0, points.shape[1])
-    lengths = np.maximum(distances[:, -1], _TINY)
-    nearest = np.full(points.shape[:2], np.inf)
-    flat = np.empty(points.shape, np.float32)
+    points = np.asarray(points, np.float32)
+    distances, parts = axes.distances.astype(np.float32), np.linspace(0.0, 1.0, points.shape[1], dtype=np.float32)
+    centres = axes.centres.astype(np.float32)
+    lengths = np.maximum(distances[labels, -1], _TINY)[:, None]
+    least = np.full(points.shape[:2], np.inf, np.float32)
+    nearest, places = np.zeros(points.shape[:2], np.int32), np.zeros(points.shape[:2], np.float32)
     for segment in range(distances.shape[1] - 1):
-        start, end = axes.centres[:, segment], axes.centres[:, segment + 1]
-        length = np.maximum(np.linalg.norm(end - start, axis=1), _TINY)
-        direction = ((end - start) / length[:, None])[labels]
-        offsets = points - start[labels][:, None]
-        along = np.einsum("spi,si->sp", offsets, direction)
-        part = np.clip(along / length[labels][:, None], 0.0, 1.0)
-        on_line = part * length[labels][:, None]
-        offsets = offsets - on_line[..., None] * direction[:, None]
-        place = distances[labels, segment][:, None] + on_line
-        away = np.abs(place / lengths[labels][:, None] - parts) - _WINDOW
-        cost = (offsets**2).sum(-1) + (np.maximum(away, 0.0) * lengths[labels][:, None]) ** 2
-        is_nearer = cost < nearest
-        nearest[is_nearer] = cost[is_nearer]
-        at = _components(offsets, part, direction, axes, labels, segment)
-        at[..., 1] += place
-        flat[is_nearer] = at[is_nearer]
+        direction, length = _edges(centres, segment)
+        offsets = points - centres[labels, segment][:, None]
+        along = np.einsum("spi,si->sp", offsets, direction[labels])
+        on_line = np.clip(along, 0.0, length[labels][:, None])
+        # Of a point beside its foot on the line: Pythagoras.
+        square = np.einsum("spi,spi->sp", offsets, offsets) - along**2 + (along - on_line) ** 2
+        away = np.abs((distances[labels, segment][:, None] + on_line) / lengths - parts) - _WINDOW
+        cost = square + (np.maximum(away, 0.0) * lengths) ** 2
+        is_nearer = cost < least
+        least[is_nearer], nearest[is_nearer], places[is_nearer] = cost[is_nearer], segment, on_line[is_nearer]
+    return _components(points, labels, axes, nearest, places)
+
+
+def _edges(centres, segment):
+    """((C, 3) unit direction, (C,) length) of a segment."""
+    edges = centres[:, segment + 1] - centres[:, segment]
+    lengths = np.maximum(np.linalg.norm(edges, axis=1), np.float32(_TINY))
+    return edges / lengths[:, None], lengths
+
+
+def _components(points, labels, axes, nearest, on_line):
+    """(S, P, 3) across, along and above, of points whose foot lies on a segment at a distance from its start."""
+    centres, normals, distances = (array.astype(np.float32) for array in (axes.centres, axes.normals, axes.distances))
+    edges = np.diff(centres, axis=1)
+    lengths = np.maximum(np.linalg.norm(edges, axis=-1), np.float32(_TINY))
+    card = labels[:, None]
+    direction = (edges / lengths[..., None])[card, nearest]
+    offsets = points - centres[card, nearest] - on_line[..., None] * direction
+    first, second = normals[card, nearest], normals[card, nearest + 1]
+    upward = first + (on_line / lengths[card, nearest])[..., None] * (second - first)
+    upward -= np.einsum("spi,spi->sp", upward, direction)[..., None] * direction
+    upward /= np.maximum(np.linalg.norm(upward, axis=-1, keepdims=True), np.float32(_TINY))
+    flat = np.empty(points.shape, np.float32)
+    flat[..., 0] = np.einsum("spi,spi->sp", offsets, np.cross(direction, upward))
+    flat[..., 1] = np.einsum("spi,spi->sp", offsets, direction) + distances[card, nearest] + on_line
+    flat[..., 2] = np.einsum("spi,spi->sp", offsets, upward)
     return flat
-
-
-def _components(offsets, part, direction, axes, labels, segment):
-    """(S, P, 3) offsets from a segment, across, along and above the ribbon there."""
-    first, second = (axes.normals[:, point][labels][:, None] for point in (segment, segment + 1))
-    normals = first + part[..., None] * (second - first)
-    normals -= np.einsum("spi,si->sp", normals, direction)[..., None] * direction[:, None]
-    normals = curve_frames.unit(normals)
-    binormals = np.cross(direction[:, None], normals)
-    pairs = (binormals, direction[:, None], normals)
-    return np.stack([(offsets * axis).sum(-1) for axis in pairs], axis=-1)
