@@ -52,10 +52,8 @@ class CardSettings(Settings):
         low=0,
         high=50_000,
     )
-    texture_size: str = param(
-        "2048",
-        "Width and height of the textures in pixels",
-        choices=tuple((str(2**n), str(2**n), f"{2**n} × {2**n} pixels") for n in range(8, 13)),
+    texture_size: int = param(
+        2048, "Width and height of the textures in pixels; a power of two suits most engines", low=128, high=8192
     )
 
     def levels(self, strand_count: int) -> list[Level]:
@@ -63,7 +61,7 @@ class CardSettings(Settings):
         found = []
         for index in range(self.level_count):
             cards = max(min(self.card_count, strand_count) >> index, 1)
-            size = max(int(self.texture_size) >> index, 128)
+            size = max(self.texture_size >> index, 128)
             found.append(Level(cards, max(self.segment_count >> index, 1), size))
         return found
 
@@ -86,7 +84,7 @@ class TubeSettings(Settings):
     )
     taper: float = param(
         0.0,
-        "How much tubes become thinner towards the tip; 0 keeps the shape of the strands",
+        "How much tubes become thinner toward the tip; 0 keeps the shape of the strands",
         low=0.0,
         high=1.0,
         subtype="FACTOR",

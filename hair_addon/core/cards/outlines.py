@@ -65,23 +65,36 @@ def _at_places(of_segments, farther):
     return np.concatenate([of_segments[:, :1], inner, of_segments[:, -1:]], axis=1)
 
 
-_NEARNESS = 4  # power of how near a point is to a place: others would pull the ends off their strands
+_RIDGE = 1e-4  # of all points' weight: places that none is near to stay on the middle line
 
 
 def heights(flat: np.ndarray, labels: np.ndarray, found: Outlines) -> np.ndarray:
-    """(C, n) mean heights of flattened strands above the middle line at each place of the outlines.
+    """(C, n) heights above the middle line at which a ribbon lies nearest to its flattened strands: least squares.
 
     Where only some strands of a clump are, as at the roots of those that stand behind the others, the mean of all of
-    them is not where these are: a ribbon there would cut into the surface.
+    them is not where these are, and between places strands bend: a ribbon there would cut into the surface.
     """
     count, last = found.along.shape[0], found.along.shape[1] - 1
-    made, onward = np.zeros(found.along.shape), flat[..., 1].astype(np.float64)
+    diagonal, beside, sums = np.zeros((3, last + 1, count))
+    onward, before = flat[..., 1].astype(np.float64), None
     for place in range(last + 1):
-        nearness = _nearness(found.along[labels], onward, place) ** _NEARNESS
-        weights = np.bincount(labels, weights=nearness.sum(axis=1), minlength=count)
-        sums = np.bincount(labels, weights=(nearness * flat[..., 2]).sum(axis=1), minlength=count)
-        made[:, place] = np.where(weights > 1e-9, sums / np.maximum(weights, 1e-9), 0.0)
-    return made
+        near = _nearness(found.along[labels], onward, place)
+        diagonal[place] = np.bincount(labels, weights=(near**2).sum(axis=1), minlength=count)
+        sums[place] = np.bincount(labels, weights=(near * flat[..., 2]).sum(axis=1), minlength=count)
+        if before is not None:
+            beside[place] = np.bincount(labels, weights=(near * before).sum(axis=1), minlength=count)
+        before = near
+    diagonal += _RIDGE * diagonal.sum(axis=0) + 1e-30
+    # The normal equations have three diagonals: elimination downwards, then upwards.
+    for place in range(1, last + 1):
+        share = beside[place] / diagonal[place - 1]
+        diagonal[place] -= share * beside[place]
+        sums[place] -= share * sums[place - 1]
+    made = np.empty(sums.shape)
+    made[last] = sums[last] / diagonal[last]
+    for place in range(last - 1, -1, -1):
+        made[place] = (sums[place] - beside[place + 1] * made[place + 1]) / diagonal[place]
+    return made.T
 
 
 def levelled(flat: np.ndarray, labels: np.ndarray, found: Outlines, lifted: np.ndarray) -> np.ndarray:

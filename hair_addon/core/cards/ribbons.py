@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.closest_point import SurfaceQuery
+from .. import geometry
 from ..geometry.mesh import TriMesh, interpolate
 from . import clusters, curve_frames
 
@@ -53,7 +53,7 @@ def axes_of(points: np.ndarray, labels: np.ndarray, count: int, segment_count: i
 
 def _away(places, surface):
     """(C, n, 3) unit normals of the surface where it is nearest to places."""
-    nearest = SurfaceQuery(surface).nearest(places.reshape(-1, 3).astype(np.float32))
+    nearest = geometry.closest_point.SurfaceQuery(surface).nearest(places.reshape(-1, 3).astype(np.float32))
     return curve_frames.unit(interpolate(surface.vertex_normals, surface, nearest)).reshape(places.shape)
 
 

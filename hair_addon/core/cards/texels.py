@@ -104,6 +104,9 @@ def _filled(sums, weights):
     means = sums / np.maximum(weights, 1e-12)[..., None]
     if len(sums) == 1 or not (weights == 0.0).any():
         return means
+    if len(sums) % 2:
+        wider = _filled(np.pad(sums, ((0, 1), (0, 1), (0, 0))), np.pad(weights, (0, 1)))
+        return wider[:-1, :-1]
     half = len(sums) // 2
     blocks = (means * (weights > 0.0)[..., None]).reshape(half, 2, half, 2, -1).sum(axis=(1, 3))
     counts = (weights > 0.0).astype(np.float32).reshape(half, 2, half, 2).sum(axis=(1, 3))
@@ -112,6 +115,6 @@ def _filled(sums, weights):
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:
-    """Linear values → sRGB's transfer function, from 0 to 1 [IEC61966]."""
+    """Linear values → sRGB's transfer function (IEC 61966-2-1), from 0 to 1."""
     linear = np.clip(linear, 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)

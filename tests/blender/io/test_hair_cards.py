@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Cards and tubes in the scene: what was promised is made, textures show the strands, undo takes all of it away."""
 
+import itertools
+
 import bmesh
 import bpy
 import numpy as np
@@ -33,7 +35,7 @@ def coordinates(mesh):
 
 
 def test_levels_have_the_polygons_and_textures_that_were_promised(hair):
-    settings = CardSettings(card_count=24, segment_count=4, level_count=2, texture_size=str(SIZE))
+    settings = CardSettings(card_count=24, segment_count=4, level_count=2, texture_size=SIZE)
     made = run_now(hair_cards.making_cards(hair.data, settings))
     sphere = bpy.data.objects["Sphere"]
     for index, (level, wanted) in enumerate(zip(made, settings.levels(500), strict=True)):
@@ -59,7 +61,7 @@ def test_cards_are_where_the_strands_are(head, rng):
     bpy.ops.vellus.add_hair(guide_count=30, strand_count=200, length=0.4)
     update()
     strands = world(bpy.context.object).reshape(-1, 3)
-    (cards,) = api.make_hair_cards(bpy.context.object, card_count=60, texture_size=str(SIZE))
+    (cards,) = api.make_hair_cards(bpy.context.object, card_count=60, texture_size=SIZE)
     update()
     places = coordinates(cards.data) @ np.array(cards.matrix_world)[:3, :3].T + np.array(cards.matrix_world)[:3, 3]
     for found, wanted in ((places.min(axis=0), strands.min(axis=0)), (places.max(axis=0), strands.max(axis=0))):
@@ -76,7 +78,7 @@ def test_a_card_covers_as_much_as_its_strands_from_the_same_side(scene):
         guide_count=12, strand_count=60, length=0.2, length_variation=0.3, gravity=0.0, tilt=0.1, radius=4e-4
     )
     hair = bpy.context.object
-    settings = CardSettings(card_count=1, segment_count=1, texture_size="512")
+    settings = CardSettings(card_count=1, segment_count=1, texture_size=512)
     (made,) = run_now(hair_cards.making_cards(hair.data, settings))
     update()
     mesh = made.mesh_object.data
@@ -118,9 +120,7 @@ def test_samples_show_the_nearest_strand_there(rng):
     found = np.concatenate(found)
     y, x = (np.indices(found.shape) + 0.5) / len(found)
     highest, wanted, border = np.full(found.shape, -1.0), np.full(found.shape, texels.NO_STRAND), np.zeros(found.shape)
-    for index, (first, second) in enumerate(
-        (a, b) for strand in places for a, b in zip(strand[:-1], strand[1:], strict=True)
-    ):
+    for index, (first, second) in enumerate((a, b) for strand in places for a, b in itertools.pairwise(strand)):
         edge = second[:2] - first[:2]
         part = ((x - first[0]) * edge[0] + (y - first[1]) * edge[1]) / (edge @ edge)
         away = np.abs((x - first[0]) * edge[1] - (y - first[1]) * edge[0]) / np.linalg.norm(edge)
@@ -134,7 +134,7 @@ def test_samples_show_the_nearest_strand_there(rng):
 
 
 def test_textures_are_written_to_a_folder(hair, tmp_path):
-    bpy.ops.vellus.hair_cards(card_count=10, segment_count=2, texture_size=str(SIZE), folder=str(tmp_path / "textures"))
+    bpy.ops.vellus.hair_cards(card_count=10, segment_count=2, texture_size=SIZE, folder=str(tmp_path / "textures"))
     names = {path.name for path in (tmp_path / "textures").iterdir()}
     assert names == {f"Hair_Cards_LOD0_{kind}.png" for kind in texels.MAPS}
     made = bpy.data.images["Hair Cards LOD0 depth"]
@@ -148,7 +148,7 @@ def test_undo_takes_cards_and_tubes_away(hair):
     bpy.ops.ed.undo_push(message="hair")
     before = {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "collections", "materials")}
     for operator, settings in (
-        (bpy.ops.vellus.hair_cards, {"card_count": 5, "segment_count": 2, "texture_size": str(SIZE)}),
+        (bpy.ops.vellus.hair_cards, {"card_count": 5, "segment_count": 2, "texture_size": SIZE}),
         (bpy.ops.vellus.hair_tubes, {"tube_count": 5}),
     ):
         operator(**settings)
@@ -176,7 +176,7 @@ def test_what_cannot_be_made_is_refused_and_leaves_nothing(hair, tmp_path):
     (tmp_path / "file").touch()
     with pytest.raises(HairError, match="cannot be written"):
         api.make_hair_cards(hair, folder=tmp_path / "file")
-    with pytest.raises(HairError, match="relative to the .blend"):
+    with pytest.raises(HairError, match=r"relative to the \.blend"):
         api.make_hair_cards(hair, folder="//textures")
     bpy.data.hair_curves["Hair"].surface = None
     with pytest.raises(HairError, match="no surface"):

@@ -82,12 +82,12 @@ def test_rectangles_of_any_shape_find_a_place(rng):
 def test_pictures_without_texels_are_refused():
     many = 20_000
     along, ones = np.tile([0.0, 1.0], (many, 1)), np.ones((many, 2))
-    with pytest.raises(HairError, match="do not fit|Too many"):
+    with pytest.raises(HairError, match=r"do not fit|Too many"):
         atlas.atlas(Outlines(along, 0.0 * ones, 0.1 * ones), np.ones(many), 0, 256)
 
 
 def test_levels_halve_and_what_is_too_large_is_refused():
-    levels = CardSettings(card_count=100, segment_count=8, level_count=5, texture_size="1024").levels(10**6)
+    levels = CardSettings(card_count=100, segment_count=8, level_count=5, texture_size=1024).levels(10**6)
     assert [(level.card_count, level.segment_count, level.texture_size) for level in levels] == [
         (100, 8, 1024),
         (50, 4, 512),

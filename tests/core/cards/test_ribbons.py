@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Ribbons: frames, what faces where, and that no strand leaves the ribbon onto which it is laid flat."""
 
+import itertools
+
 import numpy as np
 
 from hair_addon.core.cards import curve_frames, outlines, ribbons
@@ -39,7 +41,9 @@ def test_a_helix_turns_a_steady_frame_by_its_torsion():
 
 
 def test_points_gather_where_a_curve_bends():
-    corner = np.array([[x, 0.0, 0.0] for x in np.linspace(0, 1, 20)] + [[1.0, y, 0.0] for y in np.linspace(0.05, 1, 20)])
+    corner = np.array(
+        [[x, 0.0, 0.0] for x in np.linspace(0, 1, 20)] + [[1.0, y, 0.0] for y in np.linspace(0.05, 1, 20)]
+    )
     found = curve_frames.resample_by_curvature(corner[None], 9)[0]
     np.testing.assert_array_equal(found[[0, -1]], corner[[0, -1]])
     from_corner = np.linalg.norm(found - [1.0, 0.0, 0.0], axis=1)
@@ -95,7 +99,7 @@ def test_ribbons_contain_their_strands(carded):
     found, steps = carded.outlines, np.linspace(0.0, 1.0, 6)[:, None]
     for strand, card in enumerate(carded.labels):
         flat = carded.flat[strand]
-        dense = np.concatenate([a + steps * (b - a) for a, b in zip(flat[:-1], flat[1:], strict=True)])
+        dense = np.concatenate([a + steps * (b - a) for a, b in itertools.pairwise(flat)])
         low = np.interp(dense[:, 1], found.along[card], found.low[card])
         high = np.interp(dense[:, 1], found.along[card], found.high[card])
         radius = carded.radii[strand, 0] - 1e-6
@@ -114,11 +118,17 @@ def test_ribbons_are_lifted_to_the_strands_that_are_there():
     found = outlines.outlines(flat, np.full((40, 30), 1e-4), labels, axes)
     lifted = outlines.heights(flat, labels, found)
     first = [
-        outlines.ribbon_mesh(axes, found, np.zeros((1, 7, 2, 2)), by).vertices[0, 2] - 0.1 for by in (0 * lifted, lifted)
+        outlines.ribbon_mesh(axes, found, np.zeros((1, 7, 2, 2)), by).vertices[0, 2] - 0.1
+        for by in (0 * lifted, lifted)
     ]
     assert first[0] < -0.005 and abs(first[1]) < 0.4 * abs(first[0])
-    level = outlines.levelled(flat, labels, found, lifted)
-    assert np.abs(level[..., 2]).mean() < 0.9 * np.abs(flat[..., 2]).mean()
+    # No other heights are nearer to the strands.
+    least = (outlines.levelled(flat, labels, found, lifted)[..., 2].astype(np.float64) ** 2).sum()
+    for place in range(7):
+        for by in (-2e-4, 2e-4):
+            moved = lifted.copy()
+            moved[0, place] += by
+            assert (outlines.levelled(flat, labels, found, moved)[..., 2].astype(np.float64) ** 2).sum() > least
 
 
 def test_a_single_strand_has_a_ribbon_as_wide_as_itself():

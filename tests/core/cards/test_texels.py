@@ -27,7 +27,7 @@ def seen(strip, per_side=2):
 
 def maps(strip, segments):
     sums = TexelSums(SIZE)
-    for rows in (range(0, 10), range(10, SIZE)):
+    for rows in (range(10), range(10, SIZE)):
         sums.add(segments[2 * rows.start : 2 * rows.stop], strip, 2, np.zeros(2), rows)
     return sums.maps()
 
@@ -57,6 +57,8 @@ def test_empty_texels_are_as_what_is_near(strip):
     found = maps(strip, seen(strip))
     assert (found["color"].sum(axis=-1) > 0.99).all()
     np.testing.assert_allclose(found["root"][:, 0], (np.arange(SIZE) + 0.5) / SIZE, atol=0.3)
+    odd = texels._filled(np.eye(7, dtype=np.float32)[..., None] * 3.0, np.eye(7, dtype=np.float32))
+    np.testing.assert_allclose(odd, 3.0, rtol=1e-6)
     empty = maps(strip, np.full((2 * SIZE, 2 * SIZE), NO_STRAND))
     assert not empty["alpha"].any() and np.isfinite(empty["normal"]).all()
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Tubes: closed, turned outwards, with the polygons that were promised and the volume of their strands."""
 
+import itertools
 from collections import Counter
 
 import numpy as np
@@ -29,7 +30,7 @@ def volumes(mesh, count):
     found, per_tube = np.zeros(count), len(mesh.vertices) // count
     for polygon in polygons(mesh):
         corners = mesh.vertices[polygon].astype(np.float64) - mesh.vertices[polygon[0] // per_tube * per_tube]
-        for second, third in zip(corners[1:-1], corners[2:], strict=True):
+        for second, third in itertools.pairwise(corners):
             found[polygon[0] // per_tube] += np.dot(corners[0], np.cross(second, third)) / 6.0
     return found
 
