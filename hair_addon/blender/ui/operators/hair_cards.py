@@ -32,7 +32,8 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
     def draw(self, context):
         setting_rows.all_rows(self.layout, self.properties, CardSettings)
         setting_rows.row(self.layout, self.properties, "folder")
-        for index, level in enumerate(self._levels(context)):
+        settings = setting_properties.to_settings(self.properties, CardSettings)
+        for index, level in enumerate(settings.levels(hair_meshes.strand_count(hair_of(context.object)))):
             counts = {"cards": level.card_count, "triangles": level.triangle_count, "size": level.texture_size}
             text = interface_text(
                 "Level {level}: {cards} cards, {triangles:,} triangles, {size} × {size} pixels", level=index, **counts
@@ -51,7 +52,3 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
     def message(self, made):
         counts = {"cards": made[0].card_count, "pictures": made[0].picture_count, "triangles": made[0].triangle_count}
         return "{cards} cards with {pictures} pictures, {triangles:,} triangles", counts
-
-    def _levels(self, context):
-        settings = setting_properties.to_settings(self, CardSettings)
-        return settings.levels(hair_meshes.strand_count(hair_of(context.object)))

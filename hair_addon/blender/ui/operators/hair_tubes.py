@@ -26,7 +26,8 @@ class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
 
     def draw(self, context):
         setting_rows.all_rows(self.layout, self.properties, TubeSettings)
-        settings, strands = self._settings(), hair_meshes.strand_count(hair_of(context.object))
+        settings = setting_properties.to_settings(self.properties, TubeSettings)
+        strands = hair_meshes.strand_count(hair_of(context.object))
         counts = {"tubes": settings.count_of(strands), "triangles": settings.triangle_count(strands)}
         text = interface_text("{tubes:,} tubes, {triangles:,} triangles", **counts)
         self.layout.label(text=text, translate=False)
