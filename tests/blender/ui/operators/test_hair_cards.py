@@ -37,7 +37,7 @@ class Asked(AskedOperator):
 
 @pytest.mark.parametrize("is_asking", [True, False])
 def test_what_was_asked_for_is_made_once(hair, monkeypatch, is_asking):
-    """After the dialog by an operator of its own, which Blender can undo; again, as the redo panel does, by this one."""
+    """After the dialog by an operator of its own, which Blender can undo; again, as by the redo panel, by this one."""
     at_once = []
     monkeypatch.setattr(LongOperator, "execute", lambda self, context: at_once.append(self) or {"FINISHED"})
     operator = Asked()
