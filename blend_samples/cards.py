@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands beside the cards that stand for them: `python blend_samples/cards.py` draws docs/cards.png.
+"""Strands beside the cards that stand for them: `python blend_samples/cards.py` draws docs/manual/cards.png.
 
 Two rows, strands and cards, from three sides in the same light, rendered by Cycles.
 """
@@ -32,7 +32,7 @@ BOUNCES = 64  # of rays through transparent parts of cards: more than cards lie 
 def main():
     """Render both rows."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "cards.png")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "manual" / "cards.png")
     parser.add_argument("--style", default="WAVY")
     parser.add_argument("--strands", type=int, default=20_000)
     parser.add_argument("--cards", type=int, default=1500)
