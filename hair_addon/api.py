@@ -24,13 +24,13 @@ In the installed extension this is bl_ext.user_default.vellus.hair_addon.api.
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from .api_arguments import are_arrays, changed, choice, heard, mesh_of, path_of, require_no_names
+from .api_cards import CardSettings, TubeSettings, make_hair_cards, make_hair_tubes
 from .api_dynamics import (
     DynamicsSettings,
     bake_dynamics,
@@ -44,6 +44,7 @@ from .api_export import ExportSettings, export_groom
 from .api_guide_tools import change_guides
 from .api_import import DerivationSettings, TransferSettings, transfer_groom, use_as_guides, use_as_hair
 from .api_library import apply_groom, groom_names, save_groom
+from .api_pictures import draw, render
 from .api_styles import (
     Bend,
     Braid,
@@ -61,7 +62,7 @@ from .api_styles import (
     styles_of,
 )
 from .api_tables import bake_tables, table_settings
-from .core import dynamics, imaging, lazy
+from .core import dynamics, lazy
 from .core.errors import HairError
 from .core.files import settings_file
 from .core.files.settings_file import GroomSettings, require_styles
@@ -69,7 +70,7 @@ from .core.geometry.mesh import TriMesh
 from .core.geometry.strands import Strands, check_strands
 from .core.grooming.groom import GuideSettings, HairSettings
 from .core.long_work import Progress, no_progress, run_now
-from .core.params import Param, plain_value, require_class
+from .core.params import require_class
 from .core.shading import presets
 from .core.shading.appearance import Appearance
 from .core.styling.base import StyleSettings
@@ -85,6 +86,7 @@ __all__ = [
     "Appearance",
     "Bend",
     "Braid",
+    "CardSettings",
     "Clump",
     "Curl",
     "DerivationSettings",
@@ -99,6 +101,7 @@ __all__ = [
     "Smooth",
     "TransferSettings",
     "Trim",
+    "TubeSettings",
     "Wet",
     "add_hair",
     "add_style",
@@ -116,6 +119,8 @@ __all__ = [
     "groom_names",
     "interpolate_hair",
     "load_settings",
+    "make_hair_cards",
+    "make_hair_tubes",
     "points",
     "remove_delivery",
     "render",
@@ -132,7 +137,6 @@ __all__ = [
     "use_as_guides",
     "use_as_hair",
 ]
-_FRAMES = Param("")  # availability in this Blender is checked later
 
 
 # Growing.
@@ -260,50 +264,6 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     blender.groom.groom_settings.assign_look(target, wanted)
     if model is not None:
         target.vellus.model = model
-
-
-# Pictures.
-
-
-def draw(*, progress: Progress = no_progress, **settings: Any) -> np.ndarray:
-    """Draw the scene's hair and meshes from its camera: (height, width, 4) float32.
-
-    Scene-linear and premultiplied, the first row at the bottom; settings: fields of `PictureSettings`
-    (width, height, samples_per_side, is_transparent).
-
-    >>> api.draw(width=64, height=48).shape
-    (48, 64, 4)
-    """
-    sampling = imaging.pixel_sampling
-    wanted = changed(sampling.PictureSettings, None, settings, sampling.FRAME_FIELDS)
-    return run_now(blender.render.offscreen.drawing_picture(wanted), heard(progress))
-
-
-def render(
-    path: str | os.PathLike,
-    *,
-    frame: int | None = None,
-    engine: str = "vellus",
-    progress: Progress = no_progress,
-    **settings: Any,
-) -> Path:
-    """Render a frame of the scene, the current one for None, and write it atomically as .png or .exr.
-
-    engine: "vellus", "cycles" or "eevee"; settings: fields of `PictureSettings` (width, height, sample_count,
-    is_transparent, has_passes), width and height default to the scene's. Returns the path, in which ### is
-    replaced with the frame number.
-
-    >>> api.render("frame_####.png", frame=3, width=64, height=48).name
-    'frame_0003.png'
-    """
-    path, engine, progress = path_of(path), choice(engine, "engine", blender.io.frames.ENGINES), heard(progress)
-    sampling, settings = imaging.pixel_sampling, blender.io.frames.scene_size() | settings
-    wanted = changed(sampling.PictureSettings, None, settings, sampling.DRAWING_FIELDS)
-    frame = plain_value("frame", blender.host.scene_time.present_frame() if frame is None else frame, 1, _FRAMES)
-    blender.io.frames.require_pattern(path, 1)
-    target = blender.io.frames.path_of(path, frame)
-    blender.io.frames.write_frame(target, frame, engine, wanted, progress=progress)
-    return target
 
 
 # Settings.

@@ -210,7 +210,7 @@ def test_native_code_fits_the_columns_of_python(path):
 
 # Files of these folders that others are made of stand beside the others.
 BASES = {
-    "blender/ui/operators": {"base", "modal", "file_browser"},
+    "blender/ui/operators": {"asked", "base", "modal", "file_browser"},
     "blender/ui/operators/guide_tools": {"base"},
     "blender/ui/operators/styles": {"base"},
 }

@@ -60,6 +60,7 @@ _OPERATORS = {
     "use_as_hair": ("use_as_hair", "convert_particles"),
     "transfer_groom": ("transfer_groom",),
     "rendering": ("toggle_composite",),
+    "cards": ("hair_cards", "hair_tubes"),
     "output": ("render_picture", "export_groom", "save_groom_settings", "load_groom_settings"),
 }
 

@@ -9,10 +9,24 @@ import sys
 
 from ..core.errors import HairError
 from ..core.long_work import Stopped
-from . import console, export, groom, info, interruption, paths, render, settings, simulate, tables, transfer
+from . import (
+    cards,
+    console,
+    export,
+    groom,
+    info,
+    interruption,
+    paths,
+    render,
+    settings,
+    simulate,
+    tables,
+    transfer,
+    tubes,
+)
 from .options import Parser
 
-_VERBS = (groom, tables, transfer, simulate, render, export, info, settings)
+_VERBS = (groom, tables, transfer, simulate, render, export, cards, tubes, info, settings)
 
 
 def main(arguments, program):

@@ -36,7 +36,7 @@ def run(given, console):
     blender.io.mesh_files.require_blend(given.input)
     blender.io.groom_export.require_writable(given.out)
     opening.open_file(given, console)
-    chosen = _chosen(given)
+    chosen = chosen_hair(given)
     started = time.perf_counter()
     scene = blender.host.scene_time.present_scene()
     made = run_now(blender.io.groom_export.exporting(given.out, chosen, settings, scene), console.progress)
@@ -49,7 +49,7 @@ def run(given, console):
     console.result(values, f"{made.guides} guides, {made.strands} strands in {seconds:.2f} s: {made.path}")
 
 
-def _chosen(given):
+def chosen_hair(given):
     """The hair Curves to export. Raises `HairError` for a name that no hair has."""
     every = blender.io.groom_sources.all_hair()
     if not given.hair:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from ..core.errors import HairError
 
-_OPTIONS = ("out", "settings", "guides_from", "hair_from", "from_library", "deliver")
+_OPTIONS = ("out", "settings", "guides_from", "hair_from", "from_library", "deliver", "textures")
 
 
 def resolve(given):

@@ -13,13 +13,35 @@ import numpy as np
 import pytest
 import warp
 
-from hair_addon import api, api_dynamics, api_export, api_guide_tools, api_import, api_library, api_styles, api_tables
+from hair_addon import (
+    api,
+    api_cards,
+    api_dynamics,
+    api_export,
+    api_guide_tools,
+    api_import,
+    api_library,
+    api_pictures,
+    api_styles,
+    api_tables,
+)
 from hair_addon.core.placement import cvt
 from tests.support.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
 ROOT = Path(__file__).resolve().parents[2]
-MODULES = (api, api_dynamics, api_guide_tools, api_styles, api_tables, api_export, api_library, api_import)
+MODULES = (
+    api,
+    api_dynamics,
+    api_guide_tools,
+    api_styles,
+    api_tables,
+    api_export,
+    api_library,
+    api_import,
+    api_pictures,
+    api_cards,
+)
 WITHOUT_BLENDER = "import sys\nfor name in ('bpy', 'gpu', 'mathutils', 'imbuf'): sys.modules[name] = None\n"
 
 

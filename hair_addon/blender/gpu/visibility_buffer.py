@@ -15,7 +15,7 @@ from . import drawing, shaders, uniforms
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
-_NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
+NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ class VisibilityBuffer:
         lights, view: records of `uniforms`, lights one of all hair or (H,) of each; in_compute: whether a compute
         program finds the nearest strands, None: where it can.
         """
-        self.segments.clear(format="UINT", value=(_NO_SEGMENT,))
+        self.segments.clear(format="UINT", value=(NO_SEGMENT,))
         draw = self._find if (shaders.has_image_atomics() if in_compute is None else in_compute) else self._draw_strips
         self._hair, first = [], 0
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
@@ -88,7 +88,7 @@ class VisibilityBuffer:
             window = drawing.window_of(strands, record, self.size)
             self._hair.append(_Placed(strands, shading, record, samplers, first, light_block, window))
             first += self._hair[-1].segment_count
-        if first > _NO_SEGMENT:
+        if first > NO_SEGMENT:
             self._hair = []
             raise HairError("Too many strands for one picture: hide some hair or some of its instances.")
         draw()

@@ -29,7 +29,7 @@ def drawing_picture(settings):
         raise HairError(
             f"{settings.width} × {settings.height} pixels exceed {MOST_DRAWN} a side: use fewer, or render a frame."
         )
-    _start_gpu()
+    start_gpu()
     context = bpy.context
     depsgraph = context.evaluated_depsgraph_get()
     lens = camera_lens.read_lens(context.scene, depsgraph)
@@ -55,7 +55,7 @@ def drawing_picture(settings):
     return picture.read()["Combined"]
 
 
-def _start_gpu():
+def start_gpu():
     """Initialise the GPU, which Blender does not do in background mode."""
     if bpy.app.background:
         try:

@@ -79,6 +79,11 @@ def rows(layout, owner, settings_class, names):
             row(layout, owner, details.diameter[0] if details.diameter else name)
 
 
+def all_rows(layout, owner, settings_class):
+    """A row for each setting of a class."""
+    rows(layout, owner, settings_class, others(settings_class))
+
+
 def others(settings_class, *shown):
     """Names of the settings of a class that are in none of some tuples: a new one is never without its row."""
     names = {name for names in shown for name in names}

@@ -47,7 +47,7 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
     segments = np.array(buffer.segments.read(), np.int64).reshape(SIZE[::-1])
     depths = np.array(buffer.depths.read()).astype(np.uint32).reshape(SIZE[::-1]).view(np.float32)
     covered = np.array(buffer.color.read(), np.float32).reshape(*SIZE[::-1], 4)[..., 3] == 1.0
-    np.testing.assert_array_equal(covered, segments != visibility_buffer._NO_SEGMENT)  # what is found is shaded
+    np.testing.assert_array_equal(covered, segments != visibility_buffer.NO_SEGMENT)  # what is found is shaded
     for y, x in np.argwhere(covered)[::97]:
         assert buffer.hair_at(int(x), int(y)) == np.searchsorted(np.cumsum(counts), segments[y, x], side="right")
     assert covered.all() or buffer.hair_at(*map(int, np.argwhere(~covered)[0][::-1])) is None

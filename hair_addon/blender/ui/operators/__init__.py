@@ -9,6 +9,8 @@ from .delete_hair import VELLUS_OT_delete_hair
 from .delete_system import VELLUS_OT_delete_system
 from .distribute_guides import VELLUS_OT_distribute_guides
 from .export_groom import VELLUS_OT_export_groom
+from .hair_cards import VELLUS_OT_hair_cards
+from .hair_tubes import VELLUS_OT_hair_tubes
 from .interpolate_hair import VELLUS_OT_interpolate_hair
 from .load_groom_settings import VELLUS_OT_load_groom_settings
 from .pick_hair import VELLUS_OT_pick_hair
@@ -45,4 +47,6 @@ CLASSES = (
     VELLUS_OT_save_groom_settings,
     VELLUS_OT_load_groom_settings,
     VELLUS_OT_export_groom,
+    VELLUS_OT_hair_cards,
+    VELLUS_OT_hair_tubes,
 )

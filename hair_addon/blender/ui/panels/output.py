@@ -29,6 +29,10 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
             setting_rows.rows(layout, state, RenderSettings, ("composite_shadow", "sample_count"))
         layout.operator("vellus.export_groom", icon="FILE_3D", text="Export Groom…")
         column = layout.column(align=True)
+        column.operator_context = "INVOKE_DEFAULT"
+        column.operator("vellus.hair_cards", icon="MESH_PLANE", text="Hair Cards…")
+        column.operator("vellus.hair_tubes", icon="MESH_CYLINDER", text="Hair Tubes…")
+        column = layout.column(align=True)
         column.operator("vellus.save_groom_settings", icon="EXPORT", text="Save Settings…")
         column.operator("vellus.load_groom_settings", icon="IMPORT", text="Load Settings…")
         column = layout.column(align=True)

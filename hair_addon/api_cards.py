@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python interface's functions of hair for games; api.py offers them."""
+
+import os
+from typing import Any
+
+from .api_arguments import changed, heard, path_of
+from .core import lazy
+from .core.cards.card_settings import CardSettings, TubeSettings
+from .core.long_work import Progress, no_progress, run_now
+
+blender = lazy.Package(".blender", __package__)
+
+Curves = Any
+MeshObject = Any
+
+__all__ = ["CardSettings", "TubeSettings", "make_hair_cards", "make_hair_tubes"]
+
+
+def make_hair_cards(
+    hair: Curves,
+    settings: CardSettings | None = None,
+    *,
+    folder: str | os.PathLike | None = None,
+    progress: Progress = no_progress,
+    **changes: Any,
+) -> list[MeshObject]:
+    """Make cards of hair, with textures drawn of its strands; returns a mesh object for each level, the finest first.
+
+    hair: hair Curves; settings: `CardSettings`; folder: of the textures' .png files, None packs them into the .blend;
+    changes: fields of `CardSettings` by name.
+
+    >>> cards, fewer = api.make_hair_cards(bpy.data.objects["Hair"], card_count=60, segment_count=4, level_count=2)
+    >>> len(cards.data.polygons), len(fewer.data.polygons)
+    (240, 60)
+    """
+    wanted, place = changed(CardSettings, settings, changes), None if folder is None else path_of(folder)
+    work = blender.io.hair_cards.making_cards(blender.data.arguments.curves_of(hair, "HAIR"), wanted, place)
+    return [level.mesh_object for level in run_now(work, heard(progress))]
+
+
+def make_hair_tubes(
+    hair: Curves, settings: TubeSettings | None = None, *, progress: Progress = no_progress, **changes: Any
+) -> MeshObject:
+    """Make a mesh object of the strands of hair, each a closed tube with UV coordinates.
+
+    hair: hair Curves; settings: `TubeSettings`; changes: its fields by name.
+
+    >>> tubes = api.make_hair_tubes(bpy.data.objects["Hair"], tube_count=100, side_count=3, point_count=5)
+    >>> len(tubes.data.vertices)
+    1500
+    """
+    wanted = changed(TubeSettings, settings, changes)
+    work = blender.io.hair_meshes.making_tubes(blender.data.arguments.curves_of(hair, "HAIR"), wanted)
+    return run_now(work, heard(progress)).mesh_object

@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The Python interface's functions of pictures; api.py offers them."""
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .api_arguments import changed, choice, heard, path_of
+from .core import imaging, lazy
+from .core.long_work import Progress, no_progress, run_now
+from .core.params import Param, plain_value
+
+blender = lazy.Package(".blender", __package__)
+
+__all__ = ["draw", "render"]
+_FRAMES = Param("")  # availability in this Blender is checked later
+
+
+def draw(*, progress: Progress = no_progress, **settings: Any) -> np.ndarray:
+    """Draw the scene's hair and meshes from its camera: (height, width, 4) float32.
+
+    Scene-linear and premultiplied, the first row at the bottom; settings: fields of `PictureSettings`
+    (width, height, samples_per_side, is_transparent).
+
+    >>> api.draw(width=64, height=48).shape
+    (48, 64, 4)
+    """
+    sampling = imaging.pixel_sampling
+    wanted = changed(sampling.PictureSettings, None, settings, sampling.FRAME_FIELDS)
+    return run_now(blender.render.offscreen.drawing_picture(wanted), heard(progress))
+
+
+def render(
+    path: str | os.PathLike,
+    *,
+    frame: int | None = None,
+    engine: str = "vellus",
+    progress: Progress = no_progress,
+    **settings: Any,
+) -> Path:
+    """Render a frame of the scene, the current one for None, and write it atomically as .png or .exr.
+
+    engine: "vellus", "cycles" or "eevee"; settings: fields of `PictureSettings` (width, height, sample_count,
+    is_transparent, has_passes), width and height default to the scene's. Returns the path, in which ### is
+    replaced with the frame number.
+
+    >>> api.render("frame_####.png", frame=3, width=64, height=48).name
+    'frame_0003.png'
+    """
+
+    path, engine, progress = path_of(path), choice(engine, "engine", blender.io.frames.ENGINES), heard(progress)
+    sampling, settings = imaging.pixel_sampling, blender.io.frames.scene_size() | settings
+    wanted = changed(sampling.PictureSettings, None, settings, sampling.DRAWING_FIELDS)
+    frame = plain_value("frame", blender.host.scene_time.present_frame() if frame is None else frame, 1, _FRAMES)
+    blender.io.frames.require_pattern(path, 1)
+    target = blender.io.frames.path_of(path, frame)
+    blender.io.frames.write_frame(target, frame, engine, wanted, progress=progress)
+    return target

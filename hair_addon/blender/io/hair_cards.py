@@ -1,0 +1,110 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair → cards: ribbons, textures drawn of the strands, and materials with them, for each level of detail."""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.cards import atlas, clusters, outlines, ribbons, texels
+from ...core.cards.polygon_mesh import PolygonMesh
+from ...core.files.whole_file import require_place
+from ...core.long_work import Stage
+from ..data import card_images, made_meshes
+from ..materials import card_material
+from ..render import card_pictures
+from . import hair_meshes
+
+
+@dataclass(frozen=True)
+class CardLevel:
+    """A level of detail that was made: its object, {map: image}, number of cards and pictures, and triangles."""
+
+    mesh_object: object
+    images: dict
+    card_count: int
+    picture_count: int
+    triangle_count: int
+
+
+@dataclass(frozen=True)
+class _Drawn:
+    """A level before it is in the scene."""
+
+    mesh: PolygonMesh
+    maps: dict
+    card_count: int
+    picture_count: int
+
+
+def making_cards(hair, settings, folder=None):
+    """Make cards of hair Curves, as work in steps; returns [`CardLevel`], the finest first. Raises `HairError`.
+
+    settings: `CardSettings`; folder: of the textures' files, None packs them into the .blend. Nothing is added to the
+    scene before all levels are computed and drawn.
+    """
+    settings.require_size(hair_meshes.strand_count(hair))
+    if folder is not None:
+        require_place(folder / "texture.png")
+    yield Stage("Reading strands", 0.0)
+    read = hair_meshes.read_hair(hair)
+    levels = settings.levels(len(read.points))
+    drawn = []
+    for index, level in enumerate(levels):
+        drawn.append((yield from _drawing(read, level, settings.picture_count, index / len(levels))))
+    return _written(read, drawn, folder)
+
+
+def _drawing(read, level, picture_count, part):
+    mesh, placed, drawn_count = yield lambda progress: _flat_cards(read, level, picture_count, progress)
+    yield Stage("Drawing cards", part)
+    picture = card_pictures.CardPicture(placed, level.texture_size)
+    sums = texels.TexelSums(level.texture_size)
+    for turn in range(card_pictures.PASSES):
+        for rows in picture.strips():
+            yield Stage("Drawing cards", part)
+            segments, shift = picture.segments(rows, turn)
+            yield _adding(sums, segments, placed, shift, rows)
+    return _Drawn(mesh, sums.maps(), level.card_count, drawn_count)
+
+
+def _adding(sums, segments, placed, shift, rows):
+    return lambda _progress: sums.add(segments, placed, card_pictures.PER_SIDE, shift, rows)
+
+
+def _flat_cards(read, level, picture_count, progress):
+    """(mesh in local coordinates, `PlacedStrands`, number of pictures)."""
+    count = level.card_count
+    labels = clusters.clusters(clusters.strand_features(read.points), count, progress)
+    progress("Making cards", 1.0)
+    axes = ribbons.axes_of(read.points, labels, count, level.segment_count, read.surface)
+    flat = ribbons.flattened(read.points, labels, axes)
+    found = outlines.outlines(flat, read.radii, labels, axes)
+    lifted = outlines.heights(flat, labels, found)
+    flat = outlines.levelled(flat, labels, found, lifted)
+    places = atlas.atlas(found, np.bincount(labels, minlength=count), picture_count, level.texture_size)
+    strands, points, radii = places.placed(flat, read.radii, labels, found.boxes)
+    heights = float(points[..., 2].min()), float(points[..., 2].max())
+    ids = np.random.default_rng(0).permutation(len(strands)) / max(len(strands) - 1, 1)
+    placed = texels.PlacedStrands(points, radii, read.colors()[strands], ids.astype(np.float32), heights)
+    mesh = outlines.ribbon_mesh(axes, found, places.uvs(found), lifted)
+    return read.local(mesh), placed, len(places.shown)
+
+
+def _written(read, drawn, folder):
+    surface_object = read.surface_object.find()
+    name = f"{read.name} Cards"
+    images = []
+    for index, level in enumerate(drawn):
+        stem = re.sub(r"[^\w.-]+", "_", f"{name}_LOD{index}")
+        images.append(card_images.new_images(f"{name} LOD{index}", level.maps, folder, stem))
+    collection, made = made_meshes.new_collection(name, surface_object), []
+    for index, (level, its) in enumerate(zip(drawn, images, strict=True)):
+        title = f"{name} LOD{index}"
+        material = card_material.new_material(title, read.look, its)
+        mesh_object = made_meshes.new_object(title, level.mesh, surface_object, collection, material)
+        if index:
+            made_meshes.hide(mesh_object)
+        counts = level.card_count, level.picture_count, level.mesh.triangle_count
+        made.append(CardLevel(mesh_object, its, *counts))
+    return made

@@ -1,0 +1,106 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair → meshes for games: strands as arrays beside their surface, and tubes."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...core.cards import tubes
+from ...core.cards.polygon_mesh import PolygonMesh
+from ...core.errors import HairError
+from ...core.geometry.mesh import TriMesh
+from ...core.long_work import Stage
+from ...core.shading import strand_colors
+from ...core.shading.appearance import Appearance
+from ..data import curves, exported_curves, made_meshes, scene
+from ..host import scene_time
+from ..host.datablocks import Remembered
+from ..host.notices import name_of
+from ..materials import card_material
+from ..settings import properties
+from . import strand_arrays
+
+
+@dataclass(frozen=True)
+class HairBeside:
+    """Strands of length above zero in world axes around their surface's origin, in the scene's unit.
+
+    points (S, P, 3), radii (S, P), randoms (S,); surface: the posed mesh there; to_local (3, 3): to its coordinates.
+    """
+
+    name: str
+    surface_object: Remembered
+    points: np.ndarray
+    radii: np.ndarray
+    randoms: np.ndarray
+    look: Appearance
+    surface: TriMesh
+    to_local: np.ndarray
+
+    def colors(self) -> np.ndarray:
+        """Linear RGB (S, P, 3)."""
+        return strand_colors.colors(self.look, self.randoms, self.points.shape[1])
+
+    def local(self, made: PolygonMesh) -> PolygonMesh:
+        """A mesh in the surface's local coordinates."""
+        faces = made.faces
+        return replace(made, vertices=(made.vertices @ self.to_local.T).astype(np.float32), faces=faces)
+
+
+def read_hair(hair):
+    """`HairBeside` of hair Curves, where they are now. Raises `HairError`."""
+    surface_object = hair.surface
+    if surface_object is None:
+        raise HairError('"{name}" has no surface: attach it to a mesh.', name=name_of(hair))
+    metres = strand_arrays.metres_per_unit(scene_time.present_scene())
+    points = strand_arrays.world_points(hair) / metres - np.array(surface_object.matrix_world.translation)
+    if not np.isfinite(points).all():
+        raise HairError('"{name}" has points with non-finite coordinates: regenerate the hair.', name=name_of(hair))
+    radii = exported_curves.read_radii(hair, points.shape[1])(slice(None)) * (strand_arrays.world_scale(hair) / metres)
+    is_hair = np.linalg.norm(np.diff(points, axis=1), axis=-1).sum(axis=1) > 1e-9
+    if not is_hair.any():
+        raise HairError('"{name}" has no strands.', name=name_of(hair))
+    surface = scene.read_surface(surface_object, scene.present_depsgraph())
+    return HairBeside(
+        name_of(hair),
+        Remembered(surface_object),
+        points[is_hair].astype(np.float32),
+        radii[is_hair].astype(np.float32),
+        curves.read_randoms(hair)[is_hair],
+        properties.look_of(hair.vellus),
+        surface.posed_mesh,
+        surface.to_local_axes,
+    )
+
+
+def strand_count(hair):
+    """Number of strands of hair Curves, as they are now; panels ask for it."""
+    return len(hair.curves)
+
+
+@dataclass(frozen=True)
+class MadeTubes:
+    """The object of tubes, their number, and its polygons."""
+
+    mesh_object: object
+    tube_count: int
+    triangle_count: int
+
+
+def making_tubes(hair, settings):
+    """Make a mesh object of strands as tubes, as work in steps; returns `MadeTubes`. Raises `HairError`."""
+    settings.require_size(strand_count(hair))
+    yield Stage("Reading strands", 0.0)
+    read = read_hair(hair)
+    made = yield lambda progress: _tubes(read, settings, progress)
+    surface_object = read.surface_object.find()
+    name = f"{read.name} Tubes"
+    collection = made_meshes.new_collection(name, surface_object)
+    material = card_material.new_material(name, read.look)
+    mesh_object = made_meshes.new_object(name, made, surface_object, collection, material)
+    return MadeTubes(mesh_object, settings.count_of(len(read.points)), made.triangle_count)
+
+
+def _tubes(read, settings, progress):
+    progress("Making tubes", 0.2)
+    return read.local(tubes.tubes(read.points, read.radii, settings))

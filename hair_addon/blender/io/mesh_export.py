@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Mesh objects → a file of their own for engines, or the whole scene as a .blend."""
+
+import bpy
+
+from ...core.errors import HairError
+from ...core.files.whole_file import require_place, whole_file
+from ..host import paths
+
+
+def _blend(path):
+    return bpy.ops.wm.save_as_mainfile(filepath=path, copy=True, relative_remap=True)
+
+
+def _gltf(path):
+    return bpy.ops.export_scene.gltf(filepath=path, export_format="GLB", use_selection=True, export_tangents=True)
+
+
+def _fbx(path):
+    return bpy.ops.export_scene.fbx(filepath=path, use_selection=True, object_types={"MESH"}, use_tspace=True)
+
+
+def _usd(path):
+    return bpy.ops.wm.usd_export(filepath=path, selected_objects_only=True, export_textures_mode="KEEP")
+
+
+def _obj(path):
+    return bpy.ops.wm.obj_export(filepath=path, export_selected_objects=True, export_materials=False)
+
+
+# Ending → (export, operator that does it, whether the file has the textures in it).
+_FORMATS = {
+    ".blend": (_blend, "wm.save_as_mainfile", True),
+    ".glb": (_gltf, "export_scene.gltf", True),
+    ".fbx": (_fbx, "export_scene.fbx", False),
+    ".usdc": (_usd, "wm.usd_export", False),
+    ".obj": (_obj, "wm.obj_export", False),
+}
+ENDINGS = tuple(_FORMATS)
+
+
+def require_writable(path):
+    """Raise `HairError` unless meshes could be written to a path, by its ending, with what Blender has."""
+    ending = path.suffix.lower()
+    if ending not in _FORMATS:
+        raise HairError(
+            "Meshes are exported as {endings}, not as {ending}.",
+            endings=", ".join(ENDINGS),
+            ending=ending or "a file without an extension",
+        )
+    if not paths.has_operator(_FORMATS[ending][1]):
+        raise HairError(f"{path} cannot be written: this build of Blender lacks its exporter, {_FORMATS[ending][1]}.")
+    require_place(path)
+
+
+def has_textures(path):
+    """Whether the file at a path has textures in it."""
+    return _FORMATS[path.suffix.lower()][2]
+
+
+def write(path, objects):
+    """Write mesh objects of the view layer, and nothing else but in a .blend. Raises `HairError`."""
+    require_writable(path)
+    for other in bpy.context.view_layer.objects:
+        other.select_set(False)
+    for chosen in objects:
+        chosen.hide_set(False)
+        chosen.select_set(True)
+    export = _FORMATS[path.suffix.lower()][0]
+    with whole_file(path) as partial:
+        export(str(partial))

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Which strand each sample of a texture shows, of strands laid flat: drawn as hair is, from above."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...core.cards.texels import NO_STRAND
+from ..gpu import drawing, strand_textures, uniforms
+from ..gpu.visibility_buffer import NO_SEGMENT, VisibilityBuffer
+from . import offscreen
+
+PER_SIDE = 2  # samples of a texel in each pass
+PASSES = 4
+_MOST_SAMPLES = 2**24  # of a strip
+
+
+@dataclass(frozen=True)
+class _Opaque:
+    """In place of a `Shading`: strands are found, and not shaded."""
+
+    opacity: float = 1.0
+    forward: tuple = (0.0, 0.0, 0.0)
+    reflectance: tuple = (0.0, 0.0, 0.0)
+
+
+class CardPicture:
+    """`PlacedStrands` drawn into strips of a square texture of `size` texels a side."""
+
+    def __init__(self, strands, size):
+        offscreen.start_gpu()
+        self._strands = strand_textures.upload_strands(strands.places, strands.radii)
+        self._side = size * PER_SIDE
+        self._strip = min(max(_MOST_SAMPLES // self._side // PER_SIDE, 1), size)  # rows of texels
+        low, high = (float(strands.places[..., 2].min()), float(strands.places[..., 2].max()))
+        depth = 0.9 / max(high - low, 1e-9) * 2.0
+        self._view_to_clip = np.array(
+            [[2.0, 0.0, 0.0, -1.0], [0.0, 2.0, 0.0, -1.0], [0.0, 0.0, -depth, 0.5 * depth * (low + high)], [0, 0, 0, 1]]
+        )
+        self._size = size
+
+    def strips(self):
+        """Ranges of rows of texels."""
+        return [range(row, min(row + self._strip, self._size)) for row in range(0, self._size, self._strip)]
+
+    def segments(self, rows, turn):
+        """((rows · PER_SIDE, size · PER_SIDE) segment that each sample of a pass shows, (2,) shift of the samples)."""
+        tile = (0, rows.start * PER_SIDE, self._side, len(rows) * PER_SIDE)
+        with drawing.ALONE:
+            buffer = VisibilityBuffer(*tile[2:])
+            with buffer.surfaces():
+                pass
+            view = drawing.pass_record(np.eye(4), self._view_to_clip, (self._side, self._side), turn, tile)
+            hair = [(self._strands, _Opaque(), np.eye(4), np.zeros(3), {}, drawing.Steps())]
+            buffer.find_hair(hair, uniforms.LIGHTS.record(), view)
+            found = np.asarray(buffer.segments.read()).astype(np.int32).reshape(tile[3], tile[2])
+        found[found == NO_SEGMENT] = NO_STRAND
+        return found, drawing.pass_shift(turn)

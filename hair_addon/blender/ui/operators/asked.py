@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Base of long operators that show their settings, and what they will make, before they begin."""
+
+import bpy
+
+from .modal import LongOperator
+
+_WIDTH = 360  # of the dialog [pixels]
+
+
+class AskedOperator(LongOperator):
+    """Mixin of operators that open a dialog unless they are given a setting."""
+
+    _is_asking = False
+
+    def invoke(self, context, event):
+        """Ask, or begin."""
+        is_given = any(map(self.properties.is_property_set, self.properties.bl_rna.properties.keys()))
+        if is_given or bpy.app.background:
+            return super().invoke(context, event)
+        self._is_asking = True
+        return context.window_manager.invoke_props_dialog(self, width=_WIDTH)
+
+    def execute(self, context):
+        """Compute at once, or begin after the dialog, which Blender does not wait for."""
+        if not self._is_asking:
+            return super().execute(context)
+        self._is_asking = False
+        category, name = self.bl_idname.split(".")
+        begun = getattr(getattr(bpy.ops, category), name)("INVOKE_DEFAULT", **self.as_keywords())
+        # Work that goes on is an undo step of its own when it is done.
+        return begun & {"FINISHED"} or {"CANCELLED"}

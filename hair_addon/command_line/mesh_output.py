@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What the commands that make meshes of hair have in common: input, output, report."""
+
+import time
+
+from ..core import lazy
+from . import export, opening, options
+
+blender = lazy.Package("..blender", __package__)
+
+_ENDINGS = ".blend, .glb, .fbx, .usdc, .obj"
+
+
+def add(parser):
+    """Add the options of input and output."""
+    parser.add_argument("input", help=".blend file")
+    parser.add_argument("--out", required=True, metavar="FILE", help=f"file to write: {_ENDINGS}")
+    parser.add_argument("--hair", action="append", metavar="NAME", help="hair to convert; may be repeated [all]")
+    options.add_scripts(parser)
+
+
+def make(given, console, made_of):
+    """Open the input, make meshes of each hair and write them; made_of(hair): ([object], {what is counted: count})."""
+    blender.io.mesh_files.require_blend(given.input)
+    blender.io.mesh_export.require_writable(given.out)
+    opening.open_file(given, console)
+    started, objects, told = time.perf_counter(), [], []
+    for hair in export.chosen_hair(given):
+        made, counts = made_of(hair)
+        objects += made
+        told.append({"hair": blender.host.notices.name_of(hair), **counts})
+    blender.io.mesh_export.write(given.out, objects)
+    seconds = time.perf_counter() - started
+    values = {"verb": given.run.__module__.rpartition(".")[2], "input": str(given.input), "out": str(given.out)}
+    said = f"{len(objects)} meshes in {seconds:.2f} s: {given.out}"
+    console.result(values | {"made": told, "bytes": given.out.stat().st_size, "seconds": round(seconds, 3)}, said)

@@ -1,0 +1,21 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair for games: clumps of strands as cards with an atlas of their pictures, and strands as tubes."""
+
+from typing import TYPE_CHECKING
+
+from ..lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        atlas,
+        card_settings,
+        clusters,
+        curve_frames,
+        outlines,
+        polygon_mesh,
+        ribbons,
+        texels,
+        tubes,
+    )
+else:
+    __getattr__ = submodules(__name__)

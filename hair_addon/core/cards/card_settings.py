@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Settings of cards and tubes, and how many polygons they ask for."""
+
+from dataclasses import dataclass
+
+from ..errors import HairError
+from ..params import Settings, param
+
+MOST_TRIANGLES = 5_000_000  # of a mesh: beyond it, Blender's own tools stall
+
+
+@dataclass(frozen=True)
+class Level:
+    """A level of detail that was asked for: number of cards, segments of each, side of the textures [pixels]."""
+
+    card_count: int
+    segment_count: int
+    texture_size: int
+
+    @property
+    def triangle_count(self) -> int:
+        """Triangles of the level."""
+        return 2 * self.card_count * self.segment_count
+
+    @property
+    def vertex_count(self) -> int:
+        """Vertices of the level."""
+        return 2 * self.card_count * (self.segment_count + 1)
+
+
+@dataclass(frozen=True)
+class CardSettings(Settings):
+    """Ribbons in place of clumps of strands, and textures of the strands."""
+
+    card_count: int = param(
+        600, "Number of cards; more cards follow the hair more closely", label="Cards", low=1, high=50_000
+    )
+    segment_count: int = param(
+        8, "Segments along each card; more of them follow bends more closely", label="Segments", low=1, high=64
+    )
+    level_count: int = param(
+        1,
+        "Levels of detail; each has half the cards of the one before, with half the segments and half the texture size",
+        label="Levels",
+        low=1,
+        high=8,
+    )
+    picture_count: int = param(
+        0,
+        "Number of pictures in the textures; similar cards share one. With zero each card has its own",
+        label="Pictures",
+        low=0,
+        high=50_000,
+    )
+    texture_size: int = param(
+        2048, "Width and height of the textures in pixels; a power of two suits most engines", low=128, high=8192
+    )
+
+    def levels(self, strand_count: int) -> list[Level]:
+        """What is asked for of so many strands, the finest first. A card has a strand at least."""
+        found = []
+        for index in range(self.level_count):
+            cards = max(min(self.card_count, strand_count) >> index, 1)
+            size = max(self.texture_size >> index, 128)
+            found.append(Level(cards, max(self.segment_count >> index, 1), size))
+        return found
+
+    def require_size(self, strand_count: int) -> None:
+        """Raise `HairError` where a mesh would have too many triangles."""
+        _require(self.levels(strand_count)[0].triangle_count)
+
+
+@dataclass(frozen=True)
+class TubeSettings(Settings):
+    """Strands as tubes."""
+
+    tube_count: int = param(
+        2000, "Number of strands to convert, evenly chosen; zero converts all", label="Tubes", low=0, soft_high=20_000
+    )
+    side_count: int = param(4, "Sides of each tube", label="Sides", low=3, high=32)
+    point_count: int = param(12, "Points along each tube", label="Points", low=2, high=512)
+    thickness: float = param(
+        1.0, "Thickness of tubes as a multiple of the strands' thickness", above=0.0, soft_high=20.0
+    )
+    taper: float = param(
+        0.0,
+        "How much tubes become thinner toward the tip; 0 keeps the shape of the strands",
+        low=0.0,
+        high=1.0,
+        subtype="FACTOR",
+    )
+
+    def count_of(self, strand_count: int) -> int:
+        """Number of tubes of so many strands."""
+        return min(self.tube_count or strand_count, strand_count)
+
+    def vertex_count(self, strand_count: int) -> int:
+        """Vertices of all tubes."""
+        return self.count_of(strand_count) * self.side_count * self.point_count
+
+    def triangle_count(self, strand_count: int) -> int:
+        """Triangles of all tubes, with their ends."""
+        of_one = 2 * self.side_count * (self.point_count - 1) + 2 * (self.side_count - 2)
+        return self.count_of(strand_count) * of_one
+
+    def require_size(self, strand_count: int) -> None:
+        """Raise `HairError` where the mesh would have too many triangles."""
+        _require(self.triangle_count(strand_count))
+
+
+def _require(triangle_count):
+    if triangle_count > MOST_TRIANGLES:
+        raise HairError(
+            "{count} triangles exceed {most}: use fewer cards or tubes, or fewer points of each.",
+            count=triangle_count,
+            most=MOST_TRIANGLES,
+        )

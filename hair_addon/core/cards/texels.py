@@ -1,0 +1,120 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Textures of cards: means over the samples of each texel of what strands are there."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+MAPS = ("color", "alpha", "normal", "depth", "root", "id")
+NO_STRAND = -1
+
+
+@dataclass(frozen=True)
+class PlacedStrands:
+    """Strands in a texture: places (M, P, 3) from 0 to 1 and heights, radii (M, P), colors linear (M, P, 3), ids (M,).
+
+    heights: (lowest, highest) in the same unit, of depth 0 and 1.
+    """
+
+    places: np.ndarray
+    radii: np.ndarray
+    colors: np.ndarray
+    ids: np.ndarray
+    heights: tuple[float, float]
+
+
+class TexelSums:
+    """Sums over samples of square textures of `size` texels a side."""
+
+    def __init__(self, size: int) -> None:
+        self.size, self._sample_count = size, 0
+        self._covered = np.zeros(size * size)
+        self._sums = np.zeros((9, size * size), np.float32)
+
+    def add(self, segments: np.ndarray, strands: PlacedStrands, per_side: int, shift: np.ndarray, rows: range) -> None:
+        """Add a pass of per_side² samples a texel, of some rows of texels.
+
+        segments: (len(rows) · per_side, size · per_side) segment M · (P - 1) + piece that a sample shows, `NO_STRAND`
+        for none, the first row at the bottom; shift: (2,) [samples] how far the picture was moved.
+        """
+        if rows.start == 0:
+            self._sample_count += per_side**2
+        wide = self.size * per_side
+        seen = np.flatnonzero(segments.ravel() != NO_STRAND)
+        shown = segments.ravel()[seen]
+        y, x = np.divmod(seen, wide)
+        y += rows.start * per_side
+        texels = (y // per_side) * self.size + x // per_side
+        centres = (np.stack([x, y], axis=1) + 0.5 - shift) / wide
+        values = _sampled(strands, shown, centres, 1.0 / self.size)
+        self._covered += np.bincount(texels, minlength=len(self._covered))
+        for sums, value in zip(self._sums, values, strict=True):
+            sums += np.bincount(texels, weights=value, minlength=len(self._covered))
+
+    def maps(self) -> dict[str, np.ndarray]:
+        """{map: (size, size) or (size, size, 3) float32} of `MAPS`, from 0 to 1, the first row at the bottom.
+
+        Color is linear RGB, and normals are coded as tangent space from -1 to 1. Where there is no strand, they are
+        as near by.
+        """
+        side = self.size, self.size
+        alpha = (self._covered / self._sample_count).reshape(side).astype(np.float32)
+        means = _filled(self._sums.T.reshape(*side, 9), self._covered.reshape(side).astype(np.float32))
+        normals = means[..., 3:6] / np.maximum(np.linalg.norm(means[..., 3:6], axis=-1, keepdims=True), 1e-12)
+        shades = {name: means[..., 6 + index].clip(0.0, 1.0) for index, name in enumerate(("depth", "root", "id"))}
+        return {"color": means[..., :3], "alpha": alpha, "normal": 0.5 * normals + 0.5, **shades}
+
+
+def _sampled(strands, segments, centres, texel):
+    """(9, N) color, normal, depth, part from root to tip and identity of samples at (N, 2) centres.
+
+    texel: the width of one. Strands thinner than that are flat: their two sides fall into one texel.
+    """
+    pieces = strands.places.shape[1] - 1
+    strand, piece = np.divmod(segments, pieces)
+    first, second = strands.places[strand, piece], strands.places[strand, piece + 1]
+    edge = second - first
+    flat = edge[:, :2]
+    square = np.maximum((flat**2).sum(axis=1), 1e-18)
+    offset = centres - first[:, :2]
+    part = np.clip((offset * flat).sum(axis=1) / square, 0.0, 1.0)
+    mix = part[:, None]
+    colors = strands.colors[strand, piece] * (1.0 - mix) + strands.colors[strand, piece + 1] * mix
+    across = (offset[:, 1] * flat[:, 0] - offset[:, 0] * flat[:, 1]) / np.sqrt(square)
+    radius = strands.radii[strand, piece] * (1.0 - part) + strands.radii[strand, piece + 1] * part
+    roundness = np.minimum(2.0 * radius / texel, 1.0)
+    normals = _normals(edge, roundness * np.clip(across / np.maximum(radius, 1e-12), -1.0, 1.0))
+    low, high = strands.heights
+    depth = (first[:, 2] + part * edge[:, 2] - low) / max(high - low, 1e-12)
+    return np.stack([*colors.T, *normals.T, depth, (piece + part) / pieces, strands.ids[strand]])
+
+
+def _normals(edges, across):
+    """(N, 3) unit normals of fibres that are seen from above, at a part from -1 to 1 of their width."""
+    tangents = edges / np.maximum(np.linalg.norm(edges, axis=1, keepdims=True), 1e-12)
+    facing = np.array([0.0, 0.0, 1.0]) - tangents[:, 2:] * tangents
+    length = np.linalg.norm(facing, axis=1, keepdims=True)
+    facing = np.where(length > 1e-6, facing / np.maximum(length, 1e-6), (0.0, 0.0, 1.0))
+    side = np.cross(facing, tangents)  # towards growing `across`
+    return np.sqrt(1.0 - across**2)[:, None] * facing + across[:, None] * side
+
+
+def _filled(sums, weights):
+    """(n, n, k) means; those without weight from the next coarser level of a pyramid that has some."""
+    means = sums / np.maximum(weights, 1e-12)[..., None]
+    if len(sums) == 1 or not (weights == 0.0).any():
+        return means
+    if len(sums) % 2:
+        wider = _filled(np.pad(sums, ((0, 1), (0, 1), (0, 0))), np.pad(weights, (0, 1)))
+        return wider[:-1, :-1]
+    half = len(sums) // 2
+    blocks = (means * (weights > 0.0)[..., None]).reshape(half, 2, half, 2, -1).sum(axis=(1, 3))
+    counts = (weights > 0.0).astype(np.float32).reshape(half, 2, half, 2).sum(axis=(1, 3))
+    coarse = np.repeat(np.repeat(_filled(blocks, counts), 2, axis=0), 2, axis=1)
+    return np.where((weights > 0.0)[..., None], means, coarse)
+
+
+def srgb(linear: np.ndarray) -> np.ndarray:
+    """Linear values → sRGB's transfer function (IEC 61966-2-1), from 0 to 1."""
+    linear = np.clip(linear, 0.0, 1.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)

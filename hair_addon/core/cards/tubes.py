@@ -1,0 +1,71 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands → closed tubes around them."""
+
+import numpy as np
+
+from ..errors import HairError
+from ..geometry.mesh import Faces
+from . import curve_frames
+from .card_settings import TubeSettings
+from .polygon_mesh import PolygonMesh
+
+_LEAST_RADIUS = 0.01  # of the strand's own: rings of the tip keep an area
+
+
+def chosen_strands(strand_count: int, tube_count: int) -> np.ndarray:
+    """(tube_count,) indices of strands, evenly spread over all."""
+    return np.arange(tube_count) * strand_count // max(tube_count, 1)
+
+
+def tubes(points: np.ndarray, radii: np.ndarray, settings: TubeSettings) -> PolygonMesh:
+    """Make a tube of each strand: (S, P, 3) points, resampled by curvature, and (S, P) radii in the same unit.
+
+    Both ends are closed. U goes around, V from root 0 to tip 1; the ends have the coordinates of their rings.
+    Raises `HairError`.
+    """
+    if not np.isfinite(points).all():
+        raise HairError("Some strands have non-finite coordinates: regenerate the hair.")
+    settings.require_size(len(points))
+    chosen = chosen_strands(len(points), settings.count_of(len(points)))
+    curves = curve_frames.resample_by_curvature(points[chosen], settings.point_count)
+    normals = curve_frames.steady_normals(curves)
+    binormals = np.cross(curve_frames.tangents(curves), normals)
+    along = _parts(curves)
+    at_points = np.linspace(0.0, 1.0, radii.shape[1])
+    widths = np.stack([np.interp(part, at_points, row) for part, row in zip(along, radii[chosen], strict=True)])
+    widths *= settings.thickness * np.maximum(1.0 - settings.taper * along, _LEAST_RADIUS)
+    turns = np.arange(settings.side_count) * (2.0 * np.pi / settings.side_count)
+    across = np.cos(turns)[:, None] * normals[:, :, None] + np.sin(turns)[:, None] * binormals[:, :, None]
+    vertices = curves[:, :, None] + widths[:, :, None, None] * across
+    faces, uvs = _topology(len(chosen), settings.point_count, settings.side_count)
+    rows = np.clip(uvs[:, 1].astype(int), 0, None)  # V is a row of points until here
+    uvs[:, 1] = along.ravel()[rows]
+    return PolygonMesh(vertices.reshape(-1, 3).astype(np.float32), faces, uvs.astype(np.float32))
+
+
+def _parts(curves):
+    """(C, P) part of the length up to each point."""
+    lengths = np.linalg.norm(np.diff(curves, axis=1), axis=-1)
+    sums = np.concatenate([np.zeros((len(curves), 1)), np.cumsum(lengths, axis=1)], axis=1)
+    return sums / np.maximum(sums[:, -1:], 1e-12)
+
+
+def _topology(count, points, sides):
+    """(faces, (corners, 2) U and row of points): quadrilaterals of each tube, then its two ends."""
+    ring, side = (grid.ravel() for grid in np.meshgrid(np.arange(points - 1), np.arange(sides), indexing="ij"))
+    after = (side + 1) % sides
+    quads = np.stack(
+        [ring * sides + side, ring * sides + after, (ring + 1) * sides + after, (ring + 1) * sides + side], axis=1
+    )
+    quad_u = np.stack([side, side + 1, side + 1, side], axis=1) / sides
+    quad_rows = np.stack([ring, ring, ring + 1, ring + 1], axis=1)
+    root, tip = np.arange(sides)[::-1], (points - 1) * sides + np.arange(sides)
+    corners = np.concatenate([quads.ravel(), root, tip])
+    rows = np.concatenate([quad_rows.ravel(), np.zeros(sides), np.full(sides, points - 1)])
+    around = np.concatenate([quad_u.ravel(), np.arange(sides)[::-1] / sides, np.arange(sides) / sides])
+    sizes = np.concatenate([np.full(len(quads), 4), [sides, sides]])
+    first = np.arange(count)[:, None]
+    every = (corners + first * (points * sides)).ravel().astype(np.int32)
+    starts = np.concatenate([[0], np.cumsum(np.tile(sizes, count))]).astype(np.int32)
+    uvs = np.stack([np.tile(around, count), (rows + first * points).ravel()], axis=1)
+    return Faces(every, starts), uvs

@@ -1,0 +1,48 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The dialogs of cards and tubes: the polygons that they name are those that are made."""
+
+import bpy
+import pytest
+
+from hair_addon.blender.ui.operators.asked import AskedOperator
+from hair_addon.blender.ui.operators.modal import LongOperator
+from tests.support.layout import redo_panel
+
+
+def test_polygons_are_named_before_they_are_made(hair):
+    values = {"card_count": 40, "segment_count": 3, "level_count": 2, "texture_size": 256}
+    texts = redo_panel("hair_cards", **values).texts
+    assert "Level 0: 40 cards, 240 triangles, 256 × 256 pixels" in texts
+    assert "Level 1: 20 cards, 40 triangles, 128 × 128 pixels" in texts
+    bpy.ops.vellus.hair_cards(**values)
+    meshes = [bpy.data.meshes[f"Hair Cards LOD{level}"] for level in (0, 1)]
+    assert [2 * len(mesh.polygons) for mesh in meshes] == [240, 40]
+    bpy.ops.vellus.hair_tubes(side_count=4, point_count=5, tube_count=0)
+    mesh = bpy.data.meshes["Hair Tubes"]
+    mesh.calc_loop_triangles()
+    assert (
+        f"500 tubes, {len(mesh.loop_triangles):,} triangles"
+        in redo_panel("hair_tubes", side_count=4, point_count=5, tube_count=0).texts
+    )
+
+
+class Asked(AskedOperator):
+    """Stands in for a registered operator, which only Blender can make."""
+
+    bl_idname = "vellus.hair_tubes"
+
+    def as_keywords(self):
+        return {"tube_count": 3}
+
+
+@pytest.mark.parametrize("is_asking", [True, False])
+def test_what_was_asked_for_is_made_once(hair, monkeypatch, is_asking):
+    """After the dialog by an operator of its own, which Blender can undo; again, as by the redo panel, by this one."""
+    at_once = []
+    monkeypatch.setattr(LongOperator, "execute", lambda self, context: at_once.append(self) or {"FINISHED"})
+    operator = Asked()
+    operator._is_asking = is_asking
+    assert operator.execute(bpy.context) == {"FINISHED"}
+    assert len(at_once) == 1 and (at_once[0] is operator) != is_asking
+    operator.execute(bpy.context)
+    assert at_once[-1] is operator

@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""cards and tubes: hair of a .blend as meshes in files; what is wrong is one sentence."""
+
+import json
+import struct
+
+import bpy
+import pytest
+
+from tests.support.commands import run_here
+
+
+@pytest.fixture
+def shot(hair, tmp_path):
+    path = tmp_path / "shot.blend"
+    bpy.ops.wm.save_as_mainfile(filepath=str(path))
+    return path
+
+
+def test_cards_go_into_a_file_with_their_textures(shot):
+    words = ("--cards", "10", "--segment-count", "2", "--texture-size", "128", "--level-count", "2", "--json")
+    (told,) = run_here("cards", shot, "--out", "//cards.glb", *words).results
+    (made,) = told["made"]
+    assert made == {"hair": "Hair", "cards": 10, "pictures": 10, "levels": 2, "triangles": [40, 10]}
+    data = (shot.parent / "cards.glb").read_bytes()
+    described = json.loads(data[20 : 20 + struct.unpack("<I", data[12:16])[0]])
+    assert {mesh["name"] for mesh in described["meshes"]} == {"Hair Cards LOD0", "Hair Cards LOD1"}
+    for material in described["materials"]:
+        assert "baseColorTexture" in material["pbrMetallicRoughness"] and "normalTexture" in material
+        assert material["alphaMode"] != "OPAQUE"
+    triangles = [described["accessors"][m["primitives"][0]["indices"]]["count"] // 3 for m in described["meshes"]]
+    assert sorted(triangles) == [10, 40]
+    assert sorted(p.name for p in shot.parent.iterdir()) == ["cards.glb", "shot.blend"]
+
+
+def test_textures_lie_beside_files_that_have_none(shot):
+    words = ("--cards", "10", "--texture-size", "128")
+    ended = run_here("cards", shot, "--out", "//out/cards.obj", *words)
+    assert ended.status == 0 and "1 meshes" in ended.out
+    names = {path.name for path in (shot.parent / "out").iterdir()}
+    assert {"cards.obj", "Hair_Cards_LOD0_color.png"} <= names and len(names) == 7
+
+
+def test_tubes_go_into_a_file(shot):
+    ended = run_here("tubes", shot, "--out", "//tubes.obj", "--tubes", "20", "--side-count", "3", "--point-count", "5")
+    assert ended.status == 0
+    lines = (shot.parent / "tubes.obj").read_text().splitlines()
+    assert sum(line.startswith("v ") for line in lines) == 20 * 15
+    assert sum(line.startswith("o ") for line in lines) == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["cards", "--out", "a.abc"], "exported as .blend"),
+        (["tubes", "--out", "a.obj", "--hair", "Nobody"], 'has no hair "Nobody"'),
+        (["cards", "--out", "a.obj", "--cards", "0"], "must be"),
+    ],
+)
+def test_what_is_wrong_is_one_sentence(shot, tmp_path, monkeypatch, words, said):
+    monkeypatch.chdir(tmp_path)
+    ended = run_here(words[0], shot, *words[1:])
+    assert ended.status == 1 and said in ended.errors and len(ended.errors.splitlines()) == 1
+    assert [path.name for path in tmp_path.iterdir()] == ["shot.blend"]

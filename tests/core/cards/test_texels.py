@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Textures: what samples show becomes color, normal, depth and the rest; empty texels are as what is near."""
+
+import numpy as np
+import pytest
+
+from hair_addon.core.cards import texels
+from hair_addon.core.cards.texels import NO_STRAND, PlacedStrands, TexelSums
+
+SIZE = 32
+
+
+@pytest.fixture
+def strip():
+    """One strand that runs up the middle, 8 texels wide, from height 0 to 1, and from red to green."""
+    places = np.array([[[0.5, 0.0, 0.0], [0.5, 0.5, 0.5], [0.5, 1.0, 1.0]]], np.float32)
+    colors = np.array([[[1.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.0, 1.0, 0.0]]], np.float32)
+    return PlacedStrands(places, np.full((1, 3), 4.0 / SIZE), colors, np.array([0.25]), (0.0, 1.0))
+
+
+def seen(strip, per_side=2):
+    """Which segment each sample shows."""
+    side = SIZE * per_side
+    y, x = (np.indices((side, side)) + 0.5) / side
+    return np.where(np.abs(x - 0.5) < strip.radii[0, 0], (y >= 0.5).astype(int), NO_STRAND)
+
+
+def maps(strip, segments):
+    sums = TexelSums(SIZE)
+    for rows in (range(10), range(10, SIZE)):
+        sums.add(segments[2 * rows.start : 2 * rows.stop], strip, 2, np.zeros(2), rows)
+    return sums.maps()
+
+
+def test_maps_are_those_of_the_strand(strip):
+    found = maps(strip, seen(strip))
+    v = (np.arange(SIZE) + 0.5) / SIZE
+    inside = slice(SIZE // 2 - 4, SIZE // 2 + 4)
+    np.testing.assert_array_equal(found["alpha"][:, inside], 1.0)
+    assert found["alpha"].sum() == 8 * SIZE
+    for name in ("root", "depth"):
+        np.testing.assert_allclose(found[name][:, inside], np.broadcast_to(v[:, None], (SIZE, 8)), atol=1e-6)
+    np.testing.assert_allclose(found["id"], 0.25, atol=1e-6)
+    np.testing.assert_allclose(found["color"][:, 16, 1], v, atol=1e-6)
+
+
+def test_normals_are_unit_and_lean_as_a_cylinder(strip):
+    normals = 2.0 * maps(strip, seen(strip))["normal"] - 1.0
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=1e-5)
+    # The strand rises by 45°: its normals lie in the plane across it.
+    middle = normals[16, SIZE // 2 - 4 : SIZE // 2 + 4]
+    np.testing.assert_allclose(middle @ [0.0, 1.0, 1.0], 0.0, atol=1e-5)
+    assert (np.diff(middle[:, 0]) > 0.0).all() and middle[0, 0] < -0.8 < 0.8 < middle[-1, 0]
+
+
+def test_empty_texels_are_as_what_is_near(strip):
+    found = maps(strip, seen(strip))
+    assert (found["color"].sum(axis=-1) > 0.99).all()
+    np.testing.assert_allclose(found["root"][:, 0], (np.arange(SIZE) + 0.5) / SIZE, atol=0.3)
+    odd = texels._filled(np.eye(7, dtype=np.float32)[..., None] * 3.0, np.eye(7, dtype=np.float32))
+    np.testing.assert_allclose(odd, 3.0, rtol=1e-6)
+    empty = maps(strip, np.full((2 * SIZE, 2 * SIZE), NO_STRAND))
+    assert not empty["alpha"].any() and np.isfinite(empty["normal"]).all()
+
+
+def test_display_values_are_those_of_srgb():
+    np.testing.assert_allclose(texels.srgb(np.array([0.0, 0.18, 1.0, 2.0])), [0.0, 0.46135613, 1.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(texels.srgb(np.array([0.0031307, 0.0031309])), 0.04045, atol=1e-4)
