@@ -36,7 +36,7 @@ float lit_part(vec3 at, float depth, float bias)
   float warped = warped_depth(depth - bias);
   float behind = warped - moments.x;
   float rounding = 0.3 * SURFACE_BIAS * WARP * warped;
-  float variance = max(moments.y - moments.x * moments.x, rounding * rounding);
+  float variance = max(moments.y, rounding * rounding);
   // Where one surface is behind another, the bound is not tight: its tail is cut off.
   float part = clamp((variance / (variance + behind * behind) - 0.05) / 0.95, 0.0, 1.0);
   return (behind <= 0.0) ? 1.0 : part;

@@ -124,6 +124,19 @@ def test_curls_shade_as_much_where_few_of_their_points_are_drawn(scene, rng):
     np.testing.assert_allclose(means[1], means[0], rtol=0.05)
 
 
+def test_a_floor_lets_no_light_of_a_low_sun_through(scene, rng):
+    """Between texels a slope is no penumbra: from below, places right above a floor see nothing."""
+    points, radii = tuft(rng, 100)
+    hair = strand_textures.upload_strands(points, np.full_like(radii, 1e-9))
+    corners = 9.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    floor = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
+    places = 0.1 * rng.uniform(-1.0, 1.0, (200, 3))
+    places[:, 2] = 0.003
+    for height in (0.2, 0.6, 1.5):
+        assert lit(sun(0.3, -height), hair, [floor], places, 128).max() < 0.02
+        assert lit(sun(0.3, height), hair, [floor], places, 128).min() > 0.98
+
+
 @pytest.mark.parametrize("kind", [1, 3], ids=["point", "area"])
 @pytest.mark.parametrize("height", [0.05, 0.14, 0.2], ids=["inside", "among tips", "above"])
 def test_lights_near_hair_cast_shadows(scene, rng, kind, height):
