@@ -38,15 +38,11 @@ vec3 strand_light()
   vec3 back = returned_from_behind(dot(T, V), strands_behind);
   mat3 plus;
   mat3 minus;
-  world_sides(seen_x_y,
-              seen_z.xy,
-              view.seen_opacity,
-              view.hair_forward.rgb,
-              plus,
-              minus);
+  vec3 seen_channels = textureLod(visibility_channels, seen_at, 0.0).rgb;
+  strand_sides(seen_x_y, seen_z.xy, view.seen_opacity, view.hair_forward.rgb, seen_channels, plus, minus);
   vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, back));
   vec3 all = max(returned, vec3(1e-6));
-  world *= cone_visibility(seen_x_y, seen_z, view.seen_opacity, view.hair_forward.rgb, T, zonal_1 / all, zonal_2 / all);
+  world *= cone_visibility(seen_x_y, seen_z, seen_channels, T, zonal_1 / all, zonal_2 / all);
   vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
   vec3 surface_light = view.surface_color.rgb * between_hair_and_surface(strands_behind);
   world += surface_light * surface_radiance(plus, minus, hidden, T, V, returned, towards);
