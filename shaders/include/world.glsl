@@ -100,16 +100,18 @@ vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 
   return even / (2.0 * dot(sides, vec3(1.0))) * returned * part;
 }
 
-// Radiance of a strand towards V in the light of the world that white surfaces send to it. hidden: the sum of the directions
-// in which surfaces are seen, and their part of all directions.
-vec3 surface_radiance(mat3 plus, mat3 minus, vec4 hidden, vec3 T, vec3 V, vec3 returned, vec3 towards)
+// Normal of the surfaces that a strand sees. hidden: the sum of the directions in which they are.
+vec3 surface_normal_of(vec3 hidden)
 {
-  if (hidden.w < 1e-3) {
-    return vec3(0.0);
-  }
-  vec3 N = -hidden.xyz * inversesqrt(max(dot(hidden.xyz, hidden.xyz), 1e-8));
-  vec2 below = light_from_below(T, V, N);
-  return surface_irradiance(plus, minus, N) / PI * min(2.0 * hidden.w, 1.0) * max(below.x * returned + below.y * towards, vec3(0.0));
+  return -hidden * inversesqrt(max(dot(hidden, hidden), 1e-8));
+}
+
+// Light of the world that white surfaces with the normal N send to a strand, as a part of even light around it. seen: their
+// part of all directions; through_hair: the same for strands of an opacity, twice through the hair before them.
+vec3 surface_light(mat3 plus, mat3 minus, vec3 N, float seen, float through_hair, float opacity, vec3 forward)
+{
+  vec3 part = seen_through(min(through_hair / max(seen, 1e-6), 1.0), opacity, forward) * seen;
+  return surface_irradiance(plus, minus, N) / PI * min(2.0 * part, vec3(1.0));
 }
 
 // The moment `towards` of a strand with its share of what strands behind send back: the integral of

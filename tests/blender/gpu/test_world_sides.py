@@ -58,7 +58,7 @@ def test_strands_color_light_and_surfaces_do_not(scene, rng):
 def test_a_floor_hides_half_of_the_world_of_every_channel(scene, rng):
     """Single strands right above a floor without hair around them, whatever they let through."""
     roots = np.append(rng.uniform(-1.0, 1.0, (50, 2)), np.zeros((50, 1)), axis=1)
-    points = roots[:, None] + np.linspace(0.0, 0.06, 5)[:, None] * np.array([0.3, 0.0, 1.0])
+    points = roots[:, None] + np.linspace(0.0, 0.3, 5)[:, None] * np.array([0.3, 0.0, 1.0])
     hair = strand_textures.upload_strands(points.astype(np.float32), np.full((50, 5), 1e-7, np.float32))
     corners = 99.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     floor = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
@@ -68,3 +68,4 @@ def test_a_floor_hides_half_of_the_world_of_every_channel(scene, rng):
     found = np.array(texture.read(), float).reshape(-1, 2, 4)[:50, 1] / 6.0  # at the tips
     np.testing.assert_allclose(found[:, :3], np.repeat(found[:, :1], 3, axis=1), atol=1e-3)
     assert found[:, :3].mean() == pytest.approx(0.5, abs=0.06)
+    assert found[:, 3].mean() == pytest.approx(0.5, abs=0.06)  # where it sees the floor
