@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Means around a texel of the depth of surfaces, warped, of the square of that [Donnelly06], and of the depth itself, along
-// one axis: the wider, the softer the shadow.
+// Means around a texel, along one axis, of the depth of surfaces, warped, its variance [Donnelly06], and the mean of the
+// depth itself: the wider, the softer the shadow. The slope of a surface is no variance: it would let light through.
 
 #include "include/opacity.glsl"
+
+// Of the variance that a step in the middle leaves beside its slope, the whole.
+const float STEP = 1.0 / (1.0 - 2.0 / PI);
 
 ivec2 here;
 ivec2 last;
@@ -10,19 +13,19 @@ ivec2 last;
 vec3 values_at(int tap)
 {
   vec3 values = texelFetch(surface_depth, clamp(here + tap * along, ivec2(0), last), 0).rgb;
-  if (is_depth != 0) {
-    float warped = warped_depth(values.r);
-    values = vec3(warped, warped * warped, values.r);
-  }
-  return values;
+  return (is_depth != 0) ? vec3(warped_depth(values.r), 0.0, values.r) : values;
 }
 
 void main()
 {
   here = ivec2(gl_FragCoord.xy);
   last = textureSize(surface_depth, 0) - 1;
-  vec3 total = values_at(0);
+  vec3 middle = values_at(0);
+  vec3 total = vec3(0.0, middle.yz);
+  float squares = 0.0;  // of differences to the middle, which keep their digits
+  float slope = 0.0;
   float weights = 1.0;
+  float reach = 0.0;
   // A Gaussian from tap to tap: the ratio of one weight to the one before falls by the same factor each time.
   float weight = 1.0;
   float ratio = exp(-0.5 / (deviation * deviation));
@@ -30,8 +33,18 @@ void main()
   for (int tap = 1; tap <= taps; tap++) {
     weight *= ratio;
     ratio *= factor;
-    total += weight * (values_at(-tap) + values_at(tap));
+    vec3 before = values_at(-tap);
+    vec3 after = values_at(tap);
+    before.x -= middle.x;
+    after.x -= middle.x;
+    total += weight * (before + after);
+    squares += weight * (before.x * before.x + after.x * after.x);
+    slope += weight * float(tap) * (after.x - before.x);
     weights += 2.0 * weight;
+    reach += 2.0 * weight * float(tap * tap);
   }
-  color = vec4(total / weights, 1.0);
+  vec3 mean = total / weights;
+  float variance = max(squares / weights - mean.x * mean.x, 0.0);
+  float beside_slope = max(variance - slope * slope / (reach * weights), 0.0);
+  color = vec4(mean.x + middle.x, mean.y + min(variance, STEP * beside_slope), mean.z, 1.0);
 }

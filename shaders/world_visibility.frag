@@ -27,6 +27,7 @@ void main()
   seen_x_y = vec4(0.0);
   seen_z = vec4(0.0);
   seen_surface = vec4(0.0);
+  seen_channels = vec4(0.0);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 at;
@@ -35,16 +36,21 @@ void main()
     float open = weight;  // past surfaces
     float past_hair = 1.0;
     float left = 1.0;
+    float beyond = 0.0;
+    vec3 past_hair_channels = vec3(1.0);
     if (shadow_place(light, position, at, depth)) {
       float bias = is_strand ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
-      Beyond beyond = look_beyond(light, at, depth, -light.axis.xyz);
+      vec3 normal;
+      beyond = weight * surface_beyond(light, at, depth, -light.axis.xyz, normal);
       float behind;
       float front = crossed_strands(at, depth, own_count(light, position, radius), behind);
       open *= lit_part(at, depth, bias);
-      past_hair = exp(-view.seen_opacity * (is_strand ? front : crossed_before_surface(at, depth)));
+      float crossed = is_strand ? front : crossed_before_surface(at, depth);
+      past_hair = exp(-view.seen_opacity * crossed);
+      past_hair_channels = transmitted(crossed, view.hair_forward.rgb);
       left = exp(-view.seen_opacity * behind);
       // Through the hair to the surface, and back.
-      seen_surface += weight * beyond.surface * left * left * vec4(light.axis.xyz, 1.0);
+      seen_surface += beyond * left * left * vec4(light.axis.xyz, 1.0);
     }
     float seen = open * past_hair;
     vec3 share = seen * light.axis.xyz * light.axis.xyz;
@@ -54,6 +60,8 @@ void main()
     // Strands: through the hair behind them, and by P2 of sin(theta_i). Points of surfaces: over all directions without
     // hair, and with it.
     vec2 others = is_strand ? seen * vec2(left, legendre_2(dot(T, light.axis.xyz))) : open * vec2(1.0, past_hair);
+    // Surfaces stop all channels alike, strands do not. And the surfaces, without the hair before them.
+    seen_channels += vec4(open * past_hair_channels, beyond);
     seen_z += vec4(plus.z, minus.z, others);
   }
 }

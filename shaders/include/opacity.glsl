@@ -18,8 +18,9 @@ const vec4 LAYER_ENDS = vec4(0.007, 0.058, 0.205, 0.5);
 // Least depth of a layer with strands, for interpolation.
 const float LEAST_LAYER = 1e-4;
 
-// Depth of unlit texels.
+// Depth of unlit texels, and of the farthest surfaces: they are found behind the hair however far away they are.
 const float FAR = 2.0;
+const float FAR_SURFACE = 1.4;
 
 // Distance [texels] to which texels without strands take the ends of those around them.
 const int FILL_REACH = 2;

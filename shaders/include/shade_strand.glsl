@@ -38,18 +38,19 @@ vec3 strand_light()
   vec3 back = returned_from_behind(dot(T, V), strands_behind);
   mat3 plus;
   mat3 minus;
-  world_sides(seen_x_y,
-              seen_z.xy,
-              view.seen_opacity,
-              view.hair_forward.rgb,
-              plus,
-              minus);
+  vec4 seen_channels = textureLod(visibility_channels, seen_at, 0.0);
+  strand_sides(seen_x_y, seen_z.xy, view.seen_opacity, view.hair_forward.rgb, seen_channels.rgb, plus, minus);
   vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, back));
   vec3 all = max(returned, vec3(1e-6));
-  world *= cone_visibility(seen_x_y, seen_z, view.seen_opacity, view.hair_forward.rgb, T, zonal_1 / all, zonal_2 / all);
+  world *= cone_visibility(seen_x_y, seen_z, seen_channels.rgb, T, zonal_1 / all, zonal_2 / all);
   vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
-  vec3 surface_light = view.surface_color.rgb * between_hair_and_surface(strands_behind);
-  world += surface_light * surface_radiance(plus, minus, hidden, T, V, returned, towards);
+  vec3 N = surface_normal_of(hidden.xyz);
+  float surface_part = seen_channels.a / 6.0;
+  vec3 from_surfaces = surface_light(plus, minus, N, surface_part, hidden.w, view.seen_opacity, view.hair_forward.rgb);
+  from_surfaces *= view.surface_color.rgb * between_hair_and_surface(strands_behind);
+  vec2 below = light_from_below(T, V, N);
+  vec3 of_surfaces = max(below.x * returned + below.y * towards, vec3(0.0));
+  world += from_surfaces * of_surfaces;
   vec3 radiance = drawn_world * world;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
@@ -74,12 +75,15 @@ vec3 strand_light()
     // Most strands are in the shadow of the others, with no light to scatter.
     vec3 arriving = irradiance * transmitted(front, view.hair_forward.rgb);
     if (max(arriving.r, max(arriving.g, arriving.b)) > LEAST_IRRADIANCE) {
+      // Where the light passes beside the surface, that which the strand sees.
+      vec3 lit_normal = N;
       if (is_in_map) {
-        Beyond beyond = look_beyond(light, at, depth, L);
-        vec2 below = light_from_below(T, V, beyond.normal);
-        vec3 bounced = drawn_lobes.w * irradiance * surface_bounce(beyond, L, T, front, behind);
-        radiance += bounced * max(below.x * returned + below.y * towards, vec3(0.0));
+        vec3 normal;
+        float found = surface_beyond(light, at, depth, L, normal);
+        lit_normal = normalize(mix(N, normal, found) + 1e-4 * L);
       }
+      vec3 bounce = surface_bounce(lit_normal, surface_part, L, T, front, behind);
+      radiance += drawn_lobes.w * irradiance * bounce * of_surfaces;
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
       radiance += irradiance * hair_radiance(T, L, V, front, behind, blur);
     }

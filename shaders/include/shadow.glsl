@@ -6,9 +6,6 @@
 // Range around a strand, as a part of the map, in which it is read what is behind it.
 const float BEYOND_REACH = 0.01;
 
-// Range behind a strand, as a part of the hair, in which surfaces light it.
-const float BOUNCE_DISTANCE = 0.25;
-
 // The bias of a strand that grows in a direction: against the light it grows on the far side of its surface.
 float strand_bias(vec3 root_direction, vec3 L)
 {
@@ -36,7 +33,7 @@ float lit_part(vec3 at, float depth, float bias)
   float warped = warped_depth(depth - bias);
   float behind = warped - moments.x;
   float rounding = 0.3 * SURFACE_BIAS * WARP * warped;
-  float variance = max(moments.y - moments.x * moments.x, rounding * rounding);
+  float variance = max(moments.y, rounding * rounding);
   // Where one surface is behind another, the bound is not tight: its tail is cut off.
   float part = clamp((variance / (variance + behind * behind) - 0.05) / 0.95, 0.0, 1.0);
   return (behind <= 0.0) ? 1.0 : part;
@@ -74,15 +71,9 @@ float crossed_before_surface(vec3 at, float depth)
   return front * (1.0 - smoothstep(1.0, 1.5, ends.x));
 }
 
-// The surface behind a strand along a light: means over places around it.
-struct Beyond {
-  float surface;  // the part of places with a surface
-  float near;     // the same, the less the more distant it is
-  vec3 normal;    // of that surface
-};
-
-// L: towards the light.
-Beyond look_beyond(Light light, vec3 at, float depth, vec3 L)
+// Part of the places around a strand along a light with a surface behind the strand, and that surface's normal. L: towards
+// the light.
+float surface_beyond(Light light, vec3 at, float depth, vec3 L, out vec3 normal)
 {
   vec2 slope = vec2(0.0);
   float found = 0.0;
@@ -95,16 +86,13 @@ Beyond look_beyond(Light light, vec3 at, float depth, vec3 L)
     total += 0.25 * is_found * surface;
     slope += towards * surface;
   }
-  // Where the surface slopes, some of it is in front of a strand that is above it: the mean is where the strand is. Of a
-  // surface in front of the strand this side is in the shadow.
-  float surface = total / max(found, 0.25);
-  float is_there = found * step(depth, surface + SURFACE_BIAS);
-  Beyond beyond = Beyond(is_there, is_there * (1.0 - smoothstep(0.0, BOUNCE_DISTANCE, surface - depth)), vec3(0.0));
   slope *= 0.25 / BEYOND_REACH;
   vec3 right = vec3(light.world_to_shadow[0][0], light.world_to_shadow[1][0], light.world_to_shadow[2][0]);
   vec3 up = vec3(light.world_to_shadow[0][1], light.world_to_shadow[1][1], light.world_to_shadow[2][1]);
-  beyond.normal = normalize(slope.x * normalize(right) + slope.y * normalize(up) + L);
-  return beyond;
+  normal = normalize(slope.x * normalize(right) + slope.y * normalize(up) + L);
+  // Where the surface slopes, some of it is in front of a strand that is above it: the mean is where the strand is. Of a
+  // surface in front of the strand this side is in the shadow.
+  return found * step(depth, total / max(found, 0.25) + SURFACE_BIAS);
 }
 
 // Light of a surface, relative to that which it reflects at once: hair above it, of `count` strands, sends a part of it
@@ -117,16 +105,17 @@ vec3 between_hair_and_surface(float count)
   return vec3(1.0) / (vec3(1.0) - view.surface_color.rgb * reflected);
 }
 
-// Light that a surface reflects to a strand, as a part of even light around it, for unit irradiance of the light: through
-// the rest of the hair, off a diffuse surface, and through the hair again, along 1.66 times the shortest way [Elsasser42].
-vec3 surface_bounce(Beyond beyond, vec3 L, vec3 T, float front, float behind)
+// Light that surfaces reflect to a strand, as a part of even light around it, for unit irradiance of the light: through the
+// rest of the hair, off diffuse surfaces, and through the hair again, along 1.66 times the shortest way [Elsasser42]. N: their
+// normal; part: of all directions, in which they are.
+vec3 surface_bounce(vec3 N, float part, vec3 L, vec3 T, float front, float behind)
 {
-  float cosine = max(dot(beyond.normal, L), 0.0);
+  float cosine = max(dot(N, L), 0.0);
   // Strands are as wide as the sine between tangent and direction, pi / 4 in the mean over all directions.
   float back = 1.66 * cosine * 0.25 * PI / max(sin_from_cos(dot(T, L)), 0.1);
   vec3 way = transmitted(front + behind * (1.0 + back), view.hair_forward.rgb);
   way *= between_hair_and_surface(front + behind);
-  return view.surface_color.rgb * way * (beyond.near * cosine / PI);
+  return view.surface_color.rgb * way * (min(2.0 * part, 1.0) * cosine / PI);
 }
 
 // Visibility of a light from a surface: the mean over 3 × 3 texels. forward: the forward scattering of one strand.

@@ -22,6 +22,29 @@ void world_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, out ma
   minus[2] = lights.world[5].rgb * seen_through(seen_z.y, opacity, forward);
 }
 
+// The same for a strand, of which it is known how much light of each channel arrives from all sides. Each side is between
+// what surfaces alone leave, the same of all channels, and what strands alone leave.
+void strand_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, vec3 channels, out mat3 plus, out mat3 minus)
+{
+  float sides[6] = float[6](seen_x_y.x, seen_x_y.y, seen_x_y.z, seen_x_y.w, seen_z.x, seen_z.y);
+  vec3 through[6];
+  float behind_surfaces = 0.0;
+  vec3 behind_hair = vec3(0.0);
+  for (int side = 0; side < 6; side++) {
+    through[side] = seen_through(sides[side], opacity, forward);
+    behind_surfaces += sides[side];
+    behind_hair += through[side];
+  }
+  vec3 between = behind_hair - vec3(behind_surfaces);
+  vec3 wanted = channels - vec3(behind_surfaces);
+  vec3 share = clamp(wanted * between / max(between * between, vec3(1e-8)), vec3(0.0), vec3(1.0));
+  vec3 gain = channels / max(mix(vec3(behind_surfaces), behind_hair, share), vec3(1e-6));
+  for (int axis = 0; axis < 3; axis++) {
+    plus[axis] = lights.world[2 * axis].rgb * gain * mix(vec3(sides[2 * axis]), through[2 * axis], share);
+    minus[axis] = lights.world[2 * axis + 1].rgb * gain * mix(vec3(sides[2 * axis + 1]), through[2 * axis + 1], share);
+  }
+}
+
 float all_seen(vec4 seen_x_y, vec4 seen_z)
 {
   return dot(seen_x_y, vec4(1.0)) + seen_z.x + seen_z.y;
@@ -36,7 +59,7 @@ float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
 // Light of the world from the inclinations that a strand scatters to the viewer, relative to that from all sides. The mean
 // of P2 over what is seen is in seen_z; zonal_1, zonal_2: as in `zonal_part`. Light that has come through hair comes from
 // everywhere.
-vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, float opacity, vec3 forward, vec3 T, vec3 zonal_1, vec3 zonal_2)
+vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, vec3 channels, vec3 T, vec3 zonal_1, vec3 zonal_2)
 {
   float seen = max(all_seen(seen_x_y, seen_z), 1e-6);
   // Sides weigh directions by squared cosines: of light that is linear in them 3/4 of its first moment.
@@ -47,7 +70,7 @@ vec3 cone_visibility(vec4 seen_x_y, vec4 seen_z, float opacity, vec3 forward, ve
   vec3 pairs = vec3(seen_x_y.x + seen_x_y.y, seen_x_y.z + seen_x_y.w, seen_z.x + seen_z.y);
   float weighted = max(dot(sides, pairs) / (2.0 * dot(sides, vec3(1.0))), 1e-6);
   cone = clamp(cone * seen / 6.0, vec3(0.0), vec3(1.0)) / weighted;
-  return 1.0 + (cone - 1.0) * min(seen / 6.0 / seen_through(seen / 6.0, opacity, forward), vec3(1.0));
+  return 1.0 + (cone - 1.0) * min(vec3(seen) / max(channels, vec3(1e-6)), vec3(1.0));
 }
 
 // Irradiance of a surface with the normal N.
@@ -77,16 +100,18 @@ vec3 strand_radiance(mat3 plus, mat3 minus, vec3 T, vec3 V, vec3 returned, vec3 
   return even / (2.0 * dot(sides, vec3(1.0))) * returned * part;
 }
 
-// Radiance of a strand towards V in the light of the world that white surfaces send to it. hidden: the sum of the directions
-// in which surfaces are seen, and their part of all directions.
-vec3 surface_radiance(mat3 plus, mat3 minus, vec4 hidden, vec3 T, vec3 V, vec3 returned, vec3 towards)
+// Normal of the surfaces that a strand sees. hidden: the sum of the directions in which they are.
+vec3 surface_normal_of(vec3 hidden)
 {
-  if (hidden.w < 1e-3) {
-    return vec3(0.0);
-  }
-  vec3 N = -hidden.xyz * inversesqrt(max(dot(hidden.xyz, hidden.xyz), 1e-8));
-  vec2 below = light_from_below(T, V, N);
-  return surface_irradiance(plus, minus, N) / PI * min(2.0 * hidden.w, 1.0) * max(below.x * returned + below.y * towards, vec3(0.0));
+  return -hidden * inversesqrt(max(dot(hidden, hidden), 1e-8));
+}
+
+// Light of the world that white surfaces with the normal N send to a strand, as a part of even light around it. seen: their
+// part of all directions; through_hair: the same for strands of an opacity, twice through the hair before them.
+vec3 surface_light(mat3 plus, mat3 minus, vec3 N, float seen, float through_hair, float opacity, vec3 forward)
+{
+  vec3 part = seen_through(min(through_hair / max(seen, 1e-6), 1.0), opacity, forward) * seen;
+  return surface_irradiance(plus, minus, N) / PI * min(2.0 * part, vec3(1.0));
 }
 
 // The moment `towards` of a strand with its share of what strands behind send back: the integral of

@@ -20,18 +20,22 @@ _FULL_WIDTH = 0.5  # texels that a strand may be wide that is drawn for several
 _DIRECTIONS_AT_ONCE = 7
 
 
-def measure(hair, surfaces, opacities, clear=()):
+def measure(hair, surfaces, opacities, clear=(), forwards=None):
     """Visibility textures {sampler: texture} of each strands and of each surface: two lists.
 
     hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU]; opacities: of each hair's strands, for which its
-    visibility holds; the surfaces' is for the densest; clear: surfaces that hide nothing, which follow the others.
+    visibility holds; the surfaces' is for the densest; clear: surfaces that hide nothing, which follow the others;
+    forwards: what a strand of each hair passes on, (3,) each, None: the same of all channels, by the opacities.
     """
     receivers = [*surfaces, *clear]
     views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
     views += [_view_of_surface(surface) for surface in receivers]
-    of_surfaces = opacities[densest([strands for strands, _ in hair])] if hair else 1.0
-    for view, opacity in zip(views, opacities + [of_surfaces] * len(receivers), strict=True):
-        view["seen_opacity"] = opacity
+    if forwards is None:
+        forwards = [np.full(3, 1.0 - opacity) for opacity in opacities]
+    through = list(zip(opacities, forwards, strict=True))
+    of_surfaces = through[densest([strands for strands, _ in hair])] if hair else (1.0, np.zeros(3))
+    for view, (opacity, forward) in zip(views, through + [of_surfaces] * len(receivers), strict=True):
+        view["seen_opacity"], view["hair_forward"][:3] = opacity, forward
     places = [strands.texture for strands, _ in hair] + [surface.places for surface in receivers]
     targets = [_Target(view, texture) for view, texture in zip(views, places, strict=True)]
     maps = shadows.ShadowMaps(_SIZE, _DIRECTIONS_AT_ONCE)

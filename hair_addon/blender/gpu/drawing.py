@@ -104,6 +104,17 @@ def bounding_sphere(hair):
     return centre, max(float(np.linalg.norm(corners - centre, axis=1).max()), _LEAST_RADIUS)
 
 
+def tight_sphere(hair):
+    """`bounding_sphere` without the corners of boxes: of one hair, some strand touches it."""
+    centres, radii = [], []
+    for strands, to_world in hair:
+        centres.append(to_world[:3, :3] @ strands.ball[:3] + to_world[:3, 3])
+        radii.append(np.linalg.norm(to_world[:3, :3], 2) * strands.ball[3])
+    centres, radii = np.array(centres), np.array(radii)
+    centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
+    return centre, max(float((np.linalg.norm(centres - centre, axis=1) + radii).max()), _LEAST_RADIUS)
+
+
 def strand_record(strands, view, object_to_world, steps=_ALL):
     """A `uniforms.VIEW` record, completed for `StrandsOnGPU` at a place (4, 4)."""
     record = view.copy()

@@ -49,8 +49,9 @@ program_cache = Cache()  # (function decorated by `kept`, its arguments) → pro
 kept = program_cache.keeping  # decorates what makes a program: it is compiled once, and kept until Python ends
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
-VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z", "visibility_surface")  # see shaders/world_visibility.frag
-VISIBILITY_TARGETS = ("seen_x_y", "seen_z", "seen_surface")
+# See shaders/world_visibility.frag.
+VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z", "visibility_surface", "visibility_channels")
+VISIBILITY_TARGETS = ("seen_x_y", "seen_z", "seen_surface", "seen_channels")
 
 
 def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
@@ -238,7 +239,7 @@ def surface_info():
 
 @kept
 def visibility_program():
-    """The program that adds up how much of the world the texels of `places` see, in two targets."""
+    """The program that adds up how much of the world the texels of `places` see."""
     info = gpu.types.GPUShaderCreateInfo()
     declare_scene(info, is_lit=False)
     info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "places")

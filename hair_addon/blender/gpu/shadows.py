@@ -9,6 +9,7 @@ from . import drawing, shaders, shadow_programs, uniforms
 SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 
 _NEAREST = 0.01  # minimum distance of a light, as a part of the hair's diameter
+_WIDEST = np.radians(80.0)  # between the axis of a map and its border
 _FAR = 2.0  # FAR of shaders/include/opacity.glsl
 _NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it; of a back that is nowhere, 0
 
@@ -57,9 +58,9 @@ class ShadowMaps:
         lights["light"]["shadow_layer"] = -1
         if not hair:
             return
-        centre, radius = drawing.bounding_sphere(hair)
+        spheres = drawing.bounding_sphere(hair), drawing.tight_sphere(hair)
         for index in range(min(int(lights["count"]), self._layer_count)):
-            view = _aim(lights["light"][index], centre, radius, self._size)
+            view = _aim(lights["light"][index], spheres, self._size)
             if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index
                 view["light_index"] = index
@@ -171,21 +172,33 @@ def _array(size, layer_count, texture_format):
     return texture
 
 
-def _aim(light, centre, radius, size):
-    """The view of a light that holds the sphere of the hair, also written into the light; None from inside it."""
+def _aim(light, spheres, size):
+    """The view of a light that holds the hair, also written into the light.
+
+    spheres: (centre, radius) around the hair, a loose one and a tight one, which is for lights in the loose one. Of a
+    light in both, or next to them, the view holds what is up to `_WIDEST` off its axis; None without an axis.
+    """
     position = light["position"][:3].astype(np.float64)
     is_sun = light["kind"] == SUN
-    axis = light["axis"][:3].astype(np.float64) if is_sun else centre - position
-    distance = float(np.linalg.norm(axis))
-    if not is_sun and distance < 1.01 * radius:
+    for centre, radius in spheres:
+        axis = light["axis"][:3].astype(np.float64) if is_sun else centre - position
+        distance = float(np.linalg.norm(axis))
+        is_inside = not is_sun and distance * np.sin(_WIDEST) < radius
+        if not is_inside:
+            break
+    if is_inside and light["axis"][:3].any():  # where a spot or an area light shines
+        axis = light["axis"][:3].astype(np.float64)
+    length = float(np.linalg.norm(axis))
+    if length == 0.0:
         return None
     eye = centre - axis * (2.0 * radius) if is_sun else position
-    world_to_view = _look_at(eye, axis / distance)
+    world_to_view = _look_at(eye, axis / length)
     view_to_clip = _orthographic(radius) if is_sun else _perspective(radius, distance)
     view = drawing.view_record(world_to_view, view_to_clip, size, least_width=1.0)
+    near = (centre @ axis / length if is_sun else distance) - radius
     light["world_to_shadow"] = view["world_to_clip"]
-    light["extent"] = 2.0 * radius
-    light["near"] = (centre @ axis / distance if is_sun else distance) - radius
+    light["near"] = near if is_sun else max(near, 0.0)
+    light["extent"] = radius + (radius if is_sun else min(distance, radius))
     return view
 
 
@@ -214,8 +227,9 @@ def _orthographic(radius):
 
 
 def _perspective(radius, distance):
-    """(4, 4) view to clip of a cone around a sphere; objects in front of it still cast shadows."""
-    cotangent = np.sqrt(distance**2 - radius**2) / radius
+    """(4, 4) view to clip of a cone around a sphere, `_WIDEST` at most; objects in front of it still cast shadows."""
+    sine = min(radius / max(distance, radius), np.sin(_WIDEST))
+    cotangent = np.sqrt(1.0 - sine**2) / sine
     near, far = _NEAREST * 2.0 * radius, distance + 4.0 * radius
     depth_scale, depth_offset = (far + near) / (near - far), 2.0 * far * near / (near - far)
     return np.array([[cotangent, 0, 0, 0], [0, cotangent, 0, 0], [0, 0, depth_scale, depth_offset], [0, 0, -1.0, 0]])

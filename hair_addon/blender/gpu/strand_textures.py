@@ -47,6 +47,7 @@ class StrandsOnGPU:
     points: np.ndarray  # (S, P, 3) as uploaded, for computations on the CPU
     radii: np.ndarray  # (S, P)
     bounds: np.ndarray  # (2, 3): least and greatest coordinates
+    ball: np.ndarray  # (4,): a centre, and the greatest distance of a point from it
     mean_length: float  # of strands, in the coordinate system of the points
     mean_radius: float
     greatest_radius: float
@@ -68,6 +69,8 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     # Strand by strand first: NumPy is ten times faster along the long axis of a flat array.
     flat = points.reshape(strand_count, -1)
     bounds = np.stack([flat.min(axis=0).reshape(-1, 3).min(axis=0), flat.max(axis=0).reshape(-1, 3).max(axis=0)])
+    centre = 0.5 * bounds.sum(axis=0, dtype=np.float64)
+    ball = np.append(centre, _farthest(points, centre))
     # A sample of the strands is enough for the level of detail.
     some = slice(None, None, -(-strand_count // 1000))
     mean_length = float(np.linalg.norm(np.diff(points[some], axis=1), axis=2).sum(axis=1).mean())
@@ -83,10 +86,21 @@ def upload_strands(points, radii, randoms=None, wetness=None):
         points,
         radii,
         bounds,
+        ball,
         mean_length,
         float(radii[some].mean()),
         float(radii.max()),
     )
+
+
+def _farthest(points, centre):
+    """Greatest distance of points (..., P, 3) from a centre (3,)."""
+    flat, here, most = points.reshape(-1, points.shape[-2], 3), centre.astype(np.float32), 0.0
+    for first in range(0, len(flat), _AT_ONCE):
+        some = flat[first : first + _AT_ONCE] - here
+        np.square(some, out=some)
+        most = max(most, float((some[..., 0] + some[..., 1] + some[..., 2]).max()))
+    return np.sqrt(most)
 
 
 def _numbers_texture(values, row_strands):
@@ -135,6 +149,7 @@ def move_strands(strands, moved, points):
     flat = points.reshape(-1, 3)
     strands.bounds[0] = np.minimum(strands.bounds[0], flat.min(axis=0))
     strands.bounds[1] = np.maximum(strands.bounds[1], flat.max(axis=0))
+    strands.ball[3] = max(strands.ball[3], _farthest(points, strands.ball[:3]))
     heads = np.zeros((len(moved), 1, 3), np.float32)
     heads[:, 0, 0] = moved  # exact in single precision up to 16 million
     row_strands = TEXTURE_WIDTH // (strands.point_count + 1)

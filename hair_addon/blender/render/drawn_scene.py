@@ -188,8 +188,9 @@ def _placed(hair):
 
 def _visibility(hair, surfaces, clear):
     opacities = [shading.opacity for _, shading, *_ in hair]
+    forwards = [shading.forward for _, shading, *_ in hair]
     solid, seen_through = ([surface for surface, _parts in some] for some in (surfaces, clear))
-    return ambient_visibility.measure(_placed(hair), solid, opacities, seen_through)
+    return ambient_visibility.measure(_placed(hair), solid, opacities, seen_through, forwards)
 
 
 def _read_rendered_hair(depsgraph, known, refused):

@@ -122,3 +122,48 @@ def test_curls_shade_as_much_where_few_of_their_points_are_drawn(scene, rng):
         maps.draw(sun(0.4, 0.7), hair, [], steps)
         means.append(np.array(maps.samplers["hair_layers"].read()).reshape(-1, 4)[:, 3].mean())
     np.testing.assert_allclose(means[1], means[0], rtol=0.05)
+
+
+def test_a_floor_lets_no_light_of_a_low_sun_through(scene, rng):
+    """Between texels a slope is no penumbra: from below, places right above a floor see nothing."""
+    points, radii = tuft(rng, 100)
+    hair = strand_textures.upload_strands(points, np.full_like(radii, 1e-9))
+    corners = 9.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    floor = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
+    places = 0.1 * rng.uniform(-1.0, 1.0, (200, 3))
+    places[:, 2] = 0.003
+    for height in (0.2, 0.6, 1.5):
+        assert lit(sun(0.3, -height), hair, [floor], places, 128).max() < 0.02
+        assert lit(sun(0.3, height), hair, [floor], places, 128).min() > 0.98
+
+
+@pytest.mark.parametrize("kind", [1, 3], ids=["point", "area"])
+@pytest.mark.parametrize("height", [0.05, 0.14, 0.2], ids=["inside", "among tips", "above"])
+def test_lights_near_hair_cast_shadows(scene, rng, kind, height):
+    """Lights closer than the corners of the hair's box: below a floor between light and hair it is dark."""
+    points, radii = tuft(rng, 300)
+    hair = strand_textures.upload_strands(points, radii)
+    corners = 9.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
+    floor = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
+    lights = sun(0.0, 0.5 * np.pi)
+    lights["light"][0]["kind"] = kind
+    lights["light"][0]["position"][:3] = 0.0, 0.0, height
+    places = np.append(rng.uniform(-0.1, 0.1, (100, 2)), rng.uniform(-0.1, -0.02, (100, 1)), axis=1)
+    assert lit(lights, hair, [floor], places).max() < 0.05
+    places[:, 2] = 0.5 * height
+    assert lit(lights, hair, [floor], places).mean() > 0.9
+
+
+def test_the_sphere_around_hair_touches_it(scene, rng):
+    """Also after some strands have moved, and with objects that are scaled and turned."""
+    points, radii = tuft(rng, 300)
+    hair = strand_textures.upload_strands(points, radii)
+    strand_textures.move_strands(hair, np.array([3, 5]), points[[3, 5]] + np.float32(0.02))
+    to_world = np.eye(4)
+    to_world[:3, :3] = np.linalg.qr(rng.normal(size=(3, 3)))[0] * 2.0
+    to_world[:3, 3] = 1.0, 2.0, 3.0
+    for placed in ([(hair, to_world)], [(hair, to_world), (hair, np.eye(4))]):
+        center, radius = drawing.tight_sphere(placed)
+        every = np.concatenate([hair.points.reshape(-1, 3) @ m[:3, :3].T + m[:3, 3] for _, m in placed])
+        farthest = np.linalg.norm(every - center, axis=1).max()
+        assert 0.8 * radius < farthest < radius * (1.0 + 1e-5)

@@ -104,6 +104,21 @@ def test_a_sun_from_the_side_is_reflected_to_strands_close_to_a_plane(scene):
     np.testing.assert_allclose(mean_color() - without, expected, rtol=0.2)
 
 
+def test_a_wide_plane_lights_strands_at_any_height(scene):
+    """Even light has no distance: strands half as high as they are apart see as much of a wide plane as those on it."""
+    tangent, towards = (np.cos(0.5), 0.0, np.sin(0.5)), (0.0, -0.6, 0.8)
+    light = bpy.data.lights.new("Sun", "SUN")
+    light.energy, light.angle = SUN, 0.0
+    scene.collection.objects.link(bpy.data.objects.new("Sun", light))
+    look(scene, towards)
+    curves = strands_over_a_plane(scene, tangent, (0.0, 0.0, 0.0), height=0.6)
+    curves.surface.scale = (20.0, 20.0, 1.0)
+    without = mean_color()
+    curves.surface.data.materials[0].diffuse_color = (0.5, 0.5, 0.5, 1.0)
+    expected = 0.5 * SUN / np.pi * light_from_below(tangent, towards)
+    np.testing.assert_allclose(mean_color() - without, expected, rtol=0.2)
+
+
 def test_no_light_comes_through_a_plane_to_hair_behind_it(scene):
     light = bpy.data.lights.new("Sun", "SUN")
     light.energy, light.angle = SUN, 0.0

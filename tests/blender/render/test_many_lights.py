@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import scene_lights, uniforms
+from hair_addon.blender.gpu import uniforms
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
@@ -15,9 +15,8 @@ COUNT = 40
 
 
 @pytest.fixture
-def lamps(lit, monkeypatch):
-    """Lamps all around the hair, of five brightnesses, with coarse shadows; the sun is off."""
-    monkeypatch.setattr(scene_lights, "_MAP_SIZE", 128)
+def lamps(lit):
+    """Lamps all around the hair, of five brightnesses; the sun is off."""
     bpy.data.objects["Sun"].hide_render = True
     found = []
     for index in range(COUNT):
