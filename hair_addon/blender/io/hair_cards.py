@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...core.cards import atlas, clusters, outlines, ribbons, texels
+from ...core.cards import atlas, outlines, ribbons, texels
 from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.files.whole_file import require_place
+from ...core.geometry import clusters
 from ...core.long_work import Stage
 from ..data import card_images, made_meshes
 from ..materials import card_material

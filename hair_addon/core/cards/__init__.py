@@ -9,7 +9,6 @@ if TYPE_CHECKING:
     from . import (
         atlas,
         card_settings,
-        clusters,
         curve_frames,
         outlines,
         polygon_mesh,

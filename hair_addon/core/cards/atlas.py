@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import HairError
-from . import clusters
+from ..geometry import clusters
 from .outlines import Outlines
 
 _BORDER = 2.0  # texels that stay empty around a picture

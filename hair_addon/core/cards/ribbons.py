@@ -6,8 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from .. import geometry
+from ..geometry import clusters
 from ..geometry.mesh import TriMesh, interpolate
-from . import clusters, curve_frames
+from . import curve_frames
 
 _OUTWARD = 2.0  # what facing away from the surface weighs beside lying along the spread of a clump
 _WINDOW = 0.3  # of the length: strands follow the ribbon from root to tip, also where it comes back to itself

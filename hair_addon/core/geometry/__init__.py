@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Meshes and polylines as arrays: sampling, nearest neighbours, evaluation, surface deformation."""
+"""Meshes and polylines as arrays: sampling, nearest neighbours, clusters, evaluation, surface deformation."""
 
 from typing import TYPE_CHECKING
 
@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from . import (
         bspline,
         closest_point,
+        clusters,
         connected_components,
         curvature,
         fingerprint,

@@ -15,7 +15,7 @@ COUNT = 40
 
 
 @pytest.fixture
-def lamps(lit):
+def lamps(lit, fine_shadows):
     """Lamps all around the hair, of five brightnesses; the sun is off."""
     bpy.data.objects["Sun"].hide_render = True
     found = []

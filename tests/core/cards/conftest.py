@@ -6,7 +6,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hair_addon.core.cards import atlas, clusters, outlines, ribbons
+from hair_addon.core.cards import atlas, outlines, ribbons
+from hair_addon.core.geometry import clusters
 from hair_addon.core.geometry.mesh import TriMesh
 
 COUNT, SEGMENTS, SIZE = 40, 6, 512

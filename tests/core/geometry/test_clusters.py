@@ -4,8 +4,8 @@
 import numpy as np
 import pytest
 
-from hair_addon.core.cards import clusters
 from hair_addon.core.errors import HairError
+from hair_addon.core.geometry import clusters
 
 
 @pytest.mark.parametrize("count", [1, 7, 64, 300])
