@@ -108,8 +108,9 @@ def tight_sphere(hair):
     """`bounding_sphere` without the corners of boxes: of one hair, some strand touches it."""
     centres, radii = [], []
     for strands, to_world in hair:
-        centres.append(to_world[:3, :3] @ strands.ball[:3] + to_world[:3, 3])
-        radii.append(np.linalg.norm(to_world[:3, :3], 2) * strands.ball[3])
+        centre, radius = strands.ball
+        centres.append(to_world[:3, :3] @ centre + to_world[:3, 3])
+        radii.append(np.linalg.norm(to_world[:3, :3], 2) * radius)
     centres, radii = np.array(centres), np.array(radii)
     centre = 0.5 * ((centres - radii[:, None]).min(axis=0) + (centres + radii[:, None]).max(axis=0))
     return centre, max(float((np.linalg.norm(centres - centre, axis=1) + radii).max()), _LEAST_RADIUS)
@@ -135,6 +136,10 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
 # each side: twice as large where it is seen in one.
 _FULL_EXTENT = 48.0
 
+_CORNERS = np.array(
+    [[bool(corner >> axis & 1) for axis in range(3)] for corner in range(8)]
+)  # of a box: on the far side?
+
 
 def least_width_of(strands, record):
     """The least half width of `StrandsOnGPU` as the view of their `strand_record` has it, less where all are small."""
@@ -149,8 +154,8 @@ def window_of(strands, record, size):
 
     record: of `strand_record`; size: (width, height) of the picture [samples].
     """
-    corners = np.array(np.meshgrid(*strands.bounds.T)).reshape(3, -1)
-    clip = record["object_to_clip"].T.astype(np.float64) @ np.vstack([corners, np.ones(8)])
+    corners = np.where(_CORNERS, strands.bounds[1], strands.bounds[0])
+    clip = record["object_to_clip"][:3].T.astype(np.float64) @ corners.T + record["object_to_clip"][3][:, None]
     w = clip[3].min()
     if not (clip[2] + clip[3]).min() > 0.0 or not w > 0.0:
         return 0, 0, *size  # in part behind the viewer

@@ -58,9 +58,9 @@ class ShadowMaps:
         lights["light"]["shadow_layer"] = -1
         if not hair:
             return
-        spheres = drawing.bounding_sphere(hair), drawing.tight_sphere(hair)
+        loose = drawing.bounding_sphere(hair)
         for index in range(min(int(lights["count"]), self._layer_count)):
-            view = _aim(lights["light"][index], spheres, self._size)
+            view = _aim(lights["light"][index], hair, loose, self._size)
             if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index
                 view["light_index"] = index
@@ -172,20 +172,19 @@ def _array(size, layer_count, texture_format):
     return texture
 
 
-def _aim(light, spheres, size):
+def _aim(light, hair, loose, size):
     """The view of a light that holds the hair, also written into the light.
 
-    spheres: (centre, radius) around the hair, a loose one and a tight one, which is for lights in the loose one. Of a
-    light in both, or next to them, the view holds what is up to `_WIDEST` off its axis; None without an axis.
+    loose: (centre, radius) of a sphere around the hair; lights in it take a tight one. Of a light in both, or next to
+    them, the view holds what is up to `_WIDEST` off its axis; None without an axis.
     """
     position = light["position"][:3].astype(np.float64)
     is_sun = light["kind"] == SUN
-    for centre, radius in spheres:
-        axis = light["axis"][:3].astype(np.float64) if is_sun else centre - position
-        distance = float(np.linalg.norm(axis))
-        is_inside = not is_sun and distance * np.sin(_WIDEST) < radius
-        if not is_inside:
-            break
+    is_near = not is_sun and _is_inside(position, *loose)
+    centre, radius = drawing.tight_sphere(hair) if is_near else loose
+    is_inside = is_near and _is_inside(position, centre, radius)
+    axis = light["axis"][:3].astype(np.float64) if is_sun else centre - position
+    distance = float(np.linalg.norm(axis))
     if is_inside and light["axis"][:3].any():  # where a spot or an area light shines
         axis = light["axis"][:3].astype(np.float64)
     length = float(np.linalg.norm(axis))
@@ -200,6 +199,10 @@ def _aim(light, spheres, size):
     light["near"] = near if is_sun else max(near, 0.0)
     light["extent"] = radius + (radius if is_sun else min(distance, radius))
     return view
+
+
+def _is_inside(position, centre, radius):
+    return float(np.linalg.norm(centre - position)) * np.sin(_WIDEST) < radius
 
 
 def _blur_of(light, size):

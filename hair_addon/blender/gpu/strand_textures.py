@@ -5,6 +5,7 @@ A change costs one upload, or only that of the moved strands; a redraw costs non
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import gpu
 import numpy as np
@@ -47,11 +48,16 @@ class StrandsOnGPU:
     points: np.ndarray  # (S, P, 3) as uploaded, for computations on the CPU
     radii: np.ndarray  # (S, P)
     bounds: np.ndarray  # (2, 3): least and greatest coordinates
-    ball: np.ndarray  # (4,): a centre, and the greatest distance of a point from it
     mean_length: float  # of strands, in the coordinate system of the points
     mean_radius: float
     greatest_radius: float
     moved: Moved | None = None  # None where all points are as uploaded
+
+    @cached_property
+    def ball(self) -> tuple[np.ndarray, float]:
+        """A centre (3,), and the greatest distance of a point from it: read from all points, for who needs it."""
+        centre = 0.5 * self.bounds.sum(axis=0, dtype=np.float64)
+        return centre, _farthest(self.points, centre)
 
 
 def upload_strands(points, radii, randoms=None, wetness=None):
@@ -69,8 +75,6 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     # Strand by strand first: NumPy is ten times faster along the long axis of a flat array.
     flat = points.reshape(strand_count, -1)
     bounds = np.stack([flat.min(axis=0).reshape(-1, 3).min(axis=0), flat.max(axis=0).reshape(-1, 3).max(axis=0)])
-    centre = 0.5 * bounds.sum(axis=0, dtype=np.float64)
-    ball = np.append(centre, _farthest(points, centre))
     # A sample of the strands is enough for the level of detail.
     some = slice(None, None, -(-strand_count // 1000))
     mean_length = float(np.linalg.norm(np.diff(points[some], axis=1), axis=2).sum(axis=1).mean())
@@ -86,7 +90,6 @@ def upload_strands(points, radii, randoms=None, wetness=None):
         points,
         radii,
         bounds,
-        ball,
         mean_length,
         float(radii[some].mean()),
         float(radii.max()),
@@ -149,7 +152,6 @@ def move_strands(strands, moved, points):
     flat = points.reshape(-1, 3)
     strands.bounds[0] = np.minimum(strands.bounds[0], flat.min(axis=0))
     strands.bounds[1] = np.maximum(strands.bounds[1], flat.max(axis=0))
-    strands.ball[3] = max(strands.ball[3], _farthest(points, strands.ball[:3]))
     heads = np.zeros((len(moved), 1, 3), np.float32)
     heads[:, 0, 0] = moved  # exact in single precision up to 16 million
     row_strands = TEXTURE_WIDTH // (strands.point_count + 1)

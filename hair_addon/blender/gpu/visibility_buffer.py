@@ -42,7 +42,7 @@ class VisibilityBuffer:
     """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
 
     color: linear light, premultiplied; segments: of strands, what is nearest; surface_depth: of surfaces, from 0 to 1;
-    depths: of what is nearest, the bits of floats from 0 to 1.
+    depths: of hair where there is any, the bits of floats from 0 to 1; elsewhere of surfaces, or 1.
     """
 
     def __init__(self, width, height):
@@ -52,6 +52,7 @@ class VisibilityBuffer:
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
+        self._has_strips = False  # whether `depths` are of strips alone
         self._parts = {}  # (format, background) → (framebuffer, texture, depth) of additional passes
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
@@ -147,12 +148,20 @@ class VisibilityBuffer:
     def _find(self):
         """Find the nearest segments by a compute program: first depths, then indices."""
         self._copy_depths()
+        self._has_strips = False
         program = shaders.segments_program()
         images = {"depths": self.depths, "segments": self.segments}
         for is_depth in (1, 0):
             for placed in self._hair:
                 constants = {"first_segment": placed.first, "is_depth": is_depth}
                 drawing.walk_strands(placed.strands, program, placed.record, placed.lights, {}, images, constants)
+
+    def nearest_depths(self):
+        """`depths` with those of surfaces where there is no hair."""
+        if self._has_strips:
+            self._copy_depths()  # which the strips were drawn into too
+            self._has_strips = False
+        return self.depths
 
     def _copy_depths(self):
         program = shaders.surface_depths_program()
@@ -168,7 +177,7 @@ class VisibilityBuffer:
                 program.bind()
                 program.uniform_int("first_segment", placed.first)
                 drawing.draw_strip(placed.strands, program, placed.record, placed.lights)
-        self._copy_depths()  # which the strips were drawn into
+        self._has_strips = True
 
     def _shade(self, placed, picture, parts=None):
         """Fill the samples in which a strand of a hair is nearest with its light, or with parts of it.

@@ -145,7 +145,7 @@ class History:
             "now_mean": now_blocks.textures[0],
             "now_deviation": now_blocks.textures[1],
             "motion": motion,
-            "depths": buffer.depths,
+            "depths": buffer.nearest_depths(),
             "segments": buffer.segments,
         }
         self._carried.draw(self._block_batch, history_programs.carry_program(), samplers, {"history": record})

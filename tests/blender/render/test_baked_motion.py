@@ -83,7 +83,7 @@ def test_vectors_lead_from_frame_to_frame(baked, tmp_path, monkeypatch):
 
     def drawing(drawn, motion, *others):
         for moment in (motion.before, motion.now, motion.after):
-            ((texture, (strand_count, point_count), _to_world),) = moment.hair.values()
+            ((texture, (strand_count, point_count), *_place),) = moment.hair.values()
             texels = np.array(texture.read(), np.float32).reshape(-1, 4)[: strand_count * point_count, :3]
             seen.append(texels.reshape(strand_count, point_count, 3))
         return draw(drawn, motion, *others)
