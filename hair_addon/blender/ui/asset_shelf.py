@@ -18,7 +18,8 @@ class VELLUS_AST_grooms(bpy.types.AssetShelf):
 
     @classmethod
     def poll(cls, context):
-        return context.mode == "OBJECT" and surface_of(context.object) is not None
+        # Blender also asks while it has no area to draw in, and `context.object` is missing there.
+        return context.mode == "OBJECT" and surface_of(context.view_layer.objects.active) is not None
 
     @classmethod
     def asset_poll(cls, asset):
