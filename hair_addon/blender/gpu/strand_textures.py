@@ -69,8 +69,8 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     strand_count, point_count, _xyz = points.shape
     row_strands = TEXTURE_WIDTH // point_count
     texture = places_texture(points, radii, row_strands)
-    random_texture = _numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
-    wetness_texture = None if wetness is None else _numbers_texture(wetness, row_strands)
+    random_texture = numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
+    wetness_texture = None if wetness is None else numbers_texture(wetness, row_strands)
     strip = bare_vertices(vertex_count(strand_count, point_count))
     # Strand by strand first: NumPy is ten times faster along the long axis of a flat array.
     flat = points.reshape(strand_count, -1)
@@ -106,7 +106,7 @@ def _farthest(points, centre):
     return np.sqrt(most)
 
 
-def _numbers_texture(values, row_strands):
+def numbers_texture(values, row_strands):
     """A number a strand, `row_strands` a row; values: (S,)."""
     numbers = np.zeros((-(-len(values) // row_strands), row_strands), np.float32)
     numbers.ravel()[: len(values)] = values
@@ -175,7 +175,7 @@ def move_strands(strands, moved, points):
 
 
 def _no_rows(strands):
-    return _numbers_texture(np.zeros(strands.strand_count), strands.row_strands)
+    return numbers_texture(np.zeros(strands.strand_count), strands.row_strands)
 
 
 @shaders.kept
