@@ -22,7 +22,7 @@ _MOST_MOVED = 8 << 20
 
 @dataclass(frozen=True)
 class StrandMaker:
-    """The strands of a `HairBinding` on the GPU, but for their guides' points; made by `new_maker`."""
+    """`BoundStrands` on the GPU, all of them but their guides' points; made by `new_maker`."""
 
     bindings: gpu.types.GPUTexture  # of each strand its root, its normal, and its guides with their weights
     guide_normals: gpu.types.GPUTexture
@@ -34,9 +34,9 @@ class StrandMaker:
     slot_count: int  # guides of a strand
 
     def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
-        """Make all strands for guides (G, P, 3) float32, in the binding's coordinates; the `StrandsOnGPU` after it.
+        """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; the `StrandsOnGPU` after it.
 
-        strands: those of the binding, whose texture is changed; their radii stay, and their arrays on this side are as
+        strands: of the same roots, whose texture is changed; their radii stay, and their arrays on this side are as
         before. Raises `HairError` where counts do not match.
         """
         require_count("guides", len(guide_points), int(self.record["guide_count"]))
@@ -77,52 +77,68 @@ class StrandMaker:
         return Moved(self.moved, 1, self.moved_rows, before + 2)
 
 
-def new_maker(binding: HairBinding, point_count: int, axes: np.ndarray) -> StrandMaker:
-    """The `StrandMaker` of a `HairBinding`: guides and strands of as many points, no styles.
+@dataclass(frozen=True)
+class BoundStrands:
+    """S strands and whom they follow of G guides, as arrays of this side: what `HairBinding` has on a Warp device."""
 
-    axes: (3, 3), from the binding's coordinates to those of the strands. Raises `HairError` where counts or indices do
-    not match, or the driver lacks something.
-    """
+    roots: np.ndarray  # (S, 3) float32 [m]
+    normals: np.ndarray  # (S, 3) float32, unit
+    guide_normals: np.ndarray  # (G, 3) float32, unit
+    indices: np.ndarray  # (S, k) int32, -1 for none
+    weights: np.ndarray  # (S, k) float32, before guides that differ are left out
+    fading: tuple[float, float, float, float]  # `Limits.fading`
+    keep_length: float
+
+
+def bound_strands(binding: HairBinding) -> BoundStrands:
+    """The `BoundStrands` of a `HairBinding`."""
     weights = binding.guide_weights
-    roots, normals, guide_normals = (
-        array.numpy() for array in (binding.positions, binding.normals, binding.guide_normals)
-    )
-    bindings = _binding_rows(roots, normals, weights.indices.numpy(), weights.weights.numpy(), len(guide_normals))
+    arrays = (binding.positions, binding.normals, binding.guide_normals, weights.indices, weights.weights)
+    return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
+
+
+def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> StrandMaker:
+    """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
+
+    axes: (3, 3), from the coordinates of roots and guides to those of the strands. Raises `HairError` where counts or
+    indices do not match, or the driver lacks something.
+    """
+    bindings = _binding_rows(bound)
     record = uniforms.MAKING.record()
     record["axes"][:3, :3], record["axes"][3, 3] = np.asarray(axes).T, 1.0
-    record["limits"] = binding.limits.fading
-    record["keep_length"] = binding.keep_length
-    strand_count, guide_count = len(roots), len(guide_normals)
+    record["limits"], record["keep_length"] = bound.fading, bound.keep_length
+    strand_count, guide_count = len(bound.roots), len(bound.guide_normals)
     record["strand_count"], record["guide_count"], record["point_count"] = strand_count, guide_count, point_count
-    bindings_texture, record["row_bindings"] = _rows_texture(bindings, 4)
-    normals_texture, record["row_normals"] = _rows_texture(np.pad(guide_normals, ((0, 0), (0, 1))), 4)
     record["row_guides"] = TEXTURE_WIDTH // (3 * point_count)
-    segments, record["row_segments"] = _empty_rows(guide_count, point_count + 1)
     record["row_strands"] = TEXTURE_WIDTH // point_count
+    # Programs first: where there are none, nothing is uploaded.
+    slot_count = bound.indices.shape[1]
+    _segments_program(), _strands_program(slot_count)
+    bindings_texture, record["row_bindings"] = _rows_texture(bindings, 4)
+    normals_texture, record["row_normals"] = _rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
+    segments, record["row_segments"] = _empty_rows(guide_count, point_count + 1)
     if strand_count * point_count <= _MOST_MOVED:
         moved, record["row_moved"] = _empty_rows(strand_count, point_count + 1)
         moved_rows = numbers_texture(np.arange(1, strand_count + 1), int(record["row_strands"]))
     else:
         moved, moved_rows = (_empty_rows(1, 1)[0] for _ in range(2))
     block = uniforms.uniform_buffer(record)
-    slot_count = weights.indices.shape[1]
-    _segments_program(), _strands_program(slot_count)
     return StrandMaker(bindings_texture, normals_texture, segments, moved, moved_rows, record, block, slot_count)
 
 
-def _binding_rows(roots, normals, indices, weights, guide_count):
+def _binding_rows(bound):
     """(S, 4 T) float32, T texels of each strand: see shaders/interpolate_strands.comp."""
-    strand_count, slot_count = indices.shape
-    require_count("normals", len(normals), len(roots))
-    require_count("guide weights", len(indices), len(roots))
-    require_count("weights", weights.shape[1], slot_count)
-    is_used = indices >= 0
-    require_indices("guides", indices[is_used], guide_count)
+    strand_count, slot_count = bound.indices.shape
+    require_count("strands", len(bound.roots), strand_count)
+    require_count("normals", len(bound.normals), strand_count)
+    require_count("weights", bound.weights.size, bound.indices.size)
+    is_used = bound.indices >= 0
+    require_indices("guides", bound.indices[is_used], len(bound.guide_normals))
     rows = np.zeros((strand_count, 2 + -(-slot_count // 2), 4), np.float32)
-    rows[:, 0, :3], rows[:, 1, :3] = roots, normals
+    rows[:, 0, :3], rows[:, 1, :3] = bound.roots, bound.normals
     pairs = rows[:, 2:].reshape(strand_count, -1, 2)
-    pairs[:, :slot_count, 0] = np.where(is_used, indices, 0)  # exact in single precision up to 16 million
-    pairs[:, :slot_count, 1] = np.where(is_used, weights, 0.0)
+    pairs[:, :slot_count, 0] = np.where(is_used, bound.indices, 0)  # exact in single precision up to 16 million
+    pairs[:, :slot_count, 1] = np.where(is_used, bound.weights, 0.0)
     return rows.reshape(strand_count, -1)
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.blender.gpu import shaders, strand_maker, strand_textures
+from hair_addon.blender.gpu import maker_choice, shaders, strand_maker, strand_textures
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.mesh import SurfacePoints
@@ -60,6 +60,10 @@ def by_warp(binding, guides, axes):
     return following.growing_points(binding, guides, following.weights_now(binding, guides), axes).result()
 
 
+def new_maker(binding, point_count, axes):
+    return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
+
+
 def uploaded(points):
     radii = np.broadcast_to(np.linspace(2e-4, 1e-5, points.shape[1], dtype=np.float32), points.shape[:2])
     return strand_textures.upload_strands(points, radii)
@@ -88,7 +92,7 @@ def test_strands_are_those_of_warp(blender, rng, point_count, slots, limits):
     binding, guides = bound_hair(rng, point_count, slots, **limits)
     wanted = by_warp(binding, guides, AXES)
     before = uploaded(np.zeros_like(wanted))
-    maker = strand_maker.new_maker(binding, point_count, AXES)
+    maker = new_maker(binding, point_count, AXES)
     made = maker.make(before, guides.numpy())
     found = texels(made.texture, STRANDS, point_count)
     lengths = np.linalg.norm(np.diff(wanted, axis=1), axis=2).sum(axis=1)
@@ -101,7 +105,7 @@ def test_strands_are_those_of_warp(blender, rng, point_count, slots, limits):
 def test_an_edit_leaves_where_strands_were(blender, rng):
     binding, guides = bound_hair(rng, 9, 4)
     first = uploaded(by_warp(binding, guides, np.eye(3)))
-    maker = strand_maker.new_maker(binding, 9, np.eye(3))
+    maker = new_maker(binding, 9, np.eye(3))
     once = maker.make(first, guides.numpy())
     there = texels(once.texture, STRANDS, 9)
     combed = guides.numpy() + np.linspace(0.0, 0.1, 9, dtype=np.float32)[:, None]
@@ -118,7 +122,7 @@ def test_an_edit_uploads_guides_and_nothing_else(blender, rng, monkeypatch):
     """One texture of twelve bytes a point, no program, no block."""
     binding, guides = bound_hair(rng, 9, 4)
     before = uploaded(by_warp(binding, guides, np.eye(3)))
-    maker = strand_maker.new_maker(binding, 9, np.eye(3))
+    maker = new_maker(binding, 9, np.eye(3))
     before = maker.make(before, guides.numpy())
     programs = len(shaders.program_cache)
     buffers, made = [], []
@@ -139,7 +143,7 @@ def test_an_edit_uploads_guides_and_nothing_else(blender, rng, monkeypatch):
 def test_other_guides_or_strands_are_refused(blender, rng):
     binding, guides = bound_hair(rng, 9, 4)
     before = uploaded(by_warp(binding, guides, np.eye(3)))
-    maker = strand_maker.new_maker(binding, 9, np.eye(3))
+    maker = new_maker(binding, 9, np.eye(3))
     with pytest.raises(HairError, match="guides"):
         maker.make(before, guides.numpy()[1:])
     with pytest.raises(HairError, match="points of a guide"):
@@ -148,4 +152,18 @@ def test_other_guides_or_strands_are_refused(blender, rng):
         maker.make(uploaded(before.points[1:].copy()), guides.numpy())
     with pytest.raises(HairError, match="guides"):
         guide_normals = vectors(np.ones((3, 3)))
-        strand_maker.new_maker(replace(binding, guide_normals=guide_normals), 9, np.eye(3))
+        new_maker(replace(binding, guide_normals=guide_normals), 9, np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("times", "is_faster", "can_make"), [((1.0, 3.0), 1, 1), ((2.0, 3.0), 0, 1), ((np.inf, 0.0), 0, 0)]
+)
+def test_the_faster_way_is_chosen(monkeypatch, times, is_faster, can_make):
+    monkeypatch.setattr(maker_choice, "times", lambda: times)
+    assert (maker_choice.is_faster(), maker_choice.can_make()) == (is_faster, can_make)
+
+
+def test_times_are_measured_once(blender):
+    first = maker_choice.times()
+    assert min(first) > 0.0
+    assert maker_choice.times() is first
