@@ -18,13 +18,14 @@ import gpu
 import numpy as np
 import warp as wp
 
-sys.path[:0] = [str(Path(__file__).resolve().parents[2] / folder) for folder in (".", "blend_samples")]
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
 
 import head  # the samples' scene
 
 import hair_addon
 from hair_addon.blender.data import curves
-from hair_addon.blender.gpu import maker_choice, strand_textures
+from hair_addon.blender.gpu import maker_choice
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
 from hair_addon.blender.live import live_hair
