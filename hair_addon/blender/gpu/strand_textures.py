@@ -18,6 +18,8 @@ TEXTURE_WIDTH = 16384
 # Work groups along an axis: every driver takes as many.
 MOST_GROUPS = 65535
 
+_SAMPLED = 500  # strands whose lengths are compared
+
 _AT_ONCE = 400  # strands that are brought into the order of texels
 
 _MOVE_GROUP_SIZE = 64  # points that one work group of `_move_program` brings to their places
@@ -59,6 +61,19 @@ class StrandsOnGPU:
         centre = 0.5 * self.bounds.sum(axis=0, dtype=np.float64)
         return centre, _farthest(self.points, centre)
 
+    def lengthening(self, point_count: int) -> float:
+        """How much longer strands are than with as many points, evenly chosen of all: of some strands."""
+        if point_count not in self._lengthenings:
+            chosen = np.arange(point_count) * (self.point_count - 1) // (point_count - 1)
+            some = self.points[:: -(-self.strand_count // _SAMPLED)]
+            lengths = _total_length(some), _total_length(some[:, chosen])
+            self._lengthenings[point_count] = lengths[0] / max(lengths[1], 1e-12)
+        return self._lengthenings[point_count]
+
+    @cached_property
+    def _lengthenings(self):
+        return {}
+
 
 def upload_strands(points, radii, randoms=None, wetness=None):
     """(S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
@@ -94,6 +109,10 @@ def upload_strands(points, radii, randoms=None, wetness=None):
         float(radii[some].mean()),
         float(radii.max()),
     )
+
+
+def _total_length(points):
+    return float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum())
 
 
 def _farthest(points, centre):

@@ -32,9 +32,10 @@ def are_wanted() -> bool:
 
 @dataclass(frozen=True)
 class _Extent:
-    """Guides (G, P, 3) as strands are drawn, and the box (2, 3) that these strands had then."""
+    """Guides (G, P, 3) as strands are drawn, the box (2, 3) around them, and that of the strands that they had."""
 
     guides: np.ndarray
+    box: np.ndarray
     bounds: np.ndarray
 
     def bounds_for(self, guides: np.ndarray) -> np.ndarray:
@@ -43,8 +44,8 @@ class _Extent:
         A strand goes no further than the guide that goes furthest, and no further out of the guides' box than any did
         before, but for turns from root to root: a part of that way.
         """
-        way = np.sqrt(np.square(guides - self.guides).sum(axis=2).max())
-        (low, high), (low_before, high_before) = _box(guides), _box(self.guides)
+        way = np.linalg.norm(np.abs(_box(guides - self.guides)).max(axis=0))
+        (low, high), (low_before, high_before) = _box(guides), self.box
         outside = max(np.max(low_before - self.bounds[0]), np.max(self.bounds[1] - high_before), 0.0)
         margin = outside + _FURTHER * way
         least = np.maximum(low - margin, self.bounds[0] - way)
@@ -68,7 +69,8 @@ class Making:
         if self.is_refused or bound.styles.styling is not None:
             return False
         if self.extent is None:
-            self.extent = _Extent(_drawn_guides(bound), kept.on_gpu.bounds.copy())
+            guides = _drawn_guides(bound)
+            self.extent = _Extent(guides, _box(guides), kept.on_gpu.bounds.copy())
         return True
 
     def make(self, kept: Any) -> bool:
@@ -93,7 +95,9 @@ def _drawn_guides(bound):
 
 
 def _box(points):
-    return points.min(axis=(0, 1)), points.max(axis=(0, 1))
+    """(2, 3): least and greatest coordinates of (G, P, 3) points; NumPy is faster along a flat array's long axis."""
+    flat = points.reshape(len(points), -1)
+    return np.stack([flat.min(axis=0).reshape(-1, 3).min(axis=0), flat.max(axis=0).reshape(-1, 3).max(axis=0)])
 
 
 def _joined(bounds, others):

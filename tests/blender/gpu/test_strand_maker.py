@@ -118,6 +118,18 @@ def test_an_edit_leaves_where_strands_were(blender, rng):
     assert np.abs(texels(twice.texture, STRANDS, 9) - there).max() > 0.01
 
 
+def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
+    """Where its strands were is not known then, as after two changes at once."""
+    monkeypatch.setattr(strand_maker, "_MOST_MOVED", STRANDS * 9 - 1)
+    binding, guides = bound_hair(rng, 9, 4)
+    wanted = by_warp(binding, guides, np.eye(3))
+    maker = new_maker(binding, 9, np.eye(3))
+    assert maker.moved.width * maker.moved.height == 1
+    made = maker.make(uploaded(np.zeros_like(wanted)), guides.numpy())
+    assert made.moved.turn == 2
+    np.testing.assert_allclose(texels(made.texture, STRANDS, 9)[..., :3], wanted, rtol=0.0, atol=CLOSE)
+
+
 def test_an_edit_uploads_guides_and_nothing_else(blender, rng, monkeypatch):
     """One texture of twelve bytes a point, no program, no block."""
     binding, guides = bound_hair(rng, 9, 4)
