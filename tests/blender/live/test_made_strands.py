@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands that the GPU makes while guides are combed: what is written afterwards is what was shown; counted."""
 
+from types import SimpleNamespace
+
 import bpy
 import numpy as np
 import pytest
@@ -9,11 +11,12 @@ from hair_addon.blender.gpu import maker_choice, strand_maker
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
-from hair_addon.blender.render import hair_cache, made_strands
+from hair_addon.blender.render import hair_cache, made_strands, viewport
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
 from hair_addon.core.styling import lean
+from tests.blender.render.test_hair_places import view3d
 from tests.support.counting import counts_of
 from tests.support.reading import points, write_points
 
@@ -162,3 +165,29 @@ def test_the_user_may_choose(monkeypatch, choice, times, is_wanted):
 def test_nothing_is_measured_without_a_window(monkeypatch):
     monkeypatch.setattr(maker_choice, "times", None)
     assert not made_strands.are_wanted()
+
+
+def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkeypatch):
+    """It is measured when hair is drawn first; every edit of bound hair is then made there."""
+    viewport.view_cache.clear()
+    calls, asked = counts_of(monkeypatch), []
+    monkeypatch.setattr(maker_choice, "times", lambda: asked.append(1) or (0.0, 1.0))
+
+    def view():
+        context = bpy.context
+        depsgraph = context.evaluated_depsgraph_get
+        of = SimpleNamespace(space_data=view3d(), scene=context.scene, view_layer=context.view_layer)
+        of.evaluated_depsgraph_get = depsgraph
+        return viewport.drawn_scene_of(of).hair[0][0]
+
+    before = view()
+    assert asked
+    for _ in range(3):
+        comb(20)
+        after = view()
+        assert hair_cache.may_make(hair.data.session_uid)
+        assert after is not before
+        before = after
+    assert calls["moves"] == 0
+    assert after.moved.turn == 3
+    np.testing.assert_allclose(drawn(hair), grown(hair), rtol=0.0, atol=CLOSE)
