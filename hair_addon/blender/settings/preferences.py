@@ -34,6 +34,12 @@ class VellusPreferences(bpy.types.AddonPreferences):
         default="AUTOMATIC",
     )
 
+    def draw(self, _context):
+        """Rows of all preferences: Blender draws none by itself."""
+        self.layout.use_property_split = True
+        for name in ("device", "stroke_device"):
+            self.layout.prop(self, name)
+
 
 def is_extension():
     """Whether this is an installed extension, with its own folders, and not a checkout."""
