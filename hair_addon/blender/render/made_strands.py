@@ -16,7 +16,7 @@ from ..host import running
 from ..settings import preferences
 
 # Of how far guides were combed: what strands may be further out of their box than they were.
-_FURTHER = 0.25
+_FURTHER = 0.1
 
 
 def are_wanted() -> bool:
@@ -41,15 +41,15 @@ class _Extent:
     def bounds_for(self, guides: np.ndarray) -> np.ndarray:
         """(2, 3): a box that strands stay in when guides are combed, estimated without them.
 
-        A strand goes no further than the guide that goes furthest, and no further out of the guides' box than any did
-        before, but for turns from root to root: a part of that way.
+        A strand goes no further than the guide that goes furthest, and no further out of a side of the guides' box than
+        any did before, but for turns from root to root: a part of that way.
         """
         way = np.linalg.norm(np.abs(_box(guides - self.guides)).max(axis=0))
         (low, high), (low_before, high_before) = _box(guides), self.box
-        outside = max(np.max(low_before - self.bounds[0]), np.max(self.bounds[1] - high_before), 0.0)
-        margin = outside + _FURTHER * way
-        least = np.maximum(low - margin, self.bounds[0] - way)
-        greatest = np.minimum(high + margin, self.bounds[1] + way)
+        further = _FURTHER * way
+        low = low - np.maximum(low_before - self.bounds[0], 0.0) - further
+        high = high + np.maximum(self.bounds[1] - high_before, 0.0) + further
+        least, greatest = np.maximum(low, self.bounds[0] - way), np.minimum(high, self.bounds[1] + way)
         return np.stack([np.minimum(self.bounds[0], least), np.maximum(self.bounds[1], greatest)]).astype(np.float32)
 
 
