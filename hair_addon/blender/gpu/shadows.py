@@ -18,7 +18,6 @@ _NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it; of 
 _LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
 _SHADE_DISTANCE = 0.15
 _ALL = drawing.Steps()
-_SAMPLED = 500  # strands whose lengths are compared
 
 
 class ShadowMaps:
@@ -153,16 +152,10 @@ def _slot(texture, layer):
 def _record(strands, view, to_world, steps):
     """`drawing.strand_record` of strands that cover as much with fewer points, which cut curls short."""
     record = drawing.strand_record(strands, view, to_world, steps)
-    pieces = int(record["drawn_points"]) - 1
-    if pieces + 1 < strands.point_count:
-        chosen = np.arange(pieces + 1) * (strands.point_count - 1) // pieces
-        some = strands.points[:: -(-strands.strand_count // _SAMPLED)]
-        record["thickness"] *= _total_length(some) / max(_total_length(some[:, chosen]), 1e-12)
+    drawn_points = int(record["drawn_points"])
+    if drawn_points < strands.point_count:
+        record["thickness"] *= strands.lengthening(drawn_points)
     return record
-
-
-def _total_length(points):
-    return float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum())
 
 
 def _array(size, layer_count, texture_format):

@@ -18,6 +18,8 @@ TEXTURE_WIDTH = 16384
 # Work groups along an axis: every driver takes as many.
 MOST_GROUPS = 65535
 
+_SAMPLED = 500  # strands whose lengths are compared
+
 _AT_ONCE = 400  # strands that are brought into the order of texels
 
 _MOVE_GROUP_SIZE = 64  # points that one work group of `_move_program` brings to their places
@@ -59,6 +61,19 @@ class StrandsOnGPU:
         centre = 0.5 * self.bounds.sum(axis=0, dtype=np.float64)
         return centre, _farthest(self.points, centre)
 
+    def lengthening(self, point_count: int) -> float:
+        """How much longer strands are than with as many points, evenly chosen of all: of some strands."""
+        if point_count not in self._lengthenings:
+            chosen = np.arange(point_count) * (self.point_count - 1) // (point_count - 1)
+            some = self.points[:: -(-self.strand_count // _SAMPLED)]
+            lengths = _total_length(some), _total_length(some[:, chosen])
+            self._lengthenings[point_count] = lengths[0] / max(lengths[1], 1e-12)
+        return self._lengthenings[point_count]
+
+    @cached_property
+    def _lengthenings(self):
+        return {}
+
 
 def upload_strands(points, radii, randoms=None, wetness=None):
     """(S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
@@ -69,8 +84,8 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     strand_count, point_count, _xyz = points.shape
     row_strands = TEXTURE_WIDTH // point_count
     texture = places_texture(points, radii, row_strands)
-    random_texture = _numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
-    wetness_texture = None if wetness is None else _numbers_texture(wetness, row_strands)
+    random_texture = numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
+    wetness_texture = None if wetness is None else numbers_texture(wetness, row_strands)
     strip = bare_vertices(vertex_count(strand_count, point_count))
     # Strand by strand first: NumPy is ten times faster along the long axis of a flat array.
     flat = points.reshape(strand_count, -1)
@@ -96,6 +111,10 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     )
 
 
+def _total_length(points):
+    return float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum())
+
+
 def _farthest(points, centre):
     """Greatest distance of points (..., P, 3) from a centre (3,)."""
     flat, here, most = points.reshape(-1, points.shape[-2], 3), centre.astype(np.float32), 0.0
@@ -106,7 +125,7 @@ def _farthest(points, centre):
     return np.sqrt(most)
 
 
-def _numbers_texture(values, row_strands):
+def numbers_texture(values, row_strands):
     """A number a strand, `row_strands` a row; values: (S,)."""
     numbers = np.zeros((-(-len(values) // row_strands), row_strands), np.float32)
     numbers.ravel()[: len(values)] = values
@@ -175,7 +194,7 @@ def move_strands(strands, moved, points):
 
 
 def _no_rows(strands):
-    return _numbers_texture(np.zeros(strands.strand_count), strands.row_strands)
+    return numbers_texture(np.zeros(strands.strand_count), strands.row_strands)
 
 
 @shaders.kept

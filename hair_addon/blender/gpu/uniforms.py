@@ -141,6 +141,24 @@ MOTION = Block(
     },
 )
 
+MAKING = Block(
+    "Making",
+    {
+        "axes": "mat4",  # from the coordinates of roots and guides to those of the strands
+        "limits": "vec4",  # as `limited_part` of shaders/include/guide_sum.glsl
+        "keep_length": "float",
+        "strand_count": "int",
+        "guide_count": "int",
+        "point_count": "int",
+        "row_guides": "int",  # whole guides or strands in a row of each texture
+        "row_normals": "int",
+        "row_segments": "int",
+        "row_bindings": "int",
+        "row_strands": "int",
+        "row_moved": "int",  # 0 where it is not kept where strands were
+    },
+)
+
 HISTORY = Block(
     "History",
     {

@@ -48,7 +48,7 @@ class BoundHair:
     written_radii: np.ndarray | None = None  # (P,) in the datablock, None if they may have changed
     is_report_due: bool = False  # whether Blender has not reported our write yet, which is to be ignored
     straight: "BoundHair | None" = None  # the same without styles while viewports show that: alone it follows strokes
-    is_behind: bool = False  # whether strands have to grow again, as only those of `straight` have followed `guides`
+    is_behind: bool = False  # whether points have to grow again: what viewports show followed `guides` without them
 
     @property
     def points(self) -> np.ndarray:
@@ -88,12 +88,29 @@ class BoundHair:
                 self._points_have_moved()
             return moved
         strand_count = len(_grown(self.shares))
-        moved = np.arange(strand_count) if len(combed) == len(guides) else self._reached(combed)
+        moves_all = self.is_behind or len(combed) == len(guides)
+        moved = np.arange(strand_count) if moves_all else self._reached(combed)
         if len(moved):
             # Beyond a half, selecting the moved ones would take longer.
             self.grow(moved if len(moved) <= strand_count // 2 else None)
             self._points_have_moved()
         return moved
+
+    def follow_drawn(self, guides: Strands) -> np.ndarray | None:
+        """Note guides as they are combed now, where the GPU makes the strands that are shown; (M,) guides that moved.
+
+        Points grow in `catch_up`. None as from `follow`.
+        """
+        combed = following.combed(guides, self.guides)
+        if combed is None:
+            return None
+        self.guides = guides
+        if len(combed):
+            self.is_behind = True
+            self._points_have_moved()
+            if self.straight is not None:
+                self.straight.follow_drawn(guides)
+        return combed
 
     def hold(self, points: np.ndarray) -> None:
         """Have these points in place of those that follow guides, until they grow again."""
@@ -155,7 +172,7 @@ class BoundHair:
             self.straight.grow()
 
     def catch_up(self) -> None:
-        """Bring strands up to guides that only those without styles have followed."""
+        """Bring points up to guides that only what viewports show has followed."""
         if self.is_behind:
             self.grow()
 

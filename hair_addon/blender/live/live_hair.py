@@ -38,14 +38,16 @@ def follow_guides(hair, depsgraph, local=None):
         make_again(hair, depsgraph)
         return
     try:
-        moved = bound.follow(_shown_guides(hair, bound, local))
+        guides = _shown_guides(hair, bound, local)
+        is_made = hair_cache.may_make(hair.session_uid) and not hair_outside.is_wanted(hair)
+        moved = bound.follow_drawn(guides) if is_made else bound.follow(guides)
     except HairError as error:
         hair.vellus.status = str(error)
         return
     if moved is None:
         make_again(hair, depsgraph)
     elif len(moved):
-        hair_cache.move(hair.session_uid, moved, bound.shown.growing)
+        hair_cache.move(hair.session_uid, moved, bound.shown, is_made)
         write_soon(hair)
     elif hair_outside.is_wanted(hair):
         bound.is_due()  # colliders may have moved

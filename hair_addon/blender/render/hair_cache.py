@@ -28,6 +28,7 @@ from ..host import paths
 from ..host.caches import Cache
 from ..host.notices import name_of
 from ..settings import preferences, properties, shared_wetness
+from . import made_strands
 
 # Tables of this many settings are kept: one groom and the last few positions of a slider.
 _SHADING_CAPACITY = 8
@@ -47,6 +48,7 @@ class _KeptStrands:
     on_gpu: strand_textures.StrandsOnGPU | None = None  # where `pose` carried them
     pose: posed_strands.Pose | None = None  # None where no surface carries them
     moved: list = field(default_factory=list)  # [(M,) indices of strands] that moved since then
+    making: made_strands.Making = field(default_factory=made_strands.Making)
 
     def __post_init__(self):
         require_count("radii", len(self.radii), len(self.points))
@@ -95,16 +97,29 @@ def strands_on_gpu(datablock):
     if kept is None or (kept.growing is not None and kept.growing.result() is not kept.points):
         kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
     pose = _pose_of(datablock.surface)
+    is_elsewhere = kept.on_gpu is None or kept.pose is not pose
+    is_due = kept.making.due is not None
+    if is_due and not is_elsewhere and kept.making.make(kept):
+        return kept.on_gpu
+    if is_due or (is_elsewhere and _is_behind(datablock)):
+        kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
     moved, kept.moved = kept.moved, []
     if kept.on_gpu is None or kept.pose is not pose:
         points = _carried(kept, pose)
         kept.on_gpu = strand_textures.upload_strands(points, kept.radii, kept.randoms, kept.wetness)
+        kept.making.extent = None
         kept.pose = pose
     elif moved:
         chosen = np.unique(np.concatenate(moved))
         require_indices("strands", chosen, len(kept.points))
         kept.on_gpu = strand_textures.move_strands(kept.on_gpu, chosen, _carried(kept, pose, chosen))
     return kept.on_gpu
+
+
+def _is_behind(datablock):
+    """Whether what is shown was made on the GPU alone."""
+    bound = bindings.of(datablock)
+    return bound is not None and bound.shown.is_behind
 
 
 def _carried(kept, pose, chosen=slice(None)):
@@ -128,15 +143,36 @@ def refuse(datablock, error):
     print(f"Vellus: {error}", file=sys.stderr)
 
 
-def move(session_uid, moved, growing):
-    """Some strands of bound hair have moved, (M,) indices: with the next redraw they alone are uploaded.
+def move(session_uid, moved, bound, is_made=False):
+    """Strands of `BoundHair` have moved: with the next redraw they alone are uploaded, which waits for their points.
 
-    growing: a future of the points of all its strands, for which that redraw waits.
+    moved: (M,) indices of them; is_made: whether the GPU makes all of them instead, as `may_make` says.
     """
     kept = _strands_of(session_uid)
-    if kept is not None:
-        kept.growing = growing
+    if kept is None:
+        return
+    if is_made:
+        kept.making.due = bound
+    else:
+        kept.growing = bound.growing
         kept.moved.append(moved)
+
+
+def may_make(session_uid):
+    """Whether the GPU makes what viewports show of hair while its guides are combed: as `choose_makers` found."""
+    kept = _strands_of(session_uid)
+    return kept is not None and kept.making.is_chosen and not kept.moved
+
+
+def choose_makers():
+    """Find out which of the hair that a viewport draws the GPU may make, and is to."""
+    is_wanted = made_strands.are_wanted()
+    for datablock in bpy.data.hair_curves:
+        kept, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
+        if kept is not None and kept.on_gpu is not None:
+            is_at_rest = kept.pose is None or kept.pose.motion is None
+            is_bound = bound is not None and bound.free is None and kept.points is bound.shown.points
+            kept.making.is_chosen = is_wanted and is_at_rest and is_bound and kept.making.can(kept, bound.shown)
 
 
 def _strands_of(session_uid):
@@ -217,6 +253,8 @@ def _are_points(datablock, points):
 
 def _read_shown(datablock):
     bound = bindings.of(datablock)
+    if bound is not None:
+        bound.shown.catch_up()
     return _read(datablock, bound, bound and bound.shown)
 
 

@@ -164,6 +164,8 @@ def drawn_scene_of(context):
             is_draft=bindings.has_unwritten(),
             is_hair_only=not is_ours(context),
         )
+        if view.drawn.hair:
+            hair_cache.choose_makers()
     return view.drawn
 
 

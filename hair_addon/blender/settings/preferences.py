@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Preferences: the compute device."""
+"""Preferences: the compute device, and what makes the strands that viewports show."""
 
 import bpy
 
@@ -22,6 +22,23 @@ class VellusPreferences(bpy.types.AddonPreferences):
         items=[("cpu", "CPU", "Processor"), ("cuda", "NVIDIA GPU", "First CUDA device")],
         default="cpu",
     )
+    stroke_device: bpy.props.EnumProperty(
+        name="Strands While Combing",
+        description="Device that interpolates strands without styles in viewports while guides are combed",
+        translation_context=CONTEXT,
+        items=[
+            ("AUTOMATIC", "Automatic", "The graphics card where it is faster"),
+            ("GPU", "Graphics Card", "The graphics card that draws, of any vendor"),
+            ("COMPUTE", "Compute Device", "The device that computes hair"),
+        ],
+        default="AUTOMATIC",
+    )
+
+    def draw(self, _context):
+        """Rows of all preferences: Blender draws none by itself."""
+        self.layout.use_property_split = True
+        for name in ("device", "stroke_device"):
+            self.layout.prop(self, name)
 
 
 def is_extension():
@@ -31,8 +48,19 @@ def is_extension():
 
 def device():
     """Name of the Warp device that the user chose; the processor where there is no choice, or no such device."""
-    addon = bpy.context.preferences.addons.get(ADDON_MODULE)
-    if addon is None or addon.preferences is None or addon.preferences.device == "cpu":
+    chosen = _chosen()
+    if chosen is None or chosen.device == "cpu":
         return "cpu"
 
     return "cuda" if kernels.kernel_cache.wp.is_cuda_available() else "cpu"
+
+
+def stroke_device():
+    """Whether the user chose "AUTOMATIC", "GPU" or "COMPUTE" for strands while guides are combed."""
+    chosen = _chosen()
+    return "AUTOMATIC" if chosen is None else chosen.stroke_device
+
+
+def _chosen():
+    addon = bpy.context.preferences.addons.get(ADDON_MODULE)
+    return None if addon is None else addon.preferences

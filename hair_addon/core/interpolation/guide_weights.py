@@ -75,6 +75,15 @@ class Limits:
     angle: float = math.pi
     length: float = math.inf
 
+    @property
+    def fading(self) -> tuple[float, float, float, float]:
+        """The cosine at which a guide has no share, 1 / the range over which it fades; so too logarithms of lengths."""
+        none, all_of_it = -3.0, -2.0
+        if self.angle < math.pi:
+            none, all_of_it = math.cos(self.angle), math.cos(max(self.angle - FADE, 0.0))
+        length_limit = min(math.log(self.length), UNLIMITED)
+        return none, 1.0 / max(all_of_it - none, 1e-6), length_limit, 1.0 / max(0.5 * length_limit, 1e-6)
+
 
 @dataclass(frozen=True)
 class Reach:
@@ -250,8 +259,6 @@ def limited(
         device=device,
         least_rows=256,
     )
-    cosine_none, cosine_all = _fade_of_cosine(limits.angle)
-    length_limit = min(math.log(limits.length), UNLIMITED)
     weights = wp.empty_like(guide_weights.weights)
     parallel.launch(
         _limit,
@@ -261,22 +268,12 @@ def limited(
             Rows(guide_weights.weights),
             Rows(guide_weights.turns),
             shapes,
-            cosine_none,
-            1.0 / max(cosine_all - cosine_none, 1e-6),
-            length_limit,
-            1.0 / max(0.5 * length_limit, 1e-6),
+            *limits.fading,
         ],
         outputs=[weights],
         device=device,
     )
     return replace(guide_weights, weights=weights)
-
-
-def _fade_of_cosine(angle):
-    """(none, all): the cosines at which a guide has no share any more, and at which it begins to lose it."""
-    if angle >= math.pi:
-        return -3.0, -2.0
-    return math.cos(angle), math.cos(max(angle - FADE, 0.0))
 
 
 @wp.func

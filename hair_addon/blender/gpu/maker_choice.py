@@ -1,0 +1,72 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Whether strands are made where they are drawn: measured once, the first time that this could be done.
+
+The other way computes points for the host and uploads them. Where a processor draws, an upload is a copy, and a compute
+program takes longer than Warp does; on graphics cards it is the other way round.
+"""
+
+import time
+
+import gpu
+import numpy as np
+
+from ...core.errors import HairError
+from . import shaders, strand_maker, strand_textures
+
+_STRANDS, _GUIDES, _POINTS, _SLOTS = 4096, 64, 41, 8
+_RUNS = 3
+
+
+@shaders.kept
+def times() -> tuple[float, float]:
+    """Seconds in which the GPU makes some strands, and in which as many are uploaded; infinite where it cannot."""
+    try:
+        maker = _maker()
+    except HairError:
+        return np.inf, 0.0  # the driver lacks something, and nobody has to know
+    points = np.zeros((_STRANDS, _POINTS, 3), np.float32)
+    radii = np.zeros(points.shape[:2], np.float32)
+    strands = [strand_textures.upload_strands(points, radii)]
+
+    def upload():
+        strands[0] = strand_textures.upload_strands(points, radii)
+
+    def make():
+        strands[0] = maker.make(strands[0], points[:_GUIDES])
+
+    return _seconds(make, strands), _seconds(upload, strands)
+
+
+def is_faster() -> bool:
+    """Whether the GPU makes strands in half the time that their upload takes, which is a part of the other way."""
+    makes, uploads = times()
+    return makes < 0.5 * uploads
+
+
+def can_make() -> bool:
+    """Whether the GPU can make strands at all."""
+    return times()[0] < np.inf
+
+
+def _maker():
+    """Of strands that all follow other guides, as neighbours do on a surface."""
+    slots = (np.arange(_STRANDS)[:, None] * _GUIDES // _STRANDS + np.arange(_SLOTS)) % _GUIDES
+    up = np.tile(np.float32([0.0, 0.0, 1.0]), (_STRANDS, 1))
+    weights = np.full(slots.shape, 1.0 / _SLOTS, np.float32)
+    bound = strand_maker.BoundStrands(
+        np.zeros_like(up), up, up[:_GUIDES], slots, weights, (-3.0, 1.0, 200.0, 0.01), 1.0
+    )
+    return strand_maker.new_maker(bound, _POINTS, np.eye(3))
+
+
+def _seconds(work, strands):
+    """Least time of some runs, each to its end on the GPU, after one that warms up."""
+    found = []
+    for _ in range(1 + _RUNS):
+        started = time.perf_counter()
+        work()
+        end = gpu.types.GPUFrameBuffer(color_slots=strands[0].texture)
+        with end.bind():
+            end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # what is read has to be there
+        found.append(time.perf_counter() - started)
+    return min(found[1:])

@@ -1,0 +1,192 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands made of their guides by compute programs, in the texture that they are drawn from.
+
+What a strand follows is uploaded once. An edit of guides uploads these alone, and nothing is read back.
+core/interpolation has the mathematics; shaders/interpolate_strands.comp is its twin.
+"""
+
+from dataclasses import dataclass, replace
+
+import gpu
+import numpy as np
+
+from ...core.interpolation.hair_binding import HairBinding
+from ...core.kernels.checks import require_count, require_indices
+from . import shaders, uniforms
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, Moved, StrandsOnGPU, numbers_texture
+
+_GROUP_SIZE = 64
+# Points of strands up to which it is kept where they were, for motion vectors: 128 MiB.
+_MOST_MOVED = 8 << 20
+
+
+@dataclass(frozen=True)
+class StrandMaker:
+    """`BoundStrands` on the GPU, all of them but their guides' points; made by `new_maker`."""
+
+    bindings: gpu.types.GPUTexture  # of each strand its root, its normal, and its guides with their weights
+    guide_normals: gpu.types.GPUTexture
+    segments: gpu.types.GPUTexture  # of guides, in their frames; then what their weights are limited by
+    moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; one texel where that is not kept
+    moved_rows: gpu.types.GPUTexture
+    record: np.ndarray  # uniforms.MAKING
+    block: gpu.types.GPUUniformBuf
+    slot_count: int  # guides of a strand
+
+    def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
+        """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; the `StrandsOnGPU` after it.
+
+        strands: of the same roots, whose texture is changed; their radii stay, and their arrays on this side are as
+        before. Raises `HairError` where counts do not match.
+        """
+        require_count("guides", len(guide_points), int(self.record["guide_count"]))
+        require_count("points of a guide", guide_points.shape[1], int(self.record["point_count"]))
+        require_count("strands", strands.strand_count, int(self.record["strand_count"]))
+        require_count("points of a strand", strands.point_count, int(self.record["point_count"]))
+        self._put_segments(guide_points)
+        program = _strands_program(self.slot_count)
+        program.bind()
+        program.uniform_block("making", self.block)
+        for name in ("bindings", "guide_normals", "segments"):
+            program.uniform_sampler(name, getattr(self, name))
+        program.image("strands", strands.texture)
+        program.image("moved_strands", self.moved)
+        groups = -(-strands.strand_count // _GROUP_SIZE)
+        rows = -(-groups // MOST_GROUPS)
+        gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+        gpu.shader.unbind()
+        return replace(strands, moved=self._moved_since(strands))
+
+    def _put_segments(self, guide_points):
+        values = np.ascontiguousarray(guide_points, np.float32).reshape(len(guide_points), -1)
+        points, _row = _rows_texture(values, 1)
+        program = _segments_program()
+        program.bind()
+        program.uniform_block("making", self.block)
+        program.uniform_sampler("guide_points", points)
+        program.uniform_sampler("guide_normals", self.guide_normals)
+        program.image("segments", self.segments)
+        gpu.compute.dispatch(program, -(-len(values) // _GROUP_SIZE), 1, 1)
+        gpu.shader.unbind()
+
+    def _moved_since(self, strands):
+        before = strands.moved.turn if strands.moved else 0
+        if self.record["row_moved"]:
+            return Moved(self.moved, int(self.record["row_moved"]), self.moved_rows, before + 1)
+        # It is not known where strands were: as if there had been more changes than one.
+        return Moved(self.moved, 1, self.moved_rows, before + 2)
+
+
+@dataclass(frozen=True)
+class BoundStrands:
+    """S strands and whom they follow of G guides, as arrays of this side: what `HairBinding` has on a Warp device."""
+
+    roots: np.ndarray  # (S, 3) float32 [m]
+    normals: np.ndarray  # (S, 3) float32, unit
+    guide_normals: np.ndarray  # (G, 3) float32, unit
+    indices: np.ndarray  # (S, k) int32, -1 for none
+    weights: np.ndarray  # (S, k) float32, before guides that differ are left out
+    fading: tuple[float, float, float, float]  # `Limits.fading`
+    keep_length: float
+
+
+def bound_strands(binding: HairBinding) -> BoundStrands:
+    """The `BoundStrands` of a `HairBinding`."""
+    weights = binding.guide_weights
+    arrays = (binding.positions, binding.normals, binding.guide_normals, weights.indices, weights.weights)
+    return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
+
+
+def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> StrandMaker:
+    """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
+
+    axes: (3, 3), from the coordinates of roots and guides to those of the strands. Raises `HairError` where counts or
+    indices do not match, or the driver lacks something.
+    """
+    bindings = _binding_rows(bound)
+    record = uniforms.MAKING.record()
+    record["axes"][:3, :3], record["axes"][3, 3] = np.asarray(axes).T, 1.0
+    record["limits"], record["keep_length"] = bound.fading, bound.keep_length
+    strand_count, guide_count = len(bound.roots), len(bound.guide_normals)
+    record["strand_count"], record["guide_count"], record["point_count"] = strand_count, guide_count, point_count
+    record["row_guides"] = TEXTURE_WIDTH // (3 * point_count)
+    record["row_strands"] = TEXTURE_WIDTH // point_count
+    # Programs first: where there are none, nothing is uploaded.
+    slot_count = bound.indices.shape[1]
+    _segments_program(), _strands_program(slot_count)
+    bindings_texture, record["row_bindings"] = _rows_texture(bindings, 4)
+    normals_texture, record["row_normals"] = _rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
+    segments, record["row_segments"] = _empty_rows(guide_count, point_count + 1)
+    if strand_count * point_count <= _MOST_MOVED:
+        moved, record["row_moved"] = _empty_rows(strand_count, point_count + 1)
+        moved_rows = numbers_texture(np.arange(1, strand_count + 1), int(record["row_strands"]))
+    else:
+        moved, moved_rows = (_empty_rows(1, 1)[0] for _ in range(2))
+    block = uniforms.uniform_buffer(record)
+    return StrandMaker(bindings_texture, normals_texture, segments, moved, moved_rows, record, block, slot_count)
+
+
+def _binding_rows(bound):
+    """(S, 4 T) float32, T texels of each strand: see shaders/interpolate_strands.comp."""
+    strand_count, slot_count = bound.indices.shape
+    require_count("strands", len(bound.roots), strand_count)
+    require_count("normals", len(bound.normals), strand_count)
+    require_count("weights", bound.weights.size, bound.indices.size)
+    is_used = bound.indices >= 0
+    require_indices("guides", bound.indices[is_used], len(bound.guide_normals))
+    rows = np.zeros((strand_count, 2 + -(-slot_count // 2), 4), np.float32)
+    rows[:, 0, :3], rows[:, 1, :3] = bound.roots, bound.normals
+    pairs = rows[:, 2:].reshape(strand_count, -1, 2)
+    pairs[:, :slot_count, 0] = np.where(is_used, bound.indices, 0)  # exact in single precision up to 16 million
+    pairs[:, :slot_count, 1] = np.where(is_used, bound.weights, 0.0)
+    return rows.reshape(strand_count, -1)
+
+
+def _rows_texture(values, channels):
+    """(texture, whole rows of values in a row of it) of (N, channels T) float32, T texels each."""
+    texels = values.shape[1] // channels
+    in_row = min(TEXTURE_WIDTH // texels, len(values))
+    height = -(-len(values) // in_row)
+    if height * in_row > len(values):
+        values = np.concatenate([values, np.zeros((height * in_row - len(values), values.shape[1]), np.float32)])
+    data = gpu.types.Buffer("FLOAT", values.size, values.ravel())
+    texture_format = {1: "R32F", 4: "RGBA32F"}[channels]
+    texture = gpu.types.GPUTexture((in_row * texels, height), format=texture_format, data=data)
+    texture.filter_mode(False)
+    return texture, in_row
+
+
+def _empty_rows(count, texels):
+    """The same without values."""
+    in_row = min(TEXTURE_WIDTH // texels, count)
+    texture = gpu.types.GPUTexture((in_row * texels, -(-count // in_row)), format="RGBA32F")
+    texture.filter_mode(False)
+    return texture, in_row
+
+
+def _declared(samplers, images):
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(_GROUP_SIZE)
+    info.typedef_source(uniforms.MAKING.source)
+    info.uniform_buf(0, "Making", "making")
+    for slot, name in enumerate(samplers):
+        info.sampler(slot, "FLOAT_2D", name)
+    for slot, (name, qualifiers) in enumerate(images.items()):
+        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=qualifiers)
+    return info
+
+
+@shaders.kept
+def _segments_program():
+    """The compute program that brings guides into the frames of their roots."""
+    info = _declared(("guide_points", "guide_normals"), {"segments": {"WRITE"}})
+    return shaders.compile_compute(info, "guide_segments.comp")
+
+
+@shaders.kept
+def _strands_program(slot_count):
+    """The compute program that makes strands of so many guides each."""
+    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}}
+    info = _declared(("bindings", "guide_normals", "segments"), images)
+    info.define("SLOTS", str(slot_count))
+    return shaders.compile_compute(info, "interpolate_strands.comp")

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// A strand between its guides: core/interpolation/guide_weights.py and interpolation.py  [Report12] section 2.4.
+
+// Tangent and bitangent of a unit normal [Duff17].
+void root_frame(vec3 normal, out vec3 tangent, out vec3 bitangent)
+{
+  float side = (normal.z >= 0.0) ? 1.0 : -1.0;
+  float a = -1.0 / (side + normal.z);
+  float b = normal.x * normal.y * a;
+  tangent = vec3(1.0 + side * normal.x * normal.x * a, side * b, -side * normal.x);
+  bitangent = vec3(b, side + normal.y * normal.y * a, -normal.y);
+}
+
+// Cosine and sine of the turn from a guide's frame to the strand's, by the least rotation between their normals.
+// Opposite normals have no least rotation: any will do.
+vec2 frame_turn(vec3 guide_normal, vec3 tangent, vec3 bitangent, vec3 normal)
+{
+  vec3 guide_tangent;
+  vec3 guide_bitangent;
+  root_frame(guide_normal, guide_tangent, guide_bitangent);
+  float lean = dot(guide_tangent, normal) / max(1.0 + dot(guide_normal, normal), 1e-6);
+  vec3 turned = guide_tangent - lean * (guide_normal + normal);
+  vec2 turn = vec2(dot(tangent, turned), dot(bitangent, turned));
+  float size = length(turn);
+  return (size > 0.0) ? turn / size : vec2(0.0);
+}
+
+// A vector of a guide's frame in the strand's.
+vec3 turned_by(vec2 turn, vec3 along)
+{
+  return vec3(turn.x * along.x - turn.y * along.y, turn.y * along.x + turn.x * along.y, along.z);
+}
+
+// 0 up to the first value, 1 from a range further on, a smooth step between.
+float faded(float first, float per_range, float value)
+{
+  float x = clamp((value - first) * per_range, 0.0, 1.0);
+  return x * x * (3.0 - 2.0 * x);
+}
+
+// Part of a guide's weight that is left where its directions and the logarithm of its length differ from the nearest
+// guide's. facing: least cosine between their directions; apart: difference of logarithms; limits: the cosine at which
+// nothing is left, 1 / the range of cosines over which it fades, and the same of logarithms, over the last half of which
+// it does.
+float limited_part(float facing, float apart, vec4 limits)
+{
+  return faded(limits.x, limits.y, facing) * (1.0 - faded(0.5 * limits.z, limits.w, apart));
+}
+
+// Eq. 10's segment, stretched to the mean length of the guides'. keep_length: how far, 0 to 1.
+vec3 stretched(vec3 segment, float mean_length, float keep_length)
+{
+  // Where guides cancel, a direction is rounding: a thousandth of the length counts as the least.
+  float found = max(length(segment), max(1e-3 * mean_length, 1e-30));
+  return segment * (1.0 + keep_length * (mean_length / found - 1.0));
+}

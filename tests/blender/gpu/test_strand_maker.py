@@ -1,0 +1,181 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands that the GPU makes where they are drawn are those that Warp makes, and cost one upload of their guides."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import gpu
+import numpy as np
+import pytest
+import warp as wp
+
+from hair_addon.blender.gpu import maker_choice, shaders, strand_maker, strand_textures
+from hair_addon.core.errors import HairError
+from hair_addon.core.geometry import strands
+from hair_addon.core.geometry.mesh import SurfacePoints
+from hair_addon.core.grooming import following
+from hair_addon.core.interpolation import hair_binding
+from hair_addon.core.interpolation.guide_weights import find_candidates
+
+# Of a strand's length, by which it may differ: sums in single precision, in another order.
+CLOSE = 1e-5
+GUIDES, STRANDS = 70, 900
+
+
+def unit(vectors):
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
+def vectors(array):
+    return wp.array(np.float32(array), dtype=wp.vec3, device="cpu")
+
+
+def bound_hair(rng, point_count, slots, angle_limit=np.pi / 3, length_limit=3.0, keep_length=1.0):
+    """(`HairBinding`, guides as `Strands`): strands over a ball, curled guides of many lengths, one of them none."""
+    guide_roots, roots = unit(rng.normal(size=(GUIDES, 3))), unit(rng.normal(size=(STRANDS, 3)))
+    roots[:5] = guide_roots[:5]  # at guides, and straight below
+    roots[5] = (0.0, 0.0, -1.0)
+    lengths = rng.uniform(0.05, 0.3, (GUIDES, 1, 1)) / point_count
+    steps = lengths * unit(guide_roots[:, None] + 0.6 * rng.normal(size=(GUIDES, point_count - 1, 3)))
+    steps[0] = 0.0
+    points = guide_roots[:, None] + np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0), (0, 0)))
+    normals = vectors(unit(roots + 0.1 * rng.normal(size=roots.shape)))
+    guide_normals = vectors(guide_roots)
+    settings = SimpleNamespace(
+        automatic_influence=True,
+        neighbour_limit=slots,
+        angle_limit=angle_limit,
+        length_limit=length_limit,
+        keep_length=keep_length,
+    )
+    candidates = find_candidates(vectors(roots), normals, vectors(guide_roots), guide_normals, slots)
+    places = SurfacePoints(np.zeros(STRANDS, np.int32), np.zeros((STRANDS, 3), np.float32))
+    guide_places = SurfacePoints(np.zeros(GUIDES, np.int32), np.zeros((GUIDES, 3), np.float32))
+    frames = (np.float32(guide_roots), guide_normals)
+    binding = hair_binding.weighed(places, (vectors(roots), normals), frames, candidates, settings)
+    return binding, strands.from_numpy(np.float32(points), guide_places, "cpu")
+
+
+def by_warp(binding, guides, axes):
+    return following.growing_points(binding, guides, following.weights_now(binding, guides), axes).result()
+
+
+def new_maker(binding, point_count, axes):
+    return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
+
+
+def uploaded(points):
+    radii = np.broadcast_to(np.linspace(2e-4, 1e-5, points.shape[1], dtype=np.float32), points.shape[:2])
+    return strand_textures.upload_strands(points, radii)
+
+
+def texels(texture, count, texels_each):
+    """(count, texels_each, 4) of a texture whose rows hold whole strands."""
+    rows = np.array(texture.read(), np.float32).reshape(texture.height, texture.width, 4)
+    in_row = texture.width // texels_each
+    return rows[:, : in_row * texels_each].reshape(-1, texels_each, 4)[:count]
+
+
+AXES = np.array([[0.0, -2.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
+
+
+@pytest.mark.parametrize(
+    ("point_count", "slots", "limits"),
+    [
+        (9, 8, {}),
+        (41, 3, {"keep_length": 0.3, "angle_limit": np.pi, "length_limit": 1e6}),
+        (3, 1, {"angle_limit": 0.2}),
+        (17, 5, {"length_limit": 1.0, "keep_length": 0.0}),
+    ],
+)
+def test_strands_are_those_of_warp(blender, rng, point_count, slots, limits):
+    binding, guides = bound_hair(rng, point_count, slots, **limits)
+    wanted = by_warp(binding, guides, AXES)
+    before = uploaded(np.zeros_like(wanted))
+    maker = new_maker(binding, point_count, AXES)
+    made = maker.make(before, guides.numpy())
+    found = texels(made.texture, STRANDS, point_count)
+    lengths = np.linalg.norm(np.diff(wanted, axis=1), axis=2).sum(axis=1)
+    error = np.linalg.norm(found[..., :3] - wanted, axis=2).max(axis=1)
+    # Places of 1 m have half a unit of their last digit beside it, twice.
+    assert (error <= CLOSE * lengths + 4.0 * 2.0**-23).all(), error.max()
+    np.testing.assert_array_equal(found[..., 3], before.radii)
+
+
+def test_an_edit_leaves_where_strands_were(blender, rng):
+    binding, guides = bound_hair(rng, 9, 4)
+    first = uploaded(by_warp(binding, guides, np.eye(3)))
+    maker = new_maker(binding, 9, np.eye(3))
+    once = maker.make(first, guides.numpy())
+    there = texels(once.texture, STRANDS, 9)
+    combed = guides.numpy() + np.linspace(0.0, 0.1, 9, dtype=np.float32)[:, None]
+    twice = maker.make(once, combed)
+    assert twice.texture is once.texture
+    assert twice.moved.turn == once.moved.turn + 1
+    np.testing.assert_array_equal(texels(twice.moved.points, STRANDS, 10)[:, 1:], there)
+    rows = np.array(twice.moved.rows.read(), np.float32).ravel()[:STRANDS]
+    np.testing.assert_array_equal(rows, np.arange(1, STRANDS + 1))
+    assert np.abs(texels(twice.texture, STRANDS, 9) - there).max() > 0.01
+
+
+def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
+    """Where its strands were is not known then, as after two changes at once."""
+    monkeypatch.setattr(strand_maker, "_MOST_MOVED", STRANDS * 9 - 1)
+    binding, guides = bound_hair(rng, 9, 4)
+    wanted = by_warp(binding, guides, np.eye(3))
+    maker = new_maker(binding, 9, np.eye(3))
+    assert maker.moved.width * maker.moved.height == 1
+    made = maker.make(uploaded(np.zeros_like(wanted)), guides.numpy())
+    assert made.moved.turn == 2
+    np.testing.assert_allclose(texels(made.texture, STRANDS, 9)[..., :3], wanted, rtol=0.0, atol=CLOSE)
+
+
+def test_an_edit_uploads_guides_and_nothing_else(blender, rng, monkeypatch):
+    """One texture of twelve bytes a point, no program, no block."""
+    binding, guides = bound_hair(rng, 9, 4)
+    before = uploaded(by_warp(binding, guides, np.eye(3)))
+    maker = new_maker(binding, 9, np.eye(3))
+    before = maker.make(before, guides.numpy())
+    programs = len(shaders.program_cache)
+    buffers, made = [], []
+    with monkeypatch.context() as watched:
+        buffer, texture = gpu.types.Buffer, gpu.types.GPUTexture
+        watched.setattr(
+            gpu.types, "Buffer", lambda kind, size, values: buffers.append(size) or buffer(kind, size, values)
+        )
+        watched.setattr(gpu.types, "GPUTexture", lambda *given, **named: made.append(given) or texture(*given, **named))
+        watched.setattr(gpu.types, "GPUUniformBuf", None)
+        for _ in range(3):
+            before = maker.make(before, guides.numpy())
+    assert len(made) == 3
+    assert buffers == [GUIDES * 9 * 3] * 3
+    assert len(shaders.program_cache) == programs
+
+
+def test_other_guides_or_strands_are_refused(blender, rng):
+    binding, guides = bound_hair(rng, 9, 4)
+    before = uploaded(by_warp(binding, guides, np.eye(3)))
+    maker = new_maker(binding, 9, np.eye(3))
+    with pytest.raises(HairError, match="guides"):
+        maker.make(before, guides.numpy()[1:])
+    with pytest.raises(HairError, match="points of a guide"):
+        maker.make(before, guides.numpy()[:, 1:])
+    with pytest.raises(HairError, match="strands"):
+        maker.make(uploaded(before.points[1:].copy()), guides.numpy())
+    with pytest.raises(HairError, match="guides"):
+        guide_normals = vectors(np.ones((3, 3)))
+        new_maker(replace(binding, guide_normals=guide_normals), 9, np.eye(3))
+
+
+@pytest.mark.parametrize(
+    ("times", "is_faster", "can_make"), [((1.0, 3.0), 1, 1), ((2.0, 3.0), 0, 1), ((np.inf, 0.0), 0, 0)]
+)
+def test_the_faster_way_is_chosen(monkeypatch, times, is_faster, can_make):
+    monkeypatch.setattr(maker_choice, "times", lambda: times)
+    assert (maker_choice.is_faster(), maker_choice.can_make()) == (is_faster, can_make)
+
+
+def test_times_are_measured_once(blender):
+    first = maker_choice.times()
+    assert min(first) > 0.0
+    assert maker_choice.times() is first

@@ -1,0 +1,193 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands that the GPU makes while guides are combed: what is written afterwards is what was shown; counted."""
+
+from types import SimpleNamespace
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.gpu import maker_choice, strand_maker
+from hair_addon.blender.groom import bindings, pipeline
+from hair_addon.blender.host import running
+from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.render import hair_cache, made_strands, viewport
+from hair_addon.blender.settings import preferences, style_items
+from hair_addon.core.errors import HairError
+from hair_addon.core.grooming import following
+from hair_addon.core.styling import lean
+from tests.blender.render.test_hair_places import view3d
+from tests.support.counting import counts_of
+from tests.support.reading import points, write_points
+
+CLOSE = 1e-5  # [m] of strands of half a metre on a ball of one
+
+
+@pytest.fixture
+def window(monkeypatch):
+    """Act as in a window on a graphics card, where hair is written when an interaction is over."""
+    monkeypatch.setattr(running, "has_window", lambda: True)
+    monkeypatch.setattr(maker_choice, "times", lambda: (0.0, 1.0))
+    yield
+    live_hair.cancel_writing()
+    invalidation.data_replaced()
+
+
+@pytest.fixture
+def watched(hair, window):
+    """Hair that is drawn, and bound, as one of its guides was combed already."""
+    drawn(hair)
+    comb(1)
+    drawn(hair)
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    drawn(hair)
+    return hair
+
+
+def comb(count, along=(0.0, 0.01, 0.02)):
+    guides = bpy.data.objects["Guides"]
+    combed = points(guides)
+    combed[:count, 1:] += np.float32(along)
+    write_points(guides, combed)
+
+
+def drawn(hair):
+    """(S, P, 3) in the texture that the shader reads, after a viewport has drawn it."""
+    on_gpu = hair_cache.strands_on_gpu(hair.data)
+    hair_cache.choose_makers()
+    texels = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)
+    return texels[: on_gpu.strand_count, :, :3]
+
+
+def grown(hair):
+    """(S, P, 3) that interpolation makes of the guides as they are now, from nothing."""
+    return pipeline.bind_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get()).points
+
+
+def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, monkeypatch):
+    calls, computed = counts_of(monkeypatch), []
+    real = following.weights_now
+    monkeypatch.setattr(following, "weights_now", lambda *given: computed.append(1) or real(*given))
+    monkeypatch.setattr(following, "follow_some", None)
+    before = points(watched)
+    for count in (2, 20, 60):
+        comb(count)
+        shown = drawn(watched)
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert not computed
+    np.testing.assert_array_equal(points(watched), before)
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 1}
+    np.testing.assert_array_equal(drawn(watched), shown)  # nor is it uploaded
+    assert calls["uploads"] == 0
+    monkeypatch.undo()
+    np.testing.assert_array_equal(points(watched), grown(watched))
+    np.testing.assert_allclose(shown, points(watched), rtol=0.0, atol=CLOSE)
+    assert np.abs(shown - before).max() > 0.01
+
+
+def test_bounds_hold_what_was_combed_out_of_them(watched):
+    first = hair_cache.strands_on_gpu(watched.data)
+    for _ in range(4):
+        comb(60, along=(0.3, 0.0, 0.0))
+        shown = drawn(watched)
+    low, high = hair_cache.strands_on_gpu(watched.data).bounds
+    assert first.texture is hair_cache.strands_on_gpu(watched.data).texture
+    assert (shown >= low - CLOSE).all()
+    assert (shown <= high + CLOSE).all()
+    assert shown.max() > first.bounds.max()
+
+
+def test_a_surface_that_moves_meanwhile_carries_the_strands_of_now(watched):
+    comb(30)
+    drawn(watched)
+    hair_cache.invalidate_pose(watched.data.surface)
+    comb_shown = drawn(watched)
+    np.testing.assert_array_equal(comb_shown, bindings.of(watched.data).points)
+    np.testing.assert_array_equal(comb_shown, grown(watched))
+
+
+def test_strands_that_are_read_again_are_those_of_now(watched):
+    comb(30)
+    drawn(watched)
+    hair_cache.strand_cache.clear()
+    np.testing.assert_array_equal(drawn(watched), grown(watched))
+
+
+def test_a_driver_that_lacks_something_uploads_as_before(watched, monkeypatch):
+    def refuse(*_given):
+        raise HairError("no images")
+
+    monkeypatch.setattr(strand_maker, "new_maker", refuse)
+    for count in (2, 3):
+        comb(count)
+        np.testing.assert_allclose(drawn(watched), grown(watched), rtol=0.0, atol=1e-6)
+
+
+def test_one_edit_may_go_either_way(watched, monkeypatch):
+    for choice in ("GPU", "COMPUTE", "AUTOMATIC", "COMPUTE"):
+        monkeypatch.setattr(preferences, "stroke_device", lambda choice=choice: choice)
+        drawn(watched)
+        assert hair_cache.may_make(watched.data.session_uid) == (choice != "COMPUTE")
+        comb(7)
+        np.testing.assert_allclose(drawn(watched), grown(watched), rtol=0.0, atol=CLOSE)
+
+
+def test_styled_hair_is_made_as_before(watched):
+    assert hair_cache.may_make(watched.data.session_uid)
+    style_items.add(watched.data.vellus, lean.Settings(amount=0.3))
+    bpy.context.view_layer.update()
+    drawn(watched)
+    assert not hair_cache.may_make(watched.data.session_uid)
+    comb(60)
+    np.testing.assert_array_equal(drawn(watched), bindings.of(watched.data).points)
+
+
+@pytest.mark.parametrize(
+    ("choice", "times", "is_wanted"),
+    [
+        ("AUTOMATIC", (1.0, 4.0), True),
+        ("AUTOMATIC", (3.0, 4.0), False),
+        ("GPU", (3.0, 4.0), True),
+        ("GPU", (np.inf, 4.0), False),
+        ("COMPUTE", (1.0, 4.0), False),
+    ],
+)
+def test_the_user_may_choose(monkeypatch, choice, times, is_wanted):
+    monkeypatch.setattr(maker_choice, "times", lambda: times)
+    monkeypatch.setattr(running, "has_window", lambda: True)
+    monkeypatch.setattr(preferences, "stroke_device", lambda: choice)
+    assert made_strands.are_wanted() == is_wanted
+
+
+def test_nothing_is_measured_without_a_window(monkeypatch):
+    monkeypatch.setattr(maker_choice, "times", None)
+    assert not made_strands.are_wanted()
+
+
+def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkeypatch):
+    """It is measured when hair is drawn first; every edit of bound hair is then made there."""
+    viewport.view_cache.clear()
+    calls, asked = counts_of(monkeypatch), []
+    monkeypatch.setattr(maker_choice, "times", lambda: asked.append(1) or (0.0, 1.0))
+
+    def view():
+        context = bpy.context
+        depsgraph = context.evaluated_depsgraph_get
+        of = SimpleNamespace(space_data=view3d(), scene=context.scene, view_layer=context.view_layer)
+        of.evaluated_depsgraph_get = depsgraph
+        return viewport.drawn_scene_of(of).hair[0][0]
+
+    before = view()
+    assert asked
+    for _ in range(3):
+        comb(20)
+        after = view()
+        assert hair_cache.may_make(hair.data.session_uid)
+        assert after is not before
+        before = after
+    assert calls["moves"] == 0
+    assert after.moved.turn == 3
+    np.testing.assert_allclose(drawn(hair), grown(hair), rtol=0.0, atol=CLOSE)
