@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Base of all operators: `HairError` is reported without changes."""
+"""Base of all operators: when they can run; `HairError` is reported without changes."""
 
 from ....core.errors import HairError
 from ...settings.translations import CONTEXT, error_text, report_text
@@ -10,6 +10,16 @@ class HairOperator:
 
     bl_options = {"REGISTER", "UNDO"}
     bl_translation_context = CONTEXT
+
+    @classmethod
+    def poll(cls, context):
+        """Whether it `applies`; to nothing without a window, as in timers: there is no active object then."""
+        return hasattr(context, "object") and cls.applies(context)
+
+    @classmethod
+    def applies(cls, context):
+        """Whether it can run on what is active; where not, `poll_message_set` says what to select."""
+        return True
 
     def change(self, context):
         """Do it; returns (sentence, values) to report, or None."""
