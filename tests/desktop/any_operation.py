@@ -99,28 +99,12 @@ class Operations:
         hair = self._curves("HAIR")
         if hair is not None and self._activate(hair):
             bpy.context.scene.frame_end = _LAST_FRAME
-            ending = self.random.choice(["abc", "usdc", "usda"])
+            ending = self.random.choice(["abc", "abc", "usdc"])  # some builds of Blender lack USD
             animation = self.random.choice(["NONE", "GUIDES", "ALL"])
             self._call("export_groom", filepath=str(self.folder / f"groom.{ending}"), animation=animation)
 
     def do_composite(self):
         self._call("toggle_composite")
-
-    def do_use_as_guides(self):
-        """Curves of another hand on a surface become guides."""
-        surface = self._surface()
-        if surface is None or surface.library is not None or len(self._objects("CURVES")) > 20:
-            return
-        if not self._activate(surface):
-            return
-        self.say(f"empty hair on {surface.name}")
-        bpy.ops.object.curves_empty_hair_add()
-        curves = bpy.context.object
-        for _ in range(self.random.choice([0, 1, 20])):  # Blender ends where curves are added with no counts
-            curves.data.add_curves([self.random.choice([1, 2, 9])])
-        for point in curves.data.points:
-            point.position = [self.random.uniform(-1.0, 1.0) for _ in range(3)]
-        self._call("use_as_guides", strand_count=200)
 
     def do_collider(self):
         """A collection of colliders, one of which is hidden or deleted."""
@@ -141,7 +125,7 @@ class Operations:
         is_own = declared.identifier not in {"rna_type", "name"} and declared.type != "POINTER"
         return is_own and not declared.is_readonly and not declared.is_hidden
 
-    def _call(self, name, **wanted):
+    def _call(self, name, /, **wanted):
         operator = getattr(bpy.ops.vellus, name)
         active = bpy.context.object
         self.say(f"{name} {wanted} of {active.name if active else None}")
