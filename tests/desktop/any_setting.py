@@ -80,7 +80,6 @@ class Artist(Operations, Exchanges):
             self._try(self.stop_playing)
             if self.step_count % 2 == 0:
                 self._try(self.look)
-            yield
         yield from wait(1.0)
         self._try(self.look)
         print(f"any_setting: {self.redraw_count} redraws, {time.process_time():.0f} s of all processors", flush=True)
@@ -238,7 +237,7 @@ class Artist(Operations, Exchanges):
         if curves_object.data.vellus.kind == "GUIDES":
             bpy.ops.vellus.distribute_guides("EXEC_DEFAULT", guide_count=self.random.choice([1, 25, 60]), length=0.3)
         else:
-            bpy.ops.vellus.interpolate_hair("EXEC_DEFAULT", strand_count=self.random.choice([1, 500, 9000]))
+            bpy.ops.vellus.interpolate_hair("EXEC_DEFAULT", strand_count=self.random.choice([1, 500, 3000]))
 
     def do_comb(self):
         """Move the points of some guides, as a brush does: in sculpt mode, the mode left open now and then."""
