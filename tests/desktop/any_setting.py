@@ -212,7 +212,7 @@ class Artist(Operations, Exchanges):
     def do_many_strands(self):
         hair = self._curves("HAIR")
         if hair is not None:
-            hair.data.vellus.hair.strand_count = self.random.choice([7, 700, 6000, 6000, 40_000])
+            hair.data.vellus.hair.strand_count = self.random.choice([7, 700, 6000, 15_000])
             self.say(f"{hair.name}: {hair.data.vellus.hair.strand_count} strands")
 
     def do_edit(self):
