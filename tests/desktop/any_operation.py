@@ -3,9 +3,15 @@
 
 import bpy
 
-from tests.desktop.window import in_viewport, window
+from tests.desktop.window import in_viewport, viewport, wait_for, window
 
 _LAST_FRAME = 5  # of the scene: a bake is as long
+
+# Long operators that begin at once when they are clicked, with the settings that they are given here.
+_CLICKED = {
+    *("bake_dynamics", "deliver_dynamics", "distribute_guides", "export_groom", "hair_cards", "hair_tubes"),
+    *("interpolate_hair", "transfer_groom", "use_as_guides", "use_as_hair"),
+}
 
 
 class Operations:
@@ -130,4 +136,25 @@ class Operations:
         active = bpy.context.object
         self.say(f"{name} {wanted} of {active.name if active else None}")
         if operator.poll():
-            operator("EXEC_DEFAULT", **wanted)
+            is_clicked = name in _CLICKED and self.random.random() < 0.5
+            operator("INVOKE_DEFAULT" if is_clicked else "EXEC_DEFAULT", **wanted)
+
+    def is_working(self):
+        """Whether work that a click began goes on."""
+        return self.blender.host.running.job() is not None
+
+    def wait_for_work(self):
+        """Wait, as artists have to, for what a click began; Esc now and then."""
+        if not self.is_working():
+            return
+        self.say("working")
+        if self.random.random() < 0.3:
+            self.say("escape")
+            area, _region = viewport()
+            at = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
+            for value in ("PRESS", "RELEASE"):
+                window().event_simulate(type="ESC", value=value, **at)
+                yield
+        yield from wait_for(lambda: not self.is_working(), 120.0)
+        if self.is_working():
+            raise TimeoutError("two minutes were not enough for what a click began")

@@ -51,6 +51,7 @@ class Artist(Operations, Exchanges):
         self.add_asset_library()
         if not self.report.exists():
             yield from any_scene.build(self.folder)
+            self._save()  # frames are baked beside the file
             return
         report = json.loads(self.report.read_text())
         version, numbers, gauss = report["random"]
@@ -77,6 +78,7 @@ class Artist(Operations, Exchanges):
             self._try(self._step, move)
             self.step_count += 1
             yield
+            yield from self.wait_for_work()
             self._try(self.stop_playing)
             if self.step_count % 2 == 0:
                 self._try(self.look)
@@ -88,7 +90,7 @@ class Artist(Operations, Exchanges):
         with in_viewport():
             move()
             # Refused for a moment after a file was opened.
-            if bpy.context.mode == "OBJECT" and bpy.ops.ed.undo_push.poll():
+            if bpy.context.mode == "OBJECT" and not self.is_working() and bpy.ops.ed.undo_push.poll():
                 bpy.ops.ed.undo_push(message=move.__name__)
 
     def _try(self, action, *arguments):
@@ -233,11 +235,10 @@ class Artist(Operations, Exchanges):
         curves_object = self._curves()
         if curves_object is None or not self._activate(curves_object):
             return
-        self.say(f"regenerate {curves_object.name}")
         if curves_object.data.vellus.kind == "GUIDES":
-            bpy.ops.vellus.distribute_guides("EXEC_DEFAULT", guide_count=self.random.choice([1, 25, 60]), length=0.3)
+            self._call("distribute_guides", guide_count=self.random.choice([1, 25, 60]), length=0.3)
         else:
-            bpy.ops.vellus.interpolate_hair("EXEC_DEFAULT", strand_count=self.random.choice([1, 500, 3000]))
+            self._call("interpolate_hair", strand_count=self.random.choice([1, 500, 3000]))
 
     def do_comb(self):
         """Move the points of some guides, as a brush does: in sculpt mode, the mode left open now and then."""

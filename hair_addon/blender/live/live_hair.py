@@ -125,7 +125,9 @@ def _follow_linked(hair, depsgraph):
         is_as_written = bound.points.size == 3 * len(hair.points)
         if not is_as_written and attributes.is_from_library(hair):
             name, count = name_of(hair), len(hair.curves)
-            raise HairError('"{name}" keeps the {count} strands of its file: change them there.', name=name, count=count)
+            raise HairError(
+                '"{name}" keeps the {count} strands of its file: change them there.', name=name, count=count
+            )
     except HairError as error:
         hair.vellus.is_stale = False
         hair.vellus.status = str(error)
