@@ -84,6 +84,7 @@ class Artist(Operations, Exchanges):
                 self._try(self.look)
         yield from wait(1.0)
         self._try(self.look)
+        self._try(self.ask)
         print(f"any_setting: {self.redraw_count} redraws, {time.process_time():.0f} s of all processors", flush=True)
 
     def _step(self, move):
@@ -106,6 +107,11 @@ class Artist(Operations, Exchanges):
         """Tell the log, at once."""
         self.taken.append(text)
         print(f"any_setting: {text}", flush=True)
+
+    def ask(self):
+        """Ask all operators whether they apply, as other timers do: where the context is without a window, if it is."""
+        offered = [name for name in dir(bpy.ops.vellus) if getattr(bpy.ops.vellus, name).poll()]
+        self.say(f"{len(offered)} operators apply, window: {bpy.context.window}, {hasattr(bpy.context, 'object')}")
 
     def look(self):
         """Draw the window, and compare what is kept of hair with what a first drawing would bring."""

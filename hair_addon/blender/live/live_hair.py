@@ -10,10 +10,10 @@ import sys
 import bpy
 
 from ...core.errors import HairError
-from ..data import attributes, curves, drawn_lines, masks, simulated_guides
+from ..data import curves, drawn_lines, masks, simulated_guides
 from ..groom import bindings, edited_surfaces, hair_outside, painted_masks, pipeline, staleness, writing
 from ..host import running
-from ..host.notices import name_of, text_of
+from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
 from . import events, reported
@@ -115,24 +115,16 @@ def make_again(hair, depsgraph):
 
 
 def _follow_linked(hair, depsgraph):
-    """Let hair of a library, or between its guides, follow where dynamics has moved these.
-
-    Only points are written: all of hair in this file whose number of points has changed.
-    """
+    """Let hair of a library, or between its guides, follow where dynamics has moved these: points alone are written."""
     try:
         pipeline.require_uncombed(hair)
         bound = pipeline.bind_hair(*pipeline.inputs_of(hair), depsgraph, hair)
-        is_as_written = bound.points.size == 3 * len(hair.points)
-        if not is_as_written and attributes.is_from_library(hair):
-            name, count = name_of(hair), len(hair.curves)
-            raise HairError(
-                '"{name}" keeps the {count} strands of its file: change them there.', name=name, count=count
-            )
+        fits = writing.fits(hair, bound)
     except HairError as error:
         hair.vellus.is_stale = False
         hair.vellus.status = str(error)
         return
-    bound.is_written = bound.has_moved_only = bound.is_map_written = is_as_written  # by its own file
+    bound.is_written = bound.has_moved_only = bound.is_map_written = fits  # by its own file
     bindings.keep(hair, bound)
     _follow_simulated(hair)
     events.strands_made(hair)
