@@ -109,9 +109,11 @@ class Artist(Operations, Exchanges):
         print(f"any_setting: {text}", flush=True)
 
     def ask(self):
-        """Ask all operators whether they apply, as other timers do: where the context is without a window, if it is."""
-        offered = [name for name in dir(bpy.ops.vellus) if getattr(bpy.ops.vellus, name).poll()]
-        self.say(f"{len(offered)} operators apply, window: {bpy.context.window}, {hasattr(bpy.context, 'object')}")
+        """Ask all operators whether they apply, in a context with a window and in one without."""
+        for context in ({}, {"window": None}):
+            with bpy.context.temp_override(**context):
+                offered = [name for name in dir(bpy.ops.vellus) if getattr(bpy.ops.vellus, name).poll()]
+            self.say(f"{len(offered)} operators apply")
 
     def look(self):
         """Draw the window, and compare what is kept of hair with what a first drawing would bring."""

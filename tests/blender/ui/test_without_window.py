@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where Blender has no window, as in timers and handlers, there is no active object: nothing raises."""
+"""In a context without a window there is no active object: nothing raises."""
 
 import bpy
 import pytest
@@ -11,7 +11,7 @@ from tests.support.reading import points
 
 @pytest.fixture
 def no_window(hair):
-    """The context of a timer, with hair in the scene."""
+    """A context without a window, with hair in the scene."""
     with bpy.context.temp_override(window=None):
         assert not hasattr(bpy.context, "object")
         yield

@@ -13,7 +13,7 @@ class HairOperator:
 
     @classmethod
     def poll(cls, context):
-        """Whether it `applies`; to nothing without a window, as in timers: there is no active object then."""
+        """Whether it `applies`; to nothing in a context without a window, which has no active object."""
         return hasattr(context, "object") and cls.applies(context)
 
     @classmethod
