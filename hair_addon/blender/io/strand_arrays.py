@@ -51,14 +51,22 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
 
 
 def other_places(datablock):
-    """(4, 4) float64 each: from where `world_points` are [m] to where other objects of a view layer show them."""
-    back = np.linalg.inv(_to_world(datablock))
-    shown = selection.object_of(datablock, bpy.context.view_layer)
-    for other in bpy.context.view_layer.objects:
-        if other != shown and other.type == "CURVES" and other.data == datablock:
-            matrix = np.array(other.matrix_world, np.float64) @ back
-            matrix[:3, 3] *= metres_per_unit(bpy.context.scene)
-            yield matrix
+    """[(4, 4) float64]: from where `world_points` are [m] to where other objects of a view layer show them.
+
+    Raises `HairError`.
+    """
+    layer = bpy.context.view_layer
+    shown = selection.object_of(datablock, layer)
+    others = [o for o in layer.objects if o != shown and o.type == "CURVES" and o.data == datablock]
+    if not others:
+        return []
+    try:
+        back = np.linalg.inv(_to_world(datablock))
+    except np.linalg.LinAlgError as error:
+        raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(shown)) from error
+    matrices = np.stack([np.array(other.matrix_world, np.float64) @ back for other in others])
+    matrices[:, :3, 3] *= metres_per_unit(bpy.context.scene)
+    return [*matrices]
 
 
 def bring_up_to_date():

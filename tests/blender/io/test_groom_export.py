@@ -158,6 +158,22 @@ def test_guides_without_an_object_are_where_they_were(twisted, tmp_path, way):
     np.testing.assert_allclose(found["groom_width"].only, wanted_widths, rtol=1e-5)
 
 
+def test_surfaces_and_hair_without_height_are_one_sentence(hair, tmp_path):
+    sphere = bpy.data.objects["Sphere"]
+    sphere.scale.z = 0.0
+    update()
+    with pytest.raises(HairError, match='"Sphere" has a scale of zero'):
+        export(tmp_path / "groom.abc")
+    sphere.scale.z, hair.scale.z = 1.0, 0.0
+    update()
+    assert export(tmp_path / "groom.abc").strands == 500
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Twin", hair.data))
+    hair.name = "Flat"
+    update()
+    with pytest.raises(HairError, match='"Flat" has a scale of zero'):
+        export(tmp_path / "groom.abc")
+
+
 def test_guides_without_object_and_surface_are_one_sentence(hair, tmp_path):
     """Nothing says then where they are."""
     guides = bpy.data.objects["Guides"]
