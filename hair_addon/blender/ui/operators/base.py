@@ -11,15 +11,12 @@ class HairOperator:
     bl_options = {"REGISTER", "UNDO"}
     bl_translation_context = CONTEXT
 
-    @classmethod
-    def poll(cls, context):
-        """Whether it `applies`; to nothing in a context without a window, which has no active object."""
-        return hasattr(context, "object") and cls.applies(context)
+    applies = None  # a class method of (context) where it takes what is active: whether it can, with `poll_message_set`
 
     @classmethod
-    def applies(cls, context):
-        """Whether it can run on what is active; where not, `poll_message_set` says what to select."""
-        return True
+    def poll(cls, context):
+        """Whether it `applies`, if it asks; to nothing in a context without a window, which has no active object."""
+        return cls.applies is None or (hasattr(context, "object") and cls.applies(context))
 
     def change(self, context):
         """Do it; returns (sentence, values) to report, or None."""
