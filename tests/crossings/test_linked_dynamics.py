@@ -13,6 +13,7 @@ from tests.support.reading import evaluated_points, points
 from tests.support.swung import simulate, swing
 
 FRAME = 7
+HOW_MANY = '"Hair" keeps the {} strands of its file: change them there.'
 
 
 @pytest.fixture
@@ -91,6 +92,21 @@ def test_a_shot_bakes_and_shows_a_linked_character(character, tmp_path, way):
     bpy.context.scene.frame_set(FRAME)
     np.testing.assert_allclose(points(shown_hair()), there, atol=1e-6)
     assert path.read_bytes() == in_library
+
+
+@pytest.mark.parametrize("way", ["linked", "local"])
+def test_linked_hair_keeps_its_strands_and_local_hair_between_linked_guides_does_not(character, tmp_path, way):
+    """Blender resizes no Curves of another file: a sentence says so, and the hair stays as it was."""
+    path, there = character
+    shot_of(path, tmp_path, "linked")
+    bpy.context.scene.frame_set(FRAME)
+    hair = shown_hair().data if way == "linked" else shown_hair().data.copy()
+    hair.vellus.hair.strand_count = wanted = len(there) // 2
+    bpy.context.view_layer.update()
+    if way == "local":
+        assert (len(hair.curves), hair.vellus.status) == (wanted, "")
+    else:
+        assert (len(hair.curves), hair.vellus.status) == (len(there), HOW_MANY.format(len(there)))
 
 
 def test_frames_that_are_baked_in_the_library_play_in_the_shot(character, tmp_path):

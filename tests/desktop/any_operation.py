@@ -3,9 +3,15 @@
 
 import bpy
 
-from tests.desktop.window import in_viewport, window
+from tests.desktop.window import in_viewport, viewport, wait_for, window
 
 _LAST_FRAME = 5  # of the scene: a bake is as long
+
+# Long operators that begin at once when they are clicked, with the settings that they are given here.
+_CLICKED = {
+    *("bake_dynamics", "deliver_dynamics", "distribute_guides", "export_groom", "hair_cards", "hair_tubes"),
+    *("interpolate_hair", "transfer_groom", "use_as_guides", "use_as_hair"),
+}
 
 
 class Operations:
@@ -99,28 +105,12 @@ class Operations:
         hair = self._curves("HAIR")
         if hair is not None and self._activate(hair):
             bpy.context.scene.frame_end = _LAST_FRAME
-            ending = self.random.choice(["abc", "usdc", "usda"])
+            ending = self.random.choice(["abc", "abc", "usdc"])  # some builds of Blender lack USD
             animation = self.random.choice(["NONE", "GUIDES", "ALL"])
             self._call("export_groom", filepath=str(self.folder / f"groom.{ending}"), animation=animation)
 
     def do_composite(self):
         self._call("toggle_composite")
-
-    def do_use_as_guides(self):
-        """Curves of another hand on a surface become guides."""
-        surface = self._surface()
-        if surface is None or surface.library is not None or len(self._objects("CURVES")) > 20:
-            return
-        if not self._activate(surface):
-            return
-        self.say(f"empty hair on {surface.name}")
-        bpy.ops.object.curves_empty_hair_add()
-        curves = bpy.context.object
-        for _ in range(self.random.choice([0, 1, 20])):  # Blender ends where curves are added with no counts
-            curves.data.add_curves([self.random.choice([1, 2, 9])])
-        for point in curves.data.points:
-            point.position = [self.random.uniform(-1.0, 1.0) for _ in range(3)]
-        self._call("use_as_guides", strand_count=200)
 
     def do_collider(self):
         """A collection of colliders, one of which is hidden or deleted."""
@@ -141,9 +131,30 @@ class Operations:
         is_own = declared.identifier not in {"rna_type", "name"} and declared.type != "POINTER"
         return is_own and not declared.is_readonly and not declared.is_hidden
 
-    def _call(self, name, **wanted):
+    def _call(self, name, /, **wanted):
         operator = getattr(bpy.ops.vellus, name)
         active = bpy.context.object
         self.say(f"{name} {wanted} of {active.name if active else None}")
         if operator.poll():
-            operator("EXEC_DEFAULT", **wanted)
+            is_clicked = name in _CLICKED and self.random.random() < 0.5
+            operator("INVOKE_DEFAULT" if is_clicked else "EXEC_DEFAULT", **wanted)
+
+    def is_working(self):
+        """Whether work that a click began goes on."""
+        return self.blender.host.running.job() is not None
+
+    def wait_for_work(self):
+        """Wait, as artists have to, for what a click began; Esc now and then."""
+        if not self.is_working():
+            return
+        self.say("working")
+        if self.random.random() < 0.3:
+            self.say("escape")
+            area, _region = viewport()
+            at = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
+            for value in ("PRESS", "RELEASE"):
+                window().event_simulate(type="ESC", value=value, **at)
+                yield
+        yield from wait_for(lambda: not self.is_working(), 120.0)
+        if self.is_working():
+            raise TimeoutError("two minutes were not enough for what a click began")

@@ -3,7 +3,7 @@
 
 import bpy
 
-from tests.desktop.window import in_viewport, viewport
+from tests.desktop.window import in_viewport, viewport, wait
 
 SURFACES = ("Plain", "Subdivided", "Bent", "Keyed", "Scaled")
 LIBRARY = "library.blend"
@@ -27,9 +27,16 @@ def build(folder):
         bpy.ops.curve.primitive_bezier_curve_add(radius=0.8, location=(-5.0, 0.0, 1.0))
         bpy.context.object.name = "Line"
         bpy.ops.ed.undo_push(message="Scene")
-    view = viewport()[0].spaces.active.region_3d
-    view.view_location, view.view_distance = (0.0, 0.0, 0.0), 16.0
+    space = viewport()[0].spaces.active
+    space.region_3d.view_location, space.region_3d.view_distance = (0.0, 0.0, 0.0), 16.0
+    space.show_region_ui = True
+    yield from wait(0.5)
+    _sidebar().active_panel_category = "Hair"  # whose panels are drawn with every step
     yield
+
+
+def _sidebar():
+    return next(region for region in viewport()[0].regions if region.type == "UI")
 
 
 def _build_library(folder):

@@ -170,7 +170,10 @@ def use(name):
 
 
 def comb_straight():
-    """Hair with a style is shown without it in Sculpt Mode, and while a brush combs; with it afterwards."""
+    """Hair with a style is shown without it in Sculpt Mode, and while a brush combs; with it afterwards.
+
+    The guides are hidden before: combing shows them.
+    """
     with in_viewport():
         bpy.ops.object.mode_set(mode="OBJECT")
         bpy.context.view_layer.objects.active = of_kind("HAIR")
@@ -178,9 +181,13 @@ def comb_straight():
     yield from wait(1.0)
     styled = strands()
     of_kind("GUIDES").data.vellus.shows_styles_while_combing = False
+    of_kind("GUIDES").hide_set(True)
+    yield from wait(0.2)
+    facts["were shown"] = of_kind("GUIDES").visible_get()
     with in_viewport():
         bpy.ops.vellus.comb_guides()
     yield from wait(1.0)
+    facts["are shown"], facts["combing mode"] = of_kind("GUIDES").visible_get(), bpy.context.mode
     straight = strands()
     size = bpy.context.tool_settings.curves_sculpt.unified_paint_settings
     size.size = 150

@@ -13,8 +13,8 @@ pytestmark = pytest.mark.desktop
 
 SCRIPT = Path(__file__).with_name("any_setting.py")
 
-# Steps that one Blender takes, with two or three redraws each; the next goes on with the file that it saved.
-PART = 25
+# Steps that one Blender takes, with one or two redraws each; the next goes on with the file that it saved.
+PARTS = {"opengl": 50, "vulkan": 25}
 
 
 def check(desktop, extension, profile, seed, step_count, limit, backend="opengl"):
@@ -25,7 +25,8 @@ def check(desktop, extension, profile, seed, step_count, limit, backend="opengl"
     folder = build_extension.ROOT / "out" / "desktop" / f"any_setting_{seed}_{step_count}_{backend}"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    for end in [*range(PART, step_count, PART), step_count]:
+    told = []
+    for end in [*range(PARTS[backend], step_count, PARTS[backend]), step_count]:
         path = folder / f"any_setting_{end}.log"
         status = desktop.run(
             SCRIPT,
@@ -39,9 +40,11 @@ def check(desktop, extension, profile, seed, step_count, limit, backend="opengl"
         log = path.read_text(errors="replace")
         report = json.loads((folder / f"any_setting_{seed}.json").read_text())
         assert status == 0 and report["is_done"] and report["step_count"] == end, log[-4000:]
-        # What Blender calls by itself, as handlers and drawing, raises into the console alone.
-        assert "Traceback" not in log, log
-        assert "Not freed memory blocks" not in log, log[-4000:]
+        told.append(log)
+    # What raises is in the console alone, and the walk goes on after it.
+    told = "".join(told)
+    assert "Traceback" not in told, told[max(told.index("Traceback") - 1000, 0) :][:8000]
+    assert "Not freed memory blocks" not in told, told[-4000:]
 
 
 def test_a_few_random_settings(desktop, extension, new_profile):

@@ -80,3 +80,9 @@ def test_hair_follows_the_tool_and_its_undo(walk, name):
 def test_hair_is_straight_while_it_is_combed(walk):
     assert walk.facts["is straight in the stroke"] and walk.facts["is styled again"]
     assert min(walk.facts["straightened"], *walk.facts["combed"], walk.facts["styled again"]) > 1e-3
+
+
+def test_combing_shows_hidden_guides(walk):
+    """And the brush moves them: hair follows."""
+    shown = [walk.facts[name] for name in ("were shown", "are shown", "combing mode")]
+    assert shown == [False, True, "SCULPT_CURVES"] and min(walk.facts["combed"]) > 1e-3

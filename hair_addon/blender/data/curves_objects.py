@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from . import follow_nodes
+from . import follow_nodes, surface_collections
 
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
 
@@ -26,8 +26,7 @@ def link_object(name, curves, surface_object, is_rendered=True):
     render(curves_object, is_rendered)
     if is_rendered:
         show_thin(bpy.context.scene)
-    collections = surface_object.users_collection or (bpy.context.scene.collection,)
-    collections[0].objects.link(curves_object)
+    surface_collections.collection_of(surface_object).objects.link(curves_object)
     follow_nodes.add_modifier(curves_object)
     return curves_object
 

@@ -4,14 +4,15 @@
 import bpy
 import numpy as np
 
+from . import surface_collections
+
 UV_MAP = "UVMap"
 
 
 def new_collection(name, surface_object):
     """A new collection beside a surface."""
     made = bpy.data.collections.new(name)
-    parents = surface_object.users_collection or (bpy.context.scene.collection,)
-    parents[0].children.link(made)
+    surface_collections.collection_of(surface_object).children.link(made)
     return made
 
 
@@ -38,5 +39,6 @@ def new_object(name, made, surface_object, collection, material):
 
 def hide(mesh_object):
     """Hide an object in the viewport and in renders."""
-    mesh_object.hide_set(True)
+    if bpy.context.view_layer.objects.get(mesh_object.name) == mesh_object:  # as its surface is
+        mesh_object.hide_set(True)
     mesh_object.hide_render = True

@@ -114,9 +114,11 @@ def use_points(hair: Curves) -> int:
 
 
 def _mean_length(guides):
-    """[m] in the world."""
+    """[m] in the world; 0 where all guides were deleted."""
+    if not len(guides.curves):
+        return 0.0
     scale = 1.0 if guides.surface is None else guides.surface.matrix_world.median_scale
-    return float(strands.lengths(curves.read_points(guides)).mean()) * scale
+    return float(strands.ragged_lengths(curves.read_points(guides), curves.curve_offsets(guides)).mean()) * scale
 
 
 def _with_new_seeds(added, present):

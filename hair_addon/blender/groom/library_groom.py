@@ -20,7 +20,7 @@ from ...core.files import library_settings
 from ...core.files.settings_file import GroomSettings
 from ...core.geometry.mesh import SurfacePoints, TriMesh, interpolate
 from ...core.long_work import Work
-from ..data import attributes, curves, groom_assets, scene
+from ..data import attributes, curves, groom_assets, scene, surface_collections
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import setting_properties
@@ -221,8 +221,7 @@ def _drawn(groom, surface_object, kept, points):
         attributes.write(datablock, name, "FLOAT" if values.dtype.kind == "f" else "INT", "CURVE", values[kept])
     drawn = bpy.data.objects.new("Guides", datablock)
     drawn.parent = surface_object
-    collections = surface_object.users_collection or (bpy.context.scene.collection,)
-    collections[0].objects.link(drawn)
+    surface_collections.collection_of(surface_object).objects.link(drawn)
     return drawn
 
 

@@ -43,16 +43,17 @@ def as_curves(surface: Object) -> Iterator[Object]:
         raise HairError('"{name}" or its particle system is hidden: show it first.', name=name_of(surface))
     _convert(surface)
     made = next((o for o in bpy.data.objects if o not in before and o.type == "CURVES"), None)
-    if made is None:
-        raise HairError('The particle system "{system}" has no hair yet.', system=name)
-    made.name = made.data.name = name
-    made.data.surface = surface
     try:
+        if made is None or not len(made.data.curves):
+            raise HairError('The particle system "{system}" has no hair yet.', system=name)
+        made.name = made.data.name = name
+        made.data.surface = surface
         yield made
     except BaseException:
-        data = made.data
-        bpy.data.objects.remove(made)
-        bpy.data.hair_curves.remove(data)
+        if made is not None:
+            data = made.data
+            bpy.data.objects.remove(made)
+            bpy.data.hair_curves.remove(data)
         raise
     modifier = surface.modifiers[modifier.name]
     modifier.show_viewport = modifier.show_render = False

@@ -7,11 +7,13 @@ from concurrent.futures import Future
 import numpy as np
 from bpy.types import Curves, Object
 
+from ...core.errors import HairError
 from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
 from ..data import attributes, curves, curves_objects
 from ..data.scene import Surface
+from ..host.notices import name_of
 from ..materials import looks
 from ..settings import setting_properties, style_items
 from . import bindings, hair_outside, staleness
@@ -109,6 +111,19 @@ def write_hair(target: Curves) -> None:
     state.followed = staleness.guides_digest(state.guide_curves)
     bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
     _store_roots(state.guide_curves, bound)
+
+
+def fits(target: Curves, bound: BoundHair) -> bool:
+    """Whether a hair Curves datablock has as many points as what it is bound to.
+
+    Raises `HairError` where it has not and another file holds it: what Blender resizes there is lost.
+    """
+    if bound.points.size == 3 * len(target.points):
+        return True
+    if attributes.is_from_library(target):
+        name, count = name_of(target), len(target.curves)
+        raise HairError('"{name}" keeps the {count} strands of its file: change them there.', name=name, count=count)
+    return False
 
 
 def keep_styles(target: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> None:

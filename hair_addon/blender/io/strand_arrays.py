@@ -37,14 +37,11 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
     local: (S, P, 3) float32 that is taken for the points at rest, None for those of the datablock.
     """
     bring_up_to_date()
-    shown = selection.object_of(datablock, bpy.context.view_layer)
-    if shown is None:
-        raise HairError('"{name}" has no object in this view layer.', name=name_of(datablock))
+    to_world = _to_world(datablock) * (metres_per_unit(bpy.context.scene) * per_metre)
     pose = posed_strands.read_pose(datablock.surface, bpy.context.evaluated_depsgraph_get())
     at_rest = _at_rest(datablock) if local is None else local
     stored = curves.read_root_places(datablock, np.inf)
     places = pose.rooted(datablock.vellus.topology, stored, at_rest[:, 0])
-    to_world = np.array(shown.matrix_world, np.float64) * (metres_per_unit(bpy.context.scene) * per_metre)
 
     def rows(some):
         carried = pose.carry_rooted(at_rest, places, some).astype(np.float64)
@@ -54,14 +51,22 @@ def world_rows(datablock, per_metre=1.0, local=None) -> Rows:
 
 
 def other_places(datablock):
-    """(4, 4) float64 each: from where `world_points` are [m] to where other objects of a view layer show them."""
-    shown = selection.object_of(datablock, bpy.context.view_layer)
-    back = np.linalg.inv(np.array(shown.matrix_world, np.float64))
-    for other in bpy.context.view_layer.objects:
-        if other != shown and other.type == "CURVES" and other.data == datablock:
-            matrix = np.array(other.matrix_world, np.float64) @ back
-            matrix[:3, 3] *= metres_per_unit(bpy.context.scene)
-            yield matrix
+    """[(4, 4) float64]: from where `world_points` are [m] to where other objects of a view layer show them.
+
+    Raises `HairError`.
+    """
+    layer = bpy.context.view_layer
+    shown = selection.object_of(datablock, layer)
+    others = [o for o in layer.objects if o != shown and o.type == "CURVES" and o.data == datablock]
+    if not others:
+        return []
+    try:
+        back = np.linalg.inv(_to_world(datablock))
+    except np.linalg.LinAlgError as error:
+        raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(shown)) from error
+    matrices = np.stack([np.array(other.matrix_world, np.float64) @ back for other in others])
+    matrices[:, :3, 3] *= metres_per_unit(bpy.context.scene)
+    return [*matrices]
 
 
 def bring_up_to_date():
@@ -79,10 +84,19 @@ def shape_of(datablock):
 
 
 def world_scale(datablock):
-    """Metres in a unit of a Curves datablock's local coordinates, the mean."""
-    shown = selection.object_of(datablock, bpy.context.view_layer)
-    matrix = np.array(shown.matrix_world, np.float64)[:3, :3]
+    """Metres in a unit of a Curves datablock's local coordinates, the mean. Raises `HairError`."""
+    matrix = _to_world(datablock)[:3, :3]
     return float(abs(np.linalg.det(matrix))) ** (1.0 / 3.0) * metres_per_unit(bpy.context.scene)
+
+
+def _to_world(datablock):
+    """(4, 4) float64: local → world of the object that shows Curves; of their surface for guides that none shows."""
+    shown = selection.object_of(datablock, bpy.context.view_layer)
+    if shown is None and datablock.vellus.kind == "GUIDES":
+        shown = datablock.surface  # new guides lie on it with no transform of their own
+    if shown is None:
+        raise HairError('"{name}" has no object in this view layer.', name=name_of(datablock))
+    return np.array(shown.matrix_world, np.float64)
 
 
 def _at_rest(datablock):

@@ -117,14 +117,16 @@ def make_again(hair, depsgraph):
 
 
 def _follow_linked(hair, depsgraph):
-    """Let hair of a library, or between its guides, follow where dynamics has moved these: only points are written."""
+    """Let hair of a library, or between its guides, follow where dynamics has moved these: points alone are written."""
     try:
         pipeline.require_uncombed(hair)
         bound = pipeline.bind_hair(*pipeline.inputs_of(hair), depsgraph, hair)
+        fits = writing.fits(hair, bound)
     except HairError as error:
+        hair.vellus.is_stale = False
         hair.vellus.status = str(error)
         return
-    bound.is_written = bound.has_moved_only = bound.is_map_written = True  # by its own file
+    bound.is_written = bound.has_moved_only = bound.is_map_written = fits  # by its own file
     bindings.keep(hair, bound)
     _follow_simulated(hair)
     events.strands_made(hair)

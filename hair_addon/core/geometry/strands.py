@@ -106,13 +106,24 @@ def lengths(points: np.ndarray) -> np.ndarray:
     return segment_lengths(points).sum(axis=1)
 
 
+def ragged_lengths(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """(S,) float64 [m], from root to tip of ragged polylines; points and starts as of `places_along`."""
+    along, starts = _along_all(points), np.asarray(starts, np.int64)
+    return along[starts[1:] - 1] - along[starts[:-1]]
+
+
+def _along_all(points):
+    """(N,) float64: the length from the first of (N, 3) points to each, as if all were one polyline."""
+    steps = np.diff(np.asarray(points, np.float64), axis=0)
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+
+
 def places_along(points: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """(N,) float32: where each point of ragged polylines is along its own, 0 at its root and 1 at its tip.
 
     points (N, 3) and starts (S+1,) as of `resample`; every polyline has points.
     """
-    points, starts = np.asarray(points, np.float64), np.asarray(starts, np.int64)
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    along, starts = _along_all(points), np.asarray(starts, np.int64)
     first, last = along[starts[:-1]], along[starts[1:] - 1]
     spans = np.where(last > first, last - first, 1.0)
     counts = np.diff(starts)

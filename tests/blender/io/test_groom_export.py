@@ -139,6 +139,50 @@ def test_hair_that_lost_its_guides_is_exported_alone(hair, tmp_path):
     assert "groom_closest_guides" not in found and found["groom_id"].only[0] == 0
 
 
+@pytest.mark.parametrize("way", ["excluded", "deleted"])
+def test_guides_without_an_object_are_where_they_were(twisted, tmp_path, way):
+    """A collection that is excluded from the view layer, or an object that was deleted, takes no guides away."""
+    _, guides = twisted
+    wanted_points, wanted_widths = 100.0 * world(guides).reshape(-1, 3), 100.0 * widths(guides)
+    if way == "deleted":
+        bpy.data.objects.remove(guides)
+    else:
+        kept = bpy.data.collections.new("Kept")
+        bpy.context.scene.collection.children.link(kept)
+        kept.objects.link(guides)
+        bpy.context.scene.collection.objects.unlink(guides)
+        bpy.context.view_layer.layer_collection.children["Kept"].exclude = True
+    assert export(tmp_path / "groom.abc").guides == 60
+    found = shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair_guides")
+    np.testing.assert_allclose(found["P"].only, wanted_points, atol=1e-3)
+    np.testing.assert_allclose(found["groom_width"].only, wanted_widths, rtol=1e-5)
+
+
+def test_surfaces_and_hair_without_height_are_one_sentence(hair, tmp_path):
+    sphere = bpy.data.objects["Sphere"]
+    sphere.scale.z = 0.0
+    update()
+    with pytest.raises(HairError, match='"Sphere" has a scale of zero'):
+        export(tmp_path / "groom.abc")
+    sphere.scale.z, hair.scale.z = 1.0, 0.0
+    update()
+    assert export(tmp_path / "groom.abc").strands == 500
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Twin", hair.data))
+    hair.name = "Flat"
+    update()
+    with pytest.raises(HairError, match='"Flat" has a scale of zero'):
+        export(tmp_path / "groom.abc")
+
+
+def test_guides_without_object_and_surface_are_one_sentence(hair, tmp_path):
+    """Nothing says then where they are."""
+    guides = bpy.data.objects["Guides"]
+    guides.data.surface = None
+    bpy.data.objects.remove(guides)
+    with pytest.raises(HairError, match='"Guides" has no object in this view layer'):
+        export(tmp_path / "groom.abc")
+
+
 def test_each_hair_is_a_group_with_its_guides(hair, tmp_path):
     bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
     bpy.ops.vellus.add_hair(guide_count=20, strand_count=70, length=0.2)

@@ -7,10 +7,12 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
+from hair_addon.blender.data import curves
 from hair_addon.blender.groom import bindings, groom_settings, hair_styles, style_notes
 from hair_addon.blender.settings import saved_styles, setting_properties, style_items
 from hair_addon.blender.ui import look_previews, panels
 from hair_addon.core.files import style_presets
+from hair_addon.core.geometry import strands
 from hair_addon.core.grooming import groom_defaults
 from hair_addon.core.params import declared
 from hair_addon.core.styling import clump, clump_trees, curl, frizz, lean, trim, wet
@@ -18,6 +20,7 @@ from hair_addon.core.styling.base import ProfiledSettings, scaled
 from hair_addon.core.styling.kinds import KINDS, OFFERS, kind_of
 from tests.support.always import operate
 from tests.support.layout import draw, draw_all
+from tests.support.reading import points, write_points
 
 SPHERE_FACTOR = groom_defaults.FUR_LENGTH * math.sqrt(4.0 * math.pi) / 0.12  # of the sphere's default hair length
 
@@ -238,6 +241,17 @@ def test_curls_get_the_points_they_want(hair):
     state().styles[0].curl.pitch = 1.0
     operate(bpy.ops.vellus.use_points)
     assert state().hair.point_count == 257  # it takes none away
+
+
+def test_curls_on_hand_made_guides_get_the_points_for_their_mean_length(hair):
+    guides = bpy.data.objects["Guides"]
+    guides.data.vellus.written = curves.BY_HAND
+    roots = points(guides)[:, :1]
+    write_points(guides, roots + 0.8 * (points(guides) - roots))
+    style_items.assign(state(), [curl.Settings(radius=0.005, pitch=0.05)])
+    operate(bpy.ops.vellus.use_points)
+    mean_length = float(strands.lengths(points(bpy.data.objects["Guides"])).mean())
+    assert state().hair.point_count == curl.points_wanted(styles()[0], mean_length) < 257
 
 
 # The panel.

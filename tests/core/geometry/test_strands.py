@@ -60,6 +60,13 @@ def test_a_single_point_is_repeated():
     np.testing.assert_array_equal(resampled, np.repeat(np.float32([[(1, 2, 3)], [(4, 5, 6)]]), 4, axis=1))
 
 
+def test_ragged_polylines_have_the_lengths_of_each(rng):
+    polylines = [rng.normal(size=(count, 3)) for count in (2, 1, 7, 30)]
+    starts = strands.curve_offsets([len(polyline) for polyline in polylines])
+    alone = [strands.lengths(polyline[None])[0] for polyline in polylines]
+    np.testing.assert_allclose(strands.ragged_lengths(np.concatenate(polylines), starts), alone, atol=1e-12)
+
+
 def test_lengths_of_a_straight_strand():
     points = np.linspace(0.0, 1.0, 41)[None, :, None] * np.array([3.0, 0.0, 4.0])
     np.testing.assert_allclose(strands.lengths(points), 5.0)

@@ -27,7 +27,7 @@ class VELLUS_OT_add_hair(LongOperator, bpy.types.Operator):
     )
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh to grow hair on.")
         return surface_of(context.object) is not None
 

@@ -24,6 +24,10 @@ class VELLUS_OT_bake_tables(BrowsedOperator, bpy.types.Operator):
     }
     asked = "directory"
 
+    @classmethod
+    def applies(cls, _context):
+        return True  # to no hair too
+
     def prefill(self, context):
         """Fill unset properties with the settings of the hair, if there is one."""
         hair = hair_of(context.object)

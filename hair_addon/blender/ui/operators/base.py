@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Base of all operators: `HairError` is reported without changes."""
+"""Base of all operators: when they can run; `HairError` is reported without changes."""
 
 from ....core.errors import HairError
 from ...settings.translations import CONTEXT, error_text, report_text
@@ -10,6 +10,13 @@ class HairOperator:
 
     bl_options = {"REGISTER", "UNDO"}
     bl_translation_context = CONTEXT
+
+    applies = None  # a class method of (context) where it takes what is active: whether it can, with `poll_message_set`
+
+    @classmethod
+    def poll(cls, context):
+        """Whether it `applies`, if it asks; to nothing in a context without a window, which has no active object."""
+        return cls.applies is None or (hasattr(context, "object") and cls.applies(context))
 
     def change(self, context):
         """Do it; returns (sentence, values) to report, or None."""

@@ -17,7 +17,7 @@ class VELLUS_OT_comb_guides(HairOperator, bpy.types.Operator):
     bl_label = "Comb Guides"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh with guides, or hair that follows guides, in Object Mode.")
         return context.mode == "OBJECT" and guides_of(context.object) is not None
 

@@ -34,7 +34,7 @@ class VELLUS_OT_convert_particles(HairOperator, bpy.types.Operator):
     }
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh with particle hair, in Object Mode.")
         return context.mode == "OBJECT" and bool(particle_hair.systems_of(context.object))
 

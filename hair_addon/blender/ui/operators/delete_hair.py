@@ -15,7 +15,7 @@ class VELLUS_OT_delete_hair(HairOperator, bpy.types.Operator):
     bl_label = "Delete Hair"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair, guides, or a mesh with hair, in Object Mode.")
         return context.mode == "OBJECT" and bool(parts_of(context.object))
 

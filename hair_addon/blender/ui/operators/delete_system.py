@@ -16,7 +16,7 @@ class VELLUS_OT_delete_system(HairOperator, bpy.types.Operator):
     bl_label = "Delete Hair System"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a hair system in Object Mode.")
         return context.mode == "OBJECT" and edited_system(context.view_layer) is not None
 

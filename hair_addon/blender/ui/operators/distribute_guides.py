@@ -21,7 +21,7 @@ class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
     __annotations__ = setting_properties.annotations(GuideSettings)
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh to grow guides on, or guides to regenerate.")
         return surface_of(context.object) is not None
 

@@ -20,7 +20,7 @@ class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
     __annotations__ = setting_properties.annotations(TubeSettings)
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair.")
         return hair_of(context.object) is not None
 

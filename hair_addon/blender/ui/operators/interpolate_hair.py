@@ -21,7 +21,7 @@ class VELLUS_OT_interpolate_hair(LongOperator, bpy.types.Operator):
     __annotations__ = setting_properties.annotations(HairSettings)
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select guides, the mesh they grow on, or hair to regenerate.")
         return guides_of(context.object) is not None
 

@@ -24,7 +24,7 @@ class VELLUS_OT_load_groom_settings(BrowsedOperator, bpy.types.Operator):
     asked = "filepath"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair, or a mesh to grow hair on.")
         active = context.object
         return active is not None and (active.type == "MESH" or hair_of(active) is not None)

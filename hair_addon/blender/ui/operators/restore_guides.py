@@ -15,7 +15,7 @@ class VELLUS_OT_restore_guides(HairOperator, bpy.types.Operator):
     bl_label = "Restore Guides"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair whose guides were deleted.")
         guides = guides_of(context.object)
         return guides is not None and object_of(guides, context.view_layer) is None

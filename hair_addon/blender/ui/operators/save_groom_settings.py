@@ -26,7 +26,7 @@ class VELLUS_OT_save_groom_settings(BrowsedOperator, bpy.types.Operator):
     asked = "filepath"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair.")
         return hair_of(context.object) is not None
 

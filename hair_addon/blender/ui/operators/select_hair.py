@@ -15,7 +15,7 @@ class VELLUS_OT_select_hair(HairOperator, bpy.types.Operator):
     bl_label = "Select Hair"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh with hair, or guides that hair follows, in Object Mode.")
         return context.mode == "OBJECT" and hair_of(context.object) is not None
 

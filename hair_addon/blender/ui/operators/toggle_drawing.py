@@ -15,7 +15,7 @@ class VELLUS_OT_toggle_drawing(HairOperator, bpy.types.Operator):
     bl_label = "Toggle Hair Shading"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("There is no hair in this file.")
         return bool(drawn_with(context.object))
 

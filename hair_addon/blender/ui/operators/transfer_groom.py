@@ -28,7 +28,7 @@ class VELLUS_OT_transfer_groom(LongOperator, bpy.types.Operator):
     }
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select the mesh to copy hair to, and then the hair, in Object Mode.")
         return context.mode == "OBJECT" and guides_of(context.object) is not None
 

@@ -25,7 +25,7 @@ class VELLUS_OT_apply_dynamics_preset(HairOperator, bpy.types.Operator):
     }
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
         return guides_of(context.object) is not None
 

@@ -17,7 +17,7 @@ Blender without Vellus show the same hair"""
     bl_label = "Deliver Hair"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
         return guides_of(context.object) is not None
 

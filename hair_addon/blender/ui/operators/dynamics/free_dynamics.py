@@ -17,7 +17,7 @@ class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select guides whose frames have been baked.")
         guides = guides_of(context.object)
         return guides is not None and frame_folders.has_frames(guides)

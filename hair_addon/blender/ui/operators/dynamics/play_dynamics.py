@@ -18,7 +18,7 @@ class VELLUS_OT_play_dynamics(HairOperator, bpy.types.Operator):
     bl_options = {"REGISTER"}  # a change of frame is not undone
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them, in a window.")
         return guides_of(context.object) is not None and context.screen is not None
 

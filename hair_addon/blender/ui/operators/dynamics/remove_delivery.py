@@ -16,7 +16,7 @@ class VELLUS_OT_remove_delivery(HairOperator, bpy.types.Operator):
     bl_label = "Remove Delivered Hair"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select guides whose hair has been delivered.")
         guides = guides_of(context.object)
         return guides is not None and any(map(delivered_hair.is_delivered, curves.followers(guides)))

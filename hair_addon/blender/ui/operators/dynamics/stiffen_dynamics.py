@@ -21,7 +21,7 @@ class VELLUS_OT_stiffen_dynamics(HairOperator, bpy.types.Operator):
     bl_label = "Stiffen"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
         return guides_of(context.object) is not None
 

@@ -18,7 +18,7 @@ class GuideTool(HairOperator):
     Settings = ToolSettings
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         """Whether there are guides to change."""
         cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
         return context.mode in _MODES and guides_of(context.object) is not None

@@ -37,7 +37,7 @@ class VELLUS_OT_apply_groom(BrowsedOperator, bpy.types.Operator):
     asked = "filepath"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh to grow hair on.")
         return surface_of(context.object) is not None
 

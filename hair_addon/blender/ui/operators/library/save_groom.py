@@ -25,7 +25,7 @@ class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):
     }
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair.")
         return hair_of(context.object) is not None
 

@@ -22,7 +22,7 @@ class VELLUS_OT_apply_preset(HairOperator, bpy.types.Operator):
     }
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair.")
         return hair_of(context.object) is not None
 

@@ -17,7 +17,7 @@ class VELLUS_OT_apply_saved_look(HairOperator, bpy.types.Operator):
     __annotations__ = {"name": properties.text("Name", "Saved look")}
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair.")
         return hair_of(context.object) is not None
 

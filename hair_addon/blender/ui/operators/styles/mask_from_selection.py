@@ -16,7 +16,7 @@ class VELLUS_OT_mask_from_selection(HairOperator, bpy.types.Operator):
     bl_label = "Mask from Selected Guides"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair with styles and guides.")
         hair = hair_of(context.object)
         has_guides = hair is not None and hair.vellus.guide_curves is not None

@@ -20,7 +20,7 @@ class VELLUS_OT_move_style(HairOperator, bpy.types.Operator):
     }
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         return has_styles(cls, context)
 
     def change(self, context):

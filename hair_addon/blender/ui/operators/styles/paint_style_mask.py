@@ -16,7 +16,7 @@ class VELLUS_OT_paint_style_mask(HairOperator, bpy.types.Operator):
     bl_label = "Paint Style Mask"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         if painted_masks.is_painting(context.object):
             return True
         cls.poll_message_set("Select hair with styles, on a surface, in Object Mode.")

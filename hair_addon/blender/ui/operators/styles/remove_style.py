@@ -17,7 +17,7 @@ class VELLUS_OT_remove_style(HairOperator, bpy.types.Operator):
     bl_label = "Remove Style"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         return has_styles(cls, context)
 
     def change(self, context):

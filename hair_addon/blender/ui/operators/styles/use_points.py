@@ -15,7 +15,7 @@ class VELLUS_OT_use_points(HairOperator, bpy.types.Operator):
     bl_label = "Use Points for Curls"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select hair.")
         return hair_of(context.object) is not None
 

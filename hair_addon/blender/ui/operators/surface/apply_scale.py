@@ -15,7 +15,7 @@ class VELLUS_OT_apply_scale(HairOperator, bpy.types.Operator):
     bl_label = "Apply Scale"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh, or hair on one, in Object Mode.")
         return context.mode == "OBJECT" and surface_of(context.object) is not None
 

@@ -15,7 +15,7 @@ class VELLUS_OT_attach_to_surface(HairOperator, bpy.types.Operator):
     bl_label = "Attach to Surface"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("In Object Mode, select hair or guides and a mesh.")
         return context.mode == "OBJECT" and mesh_to_attach_to(context) is not None
 

@@ -15,7 +15,7 @@ class VELLUS_OT_check_uvs(HairOperator, bpy.types.Operator):
     bl_label = "Check UVs"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh, or hair on one.")
         return surface_of(context.object) is not None
 

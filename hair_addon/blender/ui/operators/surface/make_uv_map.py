@@ -15,7 +15,7 @@ class VELLUS_OT_make_uv_map(HairOperator, bpy.types.Operator):
     bl_label = "Make UV Map"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh, or hair on one, in Object Mode.")
         return context.mode == "OBJECT" and surface_of(context.object) is not None
 

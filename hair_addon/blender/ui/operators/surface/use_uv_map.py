@@ -15,7 +15,7 @@ class VELLUS_OT_use_uv_map(HairOperator, bpy.types.Operator):
     bl_label = "Use Active UV Map"
 
     @classmethod
-    def poll(cls, context):
+    def applies(cls, context):
         cls.poll_message_set("Select a mesh with hair, or hair on one.")
         return surface_of(context.object) is not None
 

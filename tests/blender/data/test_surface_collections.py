@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""New hair and meshes are seen where their surface is, whichever collections list it besides."""
+
+import bpy
+import pytest
+
+
+@pytest.mark.parametrize("way", ["in no scene", "excluded", "hidden"])
+def test_what_is_new_is_seen_beside_its_surface(sphere, way):
+    listed = bpy.data.collections.new("Colliders")
+    listed.objects.link(sphere)
+    if way != "in no scene":
+        bpy.context.scene.collection.children.link(listed)
+        layer = bpy.context.view_layer.layer_collection.children["Colliders"]
+        layer.exclude, layer.hide_viewport = way == "excluded", way == "hidden"
+    assert sphere.visible_get() and sphere.users_collection[0] == listed
+    bpy.ops.vellus.add_hair(guide_count=5, strand_count=20, length=0.2)
+    assert bpy.context.object.data.vellus.kind == "HAIR" and bpy.context.object.visible_get()
+    assert bpy.data.objects["Guides"].name in bpy.context.view_layer.objects
+    bpy.ops.vellus.hair_tubes(tube_count=3)
+    (tubes,) = (o for o in bpy.data.objects if o.type == "MESH" and o != sphere)
+    assert tubes.visible_get()
+
+
+def test_hair_stays_in_the_only_collection_of_its_surface(sphere):
+    """Though it is hidden."""
+    listed = bpy.data.collections.new("Heads")
+    bpy.context.scene.collection.children.link(listed)
+    listed.objects.link(sphere)
+    bpy.context.scene.collection.objects.unlink(sphere)
+    bpy.context.view_layer.objects.active = sphere
+    bpy.context.view_layer.layer_collection.children["Heads"].hide_viewport = True
+    bpy.ops.vellus.distribute_guides(guide_count=5, length=0.2)
+    assert bpy.data.objects["Guides"].users_collection == (listed,)
+
+
+def test_cards_are_made_beside_a_surface_that_the_view_layer_lacks(hair):
+    """All their levels, which are not hidden there."""
+    sphere = bpy.data.objects["Sphere"]
+    kept = bpy.data.collections.new("Heads")
+    bpy.context.scene.collection.children.link(kept)
+    kept.objects.link(sphere)
+    bpy.context.scene.collection.objects.unlink(sphere)
+    bpy.context.view_layer.layer_collection.children["Heads"].exclude = True
+    bpy.context.view_layer.objects.active = hair
+    assert bpy.ops.vellus.hair_cards(card_count=3, level_count=2, texture_size=128) == {"FINISHED"}
+    assert [o.name for o in kept.all_objects if "Cards" in o.name] == ["Hair Cards LOD0", "Hair Cards LOD1"]
