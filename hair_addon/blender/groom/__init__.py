@@ -22,6 +22,7 @@ if TYPE_CHECKING:
         hair_styles,
         hair_systems,
         hand_made_guides,
+        kept_following,
         kept_hair,
         library_groom,
         painted_masks,
