@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from . import (
         bindings,
         brushes,
+        carried_masks,
         diagnostics,
         edited_surfaces,
         edits,
