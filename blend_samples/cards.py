@@ -24,7 +24,7 @@ import hair_addon
 from hair_addon import api
 
 ROOT = Path(__file__).resolve().parent.parent
-SIZE = 160, 192  # pixels of a picture
+SIZE = 184, 196  # pixels of a picture
 SIDES = ((0.0, 0.0), (105.0, 105.0), (200.0, 200.0), (30.0, 200.0))  # degrees that the camera and the lights are turned
 BOUNCES = 64  # of rays through transparent parts of cards: more than cards lie over each other
 
@@ -34,10 +34,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "manual" / "cards.png")
     parser.add_argument("--style", default="WAVY")
-    parser.add_argument("--strands", type=int, default=15_000)
+    parser.add_argument("--strands", type=int, default=12_000)
     parser.add_argument("--cards", type=int, default=1200)
-    parser.add_argument("--samples", type=int, default=12)
-    parser.add_argument("--textures", type=int, default=2048)
+    parser.add_argument("--samples", type=int, default=6)
+    parser.add_argument("--textures", type=int, default=1024)
     options = parser.parse_args()
     hair_addon.register()
     gpu.init()
