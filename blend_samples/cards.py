@@ -26,6 +26,7 @@ from hair_addon import api
 ROOT = Path(__file__).resolve().parent.parent
 SIZE = 184, 196  # pixels of a picture
 SIDES = ((0.0, 0.0), (105.0, 105.0), (200.0, 200.0), (30.0, 200.0))  # degrees that the camera and the lights are turned
+KEPT_BITS = 0xF8  # of a channel
 BOUNCES = 64  # of rays through transparent parts of cards: more than cards lie over each other
 
 
@@ -85,7 +86,7 @@ def rendered(sides, sample_count):
 
 def write(pixels, path):
     """Write the sheet, with as few bits as a page needs."""
-    styles.save(np.round(255.0 * pixels).astype(np.uint8), path)
+    styles.save(np.round(255.0 * pixels).astype(np.uint8) & KEPT_BITS, path)
 
 
 if __name__ == "__main__":
