@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands beside the cards that stand for them: `python blend_samples/cards.py` draws docs/manual/cards.png.
 
-Two rows, strands and cards, from three sides in the same light, rendered by Cycles.
+Two rows, strands and cards, from three sides in the same light and once with the light behind, rendered by Cycles.
 """
 
 import argparse
@@ -24,8 +24,9 @@ import hair_addon
 from hair_addon import api
 
 ROOT = Path(__file__).resolve().parent.parent
-SIZE = 208, 222  # pixels of a picture
-SIDES = (0.0, 105.0, 200.0)  # degrees that the head is turned
+SIZE = 184, 196  # pixels of a picture
+SIDES = ((0.0, 0.0), (105.0, 105.0), (200.0, 200.0), (30.0, 200.0))  # degrees that the camera and the lights are turned
+KEPT_BITS = 0xF8  # of a channel
 BOUNCES = 64  # of rays through transparent parts of cards: more than cards lie over each other
 
 
@@ -34,10 +35,10 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "manual" / "cards.png")
     parser.add_argument("--style", default="WAVY")
-    parser.add_argument("--strands", type=int, default=15_000)
+    parser.add_argument("--strands", type=int, default=12_000)
     parser.add_argument("--cards", type=int, default=1200)
-    parser.add_argument("--samples", type=int, default=12)
-    parser.add_argument("--textures", type=int, default=2048)
+    parser.add_argument("--samples", type=int, default=6)
+    parser.add_argument("--textures", type=int, default=1024)
     options = parser.parse_args()
     hair_addon.register()
     gpu.init()
@@ -48,29 +49,31 @@ def main():
     for one in shown:
         for other in shown:
             other.hide_render = other != one
-        rows.append(np.concatenate([rendered(side, options.samples) for side in SIDES], axis=1))
+        rows.append(np.concatenate([rendered(sides, options.samples) for sides in SIDES], axis=1))
     write(np.concatenate(rows), options.out.resolve())
 
 
 def build(strand_count, style):
-    """The dressed head with styled hair, camera and lights, which turn together; returns the hair Curves."""
+    """The dressed head with styled hair, camera and lights, which turn; returns the hair Curves."""
     hair = styles.build(strand_count=strand_count)
     portrait.dress(bpy.data.objects["Head"])
     hair.vellus.hair.point_count, hair.vellus.hair.tip_taper = 41, 0.2
     api.apply_style_preset(hair, style)
     bpy.context.view_layer.update()
     scene = bpy.context.scene
-    pivot = bpy.data.objects.new("Pivot", None)
-    scene.collection.objects.link(pivot)
-    for turned in [o for o in scene.objects if o.type in {"CAMERA", "LIGHT"}]:
-        turned.parent = pivot
+    for kind in ("CAMERA", "LIGHT"):
+        pivot = bpy.data.objects.new(f"{kind} Pivot", None)
+        scene.collection.objects.link(pivot)
+        for turned in [o for o in scene.objects if o.type == kind]:
+            turned.parent = pivot
     scene.cycles.transparent_max_bounces = BOUNCES
     return hair
 
 
-def rendered(side, sample_count):
+def rendered(sides, sample_count):
     """(height, width, 3) from 0 to 1 through the scene's view transform, the top row first."""
-    bpy.data.objects["Pivot"].rotation_euler.z = math.radians(side)
+    for kind, angle in zip(("CAMERA", "LIGHT"), sides, strict=True):
+        bpy.data.objects[f"{kind} Pivot"].rotation_euler.z = math.radians(angle)
     size = {"width": SIZE[0], "height": SIZE[1], "sample_count": sample_count}
     with tempfile.TemporaryDirectory() as folder:
         path = api.render(Path(folder) / "picture.png", engine="cycles", **size)
@@ -83,7 +86,7 @@ def rendered(side, sample_count):
 
 def write(pixels, path):
     """Write the sheet, with as few bits as a page needs."""
-    styles.save(np.round(255.0 * pixels).astype(np.uint8), path)
+    styles.save(np.round(255.0 * pixels).astype(np.uint8) & KEPT_BITS, path)
 
 
 if __name__ == "__main__":

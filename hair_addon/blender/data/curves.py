@@ -171,13 +171,11 @@ def write_moved(curves, points):
         curves.vellus.written = before
 
 
-def transform(curves, matrix):
-    """Multiply all points by a (3, 3) matrix.
+def clear_parent_inverse(curves):
+    """Remove the parent inverse that Blender set to keep children in place when their surface's transform was applied.
 
-    Keeps strands in place in world space when the inverse was applied to their surface, their parent: the
-    parent inverse that Blender set to keep the child in place is removed.
+    For Curves whose points were transformed for that.
     """
-    write_moved(curves, read_points(curves) @ matrix.T)
     for user in bpy.data.objects:
         if user.data == curves and user.parent == curves.surface:
             user.matrix_local = Matrix()

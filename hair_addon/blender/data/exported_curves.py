@@ -3,6 +3,7 @@
 
 import numpy as np
 
+from ...core.geometry import strands
 from . import attributes, curves
 
 
@@ -35,12 +36,13 @@ def read_root_uvs(datablock):
 def read_radii(datablock, point_count):
     """A function of a slice of curves that gives radii (n, P) float32 in local units, at least zero.
 
-    Curves of other point counts have the mean of theirs all along.
+    Of curves with other point counts they are interpolated along each.
     """
     stored, counts = attributes.read(datablock, "radius", "FLOAT", "POINT"), curves.point_counts(datablock)
     if stored is None or len(stored) != len(counts) * point_count:
-        radii = curves.read_radii(datablock)
-        means = np.add.reduceat(radii, curves.curve_offsets(datablock)[:-1]) / np.maximum(counts, 1)
-        stored = np.broadcast_to(means.astype(np.float32)[:, None], (len(counts), point_count))
+        starts = curves.curve_offsets(datablock)
+        stored = strands.resample_values(
+            curves.read_radii(datablock), curves.read_points(datablock), starts, point_count
+        )
     rows = stored.reshape(len(counts), point_count)
     return lambda some: attributes.valid_radii(rows[some])

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from . import (
         bindings,
         brushes,
+        carried_masks,
         diagnostics,
         edited_surfaces,
         edits,
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
         hair_styles,
         hair_systems,
         hand_made_guides,
+        kept_following,
         kept_hair,
         library_groom,
         painted_masks,

@@ -196,6 +196,7 @@ def _grown[T](value: T | None) -> T:
 
 
 binding_cache = Cache()  # session_uid of hair Curves → BoundHair
+kept_cache = Cache()  # session_uid of kept hair Curves → `kept_following.KeptBinding`
 
 
 def keep(datablock: Curves, bound: BoundHair) -> None:
@@ -214,6 +215,7 @@ def of(datablock: Curves) -> BoundHair | None:
 def invalidate(datablock: Curves) -> None:
     """Drop the cache of a datablock that was changed otherwise."""
     binding_cache.invalidate(datablock.session_uid)
+    kept_cache.invalidate(datablock.session_uid)
 
 
 def is_reported() -> None:

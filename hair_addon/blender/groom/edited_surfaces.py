@@ -6,7 +6,7 @@ from bpy.types import Curves, Depsgraph
 
 from ...core import geometry
 from ...core.geometry.mesh import require_finite
-from ..data import curves, posed_strands, scene
+from ..data import curves, kept_shapes, posed_strands, scene
 from . import bindings
 
 
@@ -35,12 +35,13 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
         # The object's rotation or scale was applied: nothing has moved in world space.
         followers = [hair for hair in curves.followers(guide_curves) if not curves.is_hand_made(hair)]
         for target in (guide_curves, *followers):
-            curves.transform(target, applied)
+            kept_shapes.move(target, lambda points: points @ applied.T)
+            curves.clear_parent_inverse(target)
             bindings.invalidate(target)
     else:
         motion = geometry.surface_deform.motion(before, surface.rest, surface.faces, roots[0])
-        points, counts = curves.read_points(guide_curves), curves.point_counts(guide_curves)
-        curves.write_moved(guide_curves, posed_strands.carried(points, motion, roots, counts))
+        counts = curves.point_counts(guide_curves)
+        kept_shapes.move(guide_curves, lambda points: posed_strands.carried(points, motion, roots, counts))
     curves.write_roots(guide_curves, surface, stored)
     curves.keep_surface(guide_curves, surface)
     return True

@@ -20,13 +20,13 @@ from ...core.grooming.groom import HairSettings
 from ...core.grooming.groom_transfer import Ground, Places
 from ...core.grooming.transfer_settings import TransferSettings
 from ...core.long_work import Work
-from ..data import attributes, curves, curves_objects, guide_curves, landmarks, scene
+from ..data import attributes, curves, curves_objects, guide_curves, kept_shapes, landmarks, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..materials import looks
 from ..settings import setting_properties
-from . import guide_tools, hand_made_guides, pipeline, transferred_names
+from . import carried_masks, guide_tools, hand_made_guides, pipeline, transferred_names
 
 _OVERLAPPING = 0.01  # of a surface's area: UVs that lead elsewhere are said
 
@@ -35,13 +35,15 @@ _OVERLAPPING = 0.01  # of a surface's area: UVs that lead elsewhere are said
 class TransferredGroom:
     """New guide Curves and hair Curves, None of guides without hair; and what to say about it.
 
-    guide_count: of the source; places: `Places` of its guides; cleared: names that the mesh does not have.
+    guide_count: of the source; places: `Places` of its guides; painted: vertex groups that the mesh has got from the
+    source; cleared: names of what it does not have.
     """
 
     guides: Curves
     hair: Curves | None
     guide_count: int
     places: Places
+    painted: tuple[str, ...]
     cleared: tuple[str, ...]
     has_overlap: bool
 
@@ -55,6 +57,10 @@ class TransferredGroom:
             )
             values = {"all": self.guide_count, "far": places.far_count, "other": places.other_side_count}
             said.append((sentence, {"count": places.lost_count, **values}))
+        if self.painted:
+            said.append(
+                ('"{name}" has new vertex groups: {names}.', {"name": surface, "names": ", ".join(self.painted)})
+            )
         if self.cleared:
             sentence = '"{name}" does not have these, which were cleared: {names}.'
             said.append((sentence, {"name": surface, "names": ", ".join(self.cleared)}))
@@ -78,20 +84,25 @@ def transferring(
     source = guide_tools.open_guides(guides, depsgraph)
     curves_objects.keep_rest(target)
     surface = scene.read_surface(target, bpy.context.evaluated_depsgraph_get())
-    find_places = _finder(guides.surface, source.surface, target, surface, settings, depsgraph)
+    warp = _warp(guides.surface, source.surface, target, surface, settings, depsgraph)
+    own_ground, ground = (Ground(one.mesh, one.corner_uvs) for one in (source.surface, surface))
+    masks = carried_masks.read(guides, hair, target, depsgraph)
     remembered = tuple(map(Remembered, (guides, hair, target)))
 
     def compute(progress):
         progress("Finding places", 0.0)
-        places = find_places(source.roots)
+        places = _places(own_ground, ground, source.roots, warp, settings)
         meshes = source.surface.mesh, surface.mesh
         points = grooming.groom_transfer.carried(*meshes, source.roots, source.points, source.counts, places)
-        return places, points, settings.method == "UV" and _has_overlap(surface)
+        painted = carried_masks.carried(masks, own_ground, ground, warp, settings.reach)
+        return places, points, painted, warp is None and _has_overlap(surface)
 
-    places, points, has_overlap = yield compute
+    places, points, painted, has_overlap = yield compute
     guides, hair, target = (one.find() for one in remembered)
     made = []
     try:
+        names = carried_masks.paint(target, surface, painted)
+        made += [(target, name) for name in names]
         new_guides = _copy(guides, target, made, is_rendered=False)
         _write_guides(new_guides, surface, places, points, source.surface.scale * places.scale)
         cleared = transferred_names.clear(new_guides, hair=None, target=target)
@@ -105,28 +116,33 @@ def transferring(
         _remove(made)
         raise
     looks.evaluate_guides(new_guides)
-    return TransferredGroom(new_guides, new_hair, len(source.roots), places, tuple(dict.fromkeys(cleared)), has_overlap)
+    cleared = tuple(dict.fromkeys(cleared))
+    return TransferredGroom(new_guides, new_hair, len(source.roots), places, tuple(names), cleared, has_overlap)
 
 
-def _finder(its_object, its_surface: Surface, target, surface: Surface, settings, depsgraph):
-    """A function of the roots of guides that gives their `Places`. Raises `HairError`."""
-    transfer, scales = grooming.groom_transfer, settings.scale_lengths
+def _warp(its_object, its_surface: Surface, target, surface: Surface, settings, depsgraph):
+    """The `Warp` of space by which the nearest surface is found; None by UV. Raises `HairError`."""
     if settings.method == "UV":
-        own, other = (Ground(one.mesh, one.corner_uvs) for one in (its_surface, surface))
-        return lambda roots: transfer.places_by_uv(own, other, roots, scales)
+        return None
     if settings.method == "LANDMARKS":
-        warp = _through_landmarks(
+        return _through_landmarks(
             landmarks.read(its_object, its_surface, depsgraph),
             landmarks.read(target, surface, bpy.context.evaluated_depsgraph_get()),
         )
-    elif settings.alignment == "BOXES":
-        warp = geometry.landmark_warp.between_boxes(its_surface.mesh.vertices, surface.mesh.vertices)
-    elif settings.alignment == "LOCAL":
-        warp = Warp(surface.to_world_axes @ its_surface.to_local_axes, np.zeros(3))
-    else:
-        apart = np.array(its_object.matrix_world.translation) - np.array(target.matrix_world.translation)
-        warp = Warp(np.eye(3), apart)
-    return lambda roots: transfer.places_by_warp(its_surface.mesh, surface.mesh, roots, warp, settings.reach, scales)
+    if settings.alignment == "BOXES":
+        return geometry.landmark_warp.between_boxes(its_surface.mesh.vertices, surface.mesh.vertices)
+    if settings.alignment == "LOCAL":
+        return Warp(surface.to_world_axes @ its_surface.to_local_axes, np.zeros(3))
+    apart = np.array(its_object.matrix_world.translation) - np.array(target.matrix_world.translation)
+    return Warp(np.eye(3), apart)
+
+
+def _places(source: Ground, target: Ground, roots, warp, settings):
+    """The `Places` of guides. Raises `HairError`."""
+    transfer, scales = grooming.groom_transfer, settings.scale_lengths
+    if warp is None:
+        return transfer.places_by_uv(source, target, roots, scales)
+    return transfer.places_by_warp(source.mesh, target.mesh, roots, warp, settings.reach, scales)
 
 
 def _has_overlap(surface):
@@ -147,6 +163,7 @@ def _copy(datablock, target, made, is_rendered):
     copy = datablock.copy()
     made.append(copy)
     copy.surface = target
+    kept_shapes.forget(copy)
     state = copy.vellus
     state.root_key = state.parting_key = state.flow_key = state.followed = ""
     state.cache_identity = state.delivered_key = state.status = ""
@@ -181,6 +198,7 @@ def _write_guides(guides, surface: Surface, places: Places, points, scale):
     attributes.write(guides, "root_distance", "FLOAT", "CURVE", apart / surface.scale)
     curves.keep_surface(guides, surface)
     transferred_names.scale_lengths(guides.vellus.guides, places.scale)
+    transferred_names.scale_lengths(guides.vellus.dynamics, places.scale)
 
 
 def _growing(guides, hair, surface, places, made):

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair that came as curves: its strands are kept as they are, and guides that reproduce it are derived from them.
 
-Points, their numbers and all attributes stay, to the last bit. Vellus regenerates such hair only where an artist asks
-for it; it then has as many strands, on the same roots, which follow the guides.
+Points, their numbers and all attributes stay, to the last bit, until guides are moved, which strands follow
+(kept_following.py). Vellus regenerates such hair only where an artist asks for it; it then has as many strands, on the
+same roots.
 """
 
 from dataclasses import dataclass, replace
@@ -20,7 +21,7 @@ from ...core.grooming.derived_guides import DerivationSettings, DerivedGuides
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.rooted_curves import RootedCurves
 from ...core.long_work import Work, part_of
-from ..data import attributes, curves, curves_objects, scene
+from ..data import attributes, curves, curves_objects, kept_shapes, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -107,6 +108,7 @@ def _write_hair(hair, guides, surface, placed, settings, derived: DerivedGuides)
         if not attributes.has(hair, name, data_type, "CURVE"):
             attributes.write(hair, name, data_type, "CURVE", values)
     curves.write_guide_map(hair, derived.guide_map)
+    kept_shapes.keep(guides, curves.read_points(guides))
     # So that regenerated strands take these roots, and nothing is regenerated unless asked for.
     state.root_key = staleness.root_key(settings, None)
     state.followed = staleness.guides_digest(guides)

@@ -18,13 +18,13 @@ from ...core import grooming
 from ...core.errors import HairError
 from ...core.files import library_settings
 from ...core.files.settings_file import GroomSettings
-from ...core.geometry.mesh import SurfacePoints, TriMesh, interpolate
+from ...core.geometry.mesh import SurfacePoints, TriMesh
 from ...core.long_work import Work
-from ..data import attributes, curves, groom_assets, scene, surface_collections
+from ..data import attributes, curves, scene, surface_collections
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import setting_properties
-from . import groom_settings, pipeline
+from . import carried_masks, groom_settings, pipeline
 from .hand_made_guides import HandMade
 
 if TYPE_CHECKING:
@@ -187,24 +187,15 @@ def _painted(surface_object, surface, groom, target, found, depsgraph):
     if not groom.masks:
         return {}
     weights = np.stack(list(groom.masks.values()), axis=1)
-    carried = grooming.groom_passage.carried_weights(groom.ground, target, weights, found)
-    own = scene.read_own_mesh(surface_object, surface.to_world_axes).vertices
-    at_own = carried
-    if not np.array_equal(own, surface.mesh.vertices):  # modifiers make more vertices
-        at_own = interpolate(carried, surface.mesh, curves.nearest_roots(surface, own))
+    carried = grooming.groom_passage.carried_weights(groom.ground, target, weights, found.warp)
+    at_own = carried_masks.at_own_vertices(surface_object, surface, carried)
     painted = {}
     for mask, values, own_values in zip(groom.masks, carried.T, at_own.T, strict=True):
         is_there = mask in surface_object.vertex_groups and (
             np.abs(scene.read_vertex_group(surface_object, depsgraph, mask) - values).max(initial=0.0) <= _UNEQUAL
         )
-        painted[mask] = (mask, False) if is_there else (_new_group(surface_object, mask, own_values), True)
+        painted[mask] = (mask, False) if is_there else (carried_masks.new_group(surface_object, mask, own_values), True)
     return painted
-
-
-def _new_group(surface_object, name, weights):
-    group = surface_object.vertex_groups.new(name=name)
-    groom_assets.paint(group, np.round(weights, 6))
-    return group.name
 
 
 def _drawn(groom, surface_object, kept, points):

@@ -36,6 +36,12 @@ def guides_digest(guide_curves: Curves | None) -> str:
     return geometry.fingerprint.fingerprint(curves.read_points(guide_curves))
 
 
+def is_left_by_undo(hair: Curves) -> bool:
+    """Whether hair was written for other guides: undo may restore only one of them."""
+    followed = hair.vellus.followed
+    return followed != "" and followed != guides_digest(hair.vellus.guide_curves)
+
+
 def has_other_parting(target: Curves, depsgraph: Depsgraph) -> bool:
     """Whether the regions or part lines of hair have changed. Raises `HairError`."""
     if not partings.is_wanted(target.vellus.hair) or target.surface is None:

@@ -3,6 +3,7 @@
 
 from bpy.types import Curves, Object, PropertyGroup
 
+from ...core.dynamics.rod.settings import DynamicsSettings
 from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.params import declared
 from ...core.styling.kinds import KINDS
@@ -38,9 +39,9 @@ def clear(guides: Curves, hair: Curves | None, target: Object) -> list[str]:
 
 
 def scale_lengths(owner: PropertyGroup, factor: float) -> None:
-    """Multiply the lengths among the settings of guides or hair that a property group holds."""
+    """Multiply the lengths among the settings of guides, hair or dynamics that a property group holds."""
     names = {entry.identifier for entry in owner.bl_rna.properties}
-    for settings_class in (GuideSettings, HairSettings):
+    for settings_class in (GuideSettings, HairSettings, DynamicsSettings):
         for name, _default, details in declared(settings_class):
             if details.unit == "LENGTH" and name in names:
                 _scale(owner, name, factor)

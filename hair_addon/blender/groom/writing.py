@@ -11,7 +11,7 @@ from ...core.errors import HairError
 from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
-from ..data import attributes, curves, curves_objects
+from ..data import attributes, curves, curves_objects, kept_shapes
 from ..data.scene import Surface
 from ..host.notices import name_of
 from ..materials import looks
@@ -86,6 +86,7 @@ def write_hair(target: Curves) -> None:
     bound.catch_up()
     if not bound.has_moved_only:
         _keep_settings(target, "HAIR", state.hair, bound.settings)
+        kept_shapes.forget(target)
         state.root_key, state.parting_key = bound.root_key, bound.parting_key
         binding, radii = bound.binding, bound.radii
         normals = binding.normals.numpy()

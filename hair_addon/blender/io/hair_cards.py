@@ -11,7 +11,7 @@ from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.files.whole_file import require_place
 from ...core.geometry import clusters
 from ...core.long_work import Stage
-from ..data import card_images, made_meshes
+from ..data import armature_weights, card_images, made_meshes
 from ..materials import card_material
 from ..render import card_pictures
 from . import hair_meshes
@@ -104,6 +104,7 @@ def _written(read, drawn, folder):
         title = f"{name} LOD{index}"
         material = card_material.new_material(title, read.look, its)
         mesh_object = made_meshes.new_object(title, level.mesh, surface_object, collection, material)
+        armature_weights.bind(mesh_object, surface_object, len(level.mesh.vertices) // level.card_count)
         if index:
             made_meshes.hide(mesh_object)
         counts = level.card_count, level.picture_count, level.mesh.triangle_count

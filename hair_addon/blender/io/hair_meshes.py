@@ -12,7 +12,7 @@ from ...core.geometry.mesh import TriMesh
 from ...core.long_work import Stage
 from ...core.shading import strand_colors
 from ...core.shading.appearance import Appearance
-from ..data import curves, exported_curves, made_meshes, scene
+from ..data import armature_weights, curves, exported_curves, made_meshes, scene
 from ..host import scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -98,7 +98,9 @@ def making_tubes(hair, settings):
     collection = made_meshes.new_collection(name, surface_object)
     material = card_material.new_material(name, read.look)
     mesh_object = made_meshes.new_object(name, made, surface_object, collection, material)
-    return MadeTubes(mesh_object, settings.count_of(len(read.points)), made.triangle_count)
+    tube_count = settings.count_of(len(read.points))
+    armature_weights.bind(mesh_object, surface_object, len(made.vertices) // tube_count)
+    return MadeTubes(mesh_object, tube_count, made.triangle_count)
 
 
 def _tubes(read, settings, progress):

@@ -5,6 +5,7 @@ import bpy
 
 from ...core.errors import HairError
 from ...core.files.whole_file import require_place, whole_file
+from ..data import armature_weights
 from ..host import paths
 
 
@@ -17,7 +18,9 @@ def _gltf(path):
 
 
 def _fbx(path):
-    return bpy.ops.export_scene.fbx(filepath=path, use_selection=True, object_types={"MESH"}, use_tspace=True)
+    return bpy.ops.export_scene.fbx(
+        filepath=path, use_selection=True, object_types={"MESH", "ARMATURE"}, use_tspace=True
+    )
 
 
 def _usd(path):
@@ -59,11 +62,15 @@ def has_textures(path):
 
 
 def write(path, objects):
-    """Write mesh objects of the view layer, and nothing else but in a .blend. Raises `HairError`."""
+    """Write mesh objects of the view layer with the armatures that move them, and nothing else but in a .blend.
+
+    Raises `HairError`.
+    """
     require_writable(path)
     for other in bpy.context.view_layer.objects:
         other.select_set(False)
-    for chosen in objects:
+    rigs = [modifier.object for one in objects for modifier in armature_weights.armatures_of(one)]
+    for chosen in dict.fromkeys([*objects, *rigs]):
         chosen.hide_set(False)
         chosen.select_set(True)
     export = _FORMATS[path.suffix.lower()][0]

@@ -4,10 +4,11 @@
 import bpy
 import numpy as np
 
+from ...core import geometry
 from ...core.errors import HairError
 from ...core.files.groom_curves import Rows, slices
-from ...core.geometry import strands
-from ..data import curves, posed_strands
+from ...core.grooming import groom
+from ..data import attributes, curves, posed_strands
 from ..groom import selection
 from ..host.notices import name_of
 from ..live import live_hair
@@ -22,7 +23,8 @@ def metres_per_unit(blender_scene):
 def world_points(datablock):
     """(S, P, 3) float32 [m]: a Curves datablock's points in Blender's axes, where its surface carries them now.
 
-    Without other modifiers than ours. Curves of different point counts are resampled to the largest.
+    Without other modifiers than ours. Curves of different point counts are resampled to the largest, and Catmull-Rom
+    splines to points on the curve, as many as strands have.
     """
     rows = world_rows(datablock)
     world = np.empty(shape_of(datablock), np.float32)
@@ -80,7 +82,10 @@ def shape_of(datablock):
     counts = curves.point_counts(datablock)
     if not len(counts):
         raise HairError('"{name}" has no strands.', name=name_of(datablock))
-    return len(counts), int(counts.max()), 3
+    most = int(counts.max())
+    if attributes.are_smooth(datablock).any():
+        most = max(most, groom.POINT_COUNT)
+    return len(counts), most, 3
 
 
 def world_scale(datablock):
@@ -104,4 +109,5 @@ def _at_rest(datablock):
     points = curves.read_points(datablock)
     if len(points) == strand_count * most:
         return points.reshape(-1, most, 3)
-    return strands.resample(points, curves.curve_offsets(datablock), most)
+    starts, is_smooth = curves.curve_offsets(datablock), attributes.are_smooth(datablock)
+    return geometry.resampling.resample(points, starts, most, is_smooth)

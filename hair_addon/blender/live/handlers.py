@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..data import curves_objects
-from ..groom import bindings, pipeline
+from ..groom import bindings, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
 from ..host.notices import name_of
@@ -52,7 +52,7 @@ def after_depsgraph_update(scene, depsgraph):
         _is_undone = False
         simulated_hair.follow_undo(scene, depsgraph)
         for datablock in _of_kind("HAIR"):
-            if datablock.vellus.is_live and live_hair.is_left_by_undo(datablock):
+            if datablock.vellus.is_live and staleness.is_left_by_undo(datablock):
                 datablock.vellus.is_stale = True
     if any(isinstance(update.id, bpy.types.Image | bpy.types.World) for update in depsgraph.updates):
         events.image_changed()

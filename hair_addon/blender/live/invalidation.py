@@ -20,6 +20,7 @@ COPIES = (
     hair_cache.pose_cache,
     viewport.view_cache,
     bindings.binding_cache,
+    bindings.kept_cache,
     world_texture.light_cache,
     lights.frame_cache,
     animated.value_cache,

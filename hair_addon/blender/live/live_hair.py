@@ -16,7 +16,7 @@ from ..host import running
 from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
-from . import events, reported
+from . import events, kept_strands, reported
 
 # Seconds without a change after which an interaction is over, unless its operator still runs.
 _PAUSE = 0.3
@@ -30,10 +30,13 @@ def follow_guides(hair, depsgraph, local=None):
 
     local: (N, 3) points of the guides now, if they have been read already.
     """
+    if curves.is_hand_made(hair):
+        kept_strands.follow(hair, depsgraph, local)
+        return
     bound = bindings.of(hair)
     if bound is None:
         is_simulated = simulated_guides.is_shown(hair.vellus.guide_curves)
-        if hair.vellus.followed and not is_simulated and not is_left_by_undo(hair):
+        if hair.vellus.followed and not is_simulated and not staleness.is_left_by_undo(hair):
             return  # written for these guides, in another session or before an undo
         make_again(hair, depsgraph)
         return
@@ -90,6 +93,8 @@ def make_again(hair, depsgraph):
     """Bind hair to its guides again and compute all strands, after changes of settings, surface or guides."""
     if curves.follows_library(hair) and simulated_guides.is_shown(hair.vellus.guide_curves):
         _follow_linked(hair, depsgraph)
+        return
+    if curves.is_hand_made(hair) and kept_strands.follow(hair, depsgraph):
         return
     if not running.has_window():
         pipeline.evaluate(hair, depsgraph)
@@ -170,12 +175,6 @@ def is_ahead(hair):
     if bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
     return bound.styles.read.styles == styles
-
-
-def is_left_by_undo(hair):
-    """Whether hair was written for other guides: undo may restore only one of them."""
-    followed = hair.vellus.followed
-    return followed != "" and followed != staleness.guides_digest(hair.vellus.guide_curves)
 
 
 def write_all(*_args):

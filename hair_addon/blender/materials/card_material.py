@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Materials of cards and tubes: Principled, for Cycles, EEVEE and what exports it.
 
-Cards are layers of a cloud of strands. Each scatters a part of the light, its albedo a, half back and half through; a
-stack of such layers reflects R = (1 - sqrt(1 - a)) / (1 + sqrt(1 - a)) [Kubelka31]. The textures have the color R of a
-head of hair, and so a = 4 R / (1 + R)². Engines that let no light through a surface show R itself: exporters find a
-plain shader, Cycles and EEVEE one of their own.
+Cards are layers of a cloud of strands. Each scatters a part of the light, its albedo a. A part t of that goes on
+forward, as most of the light that crosses a fibre does, and the rest half back and half through. By Kubelka and Munk's
+relation (1 - R)² / (2 R) = K / S, with K = 1 - a and S = (1 - t) a / 2, a stack of layers reflects R if [Kubelka31]
+
+    a = R / (R + (1 - t) (1 - R)² / 4)
+
+The textures have the color R of a head of hair. Engines that let no light through a surface show R itself: exporters
+find a plain shader, Cycles and EEVEE shaders of their own. EEVEE would show what is behind a card as through glass, so
+there t = 0.
 """
 
 import bpy
@@ -13,6 +18,9 @@ from ...core.shading import appearance
 from ..data.made_meshes import UV_MAP
 
 _ANISOTROPY = 0.8  # highlights run across strands
+# Part of the scattered light that goes on forward. Before a sun, cards in Cycles had 0.1 to 0.17 of the red light of
+# blond, auburn and brown strands with 0, 0.5 to 0.8 with 0.75 to 0.85; beside or behind a sun then 0.9 to 1.4.
+_FORWARD = 0.8
 _SPECULAR = 0.5  # half of a surface's: a texel has strands of many directions
 
 
@@ -23,15 +31,20 @@ def new_material(name, look, images=None):
     material.diffuse_color = color
     tree = material.node_tree
     tree.nodes.clear()
-    plain = _new_shader(tree, look, color, ("ALL",), 0.0)
+    plain = _new_shader(tree, look, color, "ALL", 0.0)
     if images is not None:
         nodes = _new_images(tree, images)
-        shown = _new_shader(tree, look, color, ("CYCLES", "EEVEE"), -520.0)
-        shown.inputs["Thin Wall"].default_value = True
-        shown.inputs["Subsurface Weight"].default_value = 1.0
+        shaders = [plain]
         tree.links.new(nodes["color"].outputs["Color"], plain.inputs["Base Color"])
-        tree.links.new(_albedo(tree, nodes["color"].outputs["Color"]), shown.inputs["Base Color"])
-        for shader in (plain, shown):
+        for row, (target, forward) in enumerate((("CYCLES", _FORWARD), ("EEVEE", 0.0)), 1):
+            shown = _new_shader(tree, look, color, target, -720.0 * row)
+            shown.inputs["Thin Wall"].default_value = True
+            shown.inputs["Subsurface Weight"].default_value = 1.0
+            shown.inputs["Transmission Weight"].default_value = forward
+            albedo = _albedo(tree, nodes["color"].outputs["Color"], forward, -720.0 * row - 120.0)
+            tree.links.new(albedo, shown.inputs["Base Color"])
+            shaders.append(shown)
+        for shader in shaders:
             tree.links.new(nodes["color"].outputs["Alpha"], shader.inputs["Alpha"])
             tree.links.new(nodes["bump"].outputs["Normal"], shader.inputs["Normal"])
             tree.links.new(nodes["tangent"].outputs["Tangent"], shader.inputs["Tangent"])
@@ -40,13 +53,12 @@ def new_material(name, look, images=None):
     return material
 
 
-def _new_shader(tree, look, color, targets, height):
+def _new_shader(tree, look, color, target, height):
     shader = tree.nodes.new("ShaderNodeBsdfPrincipled")
     shader.location.y = height
-    for index, target in enumerate(targets):
-        output = tree.nodes.new("ShaderNodeOutputMaterial")
-        output.target, output.location = target, (320.0, height - 140.0 * index)
-        tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
+    output = tree.nodes.new("ShaderNodeOutputMaterial")
+    output.target, output.location = target, (320.0, height)
+    tree.links.new(shader.outputs["BSDF"], output.inputs["Surface"])
     look = appearance.shaded(look)
     shader.inputs["Base Color"].default_value = color
     shader.inputs["Roughness"].default_value = min(max(look.roughness, 0.05) ** 0.5, 1.0)
@@ -68,19 +80,20 @@ def _new_images(tree, images):
     return nodes
 
 
-def _albedo(tree, color):
-    """4 R / (1 + R)² of a color's socket R."""
-    above, square, part, albedo = (tree.nodes.new("ShaderNodeVectorMath") for _ in range(4))
-    for column, node in enumerate((above, square, part, albedo)):
-        node.location = (-740.0 + 160.0 * column, -640.0)
-    for node, operation in ((above, "ADD"), (square, "MULTIPLY"), (part, "DIVIDE"), (albedo, "SCALE")):
+def _albedo(tree, color, forward, height):
+    """R / (R + (1 - t) (1 - R)² / 4) of a color's socket R."""
+    missing, square, total, albedo = (tree.nodes.new("ShaderNodeVectorMath") for _ in range(4))
+    for column, node in enumerate((missing, square, total, albedo)):
+        node.location = (-740.0 + 160.0 * column, height)
+    for node, operation in ((missing, "SUBTRACT"), (square, "MULTIPLY"), (total, "MULTIPLY_ADD"), (albedo, "DIVIDE")):
         node.operation = operation
-    above.inputs[1].default_value = (1.0, 1.0, 1.0)
-    albedo.inputs["Scale"].default_value = 4.0
-    tree.links.new(color, above.inputs[0])
+    missing.inputs[0].default_value = (1.0, 1.0, 1.0)
+    total.inputs[1].default_value = (0.25 * (1.0 - forward),) * 3
+    tree.links.new(color, missing.inputs[1])
     for side in (0, 1):
-        tree.links.new(above.outputs[0], square.inputs[side])
-    tree.links.new(color, part.inputs[0])
-    tree.links.new(square.outputs[0], part.inputs[1])
-    tree.links.new(part.outputs[0], albedo.inputs[0])
+        tree.links.new(missing.outputs[0], square.inputs[side])
+    tree.links.new(square.outputs[0], total.inputs[0])
+    tree.links.new(color, total.inputs[2])
+    tree.links.new(color, albedo.inputs[0])
+    tree.links.new(total.outputs[0], albedo.inputs[1])
     return albedo.outputs[0]

@@ -256,6 +256,7 @@ class VellusCurves(bpy.types.PropertyGroup):
     parting_key: bpy.props.StringProperty(description="Settings and inputs that parted the hair", options={"HIDDEN"})
     flow_key: bpy.props.StringProperty(description="Flow lines that the guides were grown along", options={"HIDDEN"})
     written: bpy.props.StringProperty(description="Fingerprint of the generated points", options={"HIDDEN"})
+    kept_written: bpy.props.StringProperty(description="Fingerprint of moved strands", options={"HIDDEN"})
     followed: bpy.props.StringProperty(description="Fingerprint of the followed guides", options={"HIDDEN"})
     shading_status: bpy.props.StringProperty(description="Shading error", options={"HIDDEN"})
     uv_status: bpy.props.StringProperty(description="Problem with the surface's UV map", options={"HIDDEN"})

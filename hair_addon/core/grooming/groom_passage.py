@@ -89,16 +89,22 @@ def _by_agreeing_uv(source, target, roots):
     return Passage("UV", places, None) if apart <= _MOST_STRETCH * spread else None
 
 
-def carried_weights(source: Ground, target: Ground, weights: np.ndarray, found: Passage) -> np.ndarray:
-    """(W, K) float32 in [0, 1]: masks (V, K) of the source's vertices at the target's W vertices, 0 off the source."""
-    if found.warp is None:
+def carried_weights(
+    source: Ground, target: Ground, weights: np.ndarray, warp: Warp | None, reach: float = _REACH
+) -> np.ndarray:
+    """(W, K) float32 in [0, 1]: masks (V, K) of the source's vertices at the target's W vertices, 0 off the source.
+
+    warp: of space, from the source to the target, None by UV; reach: of the target's size, how far a vertex may be from
+    the source where that takes it.
+    """
+    if warp is None:
         wanted, ground = _uv_places(target), _layout(source)
         reach = _OUTSIDE * float(np.ptp(ground.vertices[:, :2], axis=0).max())
         weights = weights[source.mesh.triangles.ravel()]
     else:
         wanted = target.mesh.vertices
-        ground = TriMesh(found.warp.places(source.mesh.vertices).astype(np.float32), source.mesh.triangles)
-        reach = _REACH * float(np.ptp(target.mesh.vertices, axis=0).max())
+        ground = TriMesh(warp.places(source.mesh.vertices).astype(np.float32), source.mesh.triangles)
+        reach *= float(np.ptp(target.mesh.vertices, axis=0).max())
     nearest = geometry.closest_point.SurfaceQuery(ground).nearest(wanted)
     is_near = np.linalg.norm(positions(ground, nearest) - wanted, axis=1) <= reach
     there = interpolate(weights.astype(np.float32), ground, nearest)

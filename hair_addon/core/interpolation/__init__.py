@@ -7,6 +7,7 @@ from ..lazy import submodules
 
 if TYPE_CHECKING:
     from . import (
+        carried_strands,
         clump_centers,
         cpu_weights,
         gpu_interpolation,

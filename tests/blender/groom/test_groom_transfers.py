@@ -116,15 +116,50 @@ def test_roots_are_on_the_new_surface_and_hair_follows_the_new_guides(hair):
     assert not np.array_equal(stored(made), before)
 
 
-def test_names_that_the_mesh_lacks_are_cleared_and_said(hair, capfd):
-    target = other_sphere(3)
+def test_masks_that_the_mesh_lacks_are_painted_as_on_the_other_one(hair, sphere, capfd):
+    """Weights that are a function of place are the same function there, and mask the same strands."""
+    group, weights = sphere.vertex_groups["top"], np.empty(3 * len(sphere.data.vertices))
+    sphere.data.vertices.foreach_get("co", weights)
+    weights = np.clip(weights[2::3], 0.0, 1.0)
+    for index, weight in enumerate(weights.tolist()):
+        group.add([index], weight, "REPLACE")
+    update()
+    target = other_sphere(5, Matrix.Scale(2.0, 4))
     target.vertex_groups.clear()
     made, guides = transfer(target, hair)
-    assert guides.data.vellus.guides.density_group == ""
-    assert "which were cleared: top" in capfd.readouterr().out
-    # Hair grows where guides are, in a group of its own.
-    assert made.data.vellus.hair.density_group in target.vertex_groups
-    assert np.mean(curves.first_points(made.data)[:, 2] > -0.3) > 0.8
+    assert (guides.data.vellus.guides.density_group, made.data.vellus.hair.density_group) == ("top", "")
+    assert '"Other" has new vertex groups: top.' in capfd.readouterr().out
+    places = np.array([vertex.co[:] for vertex in target.data.vertices])
+    found = [
+        next((entry.weight for entry in vertex.groups if entry.group == target.vertex_groups["top"].index), 0.0)
+        for vertex in target.data.vertices
+    ]
+    np.testing.assert_allclose(found, np.clip(places[:, 2], 0.0, 1.0), atol=0.05)  # flat faces of the coarser sphere
+    assert curves.first_points(made.data)[:, 2].min() > -0.05
+
+
+def test_names_that_neither_mesh_has_are_cleared_and_said(hair, capfd):
+    hair.data.vellus.styles[0].curl.mask = "elsewhere"
+    guides_object(hair).data.attributes.new("elsewhere", "FLOAT", "CURVE")
+    hair.data.vellus.hair.part_lines = ""
+    target = other_sphere(3)
+    update()
+    made, _guides = transfer(target, hair)
+    assert made.data.vellus.styles[0].curl.mask == "elsewhere"  # which the guides carry
+    guides_object(hair).data.attributes.remove(guides_object(hair).data.attributes["elsewhere"])
+    made, _guides = transfer(target, hair)
+    assert made.data.vellus.styles[0].curl.mask == ""
+    assert "which were cleared: elsewhere" in capfd.readouterr().out
+
+
+@pytest.mark.parametrize("scales", [True, False])
+def test_lengths_of_dynamics_grow_with_the_surface(hair, scales):
+    dynamics = guides_object(hair).data.vellus.dynamics
+    dynamics.collision_distance, dynamics.bend_stiffness = 0.003, 5.0
+    _made, guides = transfer(other_sphere(3, Matrix.Scale(2.0, 4)), hair, scale_lengths=scales)
+    after = guides.data.vellus.dynamics
+    assert after.collision_distance == pytest.approx(0.006 if scales else 0.003, rel=0.02)
+    assert after.bend_stiffness == 5.0
 
 
 def test_guides_without_a_place_are_left_out_and_said(hair, capfd):

@@ -77,7 +77,7 @@ def test_masks_come_along(head):
     copy = TriMesh((mesh.vertices @ (0.1 * TURN).T).astype(np.float32), mesh.triangles)
     for target in (Ground(mesh, seen_from_above(mesh)), Ground(copy, seen_from_above(mesh))):
         found = passage(Ground(mesh, seen_from_above(mesh)), target, roots)
-        carried = carried_weights(Ground(mesh, seen_from_above(mesh)), target, weights, found)
+        carried = carried_weights(Ground(mesh, seen_from_above(mesh)), target, weights, found.warp)
         np.testing.assert_allclose(carried, weights, atol=2e-5)
 
 

@@ -1,0 +1,23 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kept hair that follows its guides while these are combed or simulated; its Curves are written at once."""
+
+from ...core.errors import HairError
+from ..groom import bindings, kept_following
+from . import events
+
+
+def follow(hair, depsgraph, local=None):
+    """Let kept hair follow its guides; whether they were others than it has followed. An error becomes its status.
+
+    local: (N, 3) points of the guides now, if they have been read already.
+    """
+    try:
+        is_other = kept_following.follow(hair, depsgraph, local)
+    except HairError as error:
+        bindings.kept_cache.invalidate(hair.session_uid)
+        hair.vellus.status = str(error)
+        hair.vellus.is_stale = False
+        return True
+    if is_other:
+        events.strands_made(hair)
+    return is_other

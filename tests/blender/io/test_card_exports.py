@@ -1,0 +1,62 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Cards in files that engines read, read back: faces, UV coordinates, pictures and armature."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon import api
+from hair_addon.blender.io import mesh_export
+from tests.support.following import update
+
+READERS = {".glb": ("import_scene", "gltf"), ".fbx": ("import_scene", "fbx"), ".usdc": ("wm", "usd_import")}
+
+
+@pytest.fixture
+def cards(hair, tmp_path):
+    """Cards of hair on a sphere with an armature of one bone, their textures in a folder."""
+    sphere, data = bpy.data.objects["Sphere"], bpy.data.armatures.new("Rig")
+    rig = bpy.data.objects.new("Rig", data)
+    bpy.context.scene.collection.objects.link(rig)
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = data.edit_bones.new("head")
+    bone.tail = (0.0, 0.0, 1.0)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    sphere.vertex_groups.new(name="head").add(list(range(len(sphere.data.vertices))), 1.0, "REPLACE")
+    sphere.modifiers.new("Armature", "ARMATURE").object = rig
+    update()
+    (made,) = api.make_hair_cards(hair, card_count=12, segment_count=3, texture_size=128, folder=tmp_path / "textures")
+    update()
+    return made
+
+
+def layout(mesh_object):
+    """What any importer keeps of a mesh: number of triangles, sorted UV coordinates of the corners of these."""
+    mesh = mesh_object.data
+    mesh.calc_loop_triangles()
+    uvs = np.empty((len(mesh.loops), 2), np.float32)
+    mesh.uv_layers[0].uv.foreach_get("vector", uvs.ravel())
+    corners = np.array([triangle.loops[:] for triangle in mesh.loop_triangles])
+    return len(corners), np.sort(uvs[corners].reshape(-1, 2), axis=0)
+
+
+@pytest.mark.filterwarnings("ignore:Setting the shape:DeprecationWarning")  # of Blender's exporter of FBX
+@pytest.mark.parametrize("ending", READERS)
+def test_files_have_faces_coordinates_pictures_and_the_armature(cards, tmp_path, ending):
+    count, uvs = layout(cards)
+    path = tmp_path / f"cards{ending}"
+    mesh_export.write(path, [cards])
+    before = set(bpy.data.objects), set(bpy.data.images)
+    module, name = READERS[ending]
+    getattr(getattr(bpy.ops, module), name)(filepath=str(path))
+    made = set(bpy.data.objects) - before[0]
+    (found,) = [one for one in made if one.type == "MESH" and "Cards" in one.name]
+    its_count, its_uvs = layout(found)
+    assert its_count == count == 12 * 3 * 2
+    np.testing.assert_allclose(its_uvs, uvs, atol=1e-5)
+    nodes = [node for slot in found.material_slots for node in slot.material.node_tree.nodes]
+    pictures = {node.image.name.rsplit(".", 1)[0] for node in nodes if node.bl_idname == "ShaderNodeTexImage"}
+    assert any("color" in picture for picture in pictures) and any("normal" in picture for picture in pictures)
+    assert [one for one in made if one.type == "ARMATURE"]
+    assert [group.name for group in found.vertex_groups] == ["head"]
