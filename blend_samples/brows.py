@@ -38,8 +38,12 @@ def build(head_object, openings):
     brows = [_brow(skin, side) for side in (1.0, -1.0)]
     lashes = [lash for opening in openings for lash in _lashes(opening)]
     return (
-        _hair("Brows", brows, head_object, strand_count=1000, radius=4.5e-5, tip_taper=0.3, color=BROWN, roughness=0.35),
-        _hair("Lashes", lashes, head_object, strand_count=560, radius=6.5e-5, tip_taper=0.3, color=BLACK, roughness=0.7),
+        _hair(
+            "Brows", brows, head_object, strand_count=1000, radius=4.5e-5, tip_taper=0.3, color=BROWN, roughness=0.35
+        ),
+        _hair(
+            "Lashes", lashes, head_object, strand_count=560, radius=6.5e-5, tip_taper=0.3, color=BLACK, roughness=0.7
+        ),
     )
 
 

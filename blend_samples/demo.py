@@ -110,7 +110,7 @@ def draw_styled(hair, path):
     before = settings.point_count, settings.tip_taper
     api.apply_style_preset(hair, STYLE)
     bpy.context.view_layer.update()
-    draw(path)
+    draw(path, has_blur=False)
     portrait.set_styles(hair)
     settings.point_count, settings.tip_taper = before
     bpy.context.view_layer.update()

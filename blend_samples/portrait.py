@@ -19,7 +19,8 @@ from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 SIZE = 760, 760  # pixels of a picture
 CAMERA, LOOK_AT, LENS = (0.42, -1.40, 0.745), Vector((0.0, -0.033, 0.692)), 126.0  # [m], [m], [mm]
 NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
-AUBURN = (0.34, 0.72, 1.50)  # absorption per fibre radius at the roots; the sun has bleached the tips
+# Absorption per fibre radius at the roots; the sun has bleached the tips.
+AUBURN, CHESTNUT = (0.62, 1.22, 2.30), (0.25, 0.60, 1.50)
 GAZE = CAMERA  # [m]: what the eyes look at
 FSTOP = 8.0
 
@@ -65,10 +66,10 @@ def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
     hair = bpy.data.objects["Hair"]
     set_styles(hair.data)
     look = hair.data.vellus.appearance
-    look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", head.CHESTNUT
+    look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", CHESTNUT
     look.cuticle_angle, look.roughness = math.radians(5.0), roughness_from_beta_r(math.radians(7.5))
     look.random_color = 0.2
-    look.tip_absorption, look.gradient_start, look.gradient_end = 0.52, 0.03, 0.60
+    look.tip_absorption, look.gradient_start, look.gradient_end = 0.30, 0.02, 0.42
     return guides, hair
 
 

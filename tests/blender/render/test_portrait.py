@@ -8,6 +8,7 @@ from pathlib import Path
 import bpy
 import numpy as np
 import pytest
+from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
 from hair_addon import api
@@ -56,6 +57,18 @@ def test_eyes_are_behind_their_lids_and_fill_the_hole(samples):
         gaps = np.array(sphere_front) - border[:, 1]
         assert gaps.min() > 0.0
         assert np.median(gaps) < 0.003
+
+
+def test_no_gap_is_between_lids_and_eyes(samples):
+    """From the front, what is seen within the opening is an eyeball or the border of a lid, and nothing behind them."""
+    eyes, built, _before = samples
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    fronts = [BVHTree.FromObject(bpy.data.objects[name], depsgraph) for name in ("Eyes", "Lids")]
+    for opening in eyes.openings(built):
+        for upper, lower in zip(opening.upper, opening.lower, strict=True):
+            for part in np.linspace(0.0, 1.0, 12):
+                start = Vector((1.0 - part) * upper + part * lower) - Vector((0.0, 0.02, 0.0))
+                assert any(front.ray_cast(start, Vector((0.0, 1.0, 0.0)))[0] is not None for front in fronts)
 
 
 def test_both_eyes_look_at_the_point(samples):
