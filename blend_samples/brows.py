@@ -10,14 +10,14 @@ from mathutils.bvhtree import BVHTree
 
 from hair_addon import api
 
-BROWN = (0.9, 1.6, 2.6)  # absorption per fibre radius
+BROWN, BLACK = (0.6, 1.15, 2.1), (2.2, 2.9, 3.8)  # absorption per fibre radius: of brows, of lashes
 _DEPTH = 0.0003  # [m] of the patches below the skin
 
 # Of the left brow, from the nose outward: place along X and height [m], half width [m], direction of its hair [rad]
 # from outward to upward.
 _BROW = np.array(
     [
-        (0.0130, 0.7440, 0.0032, math.radians(62.0)),
+        (0.0125, 0.7436, 0.0024, math.radians(62.0)),
         (0.0200, 0.7462, 0.0036, math.radians(42.0)),
         (0.0280, 0.7488, 0.0034, math.radians(26.0)),
         (0.0360, 0.7505, 0.0029, math.radians(6.0)),
@@ -26,7 +26,7 @@ _BROW = np.array(
     ]
 )
 _BROW_STEPS, _BROW_ROWS = 28, 5
-_BROW_LENGTH = 0.0085  # [m]
+_BROW_LENGTH = 0.0095  # [m]
 _LASH_STEPS = 26
 _UPPER_LASH, _LOWER_LASH = 0.0085, 0.0050  # [m]
 _POINTS = 8  # of each guide
@@ -38,8 +38,12 @@ def build(head_object, openings):
     brows = [_brow(skin, side) for side in (1.0, -1.0)]
     lashes = [lash for opening in openings for lash in _lashes(opening)]
     return (
-        _hair("Brows", brows, head_object, strand_count=900, radius=4.5e-5, tip_taper=0.3),
-        _hair("Lashes", lashes, head_object, strand_count=560, radius=6.5e-5, tip_taper=0.3),
+        _hair(
+            "Brows", brows, head_object, strand_count=1000, radius=4.5e-5, tip_taper=0.3, color=BROWN, roughness=0.35
+        ),
+        _hair(
+            "Lashes", lashes, head_object, strand_count=560, radius=6.5e-5, tip_taper=0.3, color=BLACK, roughness=0.7
+        ),
     )
 
 
@@ -53,10 +57,11 @@ def guides_on_skin(head_object):
 
 def _brow(skin, side):
     """(grid (R, C, 3) of roots, their (R, C, P, 3) guides) of the brow on a side."""
-    along = np.linspace(0.0, 1.0, _BROW_STEPS)
-    x, height, half_width, angle = (np.interp(along, np.linspace(0.0, 1.0, len(_BROW)), row) for row in _BROW.T)
     roots, guides = [], []
     for row in np.linspace(-1.0, 1.0, _BROW_ROWS):
+        # Its inner end is round, and its upper border begins last.
+        along = np.linspace(0.06 * row**2 + 0.03 * (1.0 + row), 1.0, _BROW_STEPS)
+        x, height, half_width, angle = (np.interp(along, np.linspace(0.0, 1.0, len(_BROW)), part) for part in _BROW.T)
         line = [_on_skin(skin, side * x[i], height[i] + row * half_width[i]) for i in range(_BROW_STEPS)]
         roots.append([point - _DEPTH * normal for point, normal in line])
         # Hair of the upper and of the lower border turns toward the middle.
@@ -119,7 +124,7 @@ def _smooth(values, width=5):
     return np.convolve(padded, np.ones(width) / width, mode="valid")
 
 
-def _hair(name, parts, head_object, **settings):
+def _hair(name, parts, head_object, color, roughness, **settings):
     """Hair between guides on the patches of parts (roots (R, C, 3), guides (R, C, P, 3))."""
     patch = _patch(f"{name} patch", [roots for roots, _guides in parts], head_object)
     lines = np.concatenate([guides.reshape(-1, _POINTS, 3) for _roots, guides in parts])
@@ -130,7 +135,7 @@ def _hair(name, parts, head_object, **settings):
     bpy.context.scene.collection.objects.link(drawn)
     guides = api.use_as_guides(drawn, patch)
     hair = api.interpolate_hair(guides, seed=3, point_count=12, **settings)
-    api.shade(hair, mode="energy", parametrization="ABSORPTION", absorption=BROWN, roughness=0.35)
+    api.shade(hair, mode="energy", parametrization="ABSORPTION", absorption=color, roughness=roughness)
     drawn.hide_render = True
     api.add_style(hair, api.Frizz(amplitude=0.00025, wavelength=0.006, seed=5))
     holder = next(o for o in bpy.context.scene.objects if o.data == hair)

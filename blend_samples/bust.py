@@ -65,4 +65,5 @@ def _jersey():
     principled = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     principled.inputs["Base Color"].default_value = color
     principled.inputs["Roughness"].default_value = 0.85
+    principled.inputs["Specular IOR Level"].default_value = 0.1  # wool
     return material

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Eyes for the sample's head: eyeballs with iris and pupil, clear corneas over them, fitted between the lids."""
+"""Eyes for the sample's head: eyeballs with iris and pupil, clear corneas over them, the wet borders of the lids."""
 
 from dataclasses import dataclass
 
@@ -10,7 +10,7 @@ from mathutils.bvhtree import BVHTree
 
 RADIUS = 0.0150  # [m] of an eyeball
 IRIS_RADIUS = 0.0047
-PUPIL_RADIUS = 0.0019
+PUPIL_RADIUS = 0.0017
 _GAP = 0.0007  # [m] between an eyeball and the lids
 _BULGE = 0.0010  # [m] of a cornea over the eyeball's sphere
 
@@ -57,16 +57,17 @@ def _opening(surface, side, step):
 
 
 def build(head_object, target):
-    """Both eyes, which look at a point [m]; returns the objects `Eyes` and `Corneas`, children of the head."""
-    balls, corneas = [], []
+    """Eyes that look at a point [m]; returns the objects `Eyes`, `Corneas` and `Lids`, children of the head."""
+    balls, corneas, lids = [], [], []
     for opening in openings(head_object):
         center = _center(opening)
         axes = _axes(np.array(target) - center)
         balls.append(_ball(center, axes))
         corneas.append(_cornea(center, axes))
+        lids.append(_lid(opening, center))
     eyes = _object("Eyes", balls, head_object, [_eye_material("Sclera", 0.25, 0.5), _eye_material("Iris", 0.6, 0.1)])
     cornea = _object("Corneas", corneas, head_object, [_cornea_material()])
-    return eyes, cornea
+    return eyes, cornea, _object("Lids", lids, head_object, [_lid_material()])
 
 
 def _center(opening):
@@ -112,6 +113,23 @@ def _cornea(center, axes):
     bump = _BULGE * np.square(np.cos(0.5 * np.pi * np.minimum(_CORNEA_RINGS / _CORNEA_RINGS[-1], 1.0)))
     lift = np.where(_CORNEA_RINGS < _CORNEA_RINGS[-1], 2e-5, -1e-4)
     return _revolved(center, axes, np.stack([radii, sphere + bump + lift], axis=1), _CORNEA_RINGS, slots=(0, 0, 0))
+
+
+def _lid(opening, center):
+    """The same of the lids' inner border, a strip from their edge to the eyeball: no gap is dark."""
+    edge = np.concatenate([opening.upper, opening.lower[::-1]])
+    edge = (np.roll(edge, 1, axis=0) + edge + np.roll(edge, -1, axis=0)) / 3.0
+    outward = edge - edge.mean(axis=0)
+    outward /= np.linalg.norm(outward, axis=1)[:, None]
+    ball = center + (RADIUS - 0.0003) * (edge - center) / np.linalg.norm(edge - center, axis=1)[:, None]
+    # It begins below the skin.
+    rings = np.stack([edge + 0.0012 * outward + (0.0, 0.0006, 0.0), 0.5 * (edge + ball), ball])
+    count = len(edge)
+    ring, place = np.meshgrid(np.arange(2), np.arange(count), indexing="ij")
+    after, first = (place + 1) % count, ring * count
+    faces = np.stack([first + place, first + after, first + count + after, first + count + place], axis=-1)
+    faces = faces.reshape(-1, 4)[:, :: 1 if center[0] > 0.0 else -1]
+    return rings.reshape(-1, 3), faces, np.zeros((3 * count, 2)), np.zeros(len(faces), int)
 
 
 def _revolved(center, axes, profile, places, slots):
@@ -173,6 +191,15 @@ def _cornea_material():
     return material
 
 
+def _lid_material():
+    material = bpy.data.materials.new("Lid")
+    principled = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    material.diffuse_color = (0.50, 0.22, 0.18, 1.0)
+    principled.inputs["Base Color"].default_value = material.diffuse_color
+    principled.inputs["Roughness"].default_value = 0.3
+    return material
+
+
 def eye_image():
     """An image of an eye by distance and azimuth from its pupil: iris with its fibres, sclera, shadow of the lid."""
     x, y = np.meshgrid(*[2.0 * (np.arange(_IMAGE_SIZE) + 0.5) / _IMAGE_SIZE - 1.0] * 2)
@@ -184,7 +211,7 @@ def eye_image():
     color = color * (1.0 - 0.75 * near_pupil) + 0.75 * near_pupil * np.array([0.42, 0.30, 0.16])
     color *= (1.0 - 0.75 * _step(iris, 0.80, 1.0))[..., None]  # the dark ring at the border
     color *= _step(iris, PUPIL_RADIUS / IRIS_RADIUS - 0.03, PUPIL_RADIUS / IRIS_RADIUS + 0.03)[..., None]
-    white = np.array([0.86, 0.83, 0.80]) - _step(distance, 0.82, 0.92)[..., None] * np.array([0.05, 0.20, 0.20])
+    white = np.array([0.74, 0.70, 0.67]) - _step(distance, 0.82, 0.92)[..., None] * np.array([0.05, 0.20, 0.20])
     border = _step(iris, 0.94, 1.06)[..., None]
     color = (1.0 - border) * color + border * white
     # Lids shade the eyeball more finely than a light's shadow map resolves.

@@ -17,15 +17,17 @@ from hair_addon import api
 from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 
 SIZE = 760, 760  # pixels of a picture
-CAMERA, LOOK_AT, LENS = (0.70, -1.28, 0.73), Vector((-0.010, -0.033, 0.683)), 126.0  # [m], [m], [mm]
+CAMERA, LOOK_AT, LENS = (0.42, -1.40, 0.745), Vector((0.0, -0.033, 0.692)), 126.0  # [m], [m], [mm]
 NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
-AUBURN = (0.27, 0.54, 1.10)  # absorption per fibre radius
-GAZE = (0.45, -1.24, 0.73)  # [m]: what the eyes look at, close to the camera
-FSTOP = 5.6
+# Absorption per fibre radius at the roots; the sun has bleached the tips.
+AUBURN, CHESTNUT = (0.62, 1.22, 2.30), (0.25, 0.60, 1.50)
+GAZE = CAMERA  # [m]: what the eyes look at
+FSTOP = 8.0
 
 LENGTH = 0.34  # [m] of guides on the crown
 _HAIRLINE_LENGTH = 0.45  # of those at the border, as a part of it
 _HAIRLINE_REACH = 0.030  # [m] over which lengths grow from the border
+_HAIRLINE_LOWER, _HAIRLINE_WIDTH = 0.006, 0.018  # [m] how far baby hair reaches below the border, and fades
 _STEPS = 41  # points of a guide
 _EAR = Vector((0.080, -0.042, 0.712)), Vector((0.030, 0.052, 0.054))  # [m]: middle and radii of what hair goes behind
 
@@ -41,7 +43,7 @@ def dress(head_object, target=GAZE):
 
 def undress(head_object):
     """Remove what `dress` added, but the skin."""
-    for name in ("Brows", "Lashes", "Bust", "Eyes", "Corneas"):
+    for name in ("Brows", "Lashes", "Bust", "Eyes", "Corneas", "Lids"):
         bpy.data.objects.remove(bpy.data.objects[name])
     for made in [o for o in head_object.children_recursive if o.name.startswith(("Brows", "Lashes"))]:
         bpy.data.objects.remove(made)
@@ -59,14 +61,15 @@ def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
     _comb(guides, [head_object, bpy.data.objects["Bust"]], seed)
     bpy.context.view_layer.objects.active = guides
     bpy.ops.vellus.interpolate_hair(
-        strand_count=strand_count, seed=seed, density_group="scalp", radius=5.5e-5, point_count=61, tip_taper=0.25
+        strand_count=strand_count, seed=seed, density_group="strands", radius=5.5e-5, point_count=61, tip_taper=0.25
     )
     hair = bpy.data.objects["Hair"]
     set_styles(hair.data)
     look = hair.data.vellus.appearance
-    look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", head.CHESTNUT
+    look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", CHESTNUT
     look.cuticle_angle, look.roughness = math.radians(5.0), roughness_from_beta_r(math.radians(7.5))
-    look.random_color = 0.15
+    look.random_color = 0.2
+    look.tip_absorption, look.gradient_start, look.gradient_end = 0.30, 0.02, 0.42
     return guides, hair
 
 
@@ -75,22 +78,25 @@ def set_styles(hair):
     api.set_styles(
         hair,
         [
-            api.Trim(random=0.16, seed=1),
-            api.Clump(size=0.020, amount=0.7, fine_amount=0.6, thickness=0.25, shape=0.25, stray=0.05, seed=2),
-            api.Curl(radius=0.0085, pitch=0.085, flatness=0.45, coherence=0.9, root=0.0, tip=1.0, seed=3),
-            api.Frizz(amplitude=0.0005, wavelength=0.05, stray=0.03, stray_gain=7.0, tip=0.6, seed=4),
+            api.Trim(random=0.14, undercoat=0.02, undercoat_length=0.45, seed=1),
+            api.Clump(size=0.020, amount=0.7, fine_amount=0.6, thickness=0.32, shape=0.25, stray=0.06, seed=2),
+            api.Curl(radius=0.0085, pitch=0.085, flatness=0.45, coherence=0.85, vary=0.3, root=0.0, tip=1.0, seed=3),
+            api.Frizz(amplitude=0.0006, wavelength=0.08, stray=0.06, stray_gain=20.0, shape=0.35, tip=0.8, seed=4),
         ],
     )
 
 
 def _add_density(head_object):
-    """The vertex group `guides`: as `scalp`, denser at the hairline."""
+    """Vertex groups: `guides`, denser at the hairline; `strands`, which fade out at it and cover the parting."""
     positions = np.array([vertex.co for vertex in head_object.data.vertices])
-    above = head.above_hairline(positions)
-    weights = np.where(above > 0.0, 0.45 + 0.55 * np.exp(-above / 0.02), 0.0)
-    group = head_object.vertex_groups.new(name="guides")
-    for vertex in np.flatnonzero(weights > 0.0):
-        group.add([int(vertex)], float(weights[vertex]), "REPLACE")
+    above = head.above_hairline(positions) + _HAIRLINE_LOWER
+    guides = np.where(above > 0.0, 0.45 + 0.55 * np.exp(-above / 0.02), 0.0)
+    border = np.clip(above / _HAIRLINE_WIDTH, 0.0, 1.0) ** 1.3
+    seen = np.exp(-np.square((positions[:, 0] - head.PARTING) / 0.02)) + np.exp(-np.square(above / 0.03))
+    for name, weights in (("guides", guides), ("strands", border * (0.5 + 0.5 * np.minimum(seen, 1.0)))):
+        group = head_object.vertex_groups.new(name=name)
+        for vertex in np.flatnonzero(weights > 0.0):
+            group.add([int(vertex)], float(weights[vertex]), "REPLACE")
 
 
 def _comb(guides, solids, seed):
@@ -127,7 +133,8 @@ def _combed(root, length, surfaces):
     sweep = Vector((side * (0.35 + 0.45 * front), 0.15 + 0.16 * front**4, -0.45 + 0.45 * front))
     around = Vector((side * 0.12, 0.05 + 0.16 * front**4, -0.95))
     fall = Vector((-side * 0.22, -0.12 * _part(abs(root[0]), 0.02, 0.07), -1.0))
-    direction = (0.55 * normal + sweep.normalized()).normalized()
+    lift = 0.30 + 0.25 * _part(abs(root[0] - head.PARTING), 0.0, 0.03)
+    direction = (lift * normal + sweep.normalized()).normalized()
     volume = 0.007 + 0.003 * crown
     combed = [position.copy()]
     for i in range(1, _STEPS):
@@ -185,12 +192,12 @@ def light():
     lens = camera.data.dof
     lens.use_dof, lens.aperture_fstop, lens.aperture_blades = True, FSTOP, 7
     lens.focus_distance = _distance_to(camera, NEAR_EYE)
-    _place("Key", (-0.30, -1.20, 1.38), 24.0, 0.30)
-    _place("Rim", (-0.75, 0.75, 1.15), 34.0, 0.4)
-    _place("Fill", (1.1, -1.0, 0.75), 6.5, 0.9)
+    _place("Key", (-0.36, -1.20, 1.38), 28.0, 0.40)
+    _place("Rim", (-0.65, 0.95, 1.35), 34.0, 0.4)
+    _place("Fill", (1.0, -1.15, 0.85), 8.0, 0.9)
     second = bpy.data.objects.new("Rim 2", bpy.data.objects["Rim"].data.copy())
     scene.collection.objects.link(second)
-    _place("Rim 2", (1.2, 0.55, 1.05), 36.0, 0.4)
+    _place("Rim 2", (0.90, 0.75, 1.50), 48.0, 0.4)
     bpy.context.view_layer.update()
 
 

@@ -58,11 +58,28 @@ def test_eyes_are_behind_their_lids_and_fill_the_hole(samples):
         assert np.median(gaps) < 0.003
 
 
+def test_lids_reach_from_their_edge_to_the_eyeball(samples):
+    eyes, built, _before = samples
+    parts = (*(halves(places(bpy.data.objects[name])) for name in ("Eyes", "Lids")), eyes.openings(built))
+    for ball, lid, opening in zip(*parts, strict=True):
+        rings = lid.reshape(3, -1, 3)  # from the edge inward
+        border = np.concatenate([opening.upper, opening.lower])
+        to_edge = np.linalg.norm(rings[:2].reshape(-1, 1, 3) - border, axis=2).min(axis=0)
+        assert to_edge.max() < 0.002
+        center = ball[-64:].mean(axis=0) + eyes.RADIUS * gaze_of(ball)
+        assert np.linalg.norm(rings[2] - center, axis=1).max() < eyes.RADIUS
+
+
+def gaze_of(ball):
+    """The direction from an eyeball's back pole to its pupil."""
+    gaze = ball[:64].mean(axis=0) - ball[-64:].mean(axis=0)
+    return gaze / np.linalg.norm(gaze)
+
+
 def test_both_eyes_look_at_the_point(samples):
     for ball in halves(places(bpy.data.objects["Eyes"])):
-        gaze = ball[:64].mean(axis=0) - ball[-64:].mean(axis=0)  # from the back pole to the pupil
         towards = TARGET - ball[-64:].mean(axis=0)
-        cosine = gaze @ towards / np.linalg.norm(gaze) / np.linalg.norm(towards)
+        cosine = gaze_of(ball) @ towards / np.linalg.norm(towards)
         assert cosine > 0.9999
 
 
