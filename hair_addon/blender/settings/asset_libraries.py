@@ -51,7 +51,7 @@ def show_changes(name):
     for window in bpy.context.window_manager.windows:
         for area in window.screen.areas:
             for region in area.regions:
-                if region.type == "ASSET_SHELF" or area.ui_type == "ASSETS" and region.type == "WINDOW":
+                if region.type == "ASSET_SHELF" or (area.ui_type == "ASSETS" and region.type == "WINDOW"):
                     with bpy.context.temp_override(window=window, area=area, region=region):
                         bpy.ops.asset.library_refresh.poll() and bpy.ops.asset.library_refresh()
 
