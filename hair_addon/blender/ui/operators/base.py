@@ -11,6 +11,12 @@ class HairOperator:
     bl_options = {"REGISTER", "UNDO"}
     bl_translation_context = CONTEXT
 
+    @classmethod
+    def may_be_redone(cls, context):
+        """Whether the last operator was this one: Blender polls it before it undoes what the redo panel changes."""
+        done = context.window_manager.operators
+        return context.object is not None and len(done) > 0 and done[-1].bl_idname == cls.__name__
+
     def change(self, context):
         """Do it; returns (sentence, values) to report, or None."""
         raise NotImplementedError

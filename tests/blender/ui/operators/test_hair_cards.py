@@ -13,8 +13,8 @@ from tests.support.layout import redo_panel
 def test_polygons_are_named_before_they_are_made(hair):
     values = {"card_count": 40, "segment_count": 3, "level_count": 2, "texture_size": 256}
     texts = redo_panel("hair_cards", **values).texts
-    assert "Level 0: 40 cards, 240 triangles, 256 × 256 pixels" in texts
-    assert "Level 1: 20 cards, 40 triangles, 128 × 128 pixels" in texts
+    assert "Level 0: 40 cards, 240 triangles, 256 px" in texts
+    assert "Level 1: 20 cards, 40 triangles, 128 px" in texts
     bpy.ops.vellus.hair_cards(**values)
     meshes = [bpy.data.meshes[f"Hair Cards LOD{level}"] for level in (0, 1)]
     assert [2 * len(mesh.polygons) for mesh in meshes] == [240, 40]
