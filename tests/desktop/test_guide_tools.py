@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide tools in a window: each from its menu, redone, undone; and hair that is combed without its styles."""
+"""The guide tools in a window: each from its menu, redone, undone; hair that is combed without its styles; and then
+tubes of it, and the groom in a library."""
 
 import json
 import re
@@ -80,3 +81,14 @@ def test_hair_follows_the_tool_and_its_undo(walk, name):
 def test_hair_is_straight_while_it_is_combed(walk):
     assert walk.facts["is straight in the stroke"] and walk.facts["is styled again"]
     assert min(walk.facts["straightened"], *walk.facts["combed"], walk.facts["styled again"]) > 1e-3
+
+
+def test_tubes_are_made_after_the_dialog_and_redone(walk):
+    made = walk.facts["tubes"]
+    assert made["asked"] == ["RUNNING_MODAL"] and made["before it is confirmed"] == 0
+    assert made["made"] > made["redone"] > 0 == made["undone"]
+
+
+def test_a_groom_that_was_saved_is_in_the_shelf_and_a_click_applies_it(walk):
+    counts = walk.facts["shelf"]
+    assert counts["applied"] == counts["before"] + 1 and counts["undone"] == counts["before"]
