@@ -11,6 +11,7 @@ const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as 
 
 // Standard errors by which the means of two blocks may differ.
 const float TOLERANCE = 2.0;
+const float TOLERANCE_OF_LIGHT = 3.0;  // where nothing but lights has moved
 
 void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
 {
@@ -90,8 +91,9 @@ void main()
   vec4 mean = textureLod(now_mean, here, 0.0);
   color = vec4(0.0);
   passes = 0.0;
-  bool is_background;
-  vec2 place = place_before(pixel, is_background);
+  bool is_still = history.is_still != 0;
+  bool is_background = false;
+  vec2 place = is_still ? vec2(pixel) + 0.5 : place_before(pixel, is_background);
   if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
     return;
   }
@@ -101,12 +103,18 @@ void main()
   if (!is_background) {  // where hair has gone, its own noise is no reason to keep some of it
     deviation = max(deviation, textureLod(before_deviation, there, 0.0));
   }
+  float tolerance = TOLERANCE;
+  if (is_still) {  // how much of a block hair covers is noise, and only its light may have changed
+    mean *= mean_before.a / max(mean.a, 0.25 * mean_before.a + 1e-4);
+    tolerance = TOLERANCE_OF_LIGHT;
+  }
   // Half floats resolve a thousandth.
-  vec4 bound = (TOLERANCE / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
+  vec4 bound = (tolerance / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
   vec4 light = previous_at(place);
   // In proportion: what is black beside a bright edge remains so.
-  light *= clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
+  vec4 factor = clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
+  light *= is_still ? vec4(factor.rgb, 1.0) : factor;
   vec4 excess = abs(mean_before - mean) / bound;
   float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
   color = light;

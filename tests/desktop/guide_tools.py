@@ -2,7 +2,7 @@
 """Each guide tool in Sculpt Mode in a window: run from its menu, redone with another value, undone, redone and undone.
 
 Run by a desktop Blender: guide_tools.py -- ZIP OUT. Writes guide_tools.json with what the tests want to know, and a
-picture of the menu. Afterwards the hair is combed without its styles.
+picture of the menu. Afterwards the hair is combed without its styles, made tubes, saved as an asset and applied.
 """
 
 import json
@@ -15,6 +15,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+from tests.desktop import grooms  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
     drag,
@@ -44,7 +45,7 @@ TOOLS = {
     "copy_guide_shape": {"amount": 0.5},
 }
 
-facts = {"tools": {}}
+facts = {"tools": {}, "tubes": {}, "shelf": {}}
 
 
 def of_kind(kind):
@@ -216,6 +217,8 @@ def walk():
     for name in TOOLS:
         yield from use(name)
     yield from comb_straight()
+    yield from grooms.tubes(of_kind("HAIR"), facts["tubes"])
+    yield from grooms.shelf(of_kind("HAIR"), OUT / "library", facts["shelf"])
     facts["is done"] = True
 
 

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The guide tools in a window: each from its menu, redone, undone; and hair that is combed without its styles."""
+"""The guide tools in a window: each from its menu, redone, undone; hair that is combed without its styles; and then
+tubes of it, and the groom in a library."""
 
 import json
 import re
@@ -86,3 +87,14 @@ def test_combing_shows_hidden_guides(walk):
     """And the brush moves them: hair follows."""
     shown = [walk.facts[name] for name in ("were shown", "are shown", "combing mode")]
     assert shown == [False, True, "SCULPT_CURVES"] and min(walk.facts["combed"]) > 1e-3
+
+
+def test_tubes_are_made_after_the_dialog_and_redone(walk):
+    made = walk.facts["tubes"]
+    assert made["asked"] == ["RUNNING_MODAL"] and made["before it is confirmed"] == 0
+    assert made["made"] > made["redone"] > 0 == made["undone"]
+
+
+def test_a_groom_that_was_saved_is_in_the_shelf_and_a_click_applies_it(walk):
+    counts = walk.facts["shelf"]
+    assert counts["applied"] == counts["before"] + 1 and counts["undone"] == counts["before"]

@@ -25,6 +25,7 @@ class SurfaceOnGPU:
     places: gpu.types.GPUTexture
     row_corners: int
     corner_count: int
+    form: int  # equal where all corners are
 
 
 @dataclass(frozen=True)
@@ -266,7 +267,8 @@ def upload_surface(positions, normals, uvs=None):
         vertices.attr_fill(name, np.ascontiguousarray(values, np.float32))
     row_corners = min(len(positions), TEXTURE_WIDTH)
     places = places_texture(positions[:, None], np.zeros((len(positions), 1), np.float32), row_corners)
-    return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners, len(positions))
+    form = hash(np.ascontiguousarray(positions, np.float32).tobytes())
+    return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners, len(positions), form)
 
 
 def draw_cover(program, blocks, samplers):

@@ -167,6 +167,7 @@ HISTORY = Block(
         "samples_per_side": "int",
         "has_hair_motion": "int",  # whether it has moved, and not only the view: by the texture of motion vectors
         "has_surface_motion": "int",
+        "is_still": "int",  # whether nothing has moved but lights: what is in a pixel was there before
         "most_passes": "float",  # that the picture before may be worth
     },
 )

@@ -26,8 +26,13 @@ def job():
 
 
 def begin(context, started, work):
-    """Take note of a `Job`, a step of some work, and have its window send timer events for as long as it runs."""
+    """Take note of a `Job`, a step of some work, and have its window send timer events for as long as it runs.
+
+    It is called as the step before it until it says what it does.
+    """
     global _job, _work, _timer
+    if _job is not None and not started.step:
+        started.step, started.part = _job.step, _job.part
     _job, _work = started, work
     if _timer is None:
         _timer = context.window_manager.event_timer_add(0.05, window=context.window)

@@ -10,7 +10,7 @@ from ...core.cards import atlas, outlines, ribbons, texels
 from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.files.whole_file import require_place
 from ...core.geometry import clusters
-from ...core.long_work import Stage
+from ...core.long_work import Stage, part_of
 from ..data import armature_weights, card_images, made_meshes
 from ..materials import card_material
 from ..render import card_pictures
@@ -50,23 +50,31 @@ def making_cards(hair, settings, folder=None):
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
     levels = settings.levels(len(read.points))
+    areas = np.cumsum([0] + [level.texture_size**2 for level in levels])
+    parts = (areas / areas[-1]).tolist()
     drawn = []
     for index, level in enumerate(levels):
-        drawn.append((yield from _drawing(read, level, settings.picture_count, index / len(levels))))
+        drawn.append((yield from _drawing(read, level, settings.picture_count, parts[index : index + 2])))
     return _written(read, drawn, folder)
 
 
-def _drawing(read, level, picture_count, part):
-    mesh, placed, drawn_count = yield lambda progress: _flat_cards(read, level, picture_count, progress)
-    yield Stage("Drawing cards", part)
+def _drawing(read, level, picture_count, parts):
+    """A level as work in steps, which is the part of the whole between two."""
+    first, last = parts
+    told = first, first + 0.1 * (last - first)
+    flat = yield lambda progress: _flat_cards(read, level, picture_count, part_of(progress, *told))
+    mesh, placed, drawn_count = flat
+    yield Stage("Drawing cards", told[1])
     picture = card_pictures.CardPicture(placed, level.texture_size)
     sums = texels.TexelSums(level.texture_size)
     for turn in range(card_pictures.PASSES):
         for rows in picture.strips():
-            yield Stage("Drawing cards", part)
+            here = turn + rows.start / level.texture_size
+            yield Stage("Drawing cards", first + (last - first) * (0.1 + 0.8 * here / card_pictures.PASSES))
             segments, shift = picture.segments(rows, turn)
             yield _adding(sums, segments, placed, shift, rows)
-    return _Drawn(mesh, sums.maps(), level.card_count, drawn_count)
+    maps = yield lambda _progress: sums.maps()
+    return _Drawn(mesh, maps, level.card_count, drawn_count)
 
 
 def _adding(sums, segments, placed, shift, rows):

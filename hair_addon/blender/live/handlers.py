@@ -12,7 +12,17 @@ from ..host.notices import name_of
 from ..materials import looks
 from ..render import composite
 from ..settings import animated, style_items
-from . import events, every_frame, invalidation, live_hair, older_files, reported, simulated_hair, unlocked_renders
+from . import (
+    events,
+    every_frame,
+    invalidation,
+    live_hair,
+    older_files,
+    refused_hair,
+    reported,
+    simulated_hair,
+    unlocked_renders,
+)
 
 # Whether a window is about to evaluate a file that was just opened, which reports all of it as updated.
 _is_opening = False
@@ -195,6 +205,12 @@ def before_reading(*_args):
 
 
 @persistent
+def before_rendering(*_args):
+    """Forget what earlier renders could not show."""
+    refused_hair.begin()
+
+
+@persistent
 def before_saving(*_args):
     """Store in the file what it is known by under another name."""
     frame_folders.remember()
@@ -249,6 +265,7 @@ def after_undo(*_args):
 def after_render(scene, *_args):
     """Say what a render could not show."""
     unlocked_renders.end(scene)
+    refused_hair.end(scene)
 
 
 @persistent
@@ -265,6 +282,7 @@ _HANDLERS = (
     (bpy.app.handlers.save_pre, before_reading),
     (bpy.app.handlers.save_pre, before_saving),
     (bpy.app.handlers.render_init, before_reading),
+    (bpy.app.handlers.render_init, before_rendering),
     (bpy.app.handlers.render_complete, after_render),
     (bpy.app.handlers.render_cancel, after_render),
     (bpy.app.handlers.undo_post, after_undo),
@@ -286,12 +304,9 @@ def unregister():
     """Remove the handlers; write pending hair, and leave composited hair to the engines."""
     for handlers, handler in _HANDLERS:
         handlers.remove(handler)
-    if bpy.app.timers.is_registered(_take_over):
-        bpy.app.timers.unregister(_take_over)
-    if bpy.app.timers.is_registered(unlocked_renders.offer):
-        bpy.app.timers.unregister(unlocked_renders.offer)
-    if bpy.app.timers.is_registered(composite.repair):
-        bpy.app.timers.unregister(composite.repair)
+    for timer in (_take_over, unlocked_renders.offer, refused_hair.offer, composite.repair):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
     every_frame.end()
     live_hair.write_all()
     composite.suspend()

@@ -10,7 +10,7 @@ from ..gpu import lights, shaders, surface_shading, world_texture
 from ..groom import bindings
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
-from ..render import hair_cache, region_pictures, viewport
+from ..render import composite, hair_cache, region_pictures, viewport
 from ..settings import animated
 from . import dynamics_state, every_frame, reported, simulated_hair, unlocked_renders
 
@@ -41,6 +41,7 @@ OTHERS = (
     dynamics_state.change_cache,
     every_frame.before_cache,
     unlocked_renders.noted_cache,
+    composite.refused_cache,
     frame_folders.folder_cache,
     guide_simulation.stiffness_cache,
     shaders.complaint_cache,

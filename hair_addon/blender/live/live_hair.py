@@ -241,7 +241,8 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         try:
             curves.require_editable(guides)
             was_edited = edited_surfaces.follow_surface(guides, depsgraph, axes_before)
-            if is_mesh_edited and not was_edited and _may_be_painted(guides, depsgraph):
+            is_placed = not curves.is_hand_made(guides)  # where its mask says
+            if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
                 state.is_stale = True
         except HairError as error:
             state.status = str(error)

@@ -11,6 +11,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.imaging.pixel_sampling import RenderSettings
 from ..data import composite_nodes, curves_objects
+from ..host.caches import Cache
 from ..settings import setting_properties
 from . import viewport
 
@@ -24,6 +25,8 @@ _OF_RENDER = (
     *("use_simplify", "simplify_subdivision_render"),
 )
 _OWN = {"is_hair_only", "composite_shadow", "has_preview_shadow"}  # of the scene's settings of ours
+
+refused_cache = Cache()  # session_uid of a hair's scene → errors of its renders since the last one began
 
 _COMPOSITED = "vellus_use_compositing"  # custom property of the hair's scene: what the render settings had
 
@@ -118,13 +121,30 @@ def repair():
                 follow(blender_scene)
 
 
+def refuse(hair_scene, sentence):
+    """Keep the error of a scene that was rendered, if it is the hair of another: Blender only prints it."""
+    if _is_of_another(hair_scene):
+        told = refused_cache.get(hair_scene.original.session_uid, list)
+        told += [] if sentence in told else [sentence]
+
+
+def refusals(blender_scene):
+    """Errors of the hair in the last render of a scene."""
+    hair_scene = blender_scene.vellus.hair_scene
+    return [] if hair_scene is None else refused_cache.get(hair_scene.session_uid) or []
+
+
+def _is_of_another(blender_scene):
+    return any(other.vellus.hair_scene == blender_scene.original for other in bpy.data.scenes)
+
+
 def is_in_sequence(blender_scene):
     """Whether a scene is rendered as the hair of another in an animation, or without a window.
 
     Blender does not tell the engine of a scene that the compositor has rendered that this is for an animation. Without
     a window it cannot be known, and nothing has played.
     """
-    if not any(other.vellus.hair_scene == blender_scene.original for other in bpy.data.scenes):
+    if not _is_of_another(blender_scene):
         return False
     running = [operator for window in bpy.context.window_manager.windows for operator in window.modal_operators]
     is_animation = any(one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)

@@ -71,12 +71,16 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         try:
             self._render(depsgraph)
         except HairError as error:
-            self.report({"ERROR"}, error_text(error))
+            self._refuse(depsgraph.scene, error_text(error))
         except KeyboardInterrupt:  # a script's
-            self.report({"ERROR"}, interface_text("Canceled: nothing was rendered."))
+            self._refuse(depsgraph.scene, interface_text("Canceled: nothing was rendered."))
         except Exception as error:  # a bug must not produce a black picture as a result
-            self.report({"ERROR"}, interface_text("Vellus could not render this: {error}", error=error))
+            self._refuse(depsgraph.scene, interface_text("Vellus could not render this: {error}", error=error))
             raise
+
+    def _refuse(self, blender_scene, sentence):
+        self.report({"ERROR"}, sentence)
+        composite.refuse(blender_scene, sentence)
 
     def _render(self, depsgraph):
         blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
@@ -121,7 +125,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         # Last, so that there is a picture of everything else. A command that renders to a file fails: a picture
         # without some of the hair is not a valid result.
         for error in refused.values():
-            self.report({"ERROR"}, error_text(error))
+            self._refuse(blender_scene, error_text(error))
 
     def _views(self, view_layer):
         """Names of the views of a stereo picture; of other pictures the empty name."""

@@ -80,7 +80,7 @@ class HairPicture:
         self.pass_count += 1
         camera, part_left = (world_to_view, view_to_clip), 1.0 - self.pass_count / self._pass_total
         light = self._color, self.pass_count
-        self._history.add(drawn, camera, view, self._pass, light, self.pass_count, part_left)
+        self._history.add(drawn, camera, view, self._pass, light, self.pass_count, part_left, is_shadowed)
 
     def _accumulate(self):
         program = shaders.accumulate_program()

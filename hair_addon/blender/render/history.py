@@ -18,6 +18,7 @@ _COLOR, _PASSES = "RGBA16F", "R16F"
 
 # Passes that the picture before may be worth: of the same strands, and of others, with which noise would hide a change.
 _MOST_PASSES, _MOST_OF_OTHERS = 24.0, 2.0
+_MOST_OF_STILL = 96.0  # where nothing but lights has moved: it is not blurred, and only light may lag
 
 
 class _Targets:
@@ -97,30 +98,31 @@ class History:
         self._blocks = [_Targets(blocks, (_COLOR, _COLOR), True) for _ in range(2)]
         self._block_batch = strand_textures.bare_vertices(6 * blocks[0] * blocks[1], "TRIS")
 
-    def add(self, drawn, camera, view, buffer, light, pass_count, part_left):
+    def add(self, drawn, camera, view, buffer, light, pass_count, part_left, has_shadows=False):
         """Take note of a pass, the pass_count-th of a picture.
 
         drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; buffer: its
         `VisibilityBuffer`; light: (texture, weight) of the passes so far, their sum and what to divide it by;
-        part_left: of all passes, those that are still to come.
+        part_left: of all passes, those that are still to come; has_shadows: whether shadows on surfaces are
+        in it, which lights move.
         """
         if pass_count == 1:
-            self._turn_to(drawn, camera, view, buffer, light)
+            self._turn_to(drawn, camera, view, buffer, light, has_shadows)
         if self._is_carried:
             self._is_carried = part_left > 0.0
         if self._is_carried:
             self._mix(light, pass_count, part_left)
 
-    def _turn_to(self, drawn, camera, view, buffer, light):
+    def _turn_to(self, drawn, camera, view, buffer, light, has_shadows):
         before, world_to_clip = self._seen, camera[1] @ camera[0]
         # Of hair that is wet in places, which may be mixed in other ways than before.
         looks = tuple(layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers)
         self._seen = _Seen(looks, motion_vectors.places(drawn, *camera), world_to_clip)
         self._is_carried = before is not None and _are_same(before.looks, looks)
         if self._is_carried:
-            self._carry(before, drawn, view, buffer, light)
+            self._carry(before, drawn, view, buffer, light, has_shadows)
 
-    def _carry(self, before, drawn, view, buffer, light):
+    def _carry(self, before, drawn, view, buffer, light, has_shadows):
         now = self._seen
         record = uniforms.HISTORY.record()
         record["now_to_before"] = (before.world_to_clip @ np.linalg.inv(now.world_to_clip)).T
@@ -129,6 +131,11 @@ class History:
         record["has_hair_motion"] = has_hair = not now.places.has_still_hair(before.places)
         has_same_strands = now.places.has_same_strands(before.places)
         record["most_passes"] = _MOST_PASSES if has_same_strands else _MOST_OF_OTHERS
+        is_same_view = np.array_equal(before.world_to_clip, now.world_to_clip)
+        # Shadows on surfaces go with a light: they would leave a trail.
+        record["is_still"] = is_same_view and has_same_strands and not (has_hair or has_surfaces or has_shadows)
+        if record["is_still"]:
+            record["most_passes"] = _MOST_OF_STILL
         motion = light[0]
         if has_hair or has_surfaces:
             steps = motion_vectors.Motion(before.places, now.places, now.places, self.size)

@@ -37,9 +37,8 @@ class ViewFilm:
         """Draw a `DrawnScene` once more: arguments as for `Film.add_pass`."""
         film, camera = self._film, (world_to_view, view_to_clip)
         view = film.add_pass(drawn, *camera, film.size, self._first_turn + film.pass_count, lens=lens)
-        self._history.add(
-            drawn, camera, view, film.samples, film.light, film.pass_count, 1.0 - film.pass_count / self._pass_total
-        )
+        part_left = 1.0 - film.pass_count / self._pass_total
+        self._history.add(drawn, camera, view, film.samples, film.light, film.pass_count, part_left, has_shadows=True)
 
     def show(self):
         """Lay the picture over the viewport that is bound."""

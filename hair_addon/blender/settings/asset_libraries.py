@@ -33,9 +33,27 @@ def first_name():
 def folder_of(name):
     """The folder of an asset library. Raises `HairError`."""
     library = bpy.context.preferences.filepaths.asset_libraries.get(name)
+    if not name:
+        raise HairError("There is no asset library: add one in Preferences ▸ File Paths.")
     if library is None or not library.path:
         raise HairError('There is no asset library "{name}": add one in Preferences ▸ File Paths.', name=name)
     return Path(bpy.path.abspath(library.path))
+
+
+def show_changes(name):
+    """Let all windows read the assets of a library again, whose files have changed."""
+    library = bpy.context.preferences.filepaths.asset_libraries.get(name)
+    if library is not None:
+        # A shelf that is not shown yet may have read all libraries for another mode, without a context to refresh in.
+        were_changed = bpy.context.preferences.is_dirty
+        library.path = library.path
+        bpy.context.preferences.is_dirty = were_changed
+    for window in bpy.context.window_manager.windows:
+        for area in window.screen.areas:
+            for region in area.regions:
+                if region.type == "ASSET_SHELF" or (area.ui_type == "ASSETS" and region.type == "WINDOW"):
+                    with bpy.context.temp_override(window=window, area=area, region=region):
+                        bpy.ops.asset.library_refresh.poll() and bpy.ops.asset.library_refresh()
 
 
 def reference():

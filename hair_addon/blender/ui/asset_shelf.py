@@ -13,7 +13,7 @@ class VELLUS_AST_grooms(bpy.types.AssetShelf):
     bl_idname = "VELLUS_AST_grooms"
     bl_space_type = "VIEW_3D"
     bl_options = {"STORE_ENABLED_CATALOGS_IN_PREFERENCES"}
-    bl_activate_operator = "vellus.apply_groom"
+    bl_activate_operator = bl_drag_operator = "vellus.apply_groom"
     bl_default_preview_size = 96
 
     @classmethod

@@ -7,6 +7,7 @@ from ..groom import particle_hair
 from ..groom.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of
 from ..live import unlocked_renders
+from ..render import composite
 from ..settings.translations import CONTEXT, interface_text
 
 # In groups: length and shape, then number and place.
@@ -25,6 +26,8 @@ _GUIDE_TOOLS = (
         ("copy_guide_shape", "COPYDOWN"),
     ),
 )
+
+_MOST_REFUSALS = 5  # that a menu lists
 
 
 def draw_guide_tools(layout):
@@ -58,6 +61,22 @@ class VELLUS_MT_unlocked_render(bpy.types.Menu):
     def draw(self, context):
         self.layout.label(text=interface_text(unlocked_renders.SENTENCE), icon="ERROR", translate=False)
         self.layout.prop(context.scene.render, "use_lock_interface")
+
+
+class VELLUS_MT_refused_hair(bpy.types.Menu):
+    """What hair a render of surfaces and hair lacks, and why"""
+
+    bl_label = "Hair Is Missing in This Render"
+    bl_idname = "VELLUS_MT_refused_hair"
+    bl_translation_context = CONTEXT
+
+    def draw(self, context):
+        told = composite.refusals(context.scene)
+        for sentence in told[:_MOST_REFUSALS]:
+            self.layout.label(text=sentence, icon="ERROR", translate=False)
+        if len(told) > _MOST_REFUSALS:
+            more = interface_text("{count} more", count=len(told) - _MOST_REFUSALS)
+            self.layout.label(text=more, icon="BLANK1", translate=False)
 
 
 class VELLUS_MT_hair(bpy.types.Menu):
@@ -131,7 +150,7 @@ _ENTRIES = (
     ("VIEW3D_MT_edit_curves", _in_curves_menu),
 )
 
-CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair, VELLUS_MT_unlocked_render)
+CLASSES = (VELLUS_MT_guide_tools, VELLUS_MT_hair, VELLUS_MT_unlocked_render, VELLUS_MT_refused_hair)
 
 
 def register():

@@ -53,6 +53,7 @@ def transfer(target, hair, **options):
     made = bpy.context.object
     guides = made.data.vellus.guide_curves
     update()
+    assert guides.vellus.status == ""
     return made, next(o for o in bpy.data.objects if o.data == guides)
 
 

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import hair_addon
-from hair_addon.blender.live import handlers
+from hair_addon.blender.live import handlers, refused_hair
+from hair_addon.blender.ui import menus
+from tests.support.layout import draw
 from tests.support.rendering import configure
 
 
@@ -108,6 +110,7 @@ def test_hair_is_laid_over_the_view_layer_that_it_is_rendered_with(composited):
 
 
 def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composited, tmp_path, capfd):
+    """And a window says so after the render, which Blender does not."""
     scene = bpy.context.scene
     bpy.data.objects["Guides"].data.vellus.simulates = True
     configure(engine="CYCLES", resolution_x=8, resolution_y=6, film_transparent=True, use_compositing=True)
@@ -115,7 +118,11 @@ def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composite
     bpy.data.objects["Sphere"].hide_render = True  # what Cycles sees is empty: the picture is the hair
     scene.render.filepath = str(tmp_path / "frame_")
     bpy.ops.render.render(animation=True)
-    assert 'Frame 2 of the guides "Guides" is not baked' in "".join(capfd.readouterr())
+    refusal = 'Frame 2 of the guides "Guides" is not baked: bake their dynamics first.'
+    assert refusal in "".join(capfd.readouterr())
+    assert bpy.app.timers.is_registered(refused_hair.offer)
+    bpy.app.timers.unregister(refused_hair.offer)
+    assert draw(menus.VELLUS_MT_refused_hair).texts == [refusal]
     found = [bpy.data.images.load(str(tmp_path / f"frame_000{frame}.png")) for frame in (1, 2)]
     first, second = (np.reshape(image.pixels, (-1, 4))[:, 3].max() for image in found)
     assert first > 0.1 and second == 0.0

@@ -176,6 +176,16 @@ def test_combed_strands_know_where_they_were(lit, monkeypatch):
     assert np.abs(vectors[False]).max() > 1.0
 
 
+def test_surfaces_that_are_read_again_have_not_moved(lit):
+    """By where their corners are: a light that moves has all of the scene read again."""
+    view = camera()
+    before = motion_vectors.places(read_drawn(), *view)
+    bpy.data.objects["Sun"].rotation_euler.x += 0.1
+    assert before.surfaces and motion_vectors.places(read_drawn(), *view).has_still_surfaces(before)
+    bpy.data.objects["Sphere"].location.x += 0.1
+    assert not motion_vectors.places(read_drawn(), *view).has_still_surfaces(before)
+
+
 def push_surface(frame):
     push = bpy.data.objects["Sphere"].modifiers.get("Push")
     if push is None:

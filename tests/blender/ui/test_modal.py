@@ -16,7 +16,7 @@ from hair_addon.blender.settings import setting_properties
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
-from hair_addon.core.long_work import Job, run_now
+from hair_addon.core.long_work import Job, Stage, run_now
 from tests.support.modal import ESC, TIMER, Operator, drive
 from tests.support.reading import points, snapshot
 
@@ -31,6 +31,16 @@ def test_work_ends_as_it_would_at_once(window):
     assert drive(operator, window) == {"FINISHED"}
     assert operator.reported == [("INFO", "7 guides")]
     assert window.status[-1] is None
+
+
+def test_a_step_that_says_nothing_is_called_as_the_one_before_it(window):
+    def work():
+        yield Stage("Drawing", 0.25)
+        yield lambda progress: None
+        return 1
+
+    assert drive(Operator(work()), window) == {"FINISHED"}
+    assert [said.split("    ")[0] for said in window.status[:-1]] == ["Drawing: 25%"]
 
 
 @pytest.mark.parametrize("event", [ESC, SimpleNamespace(type="MOUSEMOVE", value="NOTHING")])

@@ -1,8 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Base of long operators that show their settings, and what they will make, before they begin."""
 
-import bpy
-
+from ...host import running
 from .modal import LongOperator
 
 _WIDTH = 360  # of the dialog [pixels]
@@ -15,8 +14,9 @@ class AskedOperator(LongOperator):
 
     def invoke(self, context, event):
         """Ask, or begin."""
-        is_given = any(map(self.properties.is_property_set, self.properties.bl_rna.properties.keys()))
-        if is_given or bpy.app.background:
+        names = set(self.properties.bl_rna.properties.keys()) - {"rna_type"}  # which always counts as set
+        is_given = any(map(self.properties.is_property_set, names))
+        if is_given or not running.has_window():
             return super().invoke(context, event)
         self._is_asking = True
         return context.window_manager.invoke_props_dialog(self, width=_WIDTH)
@@ -26,7 +26,5 @@ class AskedOperator(LongOperator):
         if not self._is_asking:
             return super().execute(context)
         self._is_asking = False
-        category, name = self.bl_idname.split(".")
-        begun = getattr(getattr(bpy.ops, category), name)("INVOKE_DEFAULT", **self.as_keywords())
         # Work that goes on is an undo step of its own when it is done.
-        return begun & {"FINISHED"} or {"CANCELLED"}
+        return self.begin_anew() & {"FINISHED"} or {"CANCELLED"}

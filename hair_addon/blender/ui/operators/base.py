@@ -18,6 +18,12 @@ class HairOperator:
         """Whether it `applies`, if it asks; to nothing in a context without a window, which has no active object."""
         return cls.applies is None or (hasattr(context, "object") and cls.applies(context))
 
+    @classmethod
+    def may_be_redone(cls, context):
+        """Whether the last operator was this one: Blender polls it before it undoes what the redo panel changes."""
+        done = context.window_manager.operators
+        return context.object is not None and len(done) > 0 and done[-1].bl_idname == cls.__name__
+
     def change(self, context):
         """Do it; returns (sentence, values) to report, or None."""
         raise NotImplementedError

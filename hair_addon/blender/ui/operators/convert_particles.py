@@ -36,7 +36,9 @@ class VELLUS_OT_convert_particles(HairOperator, bpy.types.Operator):
     @classmethod
     def applies(cls, context):
         cls.poll_message_set("Select a mesh with particle hair, in Object Mode.")
-        return context.mode == "OBJECT" and bool(particle_hair.systems_of(context.object))
+        if context.mode != "OBJECT":
+            return False
+        return bool(particle_hair.systems_of(context.object)) or cls.may_be_redone(context)
 
     def draw(self, context):
         setting_rows.row(self.layout, self.properties, "use")

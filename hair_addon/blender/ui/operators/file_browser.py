@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Base of long operators that write a file: file browser first, then the computation."""
 
-import bpy
-
 from ....core.errors import HairError
 from .modal import LongOperator
 
@@ -33,6 +31,4 @@ class BrowsedOperator(LongOperator):
             except HairError as error:
                 return self.refuse(error)
             return super().execute(context)
-        category, name = self.bl_idname.split("_OT_")
-        run = getattr(getattr(bpy.ops, category.lower()), name)
-        return run("INVOKE_DEFAULT", **self.as_keywords()) & {"CANCELLED"} or {"FINISHED"}
+        return self.begin_anew() & {"CANCELLED"} or {"FINISHED"}

@@ -36,7 +36,7 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
         for index, level in enumerate(settings.levels(hair_meshes.strand_count(hair_of(context.object)))):
             counts = {"cards": level.card_count, "triangles": level.triangle_count, "size": level.texture_size}
             text = interface_text(
-                "Level {level}: {cards} cards, {triangles:,} triangles, {size} × {size} pixels", level=index, **counts
+                "Level {level}: {cards} cards, {triangles:,} triangles, {size} px", level=index, **counts
             )
             self.layout.label(text=text, translate=False)
 

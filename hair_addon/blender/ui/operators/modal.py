@@ -78,6 +78,12 @@ class LongOperator(HairOperator):
         self._show(context)
         return {"RUNNING_MODAL"}
 
+    def begin_anew(self):
+        """Invoke an operator like this one, after a dialog or a file browser, which Blender does not wait for."""
+        category, name = self.bl_idname.split("_OT_")
+        run = getattr(getattr(bpy.ops, category.lower()), name)
+        return run("INVOKE_DEFAULT", **self.as_keywords())
+
     def modal(self, context, event):
         """Wait for the thread; write when it is done."""
         job = running.job()

@@ -33,7 +33,7 @@ class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):
     @classmethod
     def applies(cls, context):
         cls.poll_message_set("Select curves not created by Vellus, in Object Mode.")
-        return context.mode == "OBJECT" and is_foreign(context.object)
+        return context.mode == "OBJECT" and (is_foreign(context.object) or cls.may_be_redone(context))
 
     def draw(self, context):
         try:

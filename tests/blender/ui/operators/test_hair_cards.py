@@ -4,6 +4,7 @@
 import bpy
 import pytest
 
+from hair_addon.blender.host import running
 from hair_addon.blender.ui.operators.asked import AskedOperator
 from hair_addon.blender.ui.operators.modal import LongOperator
 from tests.support.layout import redo_panel
@@ -12,8 +13,8 @@ from tests.support.layout import redo_panel
 def test_polygons_are_named_before_they_are_made(hair):
     values = {"card_count": 40, "segment_count": 3, "level_count": 2, "texture_size": 256}
     texts = redo_panel("hair_cards", **values).texts
-    assert "Level 0: 40 cards, 240 triangles, 256 × 256 pixels" in texts
-    assert "Level 1: 20 cards, 40 triangles, 128 × 128 pixels" in texts
+    assert "Level 0: 40 cards, 240 triangles, 256 px" in texts
+    assert "Level 1: 20 cards, 40 triangles, 128 px" in texts
     bpy.ops.vellus.hair_cards(**values)
     meshes = [bpy.data.meshes[f"Hair Cards LOD{level}"] for level in (0, 1)]
     assert [2 * len(mesh.polygons) for mesh in meshes] == [240, 40]
@@ -29,10 +30,23 @@ def test_polygons_are_named_before_they_are_made(hair):
 class Asked(AskedOperator):
     """Stands in for a registered operator, which only Blender can make."""
 
-    bl_idname = "vellus.hair_tubes"
+    bl_idname = "VELLUS_OT_hair_tubes"  # as Blender names operators that are running
 
     def as_keywords(self):
         return {"tube_count": 3}
+
+
+@pytest.mark.parametrize("is_asking", [True, False])
+def test_it_asks_unless_it_is_given_a_setting(hair, window, monkeypatch, is_asking):
+    monkeypatch.setattr(running, "has_window", lambda: True)
+    monkeypatch.setattr(LongOperator, "invoke", lambda self, context, event: {"FINISHED"})
+    window.window_manager.invoke_props_dialog = lambda operator, width: {"RUNNING_MODAL"}
+    operator = Asked()
+    operator.properties = bpy.context.window_manager.operator_properties_last("vellus.hair_tubes")
+    operator.properties.property_unset("tube_count")
+    if not is_asking:
+        operator.properties.tube_count = 3
+    assert operator.invoke(window, None) == ({"RUNNING_MODAL"} if is_asking else {"FINISHED"})
 
 
 @pytest.mark.parametrize("is_asking", [True, False])

@@ -7,6 +7,17 @@ import pytest
 from tests.support.layout import redo_panel
 
 
+@pytest.mark.parametrize("name", ["use_as_guides", "use_as_hair"])
+def test_the_redo_panel_is_there_after_a_run(imported, name):
+    """Blender asks `poll` with what the run has made, before it undoes that to run with other settings."""
+    bpy.context.view_layer.objects.active = imported
+    operator = getattr(bpy.ops.vellus, name)
+    assert operator("EXEC_DEFAULT", True) == {"FINISHED"}
+    assert operator.poll()
+    bpy.ops.object.select_all("EXEC_DEFAULT", True, action="SELECT")
+    assert not operator.poll()
+
+
 @pytest.mark.parametrize("grows_hair", [True, False])
 def test_the_redo_panel_draws_what_has_an_effect(imported, grows_hair):
     bpy.context.view_layer.objects.active = imported

@@ -51,4 +51,4 @@ class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):
         return "Groom saved to {path}", {"path": made}
 
     def after(self, context, made):
-        bpy.ops.asset.library_refresh.poll() and bpy.ops.asset.library_refresh()
+        asset_libraries.show_changes(self.library or asset_libraries.first_name())
