@@ -24,9 +24,9 @@ FibreLobes forward_lobes(vec2 at)
   return FibreLobes(textureLod(n_g_table, at, 0.0), textureLod(n_g_trt_table, at, 0.0).rgb, fibre_residual(at));
 }
 
-vec3 dual(int row, float theta_i)
+vec3 dual(float row, float theta_i)
 {
-  return textureLod(dual_table, vec2(theta_i / PI + 0.5, (float(row) + 0.5) / 9.0), 0.0).rgb;
+  return textureLod(dual_table, vec2(theta_i / PI + 0.5, (row + 0.5) / 9.0), 0.0).rgb;
 }
 
 #include "include/dual_radiance.glsl"

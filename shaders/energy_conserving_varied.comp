@@ -26,10 +26,10 @@ FibreLobes forward_lobes(vec2 at)
 }
 
 // Of the surrounding strands, at the same position along the gradient.
-vec3 dual(int row, float theta_i)
+vec3 dual(float row, float theta_i)
 {
   float step_count = float(textureSize(dual_table, 0).z);
-  vec3 at = vec3(theta_i / PI + 0.5, (float(row) + 0.5) / 9.0, between_ends(this_gradient(), step_count));
+  vec3 at = vec3(theta_i / PI + 0.5, (row + 0.5) / 9.0, between_ends(this_gradient(), step_count));
   return textureLod(dual_table, at, 0.0).rgb;
 }
 

@@ -8,6 +8,10 @@
 const float LEAST_ATTENUATION = 1e-3;
 const float MOST_REFLECTANCE = 0.995;
 
+// Least mean cosine: of light from everywhere; and flux: where there is no light.
+const float LEAST_COSINE = 1e-3;
+const float LEAST_FLUX = 1e-6;
+
 // Part of the light from the half circle behind that goes to its front, over the azimuth |phi| of the front.
 float back_azimuth(float phi)
 {
@@ -48,4 +52,27 @@ void fluxes(float front, float behind, vec3 a_f, vec3 a_b, out vec3 onward, out 
   layer_parts(behind, attenuation, reflectance, beyond, returned);
   onward = through / (vec3(1.0) - reflected * returned);
   backward = onward * returned;
+}
+
+float total(vec3 rgb)
+{
+  return rgb.r + rgb.g + rgb.b;
+}
+
+// Factor by which scattering of these widths of theta_h shrinks the mean sine of the inclination.
+float mean_cosine(vec3 width)
+{
+  float variance = 4.0 / 3.0 * dot(width, width);
+  float opposite = exp(-2.0 / variance);
+  return (1.0 + opposite) / (1.0 - opposite) - variance;
+}
+
+// Shift and variance, in theta_i + theta_o, of light of a flux whose mean sine is `kept` where each event multiplies it by
+// `cosine` and shifts light by `shift`; last: of an event more. `dual_scattering.drifts`.
+vec2 drift(vec3 kept, vec3 flux, float last, float cosine, float shift)
+{
+  float m = clamp(last * (total(kept) + LEAST_FLUX) / (total(flux) + LEAST_FLUX), LEAST_COSINE, 1.0);
+  float turned = shift * log(m) / log(cosine);
+  float variance = (1.0 - m * m) / (m * (3.0 - m * m));  // Banerjee et al. 2005
+  return vec2(turned, variance + turned * turned);
 }

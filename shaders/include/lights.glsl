@@ -43,12 +43,19 @@ float area_falloff(float cos_angle, float cos_cone)
   return max(0.0, tan_cone - tan_angle) / (tan_cone - atan(tan_cone));
 }
 
-// Light of a disk of radius r at the distance d, as a part of that of a point of the same power: by their solid angles,
-// 2 pi (1 - d / sqrt(d² + r²)) and pi r² / d². ratio: r² / d², of the disk as it is seen.
-float disk_part(float ratio)
+// Irradiance of a small ball by a Lambertian disk that sends 1 W/sr along its axis; height: above the disk's plane, beside:
+// from its axis. Through a plane parallel to the disk that is known exactly; what comes in at an angle counts more for a
+// ball, by the mean cosine between the disk's near edge and its far one.
+float disk_irradiance(float height, float beside, float radius)
 {
-  float root = sqrt(1.0 + ratio);
-  return 2.0 / (root * (root + 1.0));
+  float squared = radius * radius;
+  float outside = height * height + beside * beside - squared;
+  float root = sqrt(outside * outside + 4.0 * height * height * squared);
+  float flat_part = (outside > 0.0) ? 2.0 * height * height / (root * (root + outside))
+                                    : (root - outside) / (2.0 * root * squared);
+  vec2 edges = vec2(max(beside - radius, 0.0), beside + radius);
+  vec2 cosines = height * inversesqrt(vec2(height * height) + edges * edges);
+  return flat_part / (0.5 * (cosines.x + cosines.y));
 }
 
 // Irradiance [W/m²] of a small ball at `position`, per its cross section. power: RGB watts, or W/m² of a sun; radius: of an
@@ -69,10 +76,13 @@ vec3 light_irradiance(int kind,
   float distance_squared = max(dot(offset, offset), 1e-8);
   float cos_angle = dot(axis, offset) * inversesqrt(distance_squared);
   if (kind == LIGHT_AREA) {
+    float height = dot(axis, offset);
+    if (height <= 0.0) {
+      return vec3(0.0);
+    }
     // A Lambertian emitter of flux P sends P/pi along its axis.
-    float facing = max(cos_angle, 0.0);
-    float part = disk_part(radius * radius * facing / distance_squared);
-    return power * facing * part * area_falloff(cos_angle, cos_cone) / (PI * distance_squared);
+    float beside = length(offset - height * axis);
+    return power / PI * disk_irradiance(height, beside, radius) * area_falloff(cos_angle, cos_cone);
   }
   vec3 irradiance = power / (4.0 * PI * distance_squared);
   return (kind == LIGHT_SPOT) ? irradiance * spot_falloff(cos_angle, cos_cone, blend) : irradiance;

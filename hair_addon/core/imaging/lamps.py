@@ -30,11 +30,22 @@ def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
     cos_cone, blend, radius = (lamps[name][:, None].astype(float) for name in ("cos_cone", "blend", "radius"))
     beam = _spot_falloff(cos_angle, cos_cone, blend)
     point = np.where(kind == SPOT, beam, 1.0) / (4.0 * np.pi * squared)
-    facing = np.maximum(cos_angle, 0.0)
-    root = np.sqrt(1.0 + radius**2 * facing / squared)
-    area = facing * 2.0 / (root * (root + 1.0)) * _area_falloff(cos_angle, cos_cone) / (np.pi * squared)
+    height = np.maximum(cos_angle, 0.0) * np.sqrt(squared)
+    beside = np.sqrt(np.maximum(squared - np.square(height), 0.0))
+    area = _disk_irradiance(height, beside, radius) * _area_falloff(cos_angle, cos_cone) / np.pi
     part = np.where(kind == SUN, 1.0, np.where(kind == AREA, area, point))
     return part[..., None] * lamps["power"][:, None, :3]
+
+
+def _disk_irradiance(height, beside, radius):
+    """Of a small ball by a Lambertian disk that sends 1 W/sr along its axis: disk_irradiance of lights.glsl."""
+    outside = height**2 + beside**2 - radius**2
+    root = np.maximum(np.sqrt(outside**2 + 4.0 * height**2 * radius**2), 1e-12)
+    far = 2.0 * height**2 / (root * np.maximum(root + outside, 1e-12))
+    near = (root - outside) / (2.0 * root * np.maximum(radius, 1e-6) ** 2)
+    edges = np.stack([np.maximum(beside - radius, 0.0), beside + radius])
+    cosine = (height / np.sqrt(np.maximum(height**2 + edges**2, 1e-12))).mean(axis=0)
+    return np.where(height > 0.0, np.where(outside > 0.0, far, near) / np.maximum(cosine, 1e-12), 0.0)
 
 
 def _spot_falloff(cos_angle, cos_cone, blend):

@@ -144,18 +144,25 @@ def test_a_scene_without_lights_is_dark(wall):
     assert len(door.read_lights(bpy.context.evaluated_depsgraph_get(), for_render=True)[0]) == 0
 
 
-@pytest.mark.parametrize("size", [0.05, 1.0, 3.0])  # radius by distance
-def test_a_disk_lights_by_its_solid_angle(size):
-    """Against the integral over the disk of the light that a small ball on its axis receives."""
-    edges = np.linspace(0.0, size, 4001)
-    radii = 0.5 * (edges[1:] + edges[:-1])
-    squared = 1.0 + radii**2
-    received = np.sum(2.0 * np.pi * radii * np.diff(edges) / np.sqrt(squared) / squared) / (np.pi * size**2)
-    text = glsl.source("include/lights.glsl")
+@pytest.mark.parametrize("radius", [0.02, 0.4, 1.5])
+def test_a_disk_lights_by_its_solid_angle(radius):
+    """Against the integral over the disk of the light that small balls above and beside it receive."""
+    height, beside = (grid.ravel() for grid in np.meshgrid([0.2, 0.5, 1.0, 3.0], [0.0, 0.3, 0.7, 1.2, 2.5]))
+    part, turn = (np.arange(400) + 0.5) / 400, 2.0 * np.pi * (np.arange(200) + 0.5) / 200
+    out = radius * np.sqrt(part)[:, None]
+    x, y = out * np.cos(turn), out * np.sin(turn)
+    received = [np.mean(h / (h**2 + (x - b) ** 2 + y**2) ** 1.5) for h, b in zip(height, beside, strict=True)]
     found = glsl.evaluate(
-        text, "float", "disk_part(ratio)", structs=uniforms.LIGHT.source, ratio=np.array([size**2], np.float32)
+        glsl.source("include/lights.glsl"),
+        "float",
+        f"disk_irradiance(height, beside, {radius})",
+        structs=uniforms.LIGHT.source,
+        height=height.astype(np.float32),
+        beside=beside.astype(np.float32),
     )
-    assert found[0] == pytest.approx(received, rel=1e-4)
+    np.testing.assert_allclose(found, received, rtol=0.2)  # where the disk's edge is next to the ball
+    assert np.mean(np.abs(found / received - 1.0)) < 0.06
+    np.testing.assert_allclose(found[beside == 0.0], np.array(received)[beside == 0.0], rtol=2e-3)
 
 
 def test_python_has_the_irradiance_of_the_shaders(rng):

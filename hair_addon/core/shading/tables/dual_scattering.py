@@ -26,6 +26,8 @@ QUANTITIES = ("a_f", "a_b", "alpha_f", "alpha_b", "beta_f", "beta_b", "back", "b
 # By a strand, and of deep hair: without any loss, fluxes would not fall exponentially.
 _LEAST_ATTENUATION, _MOST_REFLECTANCE = 1e-3, 0.995
 
+_LEAST_COSINE, _LEAST_FLUX = 1e-3, 1e-6  # of light from everywhere; where there is none
+
 _WHITEST = 0.99  # the series over scattering events must end
 
 
@@ -215,6 +217,46 @@ def fluxes(front: Values, behind: Values, a_f: np.ndarray, a_b: np.ndarray) -> t
     return onward, onward * returned
 
 
+def mean_cosine(variance: Values) -> np.ndarray:
+    """Factor (...) by which `d_eon_lobe` of a variance (...) shrinks the mean sine of the inclination of light."""
+    return 1.0 / np.tanh(1.0 / np.asarray(variance)) - variance
+
+
+def variance_of(cosine: Values) -> np.ndarray:
+    """The inverse (...) of `mean_cosine` (Banerjee et al. 2005); cosine: (...), 0 for light from everywhere."""
+    m = np.clip(cosine, _LEAST_COSINE, 1.0)
+    return (1.0 - m * m) / (m * (3.0 - m * m))
+
+
+def drifts(
+    front: Values, behind: Values, quantity: dict[str, np.ndarray]
+) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+    """(shift, variance) (...) in theta_i + theta_o: of light that strands in front scattered on, and from behind.
+
+    The latter with one event more, in this strand. Each event multiplies the mean sine of the inclination by a mean
+    cosine: fluxes among strands that scatter only this part have the mean sine after any number of events, and tell
+    that number. Each shifts light towards the same end of the strands. In deep hair the number of events is
+    distributed geometrically: its deviation is its mean.
+    """
+    parts = np.stack([quantity["a_f"], quantity["a_b"]])
+    # Means over the channels, which differ little.
+    variances = np.stack([4.0 * np.square(quantity[name]).mean(axis=-1) for name in ("beta_f", "beta_b")])
+    alpha = 2.0 * np.stack([quantity[name].mean(axis=-1) for name in ("alpha_f", "alpha_b")])
+    cosines, weights = mean_cosine(variances), parts.sum(axis=-1)
+    cosine, shift = ((weights * values).sum(axis=0) / weights.sum(axis=0) for values in (cosines, alpha))
+    direct = direct_part(front)[..., None]
+    onward, backward = fluxes(front, behind, *parts)
+    kept, returned = fluxes(front, behind, *(parts * cosines[..., None]))
+
+    def drift(kept, flux, last):
+        left = last * (kept.sum(axis=-1) + _LEAST_FLUX) / (flux.sum(axis=-1) + _LEAST_FLUX)
+        left = np.clip(left, _LEAST_COSINE, 1.0)
+        turned = shift * np.log(left) / np.log(cosine)
+        return turned, variance_of(left) + np.square(turned)
+
+    return drift(kept - direct, onward - direct, 1.0), drift(returned, backward, cosine)
+
+
 def sample_radiance(
     tables: lookup_tables.Tables,
     dual: DualTables,
@@ -253,25 +295,18 @@ def radiance(
 
     The irradiance is that outside the hair. quantity: {name: (..., 3)} of the strands around, at theta_i; n, n_g: what
     `energy_conserving.lobe_sum` takes beside M, for light from one direction and scattered forward; roughness: (...) of
-    strands that differ in it. Widths are the mean over the channels, which differ little in them.
+    strands that differ in it. Widths and shifts are those of the light of all channels.
     """
     onward, backward = fluxes(front, behind, quantity["a_f"], quantity["a_b"])
     direct = direct_part(front)[..., None]
-    beta_f, back_width = (quantity[name].mean(axis=-1) for name in ("beta_f", "back_width"))
-    # Variances of theta_h are quarters of those of theta_i + theta_o.
-    spread = 4.0 * np.asarray(front, float) * np.square(beta_f)
-    m = [
-        energy_conserving.m_lobes(angles.theta_i, angles.theta_o, settings, roughness, widening)
-        for widening in (0.0, spread)
-    ]
-    # Light that has turned is so wide that the lobes of this strand hardly matter: sigma_b counts its passage.
-    m_back = d_eon_lobe(
-        np.sin(angles.theta_i),
-        np.cos(angles.theta_i),
-        np.sin(angles.theta_o),
-        np.cos(angles.theta_o),
-        4.0 * np.square(back_width) + spread,
-    )
+    (shift, spread), (back_shift, back_spread) = drifts(front, behind, quantity)
+    # A view rotated past the pole continues on the other side.
+    views = (angles.theta_o, 0.0), (np.arcsin(np.sin(angles.theta_o - shift)), spread)
+    m = [energy_conserving.m_lobes(angles.theta_i, view, settings, roughness, widening) for view, widening in views]
+    # Light that has turned is so wide that the lobes of this strand hardly matter.
+    turned = angles.theta_o - back_shift
+    sines = np.sin(angles.theta_i), np.cos(angles.theta_i), np.sin(turned), np.abs(np.cos(turned))
+    m_back = d_eon_lobe(*sines, back_spread)
     ahead = back_azimuth(angles.phi)[..., None]
     returning = m_back[..., None] / np.pi * (quantity["a_f"] * ahead + quantity["a_b"] * (1.0 - ahead))
     return (

@@ -225,34 +225,34 @@ def moments(theta, radiance):
 def test_lobes_are_as_bright_as_wide_and_as_shifted_as_the_tables_say(strand_count):
     """One lobe at a time: R of a black fibre, and what comes back from behind, with the same numbers for all lights."""
     tables, dual = baked(sigma_a=(100.0, 100.0, 100.0), tilt=0.0, roughness=0.1)
-    numbers = {"a_f": 0.8, "a_b": 0.1, "beta_f": 0.05, "back_width": 0.06}
+    numbers = {"a_f": 0.8, "a_b": 0.1, "beta_f": 0.03, "beta_b": 0.05, "alpha_f": 0.002, "alpha_b": 0.004}
     for name, number in numbers.items():
         dual.theta[dual_scattering.QUANTITIES.index(name)] = number
+    quantity = {name: np.full(3, number) for name, number in numbers.items()}
     theta_i, phi = np.linspace(-1.2, 1.2, 2001), (np.arange(64) + 0.5) / 64 * np.pi
     at = FibreAngles(*np.broadcast_arrays(theta_i[:, None], 0.0, phi[None, :]))
     count = np.full(at.phi.shape, strand_count)
-    alone, among = (
-        dual_scattering.sample_radiance(tables, dual, at, count, np.full_like(count, behind))[..., 0]
-        for behind in (0.0, 3.0)
-    )
-    parts = np.array([[0.8], [0.1]])
-    (onward, backward), (onward_alone, _none) = (
-        np.concatenate(dual_scattering.fluxes(strand_count, behind, *parts)) for behind in (3.0, 0.0)
-    )
-    # Light that met no strand is as narrow as ever, the rest is spread by each of those it met.
-    direct = np.exp(-strand_count)
-    spread = 4.0 * strand_count * 0.05**2
-    variance = principled.variance_from_roughness(0.1) + spread * (onward_alone - direct) / onward_alone
-    _energy, mean, deviation = moments(theta_i, alone)
-    assert mean == pytest.approx(0.0, abs=1e-3)
-    assert deviation == pytest.approx(np.sqrt(variance), rel=0.02)
 
-    scattered = (alone - direct * lookup_tables.sample_radiance(tables, at)[..., 0]) if strand_count else 0.0
-    gained = among - alone - scattered * ((onward - direct) / max(onward_alone - direct, 1e-9) - 1.0)
-    energy, mean, deviation = moments(theta_i, gained)
-    assert energy == pytest.approx(backward * 0.9, rel=0.01)  # of what comes from behind, all that is scattered
-    assert mean == pytest.approx(0.0, abs=1e-3)
-    assert deviation == pytest.approx(np.sqrt(4.0 * 0.06**2 + spread), rel=0.03)
+    alone = dual_scattering.sample_radiance(tables, dual, at, count, np.zeros_like(count))[..., 0]
+    unscattered = np.exp(-strand_count) * lookup_tables.sample_radiance(tables, at)[..., 0]
+    if strand_count:
+        (turned, spread), _none = dual_scattering.drifts(strand_count, 0.0, quantity)
+        _energy, mean, deviation = moments(theta_i, alone - unscattered)
+        assert mean == pytest.approx(turned, abs=1e-3)
+        assert deviation == pytest.approx(np.sqrt(principled.variance_from_roughness(0.1) + spread), rel=0.03)
+    else:
+        np.testing.assert_allclose(alone, unscattered, rtol=1e-6)
+
+    dark = replace(tables, n=0.0 * tables.n, n_trt=0.0 * tables.n_trt, n_res=0.0 * tables.n_res)
+    dark_dual = replace(dual, n_g=0.0 * dual.n_g, n_g_trt=0.0 * dual.n_g_trt)
+    behind = np.full_like(count, 3.0)
+    returned = dual_scattering.sample_radiance(dark, dark_dual, at, count, behind)[..., 0]
+    _onward, backward = dual_scattering.fluxes(strand_count, 3.0, quantity["a_f"], quantity["a_b"])
+    _through, (turned, spread) = dual_scattering.drifts(strand_count, 3.0, quantity)
+    energy, mean, deviation = moments(theta_i, returned)
+    assert energy == pytest.approx(backward[0] * 0.9, rel=0.01)  # of what comes from behind, all that is scattered
+    assert mean == pytest.approx(turned, abs=1e-3)
+    assert deviation == pytest.approx(np.sqrt(spread), rel=0.03)
 
 
 def test_unscattered_light_is_the_chance_of_no_strand():
