@@ -21,6 +21,7 @@ from . import (
     refused_hair,
     reported,
     simulated_hair,
+    stale_marks,
     unlocked_renders,
 )
 
@@ -52,11 +53,11 @@ def after_depsgraph_update(scene, depsgraph):
         events.surface_moved(surface_object)
         # Hair waits until the surface leaves edit and paint modes.
         if surface_object.mode == "OBJECT":
-            live_hair.follow_surface(surface_object, depsgraph, surface_object.data in changed)
+            stale_marks.follow_surface(surface_object, depsgraph, surface_object.data in changed)
     moved = [u.id.original for u in depsgraph.updates if u.is_updated_geometry or u.is_updated_transform]
-    live_hair.follow_partings(moved, depsgraph)
-    live_hair.follow_flow(moved, depsgraph)
-    live_hair.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
+    stale_marks.follow_partings(moved, depsgraph)
+    stale_marks.follow_flow(moved, depsgraph)
+    stale_marks.follow_styles({datablock for datablock in moved if isinstance(datablock, bpy.types.Object)})
     reported.remember_axes()
     if _is_undone:
         _is_undone = False
@@ -115,14 +116,14 @@ def _mark_painted(images, depsgraph):
     names = {name_of(image) for image in images}
     painting = set()
     for datablock in bpy.data.hair_curves:
-        surface, used = datablock.surface, live_hair.images_of(datablock)
+        surface, used = datablock.surface, stale_marks.images_of(datablock)
         if surface is None or not (datablock.vellus.is_live and used):
             continue
         uid = surface.session_uid
         if surface.mode == "TEXTURE_PAINT":
             painting.add(uid)
         if used & names or (reported.painting_cache.get(uid) and uid not in painting):
-            live_hair.follow_images(datablock, depsgraph)
+            stale_marks.follow_images(datablock, depsgraph)
     reported.painting_cache.clear()
     for uid in painting:
         reported.painting_cache.keep(uid, True)
@@ -139,7 +140,7 @@ def _evaluate(depsgraph, combed):
     """
     if running.job() is not None:
         for guides in combed:
-            live_hair.mark_followers(guides)
+            stale_marks.mark_followers(guides)
         return
     for guides in _of_kind("GUIDES"):
         if guides.vellus.is_shading_stale:
@@ -147,7 +148,7 @@ def _evaluate(depsgraph, combed):
         if guides.vellus.is_stale and guides.vellus.is_live and _is_surface_at_rest(guides):
             pipeline.evaluate(guides, depsgraph)
             events.strands_made(guides)
-            live_hair.follow_mask(guides, depsgraph)
+            stale_marks.follow_mask(guides, depsgraph)
             combed[guides] = None  # to be read
     for hair in _of_kind("HAIR"):
         state = hair.vellus

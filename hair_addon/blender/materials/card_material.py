@@ -8,8 +8,8 @@ relation (1 - R)² / (2 R) = K / S, with K = 1 - a and S = (1 - t) a / 2, a stac
     a = R / (R + (1 - t) (1 - R)² / 4)
 
 The textures have the color R of a head of hair. Engines that let no light through a surface show R itself: exporters
-find a plain shader, Cycles and EEVEE shaders of their own. EEVEE would show what is behind a card as through glass, so
-there t = 0.
+find a plain shader, Cycles and EEVEE shaders of their own. EEVEE takes transmission from what the picture shows behind
+a surface, not from the layers that are there, so t = 0.
 """
 
 import bpy

@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guides and hair that are marked as stale: what they read has changed, and they are regenerated when it is time."""
+
+import bpy
+
+from ...core.errors import HairError
+from ..data import curves, drawn_lines, masks
+from ..groom import bindings, edited_surfaces, staleness
+from ..host.notices import text_of
+from ..settings import style_items
+from . import events, reported
+
+
+def follow_surface(surface_object, depsgraph, is_mesh_edited):
+    """Transform the guides of a possibly edited surface, and update the hair between them.
+
+    is_mesh_edited: whether its mesh has changed, not modifiers alone, so that its weights may have too.
+    """
+    axes_before = reported.axes_cache.get(surface_object.session_uid)
+    for guides in bpy.data.hair_curves:
+        state = guides.vellus
+        if guides.surface != surface_object or not _is_carried(guides) or not state.is_live:
+            continue
+        try:
+            curves.require_editable(guides)
+            was_edited = edited_surfaces.follow_surface(guides, depsgraph, axes_before)
+            is_placed = not curves.is_hand_made(guides)  # where its mask says
+            if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):
+                state.is_stale = True
+        except HairError as error:
+            state.status = str(error)
+            continue
+        if was_edited:
+            events.strands_made(guides)
+            mark_followers(guides)
+    for hair in bpy.data.hair_curves if is_mesh_edited else ():
+        state = hair.vellus
+        if hair.surface != surface_object or state.kind != "HAIR" or not state.is_live:
+            continue
+        try:
+            if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
+                _mark(hair)
+            elif has_masks(state):
+                state.is_stale = True
+        except HairError as error:
+            state.status = str(error)
+
+
+def _is_carried(datablock):
+    """Whether an edited surface carries Curves: guides, and hair that is kept as it came; other hair grows again."""
+    kind = datablock.vellus.kind
+    return kind == "GUIDES" or (kind == "HAIR" and curves.is_hand_made(datablock))
+
+
+def _may_be_painted(target, depsgraph):
+    """Whether weights that limit where roots are have changed; nothing is read where none do."""
+    return masks.of_curves(target).group != "" and staleness.has_other_mask(target, depsgraph)
+
+
+def follow_mask(guides, depsgraph):
+    """Mark hair as stale whose guides' mask has changed; the guides may be unchanged."""
+    for hair in curves.followers(guides):
+        state = hair.vellus
+        if not state.is_live or hair.surface is None:
+            continue
+        try:
+            if not masks.own(state.hair) and staleness.has_other_mask(hair, depsgraph):
+                _mark(hair)
+        except HairError as error:
+            state.status = str(error)
+
+
+def follow_partings(changed, depsgraph):
+    """Mark hair as stale whose part lines or guide regions are among some datablocks and have changed."""
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR" or not state.is_live or not _parts_by(state, changed):
+            continue
+        try:
+            if staleness.has_other_parting(hair, depsgraph):
+                _mark(hair)
+        except HairError as error:
+            state.status = str(error)
+
+
+def follow_flow(changed, depsgraph):
+    """Mark guides as stale whose flow lines are among some datablocks and have changed."""
+    for guides in bpy.data.hair_curves:
+        state = guides.vellus
+        lines = text_of(state.guides, "flow_lines")
+        if state.kind != "GUIDES" or not state.is_live or not drawn_lines.is_among(lines, changed):
+            continue
+        try:
+            if staleness.has_other_flow(guides, depsgraph):
+                state.is_stale = True
+        except HairError as error:
+            state.status = str(error)
+
+
+def _parts_by(state, changed):
+    if drawn_lines.is_among(text_of(state.hair, "part_lines"), changed):
+        return True
+    # Read with each step of a stroke: so only if guides have regions of their own.
+    guides = state.guide_curves
+    return guides is not None and guides in changed and text_of(state.hair, "region_attribute") in guides.attributes
+
+
+def images_of(target):
+    """The names of the images that guides or hair are masked by; hair's guides have their own."""
+    state = target.vellus
+    if state.kind == "GUIDES":
+        return {text_of(state.guides, "density_image")} - {""}
+    of_styles = {style_items.masks_of(item)[1] for item in state.styles}
+    return {text_of(state.hair, "density_image"), *of_styles} - {""}
+
+
+def follow_images(target, depsgraph):
+    """Mark guides or hair as stale whose images may have been painted. Roots wait until Texture Paint is left."""
+    state = target.vellus
+    state.is_stale = True
+    if state.kind != "HAIR" or not text_of(state.hair, "density_image") or target.surface.mode == "TEXTURE_PAINT":
+        return
+    try:
+        if staleness.has_other_mask(target, depsgraph):
+            _mark(target)
+    except HairError as error:
+        state.status = str(error)
+
+
+def has_masks(state):
+    """Whether some of its styles has a mask."""
+    return any(any(style_items.masks_of(item)) for item in state.styles)
+
+
+def follow_styles(changed):
+    """Mark hair as stale whose styles read some of the objects that changed, or whose surface moved among them."""
+    for hair in bpy.data.hair_curves:
+        state = hair.vellus
+        if state.kind != "HAIR" or not state.is_live or not state.styles:
+            continue
+        named = style_items.objects_named(state)
+        if named and (hair.surface in changed or any(bpy.data.objects.get(name) in changed for name in named)):
+            state.is_stale = True
+
+
+def mark_followers(guide_curves):
+    """Mark all hair between some guides as stale."""
+    for hair in curves.followers(guide_curves):
+        _mark(hair)
+
+
+def _mark(hair):
+    """Mark hair as stale, even if it was regenerated since it was written."""
+    bindings.invalidate(hair)
+    hair.vellus.is_stale = True
