@@ -207,6 +207,7 @@ def focus():
     scene().render.engine, area.spaces.active.shading.type = "VELLUS", "RENDERED"
     area.spaces.active.region_3d.view_perspective = "CAMERA"
     area.spaces.active.overlay.show_overlays = False
+    area.spaces.active.show_region_ui = False  # the sidebar lies over the picture
     for name in ("sharp", "blurred"):
         scene().camera.data.dof.use_dof = name == "blurred"
         yield
