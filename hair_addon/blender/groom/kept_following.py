@@ -77,7 +77,7 @@ class KeptBinding:
             is_back=is_back,
         )
         out = points.copy()
-        out[rows] = self.surface.to_local(made)
+        out[rows] = self.surface.to_local(made[:, None])[:, 0]
         return out
 
 

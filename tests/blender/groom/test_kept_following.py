@@ -12,8 +12,16 @@ from tests.support.imported import curves_object, lines_on, select, stored, worl
 
 
 @pytest.fixture
-def kept(sphere, rng):
+def scale():
+    """Of the sphere; also as a test's parameter."""
+    return 1.0
+
+
+@pytest.fixture
+def kept(sphere, rng, scale):
     """Hair on the sphere, of 5 to 12 points a strand, with 40 guides."""
+    sphere.scale = (scale, scale, scale)
+    update()
     hair = curves_object(list(lines_on(sphere, rng, 300, least=5)))
     select(sphere, hair)
     bpy.ops.vellus.use_as_hair(guide_count=40)
@@ -44,6 +52,7 @@ def strands_of(hair):
 STRETCH = 1.3 * np.eye(3)
 
 
+@pytest.mark.parametrize("scale", [1.0, 2.0])
 def test_strands_grow_as_their_guides_do(kept):
     before = strands_of(kept)
     comb(guides_of(kept), STRETCH)
