@@ -44,22 +44,26 @@ class StrandMaker:
         require_count("strands", strands.strand_count, int(self.record["strand_count"]))
         require_count("points of a strand", strands.point_count, int(self.record["point_count"]))
         self._put_segments(guide_points)
+        self.fill(strands.texture)
+        return replace(strands, moved=self._moved_since(strands))
+
+    def fill(self, texture: gpu.types.GPUTexture) -> None:
+        """Make all strands in a texture like that of `StrandsOnGPU`, for the guides of the last `make`."""
         program = _strands_program(self.slot_count)
         program.bind()
         program.uniform_block("making", self.block)
         for name in ("bindings", "guide_normals", "segments"):
             program.uniform_sampler(name, getattr(self, name))
-        program.image("strands", strands.texture)
+        program.image("strands", texture)
         program.image("moved_strands", self.moved)
-        groups = -(-strands.strand_count // _GROUP_SIZE)
+        groups = -(-int(self.record["strand_count"]) // _GROUP_SIZE)
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
-        return replace(strands, moved=self._moved_since(strands))
 
     def _put_segments(self, guide_points):
         values = np.ascontiguousarray(guide_points, np.float32).reshape(len(guide_points), -1)
-        points, _row = _rows_texture(values, 1)
+        points, _row = rows_texture(values, 1)
         program = _segments_program()
         program.bind()
         program.uniform_block("making", self.block)
@@ -97,11 +101,11 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
 
 
-def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> StrandMaker:
+def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, keeps_moved: bool = True) -> StrandMaker:
     """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
 
-    axes: (3, 3), from the coordinates of roots and guides to those of the strands. Raises `HairError` where counts or
-    indices do not match, or the driver lacks something.
+    axes: (3, 3), from the coordinates of roots and guides to those of the strands; keeps_moved: whether it is kept
+    where strands were. Raises `HairError` where counts or indices do not match, or the driver lacks something.
     """
     bindings = _binding_rows(bound)
     record = uniforms.MAKING.record()
@@ -114,14 +118,14 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> Strand
     # Programs first: where there are none, nothing is uploaded.
     slot_count = bound.indices.shape[1]
     _segments_program(), _strands_program(slot_count)
-    bindings_texture, record["row_bindings"] = _rows_texture(bindings, 4)
-    normals_texture, record["row_normals"] = _rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
-    segments, record["row_segments"] = _empty_rows(guide_count, point_count + 1)
-    if strand_count * point_count <= _MOST_MOVED:
-        moved, record["row_moved"] = _empty_rows(strand_count, point_count + 1)
+    bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
+    normals_texture, record["row_normals"] = rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
+    segments, record["row_segments"] = empty_rows(guide_count, point_count + 1)
+    if keeps_moved and strand_count * point_count <= _MOST_MOVED:
+        moved, record["row_moved"] = empty_rows(strand_count, point_count + 1)
         moved_rows = numbers_texture(np.arange(1, strand_count + 1), int(record["row_strands"]))
     else:
-        moved, moved_rows = (_empty_rows(1, 1)[0] for _ in range(2))
+        moved, moved_rows = (empty_rows(1, 1)[0] for _ in range(2))
     block = uniforms.uniform_buffer(record)
     return StrandMaker(bindings_texture, normals_texture, segments, moved, moved_rows, record, block, slot_count)
 
@@ -142,7 +146,7 @@ def _binding_rows(bound):
     return rows.reshape(strand_count, -1)
 
 
-def _rows_texture(values, channels):
+def rows_texture(values, channels):
     """(texture, whole rows of values in a row of it) of (N, channels T) float32, T texels each."""
     texels = values.shape[1] // channels
     in_row = min(TEXTURE_WIDTH // texels, len(values))
@@ -156,7 +160,7 @@ def _rows_texture(values, channels):
     return texture, in_row
 
 
-def _empty_rows(count, texels):
+def empty_rows(count, texels):
     """The same without values."""
     in_row = min(TEXTURE_WIDTH // texels, count)
     texture = gpu.types.GPUTexture((in_row * texels, -(-count // in_row)), format="RGBA32F")
