@@ -33,17 +33,16 @@ class StrandMaker:
     block: gpu.types.GPUUniformBuf
     slot_count: int  # guides of a strand
 
-    def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
+    def make(self, strands: StrandsOnGPU, guide_points: np.ndarray | None) -> StrandsOnGPU:
         """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; the `StrandsOnGPU` after it.
 
-        strands: of the same roots, whose texture is changed; their radii stay, and their arrays on this side are as
-        before. Raises `HairError` where counts do not match.
+        guide_points: None for those of the last time; strands: of the same roots, whose texture is changed; their radii
+        stay, and their arrays on this side are as before. Raises `HairError` where counts do not match.
         """
-        require_count("guides", len(guide_points), int(self.record["guide_count"]))
-        require_count("points of a guide", guide_points.shape[1], int(self.record["point_count"]))
         require_count("strands", strands.strand_count, int(self.record["strand_count"]))
         require_count("points of a strand", strands.point_count, int(self.record["point_count"]))
-        self._put_segments(guide_points)
+        if guide_points is not None:
+            self._put_segments(guide_points)
         self.fill(strands.texture)
         return replace(strands, moved=self._moved_since(strands))
 
@@ -62,6 +61,8 @@ class StrandMaker:
         gpu.shader.unbind()
 
     def _put_segments(self, guide_points):
+        require_count("guides", len(guide_points), int(self.record["guide_count"]))
+        require_count("points of a guide", guide_points.shape[1], int(self.record["point_count"]))
         values = np.ascontiguousarray(guide_points, np.float32).reshape(len(guide_points), -1)
         points, _row = rows_texture(values, 1)
         program = _segments_program()

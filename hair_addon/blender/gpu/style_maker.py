@@ -7,6 +7,7 @@ shaders/style_strands.comp is the twin of core/styling/steps.cpp.
 """
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import gpu
 import numpy as np
@@ -15,21 +16,21 @@ from ...core.interpolation.hair_binding import HairBinding
 from ...core.styling import frizz, program_rows
 from ...core.styling.program_rows import Program
 from ...core.styling.random_numbers import PURPOSES
-from ...core.styling.stack import Styling
-from ...core.styling.steps import StrandData
 from . import shaders, strand_maker, uniforms
-from .strand_maker import BoundStrands, StrandMaker
+from .strand_maker import StrandMaker
 from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU
+
+if TYPE_CHECKING:
+    from ...core.styling.stack import Styling
+    from ...core.styling.steps import StrandData
 
 MOST_POINTS = 128  # of a strand: what a thread keeps of it is 32 or 48 bytes a point
 
 _GROUP_SIZE = 64
-_KINDS = {
-    name: getattr(program_rows, name) for name in ("TRIM", "CLUMP", "CURL", "FRIZZ", "BEND", "SMOOTH", "WEAVE")
-}
+_KINDS = {name: getattr(program_rows, name) for name in ("TRIM", "CLUMP", "CURL", "FRIZZ", "BEND", "SMOOTH", "WEAVE")}
 
 
-def can_style(styling: Styling) -> bool:
+def can_style(styling: "Styling") -> bool:
     """Whether the GPU can apply these styles; other stacks are applied by Warp."""
     return len(styling.program) <= uniforms.MOST_STEPS and 2 <= styling.point_count <= MOST_POINTS
 
@@ -52,17 +53,20 @@ class _Pass:
 class StyleMaker:
     """Makes strands with styles; made by `new_style_maker`."""
 
-    styling: Styling
+    styling: "Styling"
     maker: StrandMaker
     centre_maker: StrandMaker | None  # None without clumps
     centres: gpu.types.GPUTexture | None  # (K, P) points of centre strands, and the arc lengths
     locks: gpu.types.GPUTexture  # of each clump centre, and of each guide, its normal and identity
     levels: list[_Pass]
     hair: _Pass
+    _guide_points: np.ndarray | None = None  # of the last `make`
 
     def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
         """Make all strands with their styles; as `StrandMaker.make`, for guides as `Styling.guides` gives them."""
-        made = self.maker.make(strands, guide_points)
+        is_known = self._guide_points is not None and np.array_equal(self._guide_points, guide_points)
+        made = self.maker.make(strands, None if is_known else guide_points)
+        self._guide_points = guide_points.copy()
         program = _styles_program(strands.point_count, _kinds_of(self.styling.program))
         if self.centre_maker is not None:
             self.centre_maker.fill(self.centres)
@@ -83,8 +87,10 @@ class StyleMaker:
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
 
-    def restyle(self, styling: Styling) -> bool:
+    def restyle(self, styling: "Styling") -> bool:
         """Take other settings of the same styles: numbers alone are uploaded. False where more has changed."""
+        if styling is self.styling:
+            return True
         if not can_style(styling) or not _are_alike(styling, self.styling):
             return False
         self.hair.put(styling.program)
@@ -94,7 +100,27 @@ class StyleMaker:
         return True
 
 
-def new_style_maker(binding: HairBinding, styling: Styling, axes: np.ndarray) -> StyleMaker:
+def maker_of(
+    binding: HairBinding,
+    styling: "Styling | None",
+    point_count: int,
+    axes: np.ndarray,
+    before: StrandMaker | StyleMaker | None = None,
+) -> StrandMaker | StyleMaker:
+    """What makes the strands of bound hair, with styles or without: the one before where that still does.
+
+    before: for the same binding. point_count and axes: as in `new_maker`. Raises `HairError` as it does.
+    """
+    if styling is None or not len(styling.program):  # styles of guides alone are in these
+        if isinstance(before, StrandMaker):
+            return before
+        return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
+    if isinstance(before, StyleMaker) and before.restyle(styling):
+        return before
+    return new_style_maker(binding, styling, axes)
+
+
+def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) -> StyleMaker:
     """The `StyleMaker` of bound hair and its styles, of which `can_style` holds.
 
     axes: (3, 3), from the coordinates of roots and guides to those that are drawn. Raises `HairError` as `new_maker`.
@@ -145,7 +171,7 @@ def _kinds_of(program):
     return tuple(name for name, kind in _KINDS.items() if kind in present)
 
 
-def _known(data: StrandData):
+def _known(data: "StrandData"):
     """(texture, strands in a row of it, texels of a strand): see shaders/style_strands.comp."""
     columns = [data.normals.numpy(), _halves(data.identities.numpy()), data.members.numpy().T, data.masks.numpy().T]
     rows = np.concatenate(columns, axis=1, dtype=np.float32)

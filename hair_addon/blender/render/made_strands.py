@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands that follow combed guides where they are drawn: nothing is computed on this side until they are written.
 
-That holds for hair that stands still, without styles. All other hair takes the way of points that Warp computes.
+That holds for hair that stands still, with styles that the GPU can apply. All other hair takes the way of points that
+Warp computes.
 """
 
 from dataclasses import dataclass, replace
@@ -10,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import HairError
-from ..gpu import maker_choice, strand_maker
+from ..gpu import maker_choice, strand_maker, style_maker
 from ..groom.bindings import BoundHair
 from ..host import running
 from ..settings import preferences
@@ -57,7 +58,7 @@ class _Extent:
 class Making:
     """What makes the strands of one hair, and of which guides."""
 
-    maker: strand_maker.StrandMaker | None = None
+    maker: strand_maker.StrandMaker | style_maker.StyleMaker | None = None
     is_chosen: bool = False  # whether it is to make them with the next edit
     is_refused: bool = False  # whether the driver makes no such strands
     due: BoundHair | None = None  # whose guides were combed: the next redraw makes its strands
@@ -65,11 +66,12 @@ class Making:
     _binding: Any = None  # `HairBinding` of the maker
 
     def can(self, kept: Any, bound: BoundHair) -> bool:
-        """Whether strands that `hair_cache` keeps follow guides as these are: without styles, in as many points."""
-        if self.is_refused or bound.styles.styling is not None:
+        """Whether strands that `hair_cache` keeps can be made of their guides, with all their styles."""
+        styling = bound.styles.styling
+        if self.is_refused or (styling is not None and not style_maker.can_style(styling)):
             return False
         if self.extent is None:
-            guides = _drawn_guides(bound)
+            guides = _drawn(_followed(bound), bound)
             self.extent = _Extent(guides, _box(guides), kept.on_gpu.bounds.copy())
         return True
 
@@ -77,21 +79,28 @@ class Making:
         """Make the strands that `hair_cache` keeps. False where the driver cannot, for which they are then due."""
         bound = self.due
         try:
-            if self.maker is None or self._binding is not bound.binding:
-                strands = strand_maker.bound_strands(bound.binding)
-                self.maker = strand_maker.new_maker(strands, kept.on_gpu.point_count, bound.surface.to_local_axes)
-                self._binding = bound.binding
-            made = self.maker.make(kept.on_gpu, bound.guides.numpy())
+            before = self.maker if self._binding is bound.binding else None
+            count, axes = kept.on_gpu.point_count, bound.surface.to_local_axes
+            self.maker = style_maker.maker_of(bound.binding, bound.styles.styling, count, axes, before)
+            self._binding = bound.binding
+            guides = _followed(bound)
+            made = self.maker.make(kept.on_gpu, guides)
         except HairError:
             self.is_refused, self.is_chosen = True, False
             return False
         self.due = None
-        kept.on_gpu = replace(made, bounds=_joined(made.bounds, self.extent.bounds_for(_drawn_guides(bound))))
+        kept.on_gpu = replace(made, bounds=_joined(made.bounds, self.extent.bounds_for(_drawn(guides, bound))))
         return True
 
 
-def _drawn_guides(bound):
-    return bound.guides.numpy() @ np.asarray(bound.surface.to_local_axes, np.float32).T
+def _followed(bound):
+    """(G, P, 3): guides as strands follow them, which styles may lean."""
+    styling = bound.styles.styling
+    return (bound.guides if styling is None else styling.guides(bound.guides)).numpy()
+
+
+def _drawn(guides, bound):
+    return guides @ np.asarray(bound.surface.to_local_axes, np.float32).T
 
 
 def _box(points):

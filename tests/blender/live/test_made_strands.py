@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import maker_choice, strand_maker
+from hair_addon.blender.gpu import maker_choice, strand_maker, uniforms
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
@@ -15,7 +15,7 @@ from hair_addon.blender.render import hair_cache, made_strands, viewport
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
-from hair_addon.core.styling import lean
+from hair_addon.core.styling import clump, curl, frizz, lean
 from tests.blender.render.test_hair_places import view3d
 from tests.support.counting import counts_of
 from tests.support.reading import points, write_points
@@ -135,14 +135,42 @@ def test_one_edit_may_go_either_way(watched, monkeypatch):
         np.testing.assert_allclose(drawn(watched), grown(watched), rtol=0.0, atol=CLOSE)
 
 
-def test_styled_hair_is_made_as_before(watched):
+def test_styles_that_the_gpu_cannot_apply_are_made_as_before(watched, monkeypatch):
+    monkeypatch.setattr(uniforms, "MOST_STEPS", 1)
     assert hair_cache.may_make(watched.data.session_uid)
-    style_items.add(watched.data.vellus, lean.Settings(amount=0.3))
+    style_items.add(watched.data.vellus, curl.Settings())
+    style_items.add(watched.data.vellus, frizz.Settings())
     bpy.context.view_layer.update()
     drawn(watched)
     assert not hair_cache.may_make(watched.data.session_uid)
     comb(60)
     np.testing.assert_array_equal(drawn(watched), bindings.of(watched.data).points)
+
+
+@pytest.mark.parametrize(
+    "styles", [(lean.Settings(amount=0.3),), (clump.Settings(size=0.3, levels=1), curl.Settings())]
+)
+def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, styles):
+    """Guides that lean do so here; what is written afterwards is what was shown."""
+    for settings in styles:
+        style_items.add(watched.data.vellus, settings)
+    bpy.context.view_layer.update()
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    drawn(watched)
+    assert hair_cache.may_make(watched.data.session_uid)
+    with monkeypatch.context() as counted:
+        calls = counts_of(counted)
+        counted.setattr(following, "strands_now", None)
+        for count in (2, 60):
+            comb(count)
+            shown = drawn(watched)
+        assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(shown, points(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_array_equal(drawn(watched), shown)
+    assert np.abs(shown - grown(watched)).max() > 0.01  # without styles
 
 
 @pytest.mark.parametrize(
