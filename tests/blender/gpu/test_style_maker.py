@@ -32,10 +32,10 @@ STACKS = {
     "frizz": (frizz.Settings(amplitude=0.008, octaves=4, coherence=0.5, stray=0.2, keep_length=0.3),),
     "curl": (curl.Settings(radius=0.01, coherence=0.3, shape=0.8, vary=0.5),),
     "switchbacks": (curl.Settings(switchback=0.05, stretch=0.7, left_handed=0.2, keep_length=0.2),),
-    "clump": (clump.Settings(size=0.04, levels=3, twist=1.0, stray=0.2, root=0.3),),
-    "locks that curl": (clump.Settings(size=0.03, levels=3), curl.Settings(seed=1), frizz.Settings(seed=2)),
-    "two clumps": (clump.Settings(size=0.04), curl.Settings(), clump.Settings(size=0.015, levels=1, seed=4)),
-    "wet": (frizz.Settings(), wet.Settings(amount=0.8)),
+    "clump": (clump.Settings(size=0.04, twist=1.0, stray=0.2, root=0.3),),
+    "locks that curl": (clump.Settings(size=0.04), curl.Settings(seed=1), frizz.Settings(seed=2)),
+    "two clumps": (clump.Settings(size=0.04), curl.Settings(), clump.Settings(size=0.03, levels=1, seed=4)),
+    "wet": (frizz.Settings(), wet.Settings(amount=0.8, lock=0.05)),
     "braid": (braid.Settings(),),
     "rope": (bend.Settings(amount=0.3), braid.Settings(pattern="ROPE", flatness=0.4)),
     "lean": (lean.Settings(amount=0.6), curl.Settings()),
@@ -112,9 +112,9 @@ def test_masks_that_are_painted(hair, rng, one_program):
     weights[: len(weights) // 2] = 0.0  # strands that no style touches
     masks = {("One", "", False): Mask(weights), ("Two", "", True): Mask(weights, is_inverted=True)}
     styles = (
-        clump.Settings(size=0.03, mask="One"),
+        clump.Settings(size=0.04, mask="One"),
         curl.Settings(mask="Two", invert_mask=True),
-        wet.Settings(mask="One"),
+        wet.Settings(lock=0.05, mask="One"),
     )
     assert_same(hair, rng, styles, inputs=Inputs(masks=masks))
 
@@ -151,15 +151,15 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
         watched.setattr(gpu.types, "GPUUniformBuf", None)
         assert style_maker.maker_of(hair.binding, other, 41, np.eye(3), maker) is maker
         points, _radii = made(maker, hair, other, strands)
-    assert sizes == [uniforms.STYLING.dtype.itemsize] * 4  # of strands, and of centres on three levels
+    assert sizes == [uniforms.STYLING.dtype.itemsize] * 3  # of strands, and of centres on two levels
     assert len(shaders.program_cache) == programs
     assert np.quantile(errors(hair, points, hair.styled(*changed)), 0.95) <= CLOSE
 
 
 def test_other_clumps_are_bound_again(hair, one_program):
-    styling = hair.bound(clump.Settings(size=0.03))
+    styling = hair.bound(clump.Settings(size=0.04))
     maker = style_maker.maker_of(hair.binding, styling, 41, np.eye(3))
-    for styles in [(clump.Settings(size=0.04),), (clump.Settings(size=0.03, levels=1),), ()]:
+    for styles in [(clump.Settings(size=0.03, levels=1),), ()]:
         other = style_maker.maker_of(hair.binding, hair.bound(*styles), 41, np.eye(3), maker)
         assert other is not maker
 
