@@ -106,12 +106,14 @@ void apply(Step row)
 #endif
 }
 
-// Points in the coordinates that are drawn, with their radii; or points of centres with their arc lengths. A strand that
-// no style has touched keeps its points.
-void write_strand(ivec2 first, bool is_touched)
+// Points in the coordinates that are drawn, with their radii, and the box around them; or points of centres with their
+// arc lengths. A strand that no style has touched keeps its points.
+void write_strand(int strand, ivec2 first, bool is_touched)
 {
   vec3 from_root = vec3(0.0);
   float arc = 0.0;
+  vec4 least = vec4(3e38);
+  vec4 greatest = vec4(-3e38);
   for (int i = 0; i < POINTS; i++) {
     vec4 texel = imageLoad(strands, first + ivec2(i, 0));
     if (i > 0) {
@@ -121,9 +123,14 @@ void write_strand(ivec2 first, bool is_touched)
     }
     vec3 here = is_touched ? strand_root + from_root : texel.xyz;
     texel.xyz = (styling.to_drawn * vec4(here, 0.0)).xyz;
+    least = min(least, texel);
+    greatest = max(greatest, texel);
     texel.w = (styling.are_centres != 0) ? arc : texel.w;
     imageStore(strands, first + ivec2(i, 0), texel);
   }
+  ivec2 box = strand_texel(strand, 0, 2, imageSize(boxes).x / 2);
+  imageStore(boxes, box, least);
+  imageStore(boxes, box + ivec2(1, 0), greatest);
 }
 
 void main()
@@ -155,5 +162,5 @@ void main()
       apply(row);
     }
   }
-  write_strand(first, is_touched);
+  write_strand(strand, first, is_touched);
 }

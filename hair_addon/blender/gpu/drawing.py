@@ -289,7 +289,12 @@ def resolve(picture, samples_per_side):
 
 def cover(program):
     """Run a bound program whose vertex shader is cover.vert over the whole framebuffer."""
-    bare_vertices(3, "TRIS").draw(program)
+    _cover_vertices().draw(program)
+
+
+@shaders.kept  # as programs are: it is drawn several times for each light and frame
+def _cover_vertices():
+    return bare_vertices(3, "TRIS")
 
 
 @contextmanager

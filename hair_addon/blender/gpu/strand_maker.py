@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.interpolation.hair_binding import HairBinding
 from ...core.kernels.checks import require_count, require_indices
-from . import shaders, uniforms
+from . import shaders, strand_bounds, uniforms
 from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, Moved, StrandsOnGPU, numbers_texture
 
 _GROUP_SIZE = 64
@@ -29,25 +29,29 @@ class StrandMaker:
     segments: gpu.types.GPUTexture  # of guides, in their frames; then what their weights are limited by
     moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; one texel where that is not kept
     moved_rows: gpu.types.GPUTexture
+    bounds: strand_bounds.StrandBounds
     record: np.ndarray  # uniforms.MAKING
     block: gpu.types.GPUUniformBuf
     slot_count: int  # guides of a strand
 
-    def make(self, strands: StrandsOnGPU, guide_points: np.ndarray | None) -> StrandsOnGPU:
+    def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
         """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; the `StrandsOnGPU` after it.
 
-        guide_points: None for those of the last time; strands: of the same roots, whose texture is changed; their radii
-        stay, and their arrays on this side are as before. Raises `HairError` where counts do not match.
+        strands: of the same roots, whose texture is changed; their radii stay, and their arrays on this side are as
+        before, but for their bounds: six numbers that come back. Raises `HairError` where counts do not match.
         """
+        self.require_fitting(strands)
+        self.put_guides(guide_points)
+        self.fill(strands.texture)
+        return self.made(strands)
+
+    def require_fitting(self, strands: StrandsOnGPU) -> None:
+        """Raise `HairError` unless there are as many strands and points."""
         require_count("strands", strands.strand_count, int(self.record["strand_count"]))
         require_count("points of a strand", strands.point_count, int(self.record["point_count"]))
-        if guide_points is not None:
-            self._put_segments(guide_points)
-        self.fill(strands.texture)
-        return replace(strands, moved=self._moved_since(strands))
 
     def fill(self, texture: gpu.types.GPUTexture) -> None:
-        """Make all strands in a texture like that of `StrandsOnGPU`, for the guides of the last `make`."""
+        """Make all strands in a texture like that of `StrandsOnGPU`, for the guides of the last `put_guides`."""
         program = _strands_program(self.slot_count)
         program.bind()
         program.uniform_block("making", self.block)
@@ -55,12 +59,18 @@ class StrandMaker:
             program.uniform_sampler(name, getattr(self, name))
         program.image("strands", texture)
         program.image("moved_strands", self.moved)
+        program.image("boxes", self.bounds.boxes)
         groups = -(-int(self.record["strand_count"]) // _GROUP_SIZE)
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
 
-    def _put_segments(self, guide_points):
+    def made(self, strands: StrandsOnGPU) -> StrandsOnGPU:
+        """The `StrandsOnGPU` after `fill`, and after all that changes points and their boxes next."""
+        return replace(strands, moved=self._moved_since(strands), bounds=self.bounds.read(), has_points=False)
+
+    def put_guides(self, guide_points: np.ndarray) -> None:
+        """Upload guides, as `make` does."""
         require_count("guides", len(guide_points), int(self.record["guide_count"]))
         require_count("points of a guide", guide_points.shape[1], int(self.record["point_count"]))
         values = np.ascontiguousarray(guide_points, np.float32).reshape(len(guide_points), -1)
@@ -127,8 +137,10 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, keeps_mov
         moved_rows = numbers_texture(np.arange(1, strand_count + 1), int(record["row_strands"]))
     else:
         moved, moved_rows = (empty_rows(1, 1)[0] for _ in range(2))
-    block = uniforms.uniform_buffer(record)
-    return StrandMaker(bindings_texture, normals_texture, segments, moved, moved_rows, record, block, slot_count)
+    block, bounds = uniforms.uniform_buffer(record), strand_bounds.new_bounds(strand_count)
+    return StrandMaker(
+        bindings_texture, normals_texture, segments, moved, moved_rows, bounds, record, block, slot_count
+    )
 
 
 def _binding_rows(bound):
@@ -191,7 +203,7 @@ def _segments_program():
 @shaders.kept
 def _strands_program(slot_count):
     """The compute program that makes strands of so many guides each."""
-    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}}
+    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}, "boxes": {"WRITE"}}
     info = _declared(("bindings", "guide_normals", "segments"), images)
     info.define("SLOTS", str(slot_count))
     return shaders.compile_compute(info, "interpolate_strands.comp")

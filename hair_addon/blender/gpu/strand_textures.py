@@ -54,11 +54,17 @@ class StrandsOnGPU:
     mean_radius: float
     greatest_radius: float
     moved: Moved | None = None  # None where all points are as uploaded
+    has_points: bool = True  # whether `points` are where strands are, which they are not where the GPU made these
 
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
-        """A centre (3,), and the greatest distance of a point from it: read from all points, for who needs it."""
+        """A centre (3,), and the greatest distance of a point from it: read from all points, for who needs it.
+
+        That of a corner of the bounds where points are known to the GPU alone.
+        """
         centre = 0.5 * self.bounds.sum(axis=0, dtype=np.float64)
+        if not self.has_points:
+            return centre, 0.5 * float(np.linalg.norm(np.ptp(self.bounds, axis=0).astype(np.float64)))
         return centre, _farthest(self.points, centre)
 
     def lengthening(self, point_count: int) -> float:

@@ -64,24 +64,27 @@ class StyleMaker:
 
     def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
         """Make all strands with their styles; as `StrandMaker.make`, for guides as `Styling.guides` gives them."""
-        is_known = self._guide_points is not None and np.array_equal(self._guide_points, guide_points)
-        made = self.maker.make(strands, None if is_known else guide_points)
-        self._guide_points = guide_points.copy()
+        self.maker.require_fitting(strands)
+        if self._guide_points is None or not np.array_equal(self._guide_points, guide_points):
+            self.maker.put_guides(guide_points)
+            self._guide_points = guide_points.copy()
+        self.maker.fill(strands.texture)
         program = _styles_program(strands.point_count, _kinds_of(self.styling.program))
         if self.centre_maker is not None:
             self.centre_maker.fill(self.centres)
             for level in self.levels:
-                self._style(program, level, self.centres)
-        self._style(program, self.hair, strands.texture)
-        return made
+                self._style(program, level, self.centres, self.centre_maker)
+        self._style(program, self.hair, strands.texture, self.maker)
+        return self.maker.made(strands)
 
-    def _style(self, program, strands, image):
+    def _style(self, program, strands, image, maker):
         program.bind()
         program.uniform_block("styling", strands.block)
         program.uniform_sampler("known", strands.known)
         program.uniform_sampler("locks", self.locks)
         program.image("strands", image)
         program.image("centres", image if self.centres is None else self.centres)
+        program.image("boxes", maker.bounds.boxes)
         groups = -(-int(strands.record["strand_count"]) // _GROUP_SIZE)
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
@@ -222,7 +225,7 @@ def _styles_program(point_count, kinds):
     info.uniform_buf(0, "Styling", "styling")
     for slot, name in enumerate(("known", "locks")):
         info.sampler(slot, "FLOAT_2D", name)
-    for slot, name in enumerate(("strands", "centres")):
+    for slot, name in enumerate(("strands", "centres", "boxes")):
         info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
     numbers = {"POINTS": point_count, "WAVES": frizz.WAVES_AN_OCTAVE, "MOST_OCTAVES": frizz.MOST_OCTAVES}
     numbers |= {f"KIND_{name}": kind for name, kind in _KINDS.items()}

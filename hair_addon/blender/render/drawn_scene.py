@@ -110,16 +110,23 @@ def read(
         clear=clear,
         receivers=receivers,
     )
-    return _lit(drawn, lamps, maps, hair_receivers, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
+    return _lit(drawn, lamps, maps, hair_receivers, is_draft)
 
 
-def _lit(drawn, lamps, maps, hair_receivers, steps):
+def _draft_steps(hair):
+    """Of what shadows are drawn while hair moves: strands that the GPU made cost it little, and theirs do not change."""
+    return _SHADOW_STEPS if all(not strands.has_points for strands, *_ in hair) else _DRAFT_STEPS
+
+
+def _lit(drawn, lamps, maps, hair_receivers, is_draft=False):
     """A `DrawnScene` with `SceneLights`: as all that is in it is lit by them, with their shadow maps."""
     maps = maps or scene_lights.new_maps(lamps.record)
     placed, batches = _placed(drawn.hair), [surface.batch for surface, _ in drawn.surfaces]
     hair_owners = [receiver.owner for receiver in hair_receivers]
     surface_owners = [receiver.owner for receiver in drawn.receivers[: len(batches)]]
-    maps.draw(lamps.record, placed, batches, steps, lamps.casters(placed, hair_owners, batches, surface_owners))
+    steps = _draft_steps(drawn.hair) if is_draft else _SHADOW_STEPS
+    casters = lamps.casters(placed, hair_owners, batches, surface_owners)
+    maps.draw(lamps.record, placed, batches, steps, casters, is_draft)
     own = {}
     if not lamps.are_alike:
         own = {"hair_lights": lamps.lit(hair_receivers), "surface_lights": lamps.lit(drawn.receivers)}
@@ -147,7 +154,7 @@ def read_render(depsgraph, known, refused):
     lamps = scene_lights.gather(*light_door.read_lights(depsgraph, for_render=True), world, hair_receivers)
     hair_seen, surfaces_seen = _visibility(unlit.hair, unlit.surfaces, unlit.clear)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
-    return _lit(drawn, lamps, None, hair_receivers, _SHADOW_STEPS)
+    return _lit(drawn, lamps, None, hair_receivers)
 
 
 def read_unlit(depsgraph, known, refused):

@@ -107,7 +107,6 @@ def strands_on_gpu(datablock):
     if kept.on_gpu is None or kept.pose is not pose:
         points = _carried(kept, pose)
         kept.on_gpu = strand_textures.upload_strands(points, kept.radii, kept.randoms, kept.wetness)
-        kept.making.extent = None
         kept.pose = pose
     elif moved:
         chosen = np.unique(np.concatenate(moved))
@@ -172,7 +171,7 @@ def choose_makers():
         if kept is not None and kept.on_gpu is not None:
             is_at_rest = kept.pose is None or kept.pose.motion is None
             is_bound = bound is not None and bound.free is None and kept.points is bound.shown.points
-            kept.making.is_chosen = is_wanted and is_at_rest and is_bound and kept.making.can(kept, bound.shown)
+            kept.making.is_chosen = is_wanted and is_at_rest and is_bound and kept.making.can(bound.shown)
 
 
 def _strands_of(session_uid):

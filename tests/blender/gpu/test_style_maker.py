@@ -59,11 +59,13 @@ def uploaded(strands):
 
 
 def made(maker, hair, styling, strands):
-    """((S, P, 3) points, (S, P) radii) after the GPU has made strands in an uploaded texture."""
+    """((S, P, 3) points, (S, P) radii) after the GPU has made strands in an uploaded texture, whose bounds it knows."""
     on_gpu = maker.make(strands, styling.guides(hair.guides).numpy())
     texels = np.array(on_gpu.texture.read(), np.float32).reshape(on_gpu.texture.height, on_gpu.texture.width, 4)
     in_row = on_gpu.texture.width // on_gpu.point_count
     texels = texels[:, : in_row * on_gpu.point_count].reshape(-1, on_gpu.point_count, 4)[: on_gpu.strand_count]
+    boxes = texels[..., :3].reshape(-1, 3)
+    np.testing.assert_array_equal(on_gpu.bounds, [boxes.min(axis=0), boxes.max(axis=0)])
     return texels[..., :3], texels[..., 3]
 
 
