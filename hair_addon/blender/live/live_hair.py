@@ -108,8 +108,7 @@ def make_again(hair, depsgraph):
         known = bindings.of(hair)
         if known is None or known.is_written:
             pipeline.require_uncombed(hair)
-        if pipeline.restyle(hair, depsgraph):
-            _restyled(hair)
+        if _restyle(hair, depsgraph):
             return
         bindings.keep(hair, pipeline.bind_hair(guide_curves, settings, depsgraph, hair))
         _follow_simulated(hair)
@@ -152,14 +151,24 @@ def _shown_guides(hair, bound, local=None):
     return curves.read_shown_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides, local)
 
 
-def _restyled(hair):
-    """Show and write soon what `pipeline.restyle` has made."""
-    state = hair.vellus
-    if bindings.of(hair).is_written:  # with the same styles as before
-        state.is_stale = False
-        return
-    events.strands_made(hair)
-    write_soon(hair)
+def _restyle(hair, depsgraph):
+    """Show and write soon what `pipeline.restyle` makes; whether it does."""
+
+    def is_drawn(bound, styles):
+        return hair_cache.may_restyle(hair.session_uid, bound, styles) and not hair_outside.is_wanted(hair)
+
+    if not pipeline.restyle(hair, depsgraph, is_drawn):
+        return False
+    bound = bindings.of(hair)
+    if bound.is_written:  # with the same styles as before
+        hair.vellus.is_stale = False
+    else:
+        if bound.is_behind and bound.straight is None:
+            hair_cache.move(hair.session_uid, None, bound, is_made=True)
+        else:
+            events.strands_made(hair)
+        write_soon(hair)
+    return True
 
 
 def is_ahead(hair):
@@ -243,8 +252,7 @@ def follow_masks(surfaces, depsgraph):
             if bindings.of(hair) is None:
                 if not staleness.has_other_mask(hair, depsgraph):
                     make_again(hair, depsgraph)
-            elif pipeline.restyle(hair, depsgraph):
-                _restyled(hair)
+            elif _restyle(hair, depsgraph):
                 state.status = ""
         except HairError as error:
             state.status = str(error)

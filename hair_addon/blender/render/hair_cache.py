@@ -145,7 +145,7 @@ def refuse(datablock, error):
 def move(session_uid, moved, bound, is_made=False):
     """Strands of `BoundHair` have moved: with the next redraw they alone are uploaded, which waits for their points.
 
-    moved: (M,) indices of them; is_made: whether the GPU makes all of them instead, as `may_make` says.
+    moved: (M,) indices of them; is_made: whether the GPU makes all instead, as `may_make` or `may_restyle` says.
     """
     kept = _strands_of(session_uid)
     if kept is None:
@@ -161,6 +161,18 @@ def may_make(session_uid):
     """Whether the GPU makes what viewports show of hair while its guides are combed: as `choose_makers` found."""
     kept = _strands_of(session_uid)
     return kept is not None and kept.making.is_chosen and not kept.moved
+
+
+def may_restyle(session_uid, bound, styles):
+    """Whether the GPU makes what viewports show of bound hair with other styles, which change its points alone."""
+    kept = _strands_of(session_uid)
+    return (
+        may_make(session_uid)
+        and bound.straight is None
+        and kept.making.can_style(styles)
+        and bound.styles.radius_factor == styles.radius_factor
+        and _are_equal(bound.styles.wetness, styles.wetness)
+    )
 
 
 def choose_makers():

@@ -11,6 +11,7 @@ from typing import Any
 from ...core.errors import HairError
 from ..gpu import maker_choice, strand_maker, style_maker
 from ..groom.bindings import BoundHair
+from ..groom.styled_hair import StyledHair
 from ..host import running
 from ..settings import preferences
 
@@ -38,8 +39,11 @@ class Making:
 
     def can(self, bound: BoundHair) -> bool:
         """Whether strands can be made of their guides, with all their styles."""
-        styling = bound.styles.styling
-        return not self.is_refused and (styling is None or style_maker.can_style(styling))
+        return not self.is_refused and self.can_style(bound.styles)
+
+    def can_style(self, styles: StyledHair) -> bool:
+        """Whether styles can be applied to them: the one place where that is decided."""
+        return styles.styling is None or style_maker.can_style(styles.styling)
 
     def make(self, kept: Any) -> bool:
         """Make the strands that `hair_cache` keeps. False where the driver cannot, for which they are then due."""

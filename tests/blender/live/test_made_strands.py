@@ -15,7 +15,7 @@ from hair_addon.blender.render import hair_cache, made_strands, viewport
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
-from hair_addon.core.styling import clump, curl, frizz, lean
+from hair_addon.core.styling import bend, clump, curl, frizz, lean, smooth, wet
 from tests.blender.render.test_hair_places import view3d
 from tests.support.counting import counts_of
 from tests.support.reading import points, write_points
@@ -145,18 +145,29 @@ def test_styles_that_the_gpu_cannot_apply_are_made_as_before(watched, monkeypatc
     np.testing.assert_array_equal(drawn(watched), bindings.of(watched.data).points)
 
 
+def add_styles(hair, *styles):
+    """Style hair, and draw it."""
+    for settings in styles:
+        style_items.add(hair.data.vellus, settings)
+    written(hair)
+    drawn(hair)
+    assert hair_cache.may_make(hair.data.session_uid)
+
+
+def written(hair):
+    """(S, P, 3) as its Curves have it once an interaction is over."""
+    bpy.context.view_layer.update()
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    return points(hair)
+
+
 @pytest.mark.parametrize(
     "styles", [(lean.Settings(amount=0.3),), (clump.Settings(size=0.3, levels=1), curl.Settings())]
 )
 def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, styles):
     """Guides that lean do so here; what is written afterwards is what was shown."""
-    for settings in styles:
-        style_items.add(watched.data.vellus, settings)
-    bpy.context.view_layer.update()
-    live_hair.write_all()
-    bpy.context.view_layer.update()
-    drawn(watched)
-    assert hair_cache.may_make(watched.data.session_uid)
+    add_styles(watched, *styles)
     with monkeypatch.context() as counted:
         calls = counts_of(counted)
         counted.setattr(following, "strands_now", None)
@@ -164,11 +175,52 @@ def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, sty
             comb(count)
             shown = drawn(watched)
         assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
-    live_hair.write_all()
-    bpy.context.view_layer.update()
-    np.testing.assert_allclose(shown, points(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
     np.testing.assert_array_equal(drawn(watched), shown)
     assert np.abs(shown - grown(watched)).max() > 0.01  # without styles
+
+
+def slide(hair, place, name, value):
+    """Move the slider of a style's setting."""
+    setattr(style_items.group_of(hair.data.vellus.styles[place]), name, value)
+    bpy.context.view_layer.update()
+
+
+def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
+    add_styles(watched, clump.Settings(size=0.3, levels=1), curl.Settings(radius=0.02, pitch=0.1))
+    first = drawn(watched)
+    with monkeypatch.context() as counted:
+        calls = counts_of(counted)
+        counted.setattr(following, "strands_now", None)
+        slide(watched, 1, "radius", 0.03)
+        drawn(watched)
+        slide(watched, 0, "amount", 0.4)
+        comb(3)  # and combing goes on from there
+        shown = drawn(watched)
+        assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert np.abs(shown - first).max() > 0.01
+    np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_array_equal(drawn(watched), shown)
+
+
+def test_a_style_that_is_switched_off_and_on(watched):
+    """Other kinds of steps take another program, and hair without any effect none."""
+    add_styles(watched, bend.Settings(), smooth.Settings(length=0.2))
+    for place, is_on in ((0, False), (1, False), (0, True), (1, True)):
+        slide(watched, place, "is_on", is_on)
+        shown = drawn(watched)
+        np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
+
+
+def test_a_style_that_swells_strands_is_uploaded_with_their_radii(watched, monkeypatch):
+    add_styles(watched, wet.Settings(lock=0.3, amount=0.2))
+    calls = counts_of(monkeypatch)
+    slide(watched, 0, "amount", 0.9)
+    shown = drawn(watched)
+    assert calls["uploads"] == 1
+    kept = hair_cache.strands_on_gpu(watched.data)
+    np.testing.assert_array_equal(kept.radii[0], bindings.of(watched.data).radii)
+    np.testing.assert_array_equal(shown, written(watched))
 
 
 @pytest.mark.parametrize(
