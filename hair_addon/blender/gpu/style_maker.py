@@ -35,7 +35,7 @@ def can_style(styling: "Styling") -> bool:
     return len(styling.program) <= uniforms.MOST_STEPS and 2 <= styling.point_count <= MOST_POINTS
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Pass:
     """Strands that are styled together: all of the hair, or the centres of one level of a clump tree."""
 
@@ -43,7 +43,11 @@ class _Pass:
     record: np.ndarray  # uniforms.STYLING
     block: gpu.types.GPUUniformBuf
 
-    def put(self, program: Program) -> None:
+    def put_masks(self, data: "StrandData") -> None:
+        """Upload what is known of the strands anew; `put_steps` is due after it."""
+        self.known, self.record["row_known"], self.record["known_texels"] = _known(data)
+
+    def put_steps(self, program: Program) -> None:
         """Upload the rows of a program."""
         _put_steps(self.record, program)
         self.block.update(uniforms.bytes_of(self.record))
@@ -91,14 +95,21 @@ class StyleMaker:
         gpu.shader.unbind()
 
     def restyle(self, styling: "Styling") -> bool:
-        """Take other settings of the same styles: numbers alone are uploaded. False where more has changed."""
+        """Take other settings of the same styles: numbers alone are uploaded, and masks that were painted.
+
+        False where more has changed.
+        """
         if styling is self.styling:
             return True
         if not can_style(styling) or not _are_alike(styling, self.styling):
             return False
-        self.hair.put(styling.program)
-        for level, its_pass in zip(styling.levels, self.levels, strict=True):
-            its_pass.put(level.steps)
+        masks = styling.data.masks.numpy(), self.styling.data.masks.numpy()
+        parts = [(self.hair, styling.data, styling.program)]
+        parts += [(own, level.data, level.steps) for own, level in zip(self.levels, styling.levels, strict=True)]
+        for part, data, program in parts:
+            if not np.array_equal(*masks):
+                part.put_masks(data)
+            part.put_steps(program)
         self.styling = styling
         return True
 
@@ -206,13 +217,13 @@ def _joined(parts):
 
 
 def _are_alike(styling, other):
-    """Whether two stacks on the same strands differ in their numbers alone."""
+    """Whether two stacks on the same strands differ in their numbers and masks alone."""
     return (
         styling.trees is other.trees
         and styling.tree_levels == other.tree_levels
         and styling.point_count == other.point_count
         and np.array_equal(styling.axes, other.axes)
-        and np.array_equal(styling.data.masks.numpy(), other.data.masks.numpy())
+        and np.array_equal(styling.data.normals.numpy(), other.data.normals.numpy())
     )
 
 

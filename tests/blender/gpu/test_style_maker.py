@@ -158,6 +158,19 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
     assert np.quantile(errors(hair, points, hair.styled(*changed)), 0.95) <= CLOSE
 
 
+def test_masks_that_are_painted_further(hair, rng, one_program):
+    """And one that is removed: what is known of strands is uploaded again, and no more."""
+    maker, strands = None, uploaded(hair.plain)
+    for weights in (rng.random(hair.mesh.triangles.shape), rng.random(hair.mesh.triangles.shape), None):
+        inputs = Inputs(masks={("Mask", "", False): Mask(None if weights is None else weights.astype(np.float32))})
+        styles = clump.Settings(size=0.04), curl.Settings(mask="" if weights is None else "Mask")
+        styling = hair.bound(*styles, inputs=inputs)
+        before, maker = maker, style_maker.maker_of(hair.binding, styling, 41, np.eye(3), maker)
+        assert before in (None, maker)
+        points, _radii = made(maker, hair, styling, strands)
+        assert np.quantile(errors(hair, points, hair.styled(*styles, inputs=inputs)), 0.95) <= CLOSE
+
+
 def test_other_clumps_are_bound_again(hair, one_program):
     styling = hair.bound(clump.Settings(size=0.04))
     maker = style_maker.maker_of(hair.binding, styling, 41, np.eye(3))
