@@ -5,19 +5,18 @@ What a strand follows is uploaded once. An edit of guides uploads these alone, a
 core/interpolation has the mathematics; shaders/interpolate_strands.comp is its twin.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import gpu
 import numpy as np
 
 from ...core.interpolation.hair_binding import HairBinding
 from ...core.kernels.checks import require_count, require_indices
-from . import shaders, strand_bounds, uniforms
-from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, Moved, StrandsOnGPU, numbers_texture
+from . import shaders, uniforms
+from .strand_changes import StrandChanges, empty_rows, new_changes, rows_texture
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU
 
 _GROUP_SIZE = 64
-# Points of strands up to which it is kept where they were, for motion vectors: 128 MiB.
-_MOST_MOVED = 8 << 20
 
 
 @dataclass(frozen=True)
@@ -27,23 +26,24 @@ class StrandMaker:
     bindings: gpu.types.GPUTexture  # of each strand its root, its normal, and its guides with their weights
     guide_normals: gpu.types.GPUTexture
     segments: gpu.types.GPUTexture  # of guides, in their frames; then what their weights are limited by
-    moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; one texel where that is not kept
-    moved_rows: gpu.types.GPUTexture
-    bounds: strand_bounds.StrandBounds
+    changes: StrandChanges
     record: np.ndarray  # uniforms.MAKING
     block: gpu.types.GPUUniformBuf
     slot_count: int  # guides of a strand
 
-    def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
+    def make(
+        self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
+    ) -> StrandsOnGPU:
         """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; the `StrandsOnGPU` after it.
 
         strands: of the same roots, whose texture is changed; their radii stay, and their arrays on this side are as
-        before, but for their bounds: six numbers that come back. Raises `HairError` where counts do not match.
+        before, but for their bounds: six numbers that come back; rest: where strands are to be made in place of what is
+        drawn, to be carried from there. Raises `HairError` where counts do not match.
         """
         self.require_fitting(strands)
         self.put_guides(guide_points)
-        self.fill(strands.texture)
-        return self.made(strands)
+        self.fill(strands.texture if rest is None else rest)
+        return self.changes.changed(strands) if rest is None else strands
 
     def require_fitting(self, strands: StrandsOnGPU) -> None:
         """Raise `HairError` unless there are as many strands and points."""
@@ -58,16 +58,11 @@ class StrandMaker:
         for name in ("bindings", "guide_normals", "segments"):
             program.uniform_sampler(name, getattr(self, name))
         program.image("strands", texture)
-        program.image("moved_strands", self.moved)
-        program.image("boxes", self.bounds.boxes)
+        self.changes.bind(program)
         groups = -(-int(self.record["strand_count"]) // _GROUP_SIZE)
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
-
-    def made(self, strands: StrandsOnGPU) -> StrandsOnGPU:
-        """The `StrandsOnGPU` after `fill`, and after all that changes points and their boxes next."""
-        return replace(strands, moved=self._moved_since(strands), bounds=self.bounds.read(), has_points=False)
 
     def put_guides(self, guide_points: np.ndarray) -> None:
         """Upload guides, as `make` does."""
@@ -83,13 +78,6 @@ class StrandMaker:
         program.image("segments", self.segments)
         gpu.compute.dispatch(program, -(-len(values) // _GROUP_SIZE), 1, 1)
         gpu.shader.unbind()
-
-    def _moved_since(self, strands):
-        before = strands.moved.turn if strands.moved else 0
-        if self.record["row_moved"]:
-            return Moved(self.moved, int(self.record["row_moved"]), self.moved_rows, before + 1)
-        # It is not known where strands were: as if there had been more changes than one.
-        return Moved(self.moved, 1, self.moved_rows, before + 2)
 
 
 @dataclass(frozen=True)
@@ -112,11 +100,11 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
 
 
-def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, keeps_moved: bool = True) -> StrandMaker:
+def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> StrandMaker:
     """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
 
-    axes: (3, 3), from the coordinates of roots and guides to those of the strands; keeps_moved: whether it is kept
-    where strands were. Raises `HairError` where counts or indices do not match, or the driver lacks something.
+    axes: (3, 3), from the coordinates of roots and guides to those of the strands. Raises `HairError` where counts or
+    indices do not match, or the driver lacks something.
     """
     bindings = _binding_rows(bound)
     record = uniforms.MAKING.record()
@@ -132,15 +120,10 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, keeps_mov
     bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
     normals_texture, record["row_normals"] = rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
     segments, record["row_segments"] = empty_rows(guide_count, point_count + 1)
-    if keeps_moved and strand_count * point_count <= _MOST_MOVED:
-        moved, record["row_moved"] = empty_rows(strand_count, point_count + 1)
-        moved_rows = numbers_texture(np.arange(1, strand_count + 1), int(record["row_strands"]))
-    else:
-        moved, moved_rows = (empty_rows(1, 1)[0] for _ in range(2))
-    block, bounds = uniforms.uniform_buffer(record), strand_bounds.new_bounds(strand_count)
-    return StrandMaker(
-        bindings_texture, normals_texture, segments, moved, moved_rows, bounds, record, block, slot_count
-    )
+    changes = new_changes(strand_count, point_count)
+    record["row_moved"] = changes.row_moved
+    block = uniforms.uniform_buffer(record)
+    return StrandMaker(bindings_texture, normals_texture, segments, changes, record, block, slot_count)
 
 
 def _binding_rows(bound):
@@ -157,28 +140,6 @@ def _binding_rows(bound):
     pairs[:, :slot_count, 0] = np.where(is_used, bound.indices, 0)  # exact in single precision up to 16 million
     pairs[:, :slot_count, 1] = np.where(is_used, bound.weights, 0.0)
     return rows.reshape(strand_count, -1)
-
-
-def rows_texture(values, channels):
-    """(texture, whole rows of values in a row of it) of (N, channels T) float32, T texels each."""
-    texels = values.shape[1] // channels
-    in_row = min(TEXTURE_WIDTH // texels, len(values))
-    height = -(-len(values) // in_row)
-    if height * in_row > len(values):
-        values = np.concatenate([values, np.zeros((height * in_row - len(values), values.shape[1]), np.float32)])
-    data = gpu.types.Buffer("FLOAT", values.size, values.ravel())
-    texture_format = {1: "R32F", 4: "RGBA32F"}[channels]
-    texture = gpu.types.GPUTexture((in_row * texels, height), format=texture_format, data=data)
-    texture.filter_mode(False)
-    return texture, in_row
-
-
-def empty_rows(count, texels):
-    """The same without values."""
-    in_row = min(TEXTURE_WIDTH // texels, count)
-    texture = gpu.types.GPUTexture((in_row * texels, -(-count // in_row)), format="RGBA32F")
-    texture.filter_mode(False)
-    return texture, in_row
 
 
 def _declared(samplers, images):

@@ -162,6 +162,13 @@ def places_texture(points, radii, row_strands):
     return texture
 
 
+def like(texture):
+    """A texture of the same size for other strands, with nothing in it."""
+    other = gpu.types.GPUTexture((texture.width, texture.height), format="RGBA32F")
+    other.filter_mode(False)
+    return other
+
+
 def seen_points(point_count):
     """Texels of a strand in the visibility textures: SEEN_STEP of shaders/include/strand.glsl, and the tip."""
     return -(-(point_count - 1) // 4) + 1

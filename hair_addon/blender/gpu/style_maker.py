@@ -16,7 +16,7 @@ from ...core.interpolation.hair_binding import HairBinding
 from ...core.styling import frizz, program_rows
 from ...core.styling.program_rows import Program
 from ...core.styling.random_numbers import PURPOSES
-from . import shaders, strand_maker, uniforms
+from . import shaders, strand_changes, strand_maker, uniforms
 from .strand_maker import StrandMaker
 from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU
 
@@ -66,20 +66,23 @@ class StyleMaker:
     hair: _Pass
     _guide_points: np.ndarray | None = None  # of the last `make`
 
-    def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
+    def make(
+        self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
+    ) -> StrandsOnGPU:
         """Make all strands with their styles; as `StrandMaker.make`, for guides as `Styling.guides` gives them."""
         self.maker.require_fitting(strands)
         if self._guide_points is None or not np.array_equal(self._guide_points, guide_points):
             self.maker.put_guides(guide_points)
             self._guide_points = guide_points.copy()
-        self.maker.fill(strands.texture)
+        texture = strands.texture if rest is None else rest
+        self.maker.fill(texture)
         program = _styles_program(strands.point_count, _kinds_of(self.styling.program))
         if self.centre_maker is not None:
             self.centre_maker.fill(self.centres)
             for level in self.levels:
                 self._style(program, level, self.centres, self.centre_maker)
-        self._style(program, self.hair, strands.texture, self.maker)
-        return self.maker.made(strands)
+        self._style(program, self.hair, texture, self.maker)
+        return self.maker.changes.changed(strands) if rest is None else strands
 
     def _style(self, program, strands, image, maker):
         program.bind()
@@ -88,7 +91,7 @@ class StyleMaker:
         program.uniform_sampler("locks", self.locks)
         program.image("strands", image)
         program.image("centres", image if self.centres is None else self.centres)
-        program.image("boxes", maker.bounds.boxes)
+        program.image("boxes", maker.changes.bounds.boxes)
         groups = -(-int(strands.record["strand_count"]) // _GROUP_SIZE)
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
@@ -151,9 +154,9 @@ def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) 
     if styling.levels:
         bound = _joined([strand_maker.bound_strands(level.binding) for level in styling.levels])
         record["centre_count"] = len(bound.roots)
-        centre_maker = strand_maker.new_maker(bound, point_count, np.eye(3), keeps_moved=False)
+        centre_maker = strand_maker.new_maker(bound, point_count, np.eye(3))
         centre_maker = replace(centre_maker, segments=maker.segments)
-        centres, _in_row = strand_maker.empty_rows(len(bound.roots), point_count)
+        centres, _in_row = strand_changes.empty_rows(len(bound.roots), point_count)
         for level in styling.levels:
             own = record.copy()
             own["first_strand"], own["are_centres"] = level.first, 1
@@ -190,7 +193,7 @@ def _known(data: "StrandData"):
     columns = [data.normals.numpy(), _halves(data.identities.numpy()), data.members.numpy().T, data.masks.numpy().T]
     rows = np.concatenate(columns, axis=1, dtype=np.float32)
     rows = np.pad(rows, ((0, 0), (0, -rows.shape[1] % 4)))
-    texture, in_row = strand_maker.rows_texture(rows, 4)
+    texture, in_row = strand_changes.rows_texture(rows, 4)
     return texture, in_row, rows.shape[1] // 4
 
 
@@ -198,7 +201,7 @@ def _locks(data):
     """(texture, centres in a row of it): normal and identity in two texels of each."""
     identities = _halves(data.centre_identities.numpy())
     rows = np.concatenate([data.centre_normals.numpy(), identities, np.zeros((len(identities), 3))], axis=1)
-    return strand_maker.rows_texture(rows.astype(np.float32), 4)
+    return strand_changes.rows_texture(rows.astype(np.float32), 4)
 
 
 def _halves(identities):

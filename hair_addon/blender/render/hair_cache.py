@@ -99,12 +99,16 @@ def strands_on_gpu(datablock):
     pose = _pose_of(datablock.surface)
     is_elsewhere = kept.on_gpu is None or kept.pose is not pose
     is_due = kept.making.due is not None
-    if is_due and not is_elsewhere and kept.making.make(kept):
-        return kept.on_gpu
-    if is_due or (is_elsewhere and _is_behind(datablock)):
-        kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
+    if is_due or is_elsewhere:
+        is_behind = _is_behind(datablock)
+        if kept.on_gpu is not None and kept.making.bring(kept, pose, is_behind):
+            return kept.on_gpu
+        if is_due or is_behind:
+            kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
     moved, kept.moved = kept.moved, []
-    if kept.on_gpu is None or kept.pose is not pose:
+    if moved or is_elsewhere:
+        kept.making.carrier = None  # what it carries is not what is uploaded
+    if kept.on_gpu is None or is_elsewhere or (moved and not kept.on_gpu.has_points):
         points = _carried(kept, pose)
         kept.on_gpu = strand_textures.upload_strands(points, kept.radii, kept.randoms, kept.wetness)
         kept.pose = pose
@@ -181,9 +185,8 @@ def choose_makers():
     for datablock in bpy.data.hair_curves:
         kept, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
         if kept is not None and kept.on_gpu is not None:
-            is_at_rest = kept.pose is None or kept.pose.motion is None
             is_bound = bound is not None and bound.free is None and kept.points is bound.shown.points
-            kept.making.is_chosen = is_wanted and is_at_rest and is_bound and kept.making.can(bound.shown)
+            kept.making.choose(is_wanted, bound.shown if is_bound else None)
 
 
 def _strands_of(session_uid):

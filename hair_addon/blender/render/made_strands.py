@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that follow combed guides where they are drawn: nothing is computed on this side until they are written.
+"""Strands that follow combed guides, and their surface, where they are drawn: nothing is computed on this side.
 
-That holds for hair that stands still, with styles that the GPU can apply. All other hair takes the way of points that
-Warp computes.
+Guides are followed so by hair without styles, or with styles that the GPU can apply; other hair takes points that Warp
+computes. Any hair is carried so.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+
 from ...core.errors import HairError
-from ..gpu import maker_choice, strand_maker, style_maker
+from ..data.posed_strands import Pose
+from ..gpu import maker_choice, strand_carrier, strand_maker, strand_textures, style_maker
 from ..groom.bindings import BoundHair
 from ..groom.styled_hair import StyledHair
 from ..host import running
@@ -29,36 +32,84 @@ def are_wanted() -> bool:
 
 @dataclass
 class Making:
-    """What makes the strands of one hair, and of which guides."""
+    """What makes the strands of one hair, and of which guides; and what carries them with their surface."""
 
     maker: strand_maker.StrandMaker | style_maker.StyleMaker | None = None
+    carrier: strand_carrier.StrandCarrier | None = None  # None while what is drawn is at rest, or was uploaded
     is_chosen: bool = False  # whether it is to make them with the next edit
+    may_carry: bool = False  # whether it is to carry them with the next pose
     is_refused: bool = False  # whether the driver makes no such strands
     due: BoundHair | None = None  # whose guides were combed: the next redraw makes its strands
     _binding: Any = None  # `HairBinding` of the maker
+    _triangles: np.ndarray | None = None  # that the carrier's strands are rooted on
 
-    def can(self, bound: BoundHair) -> bool:
-        """Whether strands can be made of their guides, with all their styles."""
-        return not self.is_refused and self.can_style(bound.styles)
+    def choose(self, is_wanted: bool, bound: BoundHair | None) -> None:
+        """Choose what it is to do: carry strands, and make those of `BoundHair` with their styles."""
+        self.may_carry = is_wanted and not self.is_refused
+        self.is_chosen = self.may_carry and bound is not None and self.can_style(bound.styles)
 
     def can_style(self, styles: StyledHair) -> bool:
-        """Whether styles can be applied to them: the one place where that is decided."""
+        """Whether styles can be applied to strands that are made here: the one place where that is decided."""
         return styles.styling is None or style_maker.can_style(styles.styling)
 
-    def make(self, kept: Any) -> bool:
-        """Make the strands that `hair_cache` keeps. False where the driver cannot, for which they are then due."""
-        bound = self.due
-        try:
-            before = self.maker if self._binding is bound.binding else None
-            count, axes = kept.on_gpu.point_count, bound.surface.to_local_axes
-            self.maker = style_maker.maker_of(bound.binding, bound.styles.styling, count, axes, before)
-            self._binding = bound.binding
-            kept.on_gpu = self.maker.make(kept.on_gpu, _followed(bound))
-        except HairError:
-            self.is_refused, self.is_chosen = True, False
+    def bring(self, kept: Any, pose: Pose | None, is_behind: bool) -> bool:
+        """Bring the strands that `hair_cache` keeps up to combed guides, and to a pose of their surface.
+
+        is_behind: whether they were made for other guides than their points on this side. False where the driver
+        cannot, or it is not to: strands are then to be uploaded.
+        """
+        if kept.moved:
             return False
-        self.due = None
+        try:
+            if not self._can_carry(kept, pose, is_behind):
+                return False
+            if self.due is not None:
+                self._make(kept)
+            if self.carrier is not None:
+                kept.on_gpu = self.carrier.carry(kept.on_gpu, None if pose is None else pose.motion)
+        except HairError:
+            self.is_refused, self.is_chosen, self.may_carry, self.carrier = True, False, False, None
+            return False
+        self.due, kept.pose = None, pose
         return True
+
+    def _make(self, kept):
+        bound = self.due
+        before = self.maker if self._binding is bound.binding else None
+        count, axes = kept.on_gpu.point_count, bound.surface.to_local_axes
+        self.maker = style_maker.maker_of(bound.binding, bound.styles.styling, count, axes, before)
+        self._binding = bound.binding
+        kept.on_gpu = self.maker.make(kept.on_gpu, _followed(bound), self.carrier and self.carrier.rest)
+
+    def _can_carry(self, kept, pose, is_behind):
+        """Whether there is a carrier to a pose, made now if need be; or none is needed."""
+        if not (_is_deformed(pose) or _is_deformed(kept.pose)):
+            return True
+        surface = None if pose is None else pose.surface
+        if self.carrier is not None:
+            if surface is not None and self._is_carried_on(surface):
+                return True
+            self.carrier = None  # for the surface has other triangles now
+            return False
+        if surface is None or not self.may_carry or (is_behind and self.due is None and _is_deformed(kept.pose)):
+            return False
+        places = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0])
+        drawn = kept.on_gpu
+        if _is_deformed(kept.pose):
+            rest = strand_textures.places_texture(kept.points, kept.radii, drawn.row_strands)
+        else:
+            rest, kept.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
+        self.carrier = strand_carrier.new_carrier(rest, drawn.point_count, places, surface.rest)
+        self._triangles = surface.mesh.triangles
+        return True
+
+    def _is_carried_on(self, surface):
+        mine, its = (self._triangles, self.carrier.vertices), (surface.mesh.triangles, surface.rest)
+        return all(map(np.array_equal, mine, its))
+
+
+def _is_deformed(pose):
+    return pose is not None and pose.motion is not None
 
 
 def _followed(bound):

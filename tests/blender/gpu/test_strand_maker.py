@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.blender.gpu import maker_choice, shaders, strand_bounds, strand_maker, strand_textures
+from hair_addon.blender.gpu import maker_choice, shaders, strand_bounds, strand_changes, strand_maker, strand_textures
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.mesh import SurfacePoints
@@ -135,11 +135,11 @@ def test_an_edit_leaves_where_strands_were(blender, rng):
 
 def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
     """Where its strands were is not known then, as after two changes at once."""
-    monkeypatch.setattr(strand_maker, "_MOST_MOVED", STRANDS * 9 - 1)
+    monkeypatch.setattr(strand_changes, "MOST_MOVED", STRANDS * 9 - 1)
     binding, guides = bound_hair(rng, 9, 4)
     wanted = by_warp(binding, guides, np.eye(3))
     maker = new_maker(binding, 9, np.eye(3))
-    assert maker.moved.width * maker.moved.height == 1
+    assert maker.changes.moved.width * maker.changes.moved.height == 1
     made = maker.make(uploaded(np.zeros_like(wanted)), guides.numpy())
     assert made.moved.turn == 2
     np.testing.assert_allclose(texels(made.texture, STRANDS, 9)[..., :3], wanted, rtol=0.0, atol=CLOSE)
