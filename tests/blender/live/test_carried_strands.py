@@ -9,7 +9,7 @@ from hair_addon.blender.gpu import maker_choice
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.settings import style_items
-from hair_addon.core.styling import lean
+from hair_addon.core.styling import curl, lean
 from tests.blender.live.test_made_strands import CLOSE, comb, drawn, grown, watched, window  # noqa: F401 (fixtures)
 from tests.support.counting import counts_of
 from tests.support.reading import points
@@ -63,6 +63,24 @@ def test_hair_that_was_opened_on_a_bent_surface_is_carried_from_its_second_pose(
     drawn(hair)
     bend(surface, 0.6)
     np.testing.assert_allclose(drawn(hair), carried(hair), rtol=0.0, atol=1e-6)
+
+
+def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):
+    """A stroke and a slider on a bent surface upload no strands either."""
+    style_items.add(watched.data.vellus, curl.Settings(radius=0.02, pitch=0.1))
+    bend(watched.data.surface, 0.3)
+    drawn(watched)
+    live_hair.write_all()
+    bend(watched.data.surface, 0.5)
+    drawn(watched)
+    calls = counts_of(monkeypatch)
+    for count, radius in ((60, 0.02), (0, 0.03)):
+        comb(count)
+        watched.data.vellus.styles[0].curl.radius = radius
+        bpy.context.view_layer.update()
+        shown = drawn(watched)
+        assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+        np.testing.assert_allclose(shown, carried(watched, watched.data), rtol=0.0, atol=CLOSE)
 
 
 def test_styled_hair_is_carried_too(watched, monkeypatch):
