@@ -204,6 +204,25 @@ def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
     np.testing.assert_array_equal(drawn(watched), shown)
 
 
+def test_a_mask_that_is_painted_uploads_no_strands(watched, monkeypatch):
+    add_styles(watched, bend.Settings(angle=2.0))
+    surface = watched.data.surface
+    bpy.context.view_layer.objects.active = surface
+    group = surface.vertex_groups.new(name="Mask")
+    slide(watched, 0, "mask", "Mask")
+    drawn(watched)
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    shown, calls = [], counts_of(monkeypatch)
+    for weight in (1.0, 0.4):
+        group.add(range(len(surface.data.vertices) // 2), weight, "REPLACE")
+        surface.data.update()
+        bpy.context.view_layer.update()
+        shown.append(drawn(watched))
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert np.abs(shown[1] - shown[0]).max() > 0.01
+    np.testing.assert_allclose(shown[1], written(watched), rtol=0.0, atol=CLOSE)
+
+
 def test_a_style_that_is_switched_off_and_on(watched):
     """Other kinds of steps take another program, and hair without any effect none."""
     add_styles(watched, bend.Settings(), smooth.Settings(length=0.2))
