@@ -68,11 +68,20 @@ class Making:
         return True
 
     def _make(self, kept):
-        bound = self.due
-        if self.maker is None or self._binding is not bound.binding:
-            strands = strand_maker.bound_strands(bound.binding)
-            self.maker = strand_maker.new_maker(strands, kept.on_gpu.point_count, bound.surface.to_local_axes)
-            self._binding = bound.binding
+        bound, binding, known = self.due, self.due.binding, self._binding
+        if self.maker is None or known.positions is not binding.positions:
+            axes = bound.surface.to_local_axes
+            self.maker = strand_maker.new_maker(strand_maker.bound_strands(binding), bound.radii, axes)
+        elif known is not binding:
+            if known.guide_weights is not binding.guide_weights:
+                self.maker = self.maker.weighed(strand_maker.bound_strands(binding))
+            self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
+        self._binding = binding
+        if not np.array_equal(kept.radii[0], bound.radii):
+            self.maker = self.maker.of_radii(bound.radii)
+            kept.radii = np.broadcast_to(bound.radii, kept.radii.shape)
+            sizes = {"mean_radius": float(bound.radii.mean()), "greatest_radius": float(bound.radii.max())}
+            kept.on_gpu = replace(kept.on_gpu, radii=kept.radii, **sizes)
         kept.on_gpu = self.maker.make(kept.on_gpu, bound.guides.numpy(), self.carrier and self.carrier.rest)
 
     def _can_carry(self, kept, pose, is_behind):

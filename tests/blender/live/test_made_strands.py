@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon.blender.data import curves
 from hair_addon.blender.gpu import maker_choice, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
@@ -63,6 +64,51 @@ def test_a_surface_that_is_read_again_at_rest_moves_and_uploads_nothing(watched,
     np.testing.assert_array_equal(drawn(watched), shown)
     assert not any(calls.values())
     np.testing.assert_allclose(shown, grown(watched), rtol=0.0, atol=CLOSE)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"keep_length": 0.2},
+        {"angle_limit": 0.4, "length_limit": 1.5},
+        {"neighbour_limit": 3},
+        {"automatic_influence": False, "influence_distance": 0.4},
+        {"radius": 3e-3, "tip_taper": 0.9},
+    ],
+    ids=lambda settings: next(iter(settings)),
+)
+def test_settings_of_weights_are_followed_where_strands_are_drawn(watched, settings, monkeypatch):
+    comb(9)
+    drawn(watched)
+    calls, before = counts_of(monkeypatch), points(watched)
+    for name, value in settings.items():
+        setattr(watched.data.vellus.hair, name, value)
+    bpy.context.view_layer.update()
+    shown = drawn(watched)
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    np.testing.assert_array_equal(points(watched), before)
+    comb(20)
+    shown = drawn(watched)
+    on_gpu = hair_cache.strands_on_gpu(watched.data)
+    radii = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)[: on_gpu.strand_count, :, 3]
+    live_hair.write_all()
+    assert (calls["searches"], calls["uploads"], calls["writes"]) == (0, 0, 1)
+    monkeypatch.undo()
+    assert getattr(bindings.of(watched.data).settings, name) == pytest.approx(value)
+    np.testing.assert_array_equal(points(watched), grown(watched))
+    np.testing.assert_allclose(shown, points(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_array_equal(radii.ravel(), curves.read_radii(watched.data))
+    assert on_gpu.greatest_radius == radii.max()
+
+
+def test_settings_of_roots_are_not(watched, monkeypatch):
+    calls = counts_of(monkeypatch)
+    watched.data.vellus.hair.neighbour_limit = 16  # more than were found
+    bpy.context.view_layer.update()
+    assert calls["searches"] == 1
+    watched.data.vellus.hair.strand_count = 300
+    bpy.context.view_layer.update()
+    assert len(drawn(watched)) == 300
 
 
 def test_strands_that_are_read_again_are_those_of_now(watched):
