@@ -81,11 +81,10 @@ void main()
       least = min(least, place);
       greatest = max(greatest, place);
     }
-    vec4 before = imageLoad(strands, here + ivec2(point, 0));
     if (making.row_moved > 0) {
-      imageStore(moved_strands, past + ivec2(point, 0), before);
+      imageStore(moved_strands, past + ivec2(point, 0), imageLoad(strands, here + ivec2(point, 0)));
     }
-    imageStore(strands, here + ivec2(point, 0), vec4(place, before.w));
+    imageStore(strands, here + ivec2(point, 0), vec4(place, texelFetch(radii, ivec2(point, 0), 0).r));
   }
   ivec2 box = strand_texel(strand, 0, 2, imageSize(boxes).x / 2);
   imageStore(boxes, box, vec4(least, 0.0));

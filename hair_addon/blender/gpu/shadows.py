@@ -19,8 +19,8 @@ _LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
 _SHADE_DISTANCE = 0.15
 _ALL = drawing.Steps()
 
-# While hair moves, the sphere that maps are aimed at stays until it has to be larger, and is then larger by this factor,
-# or may be smaller by the other: maps whose texels move with every edit flicker.
+# While hair moves, the sphere that maps are aimed at stays until it has to be larger, and is then larger by one factor,
+# or until it may be smaller by the other: maps whose texels move with every edit flicker.
 _SPARE, _LOOSEST = 1.1, 1.4
 
 
@@ -32,7 +32,7 @@ class ShadowMaps:
     """
 
     def __init__(self, size, layer_count, in_compute=None):
-        self._size, self._layer_count = size, layer_count
+        self._size, self.layer_count = size, layer_count
         self._hair_front = _array(size, layer_count, "RG32F")
         self._hair_layers = _array(size, layer_count, "RGBA16F")
         self._surface_moments = _array(size, layer_count, "RGBA32F")
@@ -66,7 +66,7 @@ class ShadowMaps:
             return
         loose = drawing.bounding_sphere(hair)
         self._sphere = loose = _steady(loose, self._sphere) if is_moving and self._sphere else loose
-        for index in range(min(int(lights["count"]), self._layer_count)):
+        for index in range(min(int(lights["count"]), self.layer_count)):
             view = _aim(lights["light"][index], hair, loose, self._size)
             if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index

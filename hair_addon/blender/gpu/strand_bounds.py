@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The box around strands that only the GPU knows: a box of each strand, joined on the GPU, of which six numbers come back.
+"""The box around strands that only the GPU knows: boxes of each, joined there, of which six numbers come back.
 
 Compute programs of every backend can do it: neither atomics nor memory that a work group shares is needed.
 """

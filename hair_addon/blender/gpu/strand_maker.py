@@ -5,7 +5,7 @@ What a strand follows is uploaded once. An edit of guides uploads these alone, a
 core/interpolation has the mathematics; shaders/interpolate_strands.comp is its twin.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import gpu
 import numpy as np
@@ -26,6 +26,7 @@ class StrandMaker:
     bindings: gpu.types.GPUTexture  # of each strand its root, its normal, and its guides with their weights
     guide_normals: gpu.types.GPUTexture
     segments: gpu.types.GPUTexture  # of guides, in their frames; then what their weights are limited by
+    radii: gpu.types.GPUTexture  # along every strand
     changes: StrandChanges
     record: np.ndarray  # uniforms.MAKING
     block: gpu.types.GPUUniformBuf
@@ -36,9 +37,9 @@ class StrandMaker:
     ) -> StrandsOnGPU:
         """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; the `StrandsOnGPU` after it.
 
-        strands: of the same roots, whose texture is changed; their radii stay, and their arrays on this side are as
-        before, but for their bounds: six numbers that come back; rest: where strands are to be made in place of what is
-        drawn, to be carried from there. Raises `HairError` where counts do not match.
+        strands: of the same roots, whose texture is changed; their arrays on this side are as before, but for their
+        bounds: six numbers that come back; rest: where strands are to be made in place of what is drawn, to be carried
+        from there. Raises `HairError` where counts do not match.
         """
         self.require_fitting(strands)
         self.put_guides(guide_points)
@@ -55,7 +56,7 @@ class StrandMaker:
         program = _strands_program(self.slot_count)
         program.bind()
         program.uniform_block("making", self.block)
-        for name in ("bindings", "guide_normals", "segments"):
+        for name in ("bindings", "guide_normals", "segments", "radii"):
             program.uniform_sampler(name, getattr(self, name))
         program.image("strands", texture)
         self.changes.bind(program)
@@ -63,6 +64,27 @@ class StrandMaker:
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
+
+    def limited(self, fading: tuple[float, float, float, float], keep_length: float) -> "StrandMaker":
+        """The same with other `BoundStrands.fading` and `keep_length`: nothing is uploaded but a record."""
+        record = self.record.copy()
+        record["limits"], record["keep_length"] = fading, keep_length
+        return replace(self, record=record, block=uniforms.uniform_buffer(record))
+
+    def weighed(self, bound: "BoundStrands") -> "StrandMaker":
+        """The same with other guides or weights of the same strands. Raises `HairError` as `new_maker`."""
+        require_count("strands", len(bound.roots), int(self.record["strand_count"]))
+        require_count("guides", len(bound.guide_normals), int(self.record["guide_count"]))
+        record, slot_count = self.record.copy(), bound.indices.shape[1]
+        _strands_program(slot_count)
+        bindings, record["row_bindings"] = rows_texture(_binding_rows(bound), 4)
+        block = uniforms.uniform_buffer(record)
+        return replace(self, bindings=bindings, record=record, block=block, slot_count=slot_count)
+
+    def of_radii(self, radii: np.ndarray) -> "StrandMaker":
+        """The same of strands with radii (P,) float32."""
+        require_count("radii", len(radii), int(self.record["point_count"]))
+        return replace(self, radii=_profile(radii))
 
     def put_guides(self, guide_points: np.ndarray) -> None:
         """Upload guides, as `make` does."""
@@ -100,12 +122,13 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
 
 
-def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> StrandMaker:
+def new_maker(bound: BoundStrands, radii: np.ndarray, axes: np.ndarray) -> StrandMaker:
     """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
 
-    axes: (3, 3), from the coordinates of roots and guides to those of the strands. Raises `HairError` where counts or
-    indices do not match, or the driver lacks something.
+    radii: (P,) float32 along every strand; axes: (3, 3), from the coordinates of roots and guides to those of the
+    strands. Raises `HairError` where counts or indices do not match, or the driver lacks something.
     """
+    point_count = len(radii)
     bindings = _binding_rows(bound)
     record = uniforms.MAKING.record()
     record["axes"][:3, :3], record["axes"][3, 3] = np.asarray(axes).T, 1.0
@@ -122,8 +145,12 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> Strand
     segments, record["row_segments"] = empty_rows(guide_count, point_count + 1)
     changes = new_changes(strand_count, point_count)
     record["row_moved"] = changes.row_moved
-    block = uniforms.uniform_buffer(record)
-    return StrandMaker(bindings_texture, normals_texture, segments, changes, record, block, slot_count)
+    block, profile = uniforms.uniform_buffer(record), _profile(radii)
+    return StrandMaker(bindings_texture, normals_texture, segments, profile, changes, record, block, slot_count)
+
+
+def _profile(radii):
+    return rows_texture(np.float32(radii)[None], 1)[0]
 
 
 def _binding_rows(bound):
@@ -165,6 +192,6 @@ def _segments_program():
 def _strands_program(slot_count):
     """The compute program that makes strands of so many guides each."""
     images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}, "boxes": {"WRITE"}}
-    info = _declared(("bindings", "guide_normals", "segments"), images)
+    info = _declared(("bindings", "guide_normals", "segments", "radii"), images)
     info.define("SLOTS", str(slot_count))
     return shaders.compile_compute(info, "interpolate_strands.comp")

@@ -4,7 +4,7 @@
 A change costs one upload, or only that of the moved strands; a redraw costs none.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import gpu
@@ -55,6 +55,7 @@ class StrandsOnGPU:
     greatest_radius: float
     moved: Moved | None = None  # None where all points are as uploaded
     has_points: bool = True  # whether `points` are where strands are, which they are not where the GPU made these
+    lengthenings: dict = field(default_factory=dict)  # {number of points: how much longer strands are with all}
 
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
@@ -69,16 +70,12 @@ class StrandsOnGPU:
 
     def lengthening(self, point_count: int) -> float:
         """How much longer strands are than with as many points, evenly chosen of all: of some strands."""
-        if point_count not in self._lengthenings:
+        if point_count not in self.lengthenings:
             chosen = np.arange(point_count) * (self.point_count - 1) // (point_count - 1)
             some = self.points[:: -(-self.strand_count // _SAMPLED)]
             lengths = _total_length(some), _total_length(some[:, chosen])
-            self._lengthenings[point_count] = lengths[0] / max(lengths[1], 1e-12)
-        return self._lengthenings[point_count]
-
-    @cached_property
-    def _lengthenings(self):
-        return {}
+            self.lengthenings[point_count] = lengths[0] / max(lengths[1], 1e-12)
+        return self.lengthenings[point_count]
 
 
 def upload_strands(points, radii, randoms=None, wetness=None):
@@ -203,7 +200,7 @@ def move_strands(strands, moved, points):
     groups = -(-len(moved) * strands.point_count // _MOVE_GROUP_SIZE)
     rows_of_groups = -(-groups // MOST_GROUPS)
     gpu.compute.dispatch(program, -(-groups // rows_of_groups), rows_of_groups, 1)
-    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1))
+    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1), lengthenings={})
 
 
 def _no_rows(strands):

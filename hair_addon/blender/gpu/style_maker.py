@@ -13,6 +13,7 @@ import gpu
 import numpy as np
 
 from ...core.interpolation.hair_binding import HairBinding
+from ...core.kernels.checks import require_count
 from ...core.styling import frizz, program_rows
 from ...core.styling.program_rows import Program
 from ...core.styling.random_numbers import PURPOSES
@@ -57,6 +58,7 @@ class _Pass:
 class StyleMaker:
     """Makes strands with styles; made by `new_style_maker`."""
 
+    binding: HairBinding
     styling: "Styling"
     maker: StrandMaker
     centre_maker: StrandMaker | None  # None without clumps
@@ -97,6 +99,10 @@ class StyleMaker:
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
 
+    def of_radii(self, radii: np.ndarray) -> "StyleMaker":
+        """The same of strands with radii (P,) float32."""
+        return replace(self, maker=self.maker.of_radii(radii))
+
     def restyle(self, styling: "Styling") -> bool:
         """Take other settings of the same styles: numbers alone are uploaded, and masks that were painted.
 
@@ -120,31 +126,34 @@ class StyleMaker:
 def maker_of(
     binding: HairBinding,
     styling: "Styling | None",
-    point_count: int,
+    radii: np.ndarray,
     axes: np.ndarray,
     before: StrandMaker | StyleMaker | None = None,
 ) -> StrandMaker | StyleMaker:
     """What makes the strands of bound hair, with styles or without: the one before where that still does.
 
-    before: for the same binding. point_count and axes: as in `new_maker`. Raises `HairError` as it does.
+    before: for the same roots, and with styles for the same binding. radii and axes: as in `new_maker`. Raises
+    `HairError` as it does.
     """
     if styling is None or not len(styling.program):  # styles of guides alone are in these
         if isinstance(before, StrandMaker):
             return before
-        return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
-    if isinstance(before, StyleMaker) and before.restyle(styling):
+        return strand_maker.new_maker(strand_maker.bound_strands(binding), radii, axes)
+    if isinstance(before, StyleMaker) and before.binding is binding and before.restyle(styling):
         return before
-    return new_style_maker(binding, styling, axes)
+    return new_style_maker(binding, styling, radii, axes)
 
 
-def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) -> StyleMaker:
+def new_style_maker(binding: HairBinding, styling: "Styling", radii: np.ndarray, axes: np.ndarray) -> StyleMaker:
     """The `StyleMaker` of bound hair and its styles, of which `can_style` holds.
 
-    axes: (3, 3), from the coordinates of roots and guides to those that are drawn. Raises `HairError` as `new_maker`.
+    radii: (P,) float32; axes: (3, 3), from the coordinates of roots and guides to those that are drawn. Raises
+    `HairError` as `new_maker`.
     """
+    require_count("radii", len(radii), styling.point_count)
     point_count = styling.point_count
     _styles_program(point_count, _kinds_of(styling.program))  # first: where there is none, nothing is uploaded
-    maker = strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, np.eye(3))
+    maker = strand_maker.new_maker(strand_maker.bound_strands(binding), radii, np.eye(3))
     record = uniforms.STYLING.record()
     record["axes"][:3, :3], record["axes"][3, 3] = styling.axes.T, 1.0
     record["level_count"] = len(styling.data.members)
@@ -154,7 +163,7 @@ def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) 
     if styling.levels:
         bound = _joined([strand_maker.bound_strands(level.binding) for level in styling.levels])
         record["centre_count"] = len(bound.roots)
-        centre_maker = strand_maker.new_maker(bound, point_count, np.eye(3))
+        centre_maker = strand_maker.new_maker(bound, radii, np.eye(3))
         centre_maker = replace(centre_maker, segments=maker.segments)
         centres, _in_row = strand_changes.empty_rows(len(bound.roots), point_count)
         for level in styling.levels:
@@ -162,7 +171,7 @@ def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) 
             own["first_strand"], own["are_centres"] = level.first, 1
             levels.append(_new_pass(own, level.data, level.steps, np.eye(3), point_count))
     hair = _new_pass(record, styling.data, styling.program, axes, point_count)
-    return StyleMaker(styling, maker, centre_maker, centres, locks, levels, hair)
+    return StyleMaker(binding, styling, maker, centre_maker, centres, locks, levels, hair)
 
 
 def _new_pass(record, data, program, axes, point_count):

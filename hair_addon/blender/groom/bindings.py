@@ -87,7 +87,7 @@ class BoundHair:
                 self.is_behind = True
                 self._points_have_moved()
             return moved
-        strand_count = len(_grown(self.shares))
+        strand_count = len(self.binding.positions)
         moves_all = self.is_behind or len(combed) == len(guides)
         moved = np.arange(strand_count) if moves_all else self._reached(combed)
         if len(moved):

@@ -50,7 +50,10 @@ def follow_guides(hair, depsgraph, local=None):
     if moved is None:
         make_again(hair, depsgraph)
     elif len(moved):
-        hair_cache.move(hair.session_uid, moved, bound.shown, is_made)
+        if is_made:
+            hair_cache.follow_where_drawn(hair.session_uid, bound.shown)
+        else:
+            hair_cache.move(hair.session_uid, moved, bound.shown)
         write_soon(hair)
     elif hair_outside.is_wanted(hair):
         bound.is_due()  # colliders may have moved
@@ -110,6 +113,8 @@ def make_again(hair, depsgraph):
             pipeline.require_uncombed(hair)
         if _restyle(hair, depsgraph):
             return
+        if hair_cache.may_make(hair.session_uid) and _is_reweighed(hair, depsgraph):
+            return
         bindings.keep(hair, pipeline.bind_hair(guide_curves, settings, depsgraph, hair))
         _follow_simulated(hair)
     except HairError as error:
@@ -118,6 +123,17 @@ def make_again(hair, depsgraph):
         return
     events.strands_made(hair)
     write_soon(hair)
+
+
+def _is_reweighed(hair, depsgraph):
+    """Show hair with other weights of its guides, other lengths or radii, if nothing else of it has changed."""
+    bound = None if hair_outside.is_wanted(hair) else pipeline.reweighed(hair, depsgraph)
+    if bound is None:
+        return False
+    bindings.keep(hair, bound)
+    hair_cache.follow_where_drawn(hair.session_uid, bound)
+    write_soon(hair)
+    return True
 
 
 def _follow_linked(hair, depsgraph):
@@ -164,7 +180,7 @@ def _restyle(hair, depsgraph):
         hair.vellus.is_stale = False
     else:
         if bound.is_behind and bound.straight is None:
-            hair_cache.move(hair.session_uid, None, bound, is_made=True)
+            hair_cache.follow_where_drawn(hair.session_uid, bound)
         else:
             events.strands_made(hair)
         write_soon(hair)

@@ -146,19 +146,22 @@ def refuse(datablock, error):
     print(f"Vellus: {error}", file=sys.stderr)
 
 
-def move(session_uid, moved, bound, is_made=False):
+def move(session_uid, moved, bound):
     """Strands of `BoundHair` have moved: with the next redraw they alone are uploaded, which waits for their points.
 
-    moved: (M,) indices of them; is_made: whether the GPU makes all instead, as `may_make` or `may_restyle` says.
+    moved: (M,) indices of them.
     """
     kept = _strands_of(session_uid)
-    if kept is None:
-        return
-    if is_made:
-        kept.making.due = bound
-    else:
+    if kept is not None:
         kept.growing = bound.growing
         kept.moved.append(moved)
+
+
+def follow_where_drawn(session_uid, bound):
+    """Guides of `BoundHair` have moved, or their weights: with the next redraw the GPU makes all strands."""
+    kept = _strands_of(session_uid)
+    if kept is not None:
+        kept.making.due = bound
 
 
 def may_make(session_uid):

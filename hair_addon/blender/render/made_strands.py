@@ -74,11 +74,20 @@ class Making:
         return True
 
     def _make(self, kept):
-        bound = self.due
-        before = self.maker if self._binding is bound.binding else None
-        count, axes = kept.on_gpu.point_count, bound.surface.to_local_axes
-        self.maker = style_maker.maker_of(bound.binding, bound.styles.styling, count, axes, before)
-        self._binding = bound.binding
+        bound, binding, known = self.due, self.due.binding, self._binding
+        before = self.maker if self.maker is not None and known.positions is binding.positions else None
+        axes = bound.surface.to_local_axes
+        self.maker = style_maker.maker_of(binding, bound.styles.styling, bound.radii, axes, before)
+        if known is not binding and self.maker is before:
+            if known.guide_weights is not binding.guide_weights:
+                self.maker = self.maker.weighed(strand_maker.bound_strands(binding))
+            self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
+        self._binding = binding
+        if not np.array_equal(kept.radii[0], bound.radii):
+            self.maker = self.maker.of_radii(bound.radii)
+            kept.radii = np.broadcast_to(bound.radii, kept.radii.shape)
+            sizes = {"mean_radius": float(bound.radii.mean()), "greatest_radius": float(bound.radii.max())}
+            kept.on_gpu = replace(kept.on_gpu, radii=kept.radii, **sizes)
         kept.on_gpu = self.maker.make(kept.on_gpu, _followed(bound), self.carrier and self.carrier.rest)
 
     def _can_carry(self, kept, pose, is_behind):

@@ -61,12 +61,15 @@ def by_warp(binding, guides, axes):
 
 
 def new_maker(binding, point_count, axes):
-    return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
+    return strand_maker.new_maker(strand_maker.bound_strands(binding), profile(point_count), axes)
 
 
 def uploaded(points):
-    radii = np.broadcast_to(np.linspace(2e-4, 1e-5, points.shape[1], dtype=np.float32), points.shape[:2])
-    return strand_textures.upload_strands(points, radii)
+    return strand_textures.upload_strands(points, np.broadcast_to(profile(points.shape[1]), points.shape[:2]))
+
+
+def profile(point_count):
+    return np.linspace(2e-4, 1e-5, point_count, dtype=np.float32)
 
 
 def texels(texture, count, texels_each):

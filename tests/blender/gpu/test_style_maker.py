@@ -21,6 +21,7 @@ CLOSE = 1e-5
 # tips of rolls, and where strands turn past the centre of their clump.
 SENSITIVE = 2.0
 STRANDS = 150
+RADII = np.linspace(2e-4, 1e-5, 41, dtype=np.float32)
 
 STACKS = {
     "cut": (trim.Settings(factor=0.8, random=0.6, undercoat=0.3, vary=0.2),),
@@ -91,8 +92,8 @@ def assert_same(hair, rng, styles, axes=None, **given):
     axes = np.eye(3) if axes is None else axes
     styling, wanted = hair.bound(*styles, **given), hair.styled(*styles, **given)
     assert style_maker.can_style(styling)
-    maker = style_maker.maker_of(hair.binding, styling, styling.point_count, axes)
     before = uploaded(wanted)
+    maker = style_maker.maker_of(hair.binding, styling, before.radii[0], axes)
     points, radii = made(maker, hair, styling, before)
     found = np.sort(errors(hair, points @ np.linalg.inv(axes).T.astype(np.float32), wanted))
     if found[-1] > CLOSE:
@@ -139,7 +140,7 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
     """The rows of each pass, and neither guides nor textures; then strands are those of the new settings."""
     styles = STACKS["locks that curl"]
     styling = hair.bound(*styles)
-    maker = style_maker.maker_of(hair.binding, styling, 41, np.eye(3))
+    maker = style_maker.maker_of(hair.binding, styling, RADII, np.eye(3))
     strands = maker.make(uploaded(hair.plain), hair.guides.numpy())
     changed = styles[0], replace(styles[1], radius=0.02), styles[2]
     other, sizes = hair.bound(*changed), []
@@ -151,7 +152,7 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
         )
         watched.setattr(gpu.types, "GPUTexture", None)
         watched.setattr(gpu.types, "GPUUniformBuf", None)
-        assert style_maker.maker_of(hair.binding, other, 41, np.eye(3), maker) is maker
+        assert style_maker.maker_of(hair.binding, other, RADII, np.eye(3), maker) is maker
         points, _radii = made(maker, hair, other, strands)
     assert sizes == [uniforms.STYLING.dtype.itemsize] * 3  # of strands, and of centres on two levels
     assert len(shaders.program_cache) == programs
@@ -165,7 +166,7 @@ def test_masks_that_are_painted_further(hair, rng, one_program):
         inputs = Inputs(masks={("Mask", "", False): Mask(None if weights is None else weights.astype(np.float32))})
         styles = clump.Settings(size=0.04), curl.Settings(mask="" if weights is None else "Mask")
         styling = hair.bound(*styles, inputs=inputs)
-        before, maker = maker, style_maker.maker_of(hair.binding, styling, 41, np.eye(3), maker)
+        before, maker = maker, style_maker.maker_of(hair.binding, styling, RADII, np.eye(3), maker)
         assert before in (None, maker)
         points, _radii = made(maker, hair, styling, strands)
         assert np.quantile(errors(hair, points, hair.styled(*styles, inputs=inputs)), 0.95) <= CLOSE
@@ -173,9 +174,9 @@ def test_masks_that_are_painted_further(hair, rng, one_program):
 
 def test_other_clumps_are_bound_again(hair, one_program):
     styling = hair.bound(clump.Settings(size=0.04))
-    maker = style_maker.maker_of(hair.binding, styling, 41, np.eye(3))
+    maker = style_maker.maker_of(hair.binding, styling, RADII, np.eye(3))
     for styles in [(clump.Settings(size=0.03, levels=1),), ()]:
-        other = style_maker.maker_of(hair.binding, hair.bound(*styles), 41, np.eye(3), maker)
+        other = style_maker.maker_of(hair.binding, hair.bound(*styles), RADII, np.eye(3), maker)
         assert other is not maker
 
 

@@ -1,17 +1,19 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that the GPU carries with a surface that is animated: where Warp carries them, and none of them is uploaded."""
+"""Strands that the GPU carries with an animated surface: where Warp carries them, and none of them is uploaded."""
 
 import bpy
 import numpy as np
 
 from hair_addon.blender.data import posed_strands
-from hair_addon.blender.gpu import maker_choice
+from hair_addon.blender.gpu import ambient_visibility, maker_choice
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import live_hair
+from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.settings import style_items
+from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.styling import curl, lean
-from tests.blender.live.test_made_strands import CLOSE, comb, drawn, grown, watched, window  # noqa: F401 (fixtures)
 from tests.support.counting import counts_of
+from tests.support.made_strands import CLOSE, comb, drawn, grown
 from tests.support.reading import points
 
 
@@ -28,7 +30,7 @@ def bend(surface_object, amount):
 
 
 def carried(hair, target=None):
-    """(S, P, 3): the hair that grows between its guides as they are, where Warp carries it; target: whose styles it has."""
+    """(S, P, 3): hair that grows between the guides as they are, where Warp carries it; target: whose styles it has."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     pose = posed_strands.read_pose(hair.data.surface, depsgraph)
     bound = pipeline.bind_hair(*pipeline.inputs_of(hair.data), depsgraph, target)
@@ -97,3 +99,40 @@ def test_styled_hair_is_carried_too(watched, monkeypatch):
     np.testing.assert_allclose(drawn(watched), carried(watched, watched.data), rtol=0.0, atol=CLOSE)
     bend(watched.data.surface, 0.4)
     np.testing.assert_allclose(drawn(watched), carried(watched, watched.data), rtol=0.0, atol=CLOSE)
+
+
+def read(**details):
+    context = bpy.context
+    return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), **details)
+
+
+def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_shadows, monkeypatch):
+    """A direction with each frame, and after all of them what is measured at rest but for rounding."""
+    measured, real = [], ambient_visibility.measure
+    monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
+    bpy.ops.object.light_add(type="SUN")
+    frame = read()
+    assert measured
+    bend(watched.data.surface, 0.5)
+    frame = read(former=frame)  # made now, and of corners as before
+    measured.clear()
+    maps, first = frame.shadow_maps, frame.hair_visibility[0]["visibility_z"]
+    for _ in range(len(ambient_cube.DIRECTIONS)):
+        frame = read(former=frame)
+    assert frame.shadow_maps is maps
+    assert not measured
+    assert frame.hair_visibility[0]["visibility_z"] is not first
+    at_rest = read(before=frame)
+    assert measured
+    followed, wanted = ((*of.hair_visibility, *of.surface_visibility) for of in (frame, at_rest))
+    for found, texture in zip(followed, wanted, strict=True):
+        for name in found:
+            np.testing.assert_allclose(found[name].read(), texture[name].read(), rtol=0.0, atol=0.02)
+    assert np.abs(np.array(at_rest.hair_visibility[0]["visibility_z"].read()) - np.array(first.read())).max() > 0.02
+
+
+def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, coarse_shadows, monkeypatch):
+    measured, real = [], ambient_visibility.measure
+    monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
+    read(former=read())
+    assert len(measured) == 2

@@ -7,62 +7,19 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import maker_choice, strand_maker, uniforms
-from hair_addon.blender.groom import bindings, pipeline
+from hair_addon.blender.data import curves
+from hair_addon.blender.gpu import maker_choice, strand_maker
+from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
-from hair_addon.blender.live import invalidation, live_hair
+from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache, made_strands, viewport
-from hair_addon.blender.settings import preferences, style_items
+from hair_addon.blender.settings import preferences
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
-from hair_addon.core.styling import bend, clump, curl, frizz, lean, smooth, wet
 from tests.blender.render.test_hair_places import view3d
 from tests.support.counting import counts_of
-from tests.support.reading import points, write_points
-
-CLOSE = 1e-5  # [m] of strands of half a metre on a ball of one
-
-
-@pytest.fixture
-def window(monkeypatch):
-    """Act as in a window on a graphics card, where hair is written when an interaction is over."""
-    monkeypatch.setattr(running, "has_window", lambda: True)
-    monkeypatch.setattr(maker_choice, "times", lambda: (0.0, 1.0))
-    yield
-    live_hair.cancel_writing()
-    invalidation.data_replaced()
-
-
-@pytest.fixture
-def watched(hair, window):
-    """Hair that is drawn, and bound, as one of its guides was combed already."""
-    drawn(hair)
-    comb(1)
-    drawn(hair)
-    live_hair.write_all()
-    bpy.context.view_layer.update()
-    drawn(hair)
-    return hair
-
-
-def comb(count, along=(0.0, 0.01, 0.02)):
-    guides = bpy.data.objects["Guides"]
-    combed = points(guides)
-    combed[:count, 1:] += np.float32(along)
-    write_points(guides, combed)
-
-
-def drawn(hair):
-    """(S, P, 3) in the texture that the shader reads, after a viewport has drawn it."""
-    on_gpu = hair_cache.strands_on_gpu(hair.data)
-    hair_cache.choose_makers()
-    texels = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)
-    return texels[: on_gpu.strand_count, :, :3]
-
-
-def grown(hair):
-    """(S, P, 3) that interpolation makes of the guides as they are now, from nothing."""
-    return pipeline.bind_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get()).points
+from tests.support.made_strands import CLOSE, comb, drawn, grown
+from tests.support.reading import points
 
 
 def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, monkeypatch):
@@ -108,6 +65,51 @@ def test_a_surface_that_is_read_again_at_rest_moves_and_uploads_nothing(watched,
     np.testing.assert_allclose(shown, grown(watched), rtol=0.0, atol=CLOSE)
 
 
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"keep_length": 0.2},
+        {"angle_limit": 0.4, "length_limit": 1.5},
+        {"neighbour_limit": 3},
+        {"automatic_influence": False, "influence_distance": 0.4},
+        {"radius": 3e-3, "tip_taper": 0.9},
+    ],
+    ids=lambda settings: next(iter(settings)),
+)
+def test_settings_of_weights_are_followed_where_strands_are_drawn(watched, settings, monkeypatch):
+    comb(9)
+    drawn(watched)
+    calls, before = counts_of(monkeypatch), points(watched)
+    for name, value in settings.items():
+        setattr(watched.data.vellus.hair, name, value)
+    bpy.context.view_layer.update()
+    shown = drawn(watched)
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    np.testing.assert_array_equal(points(watched), before)
+    comb(20)
+    shown = drawn(watched)
+    on_gpu = hair_cache.strands_on_gpu(watched.data)
+    radii = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)[: on_gpu.strand_count, :, 3]
+    live_hair.write_all()
+    assert (calls["searches"], calls["uploads"], calls["writes"]) == (0, 0, 1)
+    monkeypatch.undo()
+    assert getattr(bindings.of(watched.data).settings, name) == pytest.approx(value)
+    np.testing.assert_array_equal(points(watched), grown(watched))
+    np.testing.assert_allclose(shown, points(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_array_equal(radii.ravel(), curves.read_radii(watched.data))
+    assert on_gpu.greatest_radius == radii.max()
+
+
+def test_settings_of_roots_are_not(watched, monkeypatch):
+    calls = counts_of(monkeypatch)
+    watched.data.vellus.hair.neighbour_limit = 16  # more than were found
+    bpy.context.view_layer.update()
+    assert calls["searches"] == 1
+    watched.data.vellus.hair.strand_count = 300
+    bpy.context.view_layer.update()
+    assert len(drawn(watched)) == 300
+
+
 def test_strands_that_are_read_again_are_those_of_now(watched):
     comb(30)
     drawn(watched)
@@ -132,115 +134,6 @@ def test_one_edit_may_go_either_way(watched, monkeypatch):
         assert hair_cache.may_make(watched.data.session_uid) == (choice != "COMPUTE")
         comb(7)
         np.testing.assert_allclose(drawn(watched), grown(watched), rtol=0.0, atol=CLOSE)
-
-
-def test_styles_that_the_gpu_cannot_apply_are_made_as_before(watched, monkeypatch):
-    monkeypatch.setattr(uniforms, "MOST_STEPS", 1)
-    assert hair_cache.may_make(watched.data.session_uid)
-    style_items.add(watched.data.vellus, curl.Settings())
-    style_items.add(watched.data.vellus, frizz.Settings())
-    bpy.context.view_layer.update()
-    drawn(watched)
-    assert not hair_cache.may_make(watched.data.session_uid)
-    comb(60)
-    np.testing.assert_array_equal(drawn(watched), bindings.of(watched.data).points)
-
-
-def add_styles(hair, *styles):
-    """Style hair, and draw it."""
-    for settings in styles:
-        style_items.add(hair.data.vellus, settings)
-    written(hair)
-    drawn(hair)
-    assert hair_cache.may_make(hair.data.session_uid)
-
-
-def written(hair):
-    """(S, P, 3) as its Curves have it once an interaction is over."""
-    bpy.context.view_layer.update()
-    live_hair.write_all()
-    bpy.context.view_layer.update()
-    return points(hair)
-
-
-@pytest.mark.parametrize(
-    "styles", [(lean.Settings(amount=0.3),), (clump.Settings(size=0.3, levels=1), curl.Settings())]
-)
-def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, styles):
-    """Guides that lean do so here; what is written afterwards is what was shown."""
-    add_styles(watched, *styles)
-    with monkeypatch.context() as counted:
-        calls = counts_of(counted)
-        counted.setattr(following, "strands_now", None)
-        for count in (2, 60):
-            comb(count)
-            shown = drawn(watched)
-        assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
-    np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
-    np.testing.assert_array_equal(drawn(watched), shown)
-    assert np.abs(shown - grown(watched)).max() > 0.01  # without styles
-
-
-def slide(hair, place, name, value):
-    """Move the slider of a style's setting."""
-    setattr(style_items.group_of(hair.data.vellus.styles[place]), name, value)
-    bpy.context.view_layer.update()
-
-
-def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
-    add_styles(watched, clump.Settings(size=0.3, levels=1), curl.Settings(radius=0.02, pitch=0.1))
-    first = drawn(watched)
-    with monkeypatch.context() as counted:
-        calls = counts_of(counted)
-        counted.setattr(following, "strands_now", None)
-        slide(watched, 1, "radius", 0.03)
-        drawn(watched)
-        slide(watched, 0, "amount", 0.4)
-        comb(3)  # and combing goes on from there
-        shown = drawn(watched)
-        assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
-    assert np.abs(shown - first).max() > 0.01
-    np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
-    np.testing.assert_array_equal(drawn(watched), shown)
-
-
-def test_a_mask_that_is_painted_uploads_no_strands(watched, monkeypatch):
-    add_styles(watched, bend.Settings(angle=2.0))
-    surface = watched.data.surface
-    bpy.context.view_layer.objects.active = surface
-    group = surface.vertex_groups.new(name="Mask")
-    slide(watched, 0, "mask", "Mask")
-    drawn(watched)
-    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
-    shown, calls = [], counts_of(monkeypatch)
-    for weight in (1.0, 0.4):
-        group.add(range(len(surface.data.vertices) // 2), weight, "REPLACE")
-        surface.data.update()
-        bpy.context.view_layer.update()
-        shown.append(drawn(watched))
-    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
-    assert np.abs(shown[1] - shown[0]).max() > 0.01
-    np.testing.assert_allclose(shown[1], written(watched), rtol=0.0, atol=CLOSE)
-
-
-def test_a_style_that_is_switched_off_and_on(watched):
-    """Other kinds of steps take another program, and hair without any effect none."""
-    add_styles(watched, bend.Settings(), smooth.Settings(length=0.2))
-    for place, is_on in ((0, False), (1, False), (0, True), (1, True)):
-        slide(watched, place, "is_on", is_on)
-        shown = drawn(watched)
-        np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
-
-
-def test_a_style_that_swells_strands_is_uploaded_with_their_radii(watched, monkeypatch):
-    add_styles(watched, wet.Settings(lock=0.3, amount=0.2))
-    calls = counts_of(monkeypatch)
-    slide(watched, 0, "amount", 0.9)
-    shown = drawn(watched)
-    assert calls["uploads"] == 1
-    kept = hair_cache.strands_on_gpu(watched.data)
-    np.testing.assert_array_equal(kept.radii[0], bindings.of(watched.data).radii)
-    np.testing.assert_array_equal(shown, written(watched))
 
 
 @pytest.mark.parametrize(

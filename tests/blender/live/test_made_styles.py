@@ -1,0 +1,126 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Styled hair that the GPU makes: strokes, sliders and painted masks compute and upload no strands on this side."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.gpu import uniforms
+from hair_addon.blender.groom import bindings
+from hair_addon.blender.live import live_hair
+from hair_addon.blender.render import hair_cache
+from hair_addon.blender.settings import style_items
+from hair_addon.core.grooming import following
+from hair_addon.core.styling import bend, clump, curl, frizz, lean, smooth, wet
+from tests.support.counting import counts_of
+from tests.support.made_strands import CLOSE, comb, drawn, grown
+from tests.support.reading import points
+
+
+def test_styles_that_the_gpu_cannot_apply_are_made_as_before(watched, monkeypatch):
+    monkeypatch.setattr(uniforms, "MOST_STEPS", 1)
+    assert hair_cache.may_make(watched.data.session_uid)
+    style_items.add(watched.data.vellus, curl.Settings())
+    style_items.add(watched.data.vellus, frizz.Settings())
+    bpy.context.view_layer.update()
+    drawn(watched)
+    assert not hair_cache.may_make(watched.data.session_uid)
+    comb(60)
+    np.testing.assert_array_equal(drawn(watched), bindings.of(watched.data).points)
+
+
+def add_styles(hair, *styles):
+    """Style hair, and draw it."""
+    for settings in styles:
+        style_items.add(hair.data.vellus, settings)
+    written(hair)
+    drawn(hair)
+    assert hair_cache.may_make(hair.data.session_uid)
+
+
+def written(hair):
+    """(S, P, 3) as its Curves have it once an interaction is over."""
+    bpy.context.view_layer.update()
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    return points(hair)
+
+
+@pytest.mark.parametrize(
+    "styles", [(lean.Settings(amount=0.3),), (clump.Settings(size=0.3, levels=1), curl.Settings())]
+)
+def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, styles):
+    """Guides that lean do so here; what is written afterwards is what was shown."""
+    add_styles(watched, *styles)
+    with monkeypatch.context() as counted:
+        calls = counts_of(counted)
+        counted.setattr(following, "strands_now", None)
+        for count in (2, 60):
+            comb(count)
+            shown = drawn(watched)
+        assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_array_equal(drawn(watched), shown)
+    assert np.abs(shown - grown(watched)).max() > 0.01  # without styles
+
+
+def slide(hair, place, name, value):
+    """Move the slider of a style's setting."""
+    setattr(style_items.group_of(hair.data.vellus.styles[place]), name, value)
+    bpy.context.view_layer.update()
+
+
+def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
+    add_styles(watched, clump.Settings(size=0.3, levels=1), curl.Settings(radius=0.02, pitch=0.1))
+    first = drawn(watched)
+    with monkeypatch.context() as counted:
+        calls = counts_of(counted)
+        counted.setattr(following, "strands_now", None)
+        slide(watched, 1, "radius", 0.03)
+        drawn(watched)
+        slide(watched, 0, "amount", 0.4)
+        comb(3)  # and combing goes on from there
+        shown = drawn(watched)
+        assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert np.abs(shown - first).max() > 0.01
+    np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_array_equal(drawn(watched), shown)
+
+
+def test_a_mask_that_is_painted_uploads_no_strands(watched, monkeypatch):
+    add_styles(watched, bend.Settings(angle=2.0))
+    surface = watched.data.surface
+    bpy.context.view_layer.objects.active = surface
+    group = surface.vertex_groups.new(name="Mask")
+    slide(watched, 0, "mask", "Mask")
+    drawn(watched)
+    bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+    shown, calls = [], counts_of(monkeypatch)
+    for weight in (1.0, 0.4):
+        group.add(range(len(surface.data.vertices) // 2), weight, "REPLACE")
+        surface.data.update()
+        bpy.context.view_layer.update()
+        shown.append(drawn(watched))
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert np.abs(shown[1] - shown[0]).max() > 0.01
+    np.testing.assert_allclose(shown[1], written(watched), rtol=0.0, atol=CLOSE)
+
+
+def test_a_style_that_is_switched_off_and_on(watched):
+    """Other kinds of steps take another program, and hair without any effect none."""
+    add_styles(watched, bend.Settings(), smooth.Settings(length=0.2))
+    for place, is_on in ((0, False), (1, False), (0, True), (1, True)):
+        slide(watched, place, "is_on", is_on)
+        shown = drawn(watched)
+        np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
+
+
+def test_a_style_that_swells_strands_is_uploaded_with_their_radii(watched, monkeypatch):
+    add_styles(watched, wet.Settings(lock=0.3, amount=0.2))
+    calls = counts_of(monkeypatch)
+    slide(watched, 0, "amount", 0.9)
+    shown = drawn(watched)
+    assert calls["uploads"] == 1
+    kept = hair_cache.strands_on_gpu(watched.data)
+    np.testing.assert_array_equal(kept.radii[0], bindings.of(watched.data).radii)
+    np.testing.assert_array_equal(shown, written(watched))
