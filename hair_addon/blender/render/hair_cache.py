@@ -171,15 +171,9 @@ def may_make(session_uid):
 
 
 def may_restyle(session_uid, bound, styles):
-    """Whether the GPU makes what viewports show of bound hair with other styles, which change its points alone."""
+    """Whether the GPU makes what viewports show of bound hair with other styles."""
     kept = _strands_of(session_uid)
-    return (
-        may_make(session_uid)
-        and bound.straight is None
-        and kept.making.can_style(styles)
-        and bound.styles.radius_factor == styles.radius_factor
-        and _are_equal(bound.styles.wetness, styles.wetness)
-    )
+    return may_make(session_uid) and bound.straight is None and kept.making.can_style(styles)
 
 
 def choose_makers():
@@ -240,7 +234,7 @@ def _is_same(datablock, kept, bound):
         is_known
         and np.array_equal(kept.radii.ravel(), curves.read_radii(datablock))
         and np.array_equal(kept.randoms, curves.read_randoms(datablock))
-        and _are_equal(kept.wetness, curves.read_wetness(datablock))
+        and made_strands.are_equal(kept.wetness, curves.read_wetness(datablock))
         and kept.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
         and (bound is not None or _are_places(kept.places, curves.read_root_places(datablock, np.inf)))
     )
@@ -256,12 +250,6 @@ def _are_places(places, others):
     if places is None or others is None:
         return places is others
     return all(map(np.array_equal, places, others))
-
-
-def _are_equal(values, others):
-    if values is None or others is None:
-        return values is others
-    return np.array_equal(values, others)
 
 
 def _are_points(datablock, points):

@@ -88,6 +88,11 @@ class Making:
             kept.radii = np.broadcast_to(bound.radii, kept.radii.shape)
             sizes = {"mean_radius": float(bound.radii.mean()), "greatest_radius": float(bound.radii.max())}
             kept.on_gpu = replace(kept.on_gpu, radii=kept.radii, **sizes)
+        wetness = bound.styles.wetness
+        if not are_equal(kept.wetness, wetness):
+            kept.wetness = wetness
+            texture = None if wetness is None else strand_textures.numbers_texture(wetness, kept.on_gpu.row_strands)
+            kept.on_gpu = replace(kept.on_gpu, wetness=texture, wetness_here=wetness)
         kept.on_gpu = self.maker.make(kept.on_gpu, _followed(bound), self.carrier and self.carrier.rest)
 
     def _can_carry(self, kept, pose, is_behind):
@@ -119,6 +124,13 @@ class Making:
 
 def _is_deformed(pose):
     return pose is not None and pose.motion is not None
+
+
+def are_equal(values: np.ndarray | None, others: np.ndarray | None) -> bool:
+    """Whether two arrays, either of which may be missing, hold the same."""
+    if values is None or others is None:
+        return values is others
+    return np.array_equal(values, others)
 
 
 def _followed(bound):

@@ -115,12 +115,25 @@ def test_a_style_that_is_switched_off_and_on(watched):
         np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
 
 
-def test_a_style_that_swells_strands_is_uploaded_with_their_radii(watched, monkeypatch):
+def test_wetness_and_the_radii_that_swell_with_it(watched, monkeypatch):
+    """By one upload of a number a strand where strands differ in it."""
     add_styles(watched, wet.Settings(lock=0.3, amount=0.2))
     calls = counts_of(monkeypatch)
-    slide(watched, 0, "amount", 0.9)
-    shown = drawn(watched)
-    assert calls["uploads"] == 1
-    kept = hair_cache.strands_on_gpu(watched.data)
-    np.testing.assert_array_equal(kept.radii[0], bindings.of(watched.data).radii)
-    np.testing.assert_array_equal(shown, written(watched))
+    for amount, vary in ((0.9, 0.0), (0.9, 0.5), (0.5, 0.3), (0.5, 0.0)):
+        slide(watched, 0, "amount", amount)
+        slide(watched, 0, "vary", vary)
+        shown = drawn(watched)
+        on_gpu, bound = hair_cache.strands_on_gpu(watched.data), bindings.of(watched.data)
+        radii = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)[
+            : on_gpu.strand_count, :, 3
+        ]
+        np.testing.assert_array_equal(radii, np.broadcast_to(bound.radii, radii.shape))
+        assert on_gpu.greatest_radius == bound.radii.max()
+        assert (on_gpu.wetness is None) == (vary == 0.0)
+        if vary > 0.0:
+            texels = np.array(on_gpu.wetness.read(), np.float32).ravel()[: on_gpu.strand_count]
+            np.testing.assert_array_equal(texels, bound.styles.wetness)
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_array_equal(drawn(watched), shown)
+    assert calls["uploads"] == 0
