@@ -38,10 +38,13 @@ class StrandChanges:
         return replace(strands, moved=moved, bounds=self.bounds.read(), has_points=False)
 
 
-def new_changes(strand_count: int, point_count: int) -> StrandChanges:
-    """`StrandChanges` of strands of as many points each. Raises `HairError` where the driver lacks something."""
+def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -> StrandChanges:
+    """`StrandChanges` of strands of as many points each; keeps_moved: whether to keep where they were before.
+
+    Raises `HairError` where the driver lacks something.
+    """
     bounds = strand_bounds.new_bounds(strand_count)
-    if strand_count * point_count <= MOST_MOVED:
+    if keeps_moved and strand_count * point_count <= MOST_MOVED:
         moved, row_moved = empty_rows(strand_count, point_count + 1)
         moved_rows = numbers_texture(np.arange(1, strand_count + 1), TEXTURE_WIDTH // point_count)
         return StrandChanges(moved, row_moved, moved_rows, bounds)

@@ -122,11 +122,12 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
 
 
-def new_maker(bound: BoundStrands, radii: np.ndarray, axes: np.ndarray) -> StrandMaker:
+def new_maker(bound: BoundStrands, radii: np.ndarray, axes: np.ndarray, keeps_moved: bool = True) -> StrandMaker:
     """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
 
     radii: (P,) float32 along every strand; axes: (3, 3), from the coordinates of roots and guides to those of the
-    strands. Raises `HairError` where counts or indices do not match, or the driver lacks something.
+    strands; keeps_moved: as in `new_changes`. Raises `HairError` where counts or indices do not match, or the driver
+    lacks something.
     """
     point_count = len(radii)
     bindings = _binding_rows(bound)
@@ -143,7 +144,7 @@ def new_maker(bound: BoundStrands, radii: np.ndarray, axes: np.ndarray) -> Stran
     bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
     normals_texture, record["row_normals"] = rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
     segments, record["row_segments"] = empty_rows(guide_count, point_count + 1)
-    changes = new_changes(strand_count, point_count)
+    changes = new_changes(strand_count, point_count, keeps_moved)
     record["row_moved"] = changes.row_moved
     block, profile = uniforms.uniform_buffer(record), _profile(radii)
     return StrandMaker(bindings_texture, normals_texture, segments, profile, changes, record, block, slot_count)

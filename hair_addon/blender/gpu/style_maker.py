@@ -163,7 +163,7 @@ def new_style_maker(binding: HairBinding, styling: "Styling", radii: np.ndarray,
     if styling.levels:
         bound = _joined([strand_maker.bound_strands(level.binding) for level in styling.levels])
         record["centre_count"] = len(bound.roots)
-        centre_maker = strand_maker.new_maker(bound, radii, np.eye(3))
+        centre_maker = strand_maker.new_maker(bound, radii, np.eye(3), keeps_moved=False)
         centre_maker = replace(centre_maker, segments=maker.segments)
         centres, _in_row = strand_changes.empty_rows(len(bound.roots), point_count)
         for level in styling.levels:
