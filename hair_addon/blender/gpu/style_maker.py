@@ -248,8 +248,9 @@ def _styles_program(point_count, kinds):
     info.uniform_buf(0, "Styling", "styling")
     for slot, name in enumerate(("known", "locks")):
         info.sampler(slot, "FLOAT_2D", name)
-    for slot, name in enumerate(("strands", "centres", "boxes")):
-        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
+    both = {"NO_RESTRICT", "READ", "WRITE"}  # centres are read from the image that others are written to
+    for slot, (name, qualifiers) in enumerate({"strands": both, "centres": both, "boxes": {"WRITE"}}.items()):
+        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=qualifiers)
     numbers = {"POINTS": point_count, "WAVES": frizz.WAVES_AN_OCTAVE, "MOST_OCTAVES": frizz.MOST_OCTAVES}
     numbers |= {f"KIND_{name}": kind for name, kind in _KINDS.items()}
     numbers |= {f"RANDOM_{name}": purpose for name, purpose in PURPOSES.items()}

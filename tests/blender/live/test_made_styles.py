@@ -64,6 +64,16 @@ def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, sty
     assert np.abs(shown - grown(watched)).max() > 0.01  # without styles
 
 
+def test_hair_of_another_number_of_points_than_its_guides(watched, monkeypatch):
+    watched.data.vellus.hair.point_count = 20
+    add_styles(watched)
+    calls = counts_of(monkeypatch)
+    comb(20)
+    assert drawn(watched).shape[1] == 20
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    np.testing.assert_allclose(drawn(watched), written(watched).reshape(-1, 20, 3), rtol=0.0, atol=CLOSE)
+
+
 def slide(hair, place, name, value):
     """Move the slider of a style's setting."""
     setattr(style_items.group_of(hair.data.vellus.styles[place]), name, value)
