@@ -23,6 +23,8 @@ _ALL = drawing.Steps()
 # or until it may be smaller by the other: maps whose texels move with every edit flicker.
 _SPARE, _LOOSEST = 1.1, 1.4
 
+_AIMED = ("world_to_shadow", "near", "extent")  # of a light, by `_aim`
+
 
 class ShadowMaps:
     """Shadow textures of the first lights, reused until something moves.
@@ -39,6 +41,7 @@ class ShadowMaps:
         self._in_compute = shaders.has_image_atomics() if in_compute is None else in_compute
         self._targets = {}  # (texture, layer) that is filtered into → its framebuffer
         self._sphere = None  # that maps were aimed at last
+        self._views = {}  # index of a light not near hair → (what it was aimed by, view, what `_aim` wrote)
         self._surfaces = {}  # layer → (what its surfaces were drawn with, texture of the depth that they hide behind)
         # Target of the drawing before it is filtered into a map.
         self._surface_depth = gpu.types.GPUTexture((size, size), format="R32F")
@@ -67,12 +70,31 @@ class ShadowMaps:
         loose = drawing.bounding_sphere(hair)
         self._sphere = loose = _steady(loose, self._sphere) if is_moving and self._sphere else loose
         for index in range(min(int(lights["count"]), self.layer_count)):
-            view = _aim(lights["light"][index], hair, loose, self._size)
+            view = self._aimed(index, lights["light"][index], hair, loose)
             if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index
                 view["light_index"] = index
                 cast = (hair, surfaces) if casters is None else casters(index)
                 self._draw_light(index, view, lights, *cast, steps)
+
+    def _aimed(self, index, light, hair, loose):
+        """What `_aim` returns and writes, kept while the light and the sphere stay."""
+        aimed_by = (
+            light["position"].tobytes(),
+            light["axis"].tobytes(),
+            int(light["kind"]),
+            *loose[0].tolist(),
+            loose[1],
+        )
+        before, view, written = self._views.get(index, (None, None, None))
+        if before == aimed_by:
+            for name, value in written.items():
+                light[name] = value
+            return view.copy()
+        view = _aim(light, hair, loose, self._size)
+        if view is not None and (light["kind"] == SUN or not _is_inside(light["position"][:3].astype(float), *loose)):
+            self._views[index] = aimed_by, view.copy(), {name: light[name].copy() for name in _AIMED}
+        return view
 
     def _draw_light(self, layer, view, lights, hair, surfaces, steps):
         hidden = {"hidden_depth": self._drawn_surfaces(layer, view, lights, surfaces)}

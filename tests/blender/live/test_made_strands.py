@@ -4,15 +4,16 @@
 from types import SimpleNamespace
 
 import bpy
+import gpu
 import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves
-from hair_addon.blender.gpu import maker_choice, strand_maker
+from hair_addon.blender.gpu import drawing, maker_choice, shaders, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
 from hair_addon.blender.live import live_hair
-from hair_addon.blender.render import hair_cache, made_strands, viewport
+from hair_addon.blender.render import drawn_scene, hair_cache, made_strands, viewport
 from hair_addon.blender.settings import preferences
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
@@ -182,3 +183,39 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkey
     assert calls["moves"] == 0
     assert after.moved.turn == 3
     np.testing.assert_allclose(drawn(hair), grown(hair), rtol=0.0, atol=CLOSE)
+
+
+def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watched, coarse_shadows, monkeypatch):
+    """From the comb to shadows and light: one texture of twelve bytes a point of guides; six numbers come back."""
+    bpy.ops.object.light_add(type="SUN")
+
+    def frame(before):
+        context = bpy.context
+        given = context.scene, context.view_layer, context.evaluated_depsgraph_get()
+        return drawn_scene.read(*given, before=before, is_draft=before is not None)
+
+    shown = frame(None)
+    for _ in range(15):  # light has come round once
+        comb(20)
+        shown = frame(shown)
+    programs, maps, calls = len(shaders.program_cache), shown.shadow_maps, counts_of(monkeypatch)
+    textures, sent, surfaces = [], [], []
+    texture, buffer, draw_surface = gpu.types.GPUTexture, gpu.types.Buffer, drawing.draw_surface_depth
+
+    def sized(kind, size, values):
+        if kind == "FLOAT":  # others are blocks of uniforms
+            sent.append(size)
+        return buffer(kind, size, values)
+
+    monkeypatch.setattr(gpu.types, "GPUTexture", lambda *given, **named: textures.append(1) or texture(*given, **named))
+    monkeypatch.setattr(gpu.types, "Buffer", sized)
+    monkeypatch.setattr(drawing, "draw_surface_depth", lambda *given: surfaces.append(1) or draw_surface(*given))
+    for _ in range(3):
+        comb(20)
+        shown = frame(shown)
+    assert sent == [bindings.of(watched.data).guides.numpy().size] * 3
+    assert len(textures) == 3
+    assert len(shaders.program_cache) == programs
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert shown.shadow_maps is maps
+    assert len(surfaces) == 3  # into the map of one direction of the world each, and none into the sun's
