@@ -3,9 +3,9 @@
 
 .venv/bin/python tests/benchmarks/edit_guides.py --strands 30000 100000
 
-Guides are combed, a slider of their weights moves, the surface bends, or simulated guides play. Hair is shaded by
-the Marschner model with shadows, as a viewport draws meanwhile. Strands are made by the compute device and uploaded, or
-made where they are drawn; the bytes that a change uploads are counted.
+Guides are combed, a slider of their weights or of a style moves, the surface bends, or simulated guides play. Hair is
+shaded by the Marschner model with shadows, as a viewport draws meanwhile. Strands are made by the compute device and
+uploaded, or made where they are drawn; the bytes that a change uploads are counted.
 """
 
 import argparse
@@ -32,7 +32,8 @@ from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache
-from hair_addon.blender.settings import preferences
+from hair_addon.blender.settings import preferences, style_items
+from hair_addon.core.styling.kinds import KINDS
 from tests.benchmarks.draw_frames import Frame
 
 REPETITIONS = 50
@@ -40,7 +41,7 @@ ACTIONS = ("stroke", "slider", "surface", "playback")
 
 # What is timed by itself, each waited for; the host has the rest.
 PARTS = {
-    "guides' upload": (strand_maker.StrandMaker, "_put_segments"),
+    "guides' upload": (strand_maker.StrandMaker, "put_guides"),
     "strands": (hair_cache, "strands_on_gpu"),
     "surfaces": (drawn_scene.drawn_meshes, "read_drawn_meshes"),
     "pose": (hair_cache, "_pose_of"),
@@ -78,9 +79,12 @@ class Editing:
         live_hair.follow_guides(self.hair, depsgraph, self.points.reshape(-1, 3))
 
     def slider(self):
-        """Let strands be as long as their guides, or less."""
+        """Let strands be as long as their guides, or less; those with styles take more of the last one, or less."""
         self.turn += 1
-        self.hair.vellus.hair.keep_length = 0.9 if self.turn % 2 else 0.8
+        if len(self.hair.vellus.styles):
+            style_items.group_of(self.hair.vellus.styles[-1]).amount = 0.9 if self.turn % 2 else 0.8
+        else:
+            self.hair.vellus.hair.keep_length = 0.9 if self.turn % 2 else 0.8
         bpy.context.view_layer.update()
 
     def surface(self):
@@ -105,6 +109,7 @@ class Editing:
         details = {"before": self.drawn, "is_draft": True} if action in {"stroke", "slider"} else {"former": self.drawn}
         self.drawn = self.read(**details)
         self.frame.draw(self.drawn)
+        hair_cache.choose_makers()
 
     def parts(self, action):
         """{part: milliseconds} of one change, each waited for."""
@@ -192,6 +197,7 @@ def main():
     parser.add_argument("--guides", type=int, default=4000)
     parser.add_argument("--share", type=float, nargs="+", default=[1.0, 0.03], help="part of the guides that is combed")
     parser.add_argument("--size", type=int, nargs=2, default=[1920, 1080], metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--styles", nargs="+", default=[], choices=sorted(KINDS), help="that the hair has")
     parser.add_argument("--actions", nargs="+", default=ACTIONS, choices=ACTIONS)
     parser.add_argument("--ways", nargs="+", default=["COMPUTE", "GPU"], help="where strands are made")
     parser.add_argument("--devices", nargs="+", default=["cpu"], help="Warp devices of the way by uploads")
@@ -226,6 +232,9 @@ def _measure_way(options, strand_count, device, action, share, way):
     preferences.device, preferences.stroke_device = (lambda: device), (lambda: way)
     built = head.build()
     guides, hair = head.grow(built, guide_count=options.guides, strand_count=strand_count)
+    for kind in options.styles:
+        style_items.add(hair.data.vellus, KINDS[kind]())
+    bpy.context.view_layer.update()
     live_hair.write_all()
     head.light()
     if action == "surface":
