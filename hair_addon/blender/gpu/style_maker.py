@@ -103,6 +103,31 @@ class StyleMaker:
         """The same of strands with radii (P,) float32."""
         return replace(self, maker=self.maker.of_radii(radii))
 
+    def rebound(self, binding: HairBinding, styling: "Styling") -> "StyleMaker | None":
+        """The same for other weights or limits of the same strands and clumps; None where these are others.
+
+        Raises `HairError` as `new_style_maker`.
+        """
+        if not can_style(styling) or not _are_alike(styling, self.styling):
+            return None
+        maker, centre_maker = self.maker, self.centre_maker
+        if binding.guide_weights is not self.binding.guide_weights:
+            maker = maker.weighed(strand_maker.bound_strands(binding))
+        maker = maker.limited(binding.limits.fading, binding.keep_length)
+        if centre_maker is not None:
+            centre_maker = centre_maker.weighed(_centres_of(styling)).limited(
+                binding.limits.fading, binding.keep_length
+            )
+        for part, data, program in self._parts(styling):
+            part.put_masks(data)
+            part.put_steps(program)
+        return replace(self, binding=binding, styling=styling, maker=maker, centre_maker=centre_maker)
+
+    def _parts(self, styling):
+        """[(pass, what is known of its strands, their program)]."""
+        levels = [(own, level.data, level.steps) for own, level in zip(self.levels, styling.levels, strict=True)]
+        return [(self.hair, styling.data, styling.program), *levels]
+
     def restyle(self, styling: "Styling") -> bool:
         """Take other settings of the same styles: numbers alone are uploaded, and masks that were painted.
 
@@ -110,12 +135,11 @@ class StyleMaker:
         """
         if styling is self.styling:
             return True
-        if not can_style(styling) or not _are_alike(styling, self.styling):
+        is_alike = styling.trees is self.styling.trees and _are_alike(styling, self.styling)
+        if not can_style(styling) or not is_alike:
             return False
         masks = styling.data.masks.numpy(), self.styling.data.masks.numpy()
-        parts = [(self.hair, styling.data, styling.program)]
-        parts += [(own, level.data, level.steps) for own, level in zip(self.levels, styling.levels, strict=True)]
-        for part, data, program in parts:
+        for part, data, program in self._parts(styling):
             if not np.array_equal(*masks):
                 part.put_masks(data)
             part.put_steps(program)
@@ -132,14 +156,15 @@ def maker_of(
 ) -> StrandMaker | StyleMaker:
     """What makes the strands of bound hair, with styles or without: the one before where that still does.
 
-    before: for the same roots, and with styles for the same binding. radii and axes: as in `new_maker`. Raises
-    `HairError` as it does.
+    before: for strands at the same places. radii and axes: as in `new_maker`. Raises `HairError` as it does.
     """
     if styling is None or not len(styling.program):  # styles of guides alone are in these
         if isinstance(before, StrandMaker):
             return before
         return strand_maker.new_maker(strand_maker.bound_strands(binding), radii, axes)
-    if isinstance(before, StyleMaker) and before.binding is binding and before.restyle(styling):
+    if isinstance(before, StyleMaker) and before.binding is not binding:
+        before = before.rebound(binding, styling)
+    if isinstance(before, StyleMaker) and before.restyle(styling):
         return before
     return new_style_maker(binding, styling, radii, axes)
 
@@ -161,7 +186,7 @@ def new_style_maker(binding: HairBinding, styling: "Styling", radii: np.ndarray,
     locks, record["row_locks"] = _locks(styling.data)
     centre_maker, centres, levels = None, None, []
     if styling.levels:
-        bound = _joined([strand_maker.bound_strands(level.binding) for level in styling.levels])
+        bound = _centres_of(styling)
         record["centre_count"] = len(bound.roots)
         centre_maker = strand_maker.new_maker(bound, radii, np.eye(3), keeps_moved=False)
         centre_maker = replace(centre_maker, segments=maker.segments)
@@ -219,8 +244,9 @@ def _halves(identities):
     return np.stack([bits >> np.uint32(16), bits & np.uint32(0xFFFF)], axis=1)
 
 
-def _joined(parts):
-    """Strands of several bindings to the same guides by the same settings, one after the other."""
+def _centres_of(styling):
+    """`BoundStrands` of the clump centres of all levels, one after the other: all by the same settings."""
+    parts = [strand_maker.bound_strands(level.binding) for level in styling.levels]
     arrays = {
         name: np.concatenate([getattr(part, name) for part in parts])
         for name in ("roots", "normals", "indices", "weights")
@@ -229,10 +255,9 @@ def _joined(parts):
 
 
 def _are_alike(styling, other):
-    """Whether two stacks on the same strands differ in their numbers and masks alone."""
+    """Whether two stacks on the same strands differ in their numbers, masks and what clumps follow alone."""
     return (
-        styling.trees is other.trees
-        and styling.tree_levels == other.tree_levels
+        styling.tree_levels == other.tree_levels
         and styling.point_count == other.point_count
         and np.array_equal(styling.axes, other.axes)
         and np.array_equal(styling.data.normals.numpy(), other.data.normals.numpy())

@@ -156,8 +156,7 @@ class BoundHair:
 
         is_drawn: whether the GPU makes the strands that are shown; then points grow in `catch_up`.
         """
-        if styles.styling is not None and self.styles.styling is not None:
-            styles.styling.followed.continue_from(self.styles.styling.followed)
+        styles.continue_from(self.styles)
         self.styles = styles
         if is_drawn:
             self.is_behind = True

@@ -29,6 +29,10 @@ def test_styles_that_the_gpu_cannot_apply_are_made_as_before(watched, monkeypatc
     np.testing.assert_array_equal(drawn(watched), bindings.of(watched.data).points)
 
 
+# [m] that single strands of clumps may differ by, where they turn past a center; other settings move hair by far more.
+SENSITIVE = 1e-4
+
+
 def add_styles(hair, *styles):
     """Style hair, and draw it."""
     for settings in styles:
@@ -95,6 +99,26 @@ def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
     assert np.abs(shown - first).max() > 0.01
     np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
     np.testing.assert_array_equal(drawn(watched), shown)
+
+
+@pytest.mark.parametrize("settings", [{"keep_length": 0.2}, {"neighbour_limit": 3, "radius": 3e-3}])
+def test_settings_of_weights_are_followed_with_all_styles(watched, settings, monkeypatch):
+    add_styles(watched, clump.Settings(size=0.3, levels=1), lean.Settings(amount=0.2), curl.Settings(radius=0.02))
+    first, calls = drawn(watched), counts_of(monkeypatch)
+    for name, value in settings.items():
+        setattr(watched.data.vellus.hair, name, value)
+    bpy.context.view_layer.update()
+    comb(9)
+    slide(watched, 0, "amount", 0.7)
+    shown = drawn(watched)
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert np.abs(shown - first).max() > 0.01
+    np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=SENSITIVE)
+    bindings.invalidate(watched.data)
+    watched.data.vellus.hair.seed += 1  # all of it anew
+    watched.data.vellus.hair.seed -= 1
+    bpy.context.view_layer.update()
+    np.testing.assert_allclose(written(watched), shown, rtol=0.0, atol=SENSITIVE)
 
 
 def test_a_mask_that_is_painted_uploads_no_strands(watched, monkeypatch):
