@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves
-from hair_addon.blender.gpu import drawing, maker_choice, shaders, strand_maker
+from hair_addon.blender.gpu import ambient_visibility, drawing, maker_choice, shaders, strand_maker
 from hair_addon.blender.groom import bindings
-from hair_addon.blender.host import running
+from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache, made_strands, viewport
 from hair_addon.blender.settings import preferences, style_items
@@ -195,6 +195,41 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkey
     assert calls["moves"] == 0
     assert after.moved.turn == 3
     np.testing.assert_allclose(drawn(hair), grown(hair), rtol=0.0, atol=CLOSE)
+
+
+def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, coarse_shadows, monkeypatch):
+    viewport.view_cache.clear()
+    measured, real = [], ambient_visibility.measure
+    monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
+    is_playing = [False]
+    monkeypatch.setattr(scene_time, "is_playing", lambda: is_playing[0])
+
+    def view():
+        context = bpy.context
+        of = SimpleNamespace(space_data=view3d(), scene=context.scene, view_layer=context.view_layer)
+        of.evaluated_depsgraph_get = context.evaluated_depsgraph_get
+        return viewport.drawn_scene_of(of)
+
+    comb(9)  # bound
+    view()
+    is_playing[0] = True
+    for _ in range(2):
+        comb(9)
+        view()
+        viewport.invalidate()  # more than hair
+        view()
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    view()
+    measured.clear()
+    viewport.invalidate()
+    played = view()
+    assert not measured
+    is_playing[0] = False
+    at_rest = view()
+    assert measured == [1]
+    assert at_rest is not played
+    assert view() is at_rest
 
 
 def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watched, coarse_shadows, monkeypatch):
