@@ -6,7 +6,6 @@ and their inputs, so `evaluate` can regenerate them.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 from bpy.types import Curves, Depsgraph, Object
 
@@ -314,40 +313,6 @@ def restyle(target: Curves, depsgraph: Depsgraph) -> bool:
         trees = bound.styles
         bound.restyle(styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: trees.trees))
     return True
-
-
-# Settings that change neither where strands are rooted nor which guides may be theirs: of their weights, and others.
-_WEIGHING = ("automatic_influence", "influence_distance", "neighbour_limit")
-_AFTER_WEIGHING = ("keep_length", "angle_limit", "length_limit", "radius", "tip_taper", "guide_map")
-
-
-def reweighed(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
-    """The `BoundHair` of unstyled hair whose weights, lengths or radii are set otherwise; its points have to grow.
-
-    None where more has changed: nothing is read or searched. Raises `HairError`.
-    """
-    known = bindings.of(target)
-    guide_curves, settings = inputs_of(target)
-    if known is None or known.guide_uid != guide_curves.session_uid or known.straight is not None:
-        return None
-    if known.free is not None or known.styles.styling is not None or style_items.styles_of(target.vellus):
-        return None
-    weighing, others = ({name: getattr(settings, name) for name in names} for names in (_WEIGHING, _AFTER_WEIGHING))
-    if replace(known.settings, **weighing, **others) != settings:
-        return None
-    if settings.neighbour_limit >= known.binding.candidates.indices.shape[1]:
-        return None
-    device = known.binding.positions.device
-    guides = curves.read_shown_guides(guide_curves, known.surface, device, known.guides)
-    if following.combed(guides, known.guides) is None:
-        return None
-    if replace(known.settings, **others) == settings:
-        binding, shares = hair_binding.limited_again(known.binding, settings), known.shares
-    else:
-        binding, shares = hair_binding.weigh_again(known.binding, settings), None
-    changed = {"settings": settings, "binding": binding, "shares": shares, "guides": guides}
-    state = {"is_written": False, "has_moved_only": False, "is_map_written": False, "is_behind": True}
-    return replace(known, **changed, **state)
 
 
 def evaluate(target: Curves, depsgraph: Depsgraph) -> None:

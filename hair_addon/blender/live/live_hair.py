@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, simulated_guides
-from ..groom import bindings, hair_outside, painted_masks, pipeline, staleness, writing
+from ..groom import bindings, hair_outside, painted_masks, pipeline, reweighed_hair, staleness, writing
 from ..host import running
 from ..host.notices import text_of
 from ..render import hair_cache
@@ -114,7 +114,7 @@ def make_again(hair, depsgraph):
         if pipeline.restyle(hair, depsgraph):
             _restyled(hair)
             return
-        if hair_cache.may_make(hair.session_uid) and _is_reweighed(hair, depsgraph):
+        if hair_cache.may_make(hair.session_uid) and _is_reweighed(hair):
             return
         bindings.keep(hair, pipeline.bind_hair(guide_curves, settings, depsgraph, hair))
         _follow_simulated(hair)
@@ -126,9 +126,9 @@ def make_again(hair, depsgraph):
     write_soon(hair)
 
 
-def _is_reweighed(hair, depsgraph):
+def _is_reweighed(hair):
     """Show hair with other weights of its guides, other lengths or radii, if nothing else of it has changed."""
-    bound = None if hair_outside.is_wanted(hair) else pipeline.reweighed(hair, depsgraph)
+    bound = None if hair_outside.is_wanted(hair) else reweighed_hair.reweighed(hair)
     if bound is None:
         return False
     bindings.keep(hair, bound)
