@@ -106,8 +106,12 @@ class Editing:
     def once(self, action):
         """One change to the finished picture."""
         getattr(self, action)()
-        details = {"before": self.drawn, "is_draft": True} if action in {"stroke", "slider"} else {"former": self.drawn}
-        self.drawn = self.read(**details)
+        is_played, is_hair_only = action in {"surface", "playback"}, action != "surface"
+        self.drawn = self.read(
+            before=self.drawn if is_hair_only else None,
+            former=self.drawn if is_played else None,
+            is_draft=is_hair_only,
+        )
         self.frame.draw(self.drawn)
         hair_cache.choose_makers()
 

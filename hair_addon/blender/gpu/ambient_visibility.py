@@ -32,8 +32,13 @@ def measure(hair, surfaces, opacities, clear=(), forwards=None):
     of_strands = list(zip(opacities, forwards, strict=True))
     maps = shadows.ShadowMaps(_SIZE, _DIRECTIONS_AT_ONCE)
     targets = [_Target(place) for place in _places(hair, [*surfaces, *clear], of_strands)]
+    steps, batches = _steps(hair), [surface.batch for surface in surfaces]
     for first in range(0, len(ambient_cube.DIRECTIONS), _DIRECTIONS_AT_ONCE):
-        _add(targets, slice(first, first + _DIRECTIONS_AT_ONCE), maps, hair, surfaces)
+        chosen = slice(first, first + _DIRECTIONS_AT_ONCE)
+        lights = _suns(ambient_cube.DIRECTIONS[chosen], ambient_cube.WEIGHTS[chosen])
+        maps.draw(lights, hair, batches, steps)
+        for target in targets:
+            target.add(lights, maps.samplers)
     return _split([target.textures for target in targets], len(hair))
 
 
@@ -44,7 +49,8 @@ class Renewal:
     """
 
     def __init__(self):
-        self._maps = shadows.ShadowMaps(_SIZE, 1)
+        self._lights = _suns(ambient_cube.DIRECTIONS, ambient_cube.WEIGHTS)
+        self._maps = shadows.ShadowMaps(_SIZE, len(ambient_cube.DIRECTIONS))  # of all, whose surfaces may stay
         self._targets, self._turn = [], 0
 
     def step(self, seen, hair, surfaces, through, clear=()):
@@ -58,7 +64,12 @@ class Renewal:
             self._targets, self._turn = [_Target(place) for place in places], 0
         for target, place in zip(self._targets, places, strict=True):
             target.view, target.places = place
-        _add(self._targets, slice(self._turn, self._turn + 1), self._maps, hair, surfaces)
+        batches, turn = [surface.batch for surface in surfaces], self._turn
+        self._maps.draw(self._lights, hair, batches, _steps(hair), is_moving=True, chosen=turn)
+        one = self._lights.copy()
+        one["count"], one["light"][0] = 1, self._lights["light"][turn]
+        for target in self._targets:
+            target.add(one, self._maps.samplers)
         self._turn += 1
         if self._turn < len(ambient_cube.DIRECTIONS):
             return seen
@@ -78,14 +89,6 @@ def _places(hair, receivers, through):
         view["seen_opacity"], view["hair_forward"][:3] = opacity, forward
     textures = [strands.texture for strands, _ in hair] + [surface.places for surface in receivers]
     return list(zip(views, textures, strict=True))
-
-
-def _add(targets, chosen, maps, hair, surfaces):
-    """Add some directions of the world to `_Target`s."""
-    lights = _suns(ambient_cube.DIRECTIONS[chosen], ambient_cube.WEIGHTS[chosen])
-    maps.draw(lights, hair, [surface.batch for surface in surfaces], _steps(hair))
-    for target in targets:
-        target.add(lights, maps.samplers)
 
 
 def _split(textures, hair_count):

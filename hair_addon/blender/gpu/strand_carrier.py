@@ -5,15 +5,18 @@ Strands at rest and their roots are uploaded once, or made there; a pose of the 
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import gpu
 import numpy as np
 
-from ...core.geometry.surface_deform import SurfaceMotion
 from ...core.kernels.checks import require_count, require_indices
 from . import shaders
 from .strand_changes import StrandChanges, new_changes, rows_texture
 from .strand_textures import MOST_GROUPS, StrandsOnGPU
+
+if TYPE_CHECKING:
+    from ...core.geometry.surface_deform import SurfaceMotion
 
 _GROUP_SIZE = 64
 _NOT_TURNED = np.eye(3, dtype=np.float32)[:2]
@@ -28,7 +31,7 @@ class StrandCarrier:
     vertices: np.ndarray  # (V, 3) of the surface at rest
     changes: StrandChanges
 
-    def carry(self, strands: StrandsOnGPU, motion: SurfaceMotion | None) -> StrandsOnGPU:
+    def carry(self, strands: StrandsOnGPU, motion: "SurfaceMotion | None") -> StrandsOnGPU:
         """Carry all strands from their rest; the `StrandsOnGPU` after it.
 
         strands: of the same roots, whose texture is changed: another one than `rest`; motion: from the same vertices,

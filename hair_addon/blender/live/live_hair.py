@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, simulated_guides
-from ..groom import bindings, hair_outside, painted_masks, pipeline, reweighing, staleness, writing
+from ..groom import bindings, hair_outside, painted_masks, pipeline, reweighed_hair, staleness, writing
 from ..host import running
 from ..host.notices import text_of
 from ..render import hair_cache
@@ -127,7 +127,7 @@ def make_again(hair, depsgraph):
 
 def _is_reweighed(hair, depsgraph):
     """Show hair with other weights of its guides, other lengths or radii, if nothing else of it has changed."""
-    bound = None if hair_outside.is_wanted(hair) else reweighing.reweighed(hair, depsgraph)
+    bound = None if hair_outside.is_wanted(hair) else reweighed_hair.reweighed(hair, depsgraph)
     if bound is None:
         return False
     bindings.keep(hair, bound)

@@ -95,8 +95,9 @@ def read(
         lamps = scene_lights.gather(*found, world, hair_receivers)
     # Where Warp computes hair that plays, each frame is as at rest.
     last = before or (former if _are_made(hair) else None)
-    if before is None and last is not None:
-        is_draft, maps = True, last.shadow_maps if _fit(last.shadow_maps, lamps) else None
+    is_draft = is_draft or (former is not None and _are_made(hair))
+    if before is None and last is not None and _fit(last.shadow_maps, lamps):
+        maps = last.shadow_maps
     renewal = None
     if is_draft and last is not None and _have_same_places(last, hair, (*surfaces, *clear)):
         seen = last.hair_visibility, last.surface_visibility

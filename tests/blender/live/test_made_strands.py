@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands that the GPU makes while guides are combed: what is written afterwards is what was shown; counted."""
 
+from itertools import cycle
 from types import SimpleNamespace
 
 import bpy
@@ -9,9 +10,9 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves
-from hair_addon.blender.gpu import drawing, maker_choice, shaders, strand_maker
+from hair_addon.blender.gpu import ambient_visibility, drawing, maker_choice, shaders, strand_maker
 from hair_addon.blender.groom import bindings
-from hair_addon.blender.host import running
+from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache, made_strands, viewport
 from hair_addon.blender.settings import preferences
@@ -185,6 +186,41 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkey
     np.testing.assert_allclose(drawn(hair), grown(hair), rtol=0.0, atol=CLOSE)
 
 
+def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, coarse_shadows, monkeypatch):
+    viewport.view_cache.clear()
+    measured, real = [], ambient_visibility.measure
+    monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
+    is_playing = [False]
+    monkeypatch.setattr(scene_time, "is_playing", lambda: is_playing[0])
+
+    def view():
+        context = bpy.context
+        of = SimpleNamespace(space_data=view3d(), scene=context.scene, view_layer=context.view_layer)
+        of.evaluated_depsgraph_get = context.evaluated_depsgraph_get
+        return viewport.drawn_scene_of(of)
+
+    comb(9)  # bound
+    view()
+    is_playing[0] = True
+    for _ in range(2):
+        comb(9)
+        view()
+        viewport.invalidate()  # more than hair
+        view()
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    view()
+    measured.clear()
+    viewport.invalidate()
+    played = view()
+    assert not measured
+    is_playing[0] = False
+    at_rest = view()
+    assert measured == [1]
+    assert at_rest is not played
+    assert view() is at_rest
+
+
 def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watched, coarse_shadows, monkeypatch):
     """From the comb to shadows and light: one texture of twelve bytes a point of guides; six numbers come back."""
     bpy.ops.object.light_add(type="SUN")
@@ -195,8 +231,9 @@ def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watc
         return drawn_scene.read(*given, before=before, is_draft=before is not None)
 
     shown = frame(None)
-    for _ in range(15):  # light has come round once
-        comb(20)
+    to_and_fro = cycle([np.float32([0.0, 0.01, 0.02]), np.float32([0.0, -0.01, -0.02])])
+    for _ in range(16):  # light has come round once
+        comb(20, next(to_and_fro))
         shown = frame(shown)
     programs, maps, calls = len(shaders.program_cache), shown.shadow_maps, counts_of(monkeypatch)
     textures, sent, surfaces = [], [], []
@@ -211,11 +248,11 @@ def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watc
     monkeypatch.setattr(gpu.types, "Buffer", sized)
     monkeypatch.setattr(drawing, "draw_surface_depth", lambda *given: surfaces.append(1) or draw_surface(*given))
     for _ in range(3):
-        comb(20)
+        comb(20, next(to_and_fro))
         shown = frame(shown)
     assert sent == [bindings.of(watched.data).guides.numpy().size] * 3
     assert len(textures) == 3
     assert len(shaders.program_cache) == programs
     assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
     assert shown.shadow_maps is maps
-    assert len(surfaces) == 3  # into the map of one direction of the world each, and none into the sun's
+    assert not surfaces  # which stay in the maps of the sun and of the world's directions

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Bound hair whose settings of weights, lengths or radii change, while a slider moves: nothing is searched."""
+"""Bound hair with other weights of its guides, other lengths or radii: what sliders change where strands are drawn."""
 
 from dataclasses import replace
 
