@@ -11,7 +11,7 @@ from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.settings import style_items
 from hair_addon.core.grooming import following
-from hair_addon.core.styling import bend, clump, curl, frizz, lean, smooth, wet
+from hair_addon.core.styling import bend, clump, curl, frizz, lean, wet
 from tests.support.counting import counts_of
 from tests.support.made_strands import CLOSE, comb, drawn, grown
 from tests.support.reading import points
@@ -141,8 +141,8 @@ def test_a_mask_that_is_painted_uploads_no_strands(watched, monkeypatch):
 
 
 def test_a_style_that_is_switched_off_and_on(watched):
-    """Other kinds of steps take another program, and hair without any effect none."""
-    add_styles(watched, bend.Settings(), smooth.Settings(length=0.2))
+    """Steps take a program of their kinds, styles of guides alone take none, nor does hair without any effect."""
+    add_styles(watched, bend.Settings(), lean.Settings(amount=0.5))
     for place, is_on in ((0, False), (1, False), (0, True), (1, True)):
         slide(watched, place, "is_on", is_on)
         shown = drawn(watched)
