@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Makes strands of their guides in the texture that they are drawn from: core/interpolation/interpolation.py on any GPU.
-// Where points were before is left for motion vectors.
+// Where points were before is left for motion vectors, and the box of each strand for what is around all.
 
 #include "include/guide_sum.glsl"
 #include "include/strand.glsl"
@@ -64,6 +64,8 @@ void main()
   vec3 place = (making.axes * vec4(root, 0.0)).xyz;
   ivec2 here = strand_texel(strand, 0, making.point_count, making.row_strands);
   ivec2 past = strand_texel(strand, 1, making.point_count + 1, making.row_moved);
+  vec3 least = place;
+  vec3 greatest = place;
   for (int point = 0; point < making.point_count; point++) {
     if (point > 0) {
       vec3 sum = vec3(0.0);
@@ -76,11 +78,15 @@ void main()
       }
       sum = stretched(sum, mean_length, making.keep_length);
       place += tangent * sum.x + bitangent * sum.y + normal * sum.z;
+      least = min(least, place);
+      greatest = max(greatest, place);
     }
-    vec4 before = imageLoad(strands, here + ivec2(point, 0));
     if (making.row_moved > 0) {
-      imageStore(moved_strands, past + ivec2(point, 0), before);
+      imageStore(moved_strands, past + ivec2(point, 0), imageLoad(strands, here + ivec2(point, 0)));
     }
-    imageStore(strands, here + ivec2(point, 0), vec4(place, before.w));
+    imageStore(strands, here + ivec2(point, 0), vec4(place, texelFetch(radii, ivec2(point, 0), 0).r));
   }
+  ivec2 box = strand_texel(strand, 0, 2, imageSize(boxes).x / 2);
+  imageStore(boxes, box, vec4(least, 0.0));
+  imageStore(boxes, box + ivec2(1, 0), vec4(greatest, 0.0));
 }

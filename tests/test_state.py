@@ -33,12 +33,16 @@ PURE = {
     "blender/gpu/uniforms.py: settings_block",
     "blender/host/paths.py: addon_version",
     "blender/settings/setting_properties.py: _settings_of",
+    "blender/settings/setting_properties.py: as_stored",
     "core/dynamics/rod/stiffness_advice.py: tip_sink",
     "core/geometry/bspline.py: basis_matrix",
     "core/geometry/bspline.py: _device_matrix",
     "core/geometry/bspline.py: _flat_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
     "core/params.py: _declared",
+    "core/shading/appearance.py: strand_settings",
+    "core/shading/appearance.py: table_settings",
+    "core/shading/appearance.py: wetted",
 }
 
 _DISPLAYS = (ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.Set, ast.SetComp)

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What an edit of guides costs until the picture is finished: milliseconds of its parts, on the sample head.
+"""What a change of hair costs until the picture is finished: milliseconds of its parts, on the sample head.
 
 .venv/bin/python tests/benchmarks/edit_guides.py --strands 30000 100000
 
-Shaded by the Marschner model with shadows, as a viewport draws while guides are combed. Strands are made by the compute
-device and uploaded, or made where they are drawn; the bytes that an edit uploads and reads back are counted.
+Guides are combed, a slider of their weights or of a style moves, the surface bends, or simulated guides play. Hair is
+shaded by the Marschner model with shadows, as a viewport draws meanwhile. Strands are made by the compute device and
+uploaded, or made where they are drawn; the bytes that a change uploads are counted.
 """
 
 import argparse
@@ -25,71 +26,141 @@ import head  # the samples' scene
 
 import hair_addon
 from hair_addon.blender.data import curves
-from hair_addon.blender.gpu import maker_choice
+from hair_addon.blender.gpu import maker_choice, strand_maker
+from hair_addon.blender.gpu.shadows import ShadowMaps
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache
-from hair_addon.blender.settings import preferences
+from hair_addon.blender.settings import preferences, style_items
+from hair_addon.core.styling.kinds import KINDS
 from tests.benchmarks.draw_frames import Frame
 
 REPETITIONS = 50
-PARTS = ("host", "strands", "read, shadows", "drawing")
+ACTIONS = ("stroke", "slider", "surface", "playback")
+
+# What is timed by itself, each waited for; the host has the rest.
+PARTS = {
+    "guides' upload": (strand_maker.StrandMaker, "put_guides"),
+    "strands": (hair_cache, "strands_on_gpu"),
+    "surfaces": (drawn_scene.drawn_meshes, "read_drawn_meshes"),
+    "pose": (hair_cache, "_pose_of"),
+    "shadows": (ShadowMaps, "draw"),
+    "visibility": (drawn_scene, "_renewed"),
+    "all of it": (drawn_scene, "_visibility"),
+    "drawing": (Frame, "draw"),
+}
+_WITHIN = {"guides' upload": "strands", "pose": "strands"}
+_NESTED = {"shadows": ("visibility", "all of it")}  # which draw maps of their own
 
 
 class Editing:
-    """Guides of the sample head that are combed, with what follows until its hair is drawn."""
+    """Hair of the sample head that is changed, with what follows until it is drawn."""
 
     def __init__(self, guides, hair, frame, share):
         self.guides, self.hair, self.frame = guides.data, hair.data, frame
         self.points = curves.read_points(self.guides).reshape(len(guides.data.curves), -1, 3)
         self.combed = slice(0, max(1, int(share * len(self.points))))
         self.turn = 0
-        self.drawn = self.read(None)
-        self.edit()
-        self.drawn = self.read(None)  # bound now
+        self.drawn = self.read()
+        self.stroke()
+        self.drawn = self.read()  # bound now
         hair_cache.choose_makers()
 
-    def read(self, before):
+    def read(self, **details):
         """The `DrawnScene` as a viewport reads it."""
         context = bpy.context
-        depsgraph = context.evaluated_depsgraph_get()
-        return drawn_scene.read(
-            context.scene, context.view_layer, depsgraph, before=before, is_draft=before is not None
-        )
+        return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), **details)
 
-    def edit(self):
+    def stroke(self):
         """Follow guides that were combed back or forth."""
+        self._combed()
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        live_hair.follow_guides(self.hair, depsgraph, self.points.reshape(-1, 3))
+
+    def slider(self):
+        """Let strands be as long as their guides, or less; those with styles take more of the last one, or less."""
+        self.turn += 1
+        if len(self.hair.vellus.styles):
+            style_items.group_of(self.hair.vellus.styles[-1]).amount = 0.9 if self.turn % 2 else 0.8
+        else:
+            self.hair.vellus.hair.keep_length = 0.9 if self.turn % 2 else 0.8
+        bpy.context.view_layer.update()
+
+    def surface(self):
+        """Go to the next frame of a surface that bends."""
+        self.turn += 1
+        bpy.context.scene.frame_set(self.turn)
+
+    def playback(self):
+        """Show guides where they were simulated in the next frame."""
+        self._combed()
+        live_hair.show_guides(self.guides, self.points, bpy.context.evaluated_depsgraph_get())
+
+    def _combed(self):
         self.turn += 1
         along = np.linspace(0.0, 1.0, self.points.shape[1], dtype=np.float32)[:, None]
         self.points = self.points.copy()  # those before are what hair has followed
         self.points[self.combed] += along * np.float32([0.0, 1e-3, 0.0]) * (1 if self.turn % 2 else -1)
-        depsgraph = bpy.context.evaluated_depsgraph_get()
-        live_hair.follow_guides(self.hair, depsgraph, self.points.reshape(-1, 3))
 
-    def once(self):
-        """One edit to the finished picture."""
-        self.edit()
-        self.drawn = self.read(self.drawn)
+    def once(self, action):
+        """One change to the finished picture."""
+        getattr(self, action)()
+        is_played, is_hair_only = action in {"surface", "playback"}, action != "surface"
+        self.drawn = self.read(
+            before=self.drawn if is_hair_only else None,
+            former=self.drawn if is_played else None,
+            is_draft=is_hair_only,
+        )
         self.frame.draw(self.drawn)
+        hair_cache.choose_makers()
 
-    def parts(self):
-        """Milliseconds of `PARTS` of one edit, each waited for."""
-        times = [time.perf_counter()]
+    def parts(self, action):
+        """{part: milliseconds} of one change, each waited for."""
+        found, real = dict.fromkeys(PARTS, 0.0), {part: getattr(*where) for part, where in PARTS.items()}
+        running_parts = []
 
-        def waited():
-            self.frame.wait()
-            times.append(time.perf_counter())
+        def timed(part):
+            def call(*given, **named):
+                if set(running_parts) & set(_NESTED.get(part, ())):
+                    return real[part](*given, **named)
+                self.frame.wait()
+                started = time.perf_counter()
+                running_parts.append(part)
+                result = real[part](*given, **named)
+                running_parts.pop()
+                self.frame.wait()
+                found[part] += 1e3 * (time.perf_counter() - started)
+                return result
 
-        self.edit()
-        waited()
-        hair_cache.strands_on_gpu(self.hair)
-        waited()
-        self.drawn = self.read(self.drawn)
-        waited()
-        self.frame.draw(self.drawn)
-        times.append(time.perf_counter())
-        return 1e3 * np.diff(times)
+            return call
+
+        for part, (owner, name) in PARTS.items():
+            setattr(owner, name, timed(part))
+        try:
+            started = time.perf_counter()
+            self.once(action)
+            whole = 1e3 * (time.perf_counter() - started)
+        finally:
+            for part, (owner, name) in PARTS.items():
+                setattr(owner, name, real[part])
+        for part, outer in _WITHIN.items():
+            found[outer] -= found[part]
+        return found | {"host": whole - sum(found.values())}
+
+
+def bend(surface, frames):
+    """Let a surface bend to and fro by a shape key with keyframes."""
+    surface.shape_key_add(name="Basis")
+    key = surface.shape_key_add(name="Bent")
+    places = np.empty(3 * len(key.data), np.float32)
+    key.data.foreach_get("co", places)
+    places = places.reshape(-1, 3)
+    places += 0.01 * np.sin(20.0 * places[:, [1, 2, 0]])
+    key.data.foreach_set("co", places.ravel())
+    for frame in range(0, frames, 10):
+        key.value = 0.2 + 0.8 * (frame // 10 % 2)
+        key.keyframe_insert("value", frame=frame)
 
 
 class Traffic:
@@ -109,17 +180,18 @@ class Traffic:
         gpu.types.Buffer = self._buffer
 
 
-def measure(editing, repetitions):
-    """(median of one edit [ms], quartiles, medians of `PARTS`, bytes uploaded by one edit)."""
+def measure(editing, action, repetitions):
+    """(median of one change [ms], quartiles, {part: median}, bytes uploaded by one)."""
     totals = []
-    for _ in range(repetitions + 2):
+    for _ in range(repetitions + 3):
         started = time.perf_counter()
-        editing.once()
+        editing.once(action)
         totals.append(1e3 * (time.perf_counter() - started))
-    parts = np.median([editing.parts() for _ in range(max(3, repetitions // 3))], axis=0)
+    found = [editing.parts(action) for _ in range(max(3, repetitions // 3))]
+    parts = {part: float(np.median([one[part] for one in found])) for part in found[0]}
     with Traffic() as traffic:
-        editing.once()
-    return np.percentile(totals[2:], [50, 25, 75]), parts, traffic.sent
+        editing.once(action)
+    return np.percentile(totals[3:], [50, 25, 75]), parts, traffic.sent
 
 
 def main():
@@ -129,6 +201,9 @@ def main():
     parser.add_argument("--guides", type=int, default=4000)
     parser.add_argument("--share", type=float, nargs="+", default=[1.0, 0.03], help="part of the guides that is combed")
     parser.add_argument("--size", type=int, nargs=2, default=[1920, 1080], metavar=("WIDTH", "HEIGHT"))
+    parser.add_argument("--styles", nargs="+", default=[], choices=sorted(KINDS), help="that the hair has")
+    parser.add_argument("--actions", nargs="+", default=ACTIONS, choices=ACTIONS)
+    parser.add_argument("--ways", nargs="+", default=["COMPUTE", "GPU"], help="where strands are made")
     parser.add_argument("--devices", nargs="+", default=["cpu"], help="Warp devices of the way by uploads")
     parser.add_argument("--repetitions", type=int, default=REPETITIONS)
     options = parser.parse_args()
@@ -149,31 +224,39 @@ def main():
 
 
 def _measure_ways(options, strand_count, device):
+    for action in options.actions:
+        for share in options.share if action == "stroke" else (1.0,):
+            for way in options.ways:
+                if way == "COMPUTE" or device == options.devices[0]:
+                    _measure_way(options, strand_count, device, action, share, way)
+
+
+def _measure_way(options, strand_count, device, action, share, way):
     bpy.ops.wm.read_factory_settings(use_empty=True)
-    preferences.device = lambda: device
+    preferences.device, preferences.stroke_device = (lambda: device), (lambda: way)
     built = head.build()
     guides, hair = head.grow(built, guide_count=options.guides, strand_count=strand_count)
+    for kind in options.styles:
+        style_items.add(hair.data.vellus, KINDS[kind]())
+    bpy.context.view_layer.update()
     live_hair.write_all()
     head.light()
+    if action == "surface":
+        bend(hair.data.surface, 4 * options.repetitions)
     bpy.context.view_layer.update()
     frame = Frame(*options.size, 1)
-    for share in options.share:
-        for way in ("COMPUTE", "GPU"):
-            if way == "GPU" and device != options.devices[0]:
-                continue  # it does not compute there
-            preferences.stroke_device = lambda way=way: way
-            hair_cache.strand_cache.clear()
-            editing = Editing(guides, hair, frame, share)
-            assert hair_cache.may_make(hair.data.session_uid) == (way == "GPU")
-            few = options.repetitions if way == "GPU" or strand_count <= 200_000 else options.repetitions // 5
-            (median, low, high), parts, sent = measure(editing, few)
-            shown = "  ".join(f"{name} {part:7.2f}" for name, part in zip(PARTS, parts, strict=True))
-            print(
-                f"{strand_count:8} strands  {share:4.0%} of guides  {way:7} {device:6} {median:8.2f} "
-                f"({low:.2f} to {high:.2f})   {shown}   sent {sent / 1e6:.2f} MB",
-                flush=True,
-            )
-            _print_error(hair)
+    editing = Editing(guides, hair, frame, share)
+    assert hair_cache.may_make(hair.data.session_uid) == (way == "GPU")
+    few = options.repetitions if way == "GPU" or strand_count <= 200_000 else options.repetitions // 5
+    (median, low, high), parts, sent = measure(editing, action, few)
+    shown = "  ".join(f"{part} {value:.2f}" for part, value in parts.items() if value)
+    print(
+        f"{strand_count:8} strands  {action:8} {share:4.0%} of guides  {way:7} {device:6} {median:8.2f} "
+        f"({low:.2f} to {high:.2f})   {shown}   sent {sent / 1e6:.2f} MB",
+        flush=True,
+    )
+    if action != "surface":
+        _print_error(hair)
 
 
 def _print_error(hair):

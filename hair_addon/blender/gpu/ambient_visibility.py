@@ -27,27 +27,72 @@ def measure(hair, surfaces, opacities, clear=(), forwards=None):
     visibility holds; the surfaces' is for the densest; clear: surfaces that hide nothing, which follow the others;
     forwards: what a strand of each hair passes on, (3,) each, None: the same of all channels, by the opacities.
     """
-    receivers = [*surfaces, *clear]
-    views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
-    views += [_view_of_surface(surface) for surface in receivers]
     if forwards is None:
         forwards = [np.full(3, 1.0 - opacity) for opacity in opacities]
-    through = list(zip(opacities, forwards, strict=True))
-    of_surfaces = through[densest([strands for strands, _ in hair])] if hair else (1.0, np.zeros(3))
-    for view, (opacity, forward) in zip(views, through + [of_surfaces] * len(receivers), strict=True):
-        view["seen_opacity"], view["hair_forward"][:3] = opacity, forward
-    places = [strands.texture for strands, _ in hair] + [surface.places for surface in receivers]
-    targets = [_Target(view, texture) for view, texture in zip(views, places, strict=True)]
+    of_strands = list(zip(opacities, forwards, strict=True))
     maps = shadows.ShadowMaps(_SIZE, _DIRECTIONS_AT_ONCE)
-    steps = _steps(hair)
+    targets = [_Target(place) for place in _places(hair, [*surfaces, *clear], of_strands)]
+    steps, batches = _steps(hair), [surface.batch for surface in surfaces]
     for first in range(0, len(ambient_cube.DIRECTIONS), _DIRECTIONS_AT_ONCE):
         chosen = slice(first, first + _DIRECTIONS_AT_ONCE)
         lights = _suns(ambient_cube.DIRECTIONS[chosen], ambient_cube.WEIGHTS[chosen])
-        maps.draw(lights, hair, [surface.batch for surface in surfaces], steps)
+        maps.draw(lights, hair, batches, steps)
         for target in targets:
             target.add(lights, maps.samplers)
-    textures = [target.textures for target in targets]
-    return textures[: len(hair)], textures[len(hair) :]
+    return _split([target.textures for target in targets], len(hair))
+
+
+class Renewal:
+    """Visibility that follows what moves, one direction of the world with each change of it.
+
+    What is complete is shown while the next is added up, so all that is shown is from the same few changes.
+    """
+
+    def __init__(self):
+        self._lights = _suns(ambient_cube.DIRECTIONS, ambient_cube.WEIGHTS)
+        self._maps = shadows.ShadowMaps(_SIZE, len(ambient_cube.DIRECTIONS))  # of all, whose surfaces may stay
+        self._targets, self._turn = [], 0
+
+    def step(self, seen, hair, surfaces, through, clear=()):
+        """Add a direction; the visibility textures that are complete now, as `measure` returns them.
+
+        seen: those that were complete before, of as many places; through: (opacity, what is passed on (3,)) of each
+        hair; the rest as for `measure`.
+        """
+        places = _places(hair, [*surfaces, *clear], through)
+        if [target.size for target in self._targets] != [_size_of(*place) for place in places]:
+            self._targets, self._turn = [_Target(place) for place in places], 0
+        for target, place in zip(self._targets, places, strict=True):
+            target.view, target.places = place
+        batches, turn = [surface.batch for surface in surfaces], self._turn
+        self._maps.draw(self._lights, hair, batches, _steps(hair), is_moving=True, chosen=turn)
+        one = self._lights.copy()
+        one["count"], one["light"][0] = 1, self._lights["light"][turn]
+        for target in self._targets:
+            target.add(one, self._maps.samplers)
+        self._turn += 1
+        if self._turn < len(ambient_cube.DIRECTIONS):
+            return seen
+        self._turn = 0
+        complete = [target.textures for target in self._targets]
+        for target, textures in zip(self._targets, [*seen[0], *seen[1]], strict=True):
+            target.take(textures)
+        return _split(complete, len(hair))
+
+
+def _places(hair, receivers, through):
+    """[(`uniforms.VIEW` record, texture)] of what receives light: strands, then surfaces."""
+    views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
+    views += [_view_of_surface(surface) for surface in receivers]
+    of_surfaces = through[densest([strands for strands, _ in hair])] if hair else (1.0, np.zeros(3))
+    for view, (opacity, forward) in zip(views, through + [of_surfaces] * len(receivers), strict=True):
+        view["seen_opacity"], view["hair_forward"][:3] = opacity, forward
+    textures = [strands.texture for strands, _ in hair] + [surface.places for surface in receivers]
+    return list(zip(views, textures, strict=True))
+
+
+def _split(textures, hair_count):
+    return textures[:hair_count], textures[hair_count:]
 
 
 def _steps(hair):
@@ -98,10 +143,14 @@ def _view_of_surface(surface):
 class _Target:
     """Textures that visibility is added up in, a texel for each place."""
 
-    def __init__(self, view, places):
-        self.view, self.places = view, places
-        size = int(view["row_strands"] * view["seen_points"]), places.height
-        self.textures = {name: _texture(size) for name in shaders.VISIBILITY_SAMPLERS}
+    def __init__(self, place):
+        self.view, self.places = place
+        self.size = _size_of(*place)
+        self.take({name: _texture(self.size) for name in shaders.VISIBILITY_SAMPLERS})
+
+    def take(self, textures):
+        """Add up in these textures {sampler: texture}, from zero."""
+        self.textures = textures
         self.framebuffer = gpu.types.GPUFrameBuffer(color_slots=tuple(self.textures.values()))
         with self.framebuffer.bind():
             self.framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0))
@@ -110,6 +159,10 @@ class _Target:
         with self.framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"):
             blocks = {"view": self.view, "lights": lights}
             drawing.draw_cover(shaders.visibility_program(), blocks, {"places": self.places, **maps})
+
+
+def _size_of(view, places):
+    return int(view["row_strands"] * view["seen_points"]), places.height
 
 
 def _texture(size):

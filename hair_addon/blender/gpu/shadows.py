@@ -19,6 +19,12 @@ _LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
 _SHADE_DISTANCE = 0.15
 _ALL = drawing.Steps()
 
+# While hair moves, the sphere that maps are aimed at stays until it has to be larger, and is then larger by one factor,
+# or until it may be smaller by the other: maps whose texels move with every edit flicker.
+_SPARE, _LOOSEST = 1.1, 1.4
+
+_AIMED = ("world_to_shadow", "near", "extent")  # of a light, by `_aim`
+
 
 class ShadowMaps:
     """Shadow textures of the first lights, reused until something moves.
@@ -28,11 +34,15 @@ class ShadowMaps:
     """
 
     def __init__(self, size, layer_count, in_compute=None):
-        self._size, self._layer_count = size, layer_count
+        self._size, self.layer_count = size, layer_count
         self._hair_front = _array(size, layer_count, "RG32F")
         self._hair_layers = _array(size, layer_count, "RGBA16F")
         self._surface_moments = _array(size, layer_count, "RGBA32F")
         self._in_compute = shaders.has_image_atomics() if in_compute is None else in_compute
+        self._targets = {}  # (texture, layer) that is filtered into → its framebuffer
+        self._sphere = None  # that maps were aimed at last
+        self._views = {}  # index of a light not near hair → (what it was aimed by, view, what `_aim` wrote)
+        self._surfaces = {}  # layer → (what its surfaces were drawn with, texture of the depth that they hide behind)
         # Target of the drawing before it is filtered into a map.
         self._surface_depth = gpu.types.GPUTexture((size, size), format="R32F")
         self._half_blurred = gpu.types.GPUTexture((size, size), format="RGBA32F")
@@ -47,45 +57,77 @@ class ShadowMaps:
         textures = (self._hair_front, self._hair_layers, self._surface_moments)
         return dict(zip(shaders.SHADOW_SAMPLERS, textures, strict=True))
 
-    def draw(self, lights, hair, surfaces, steps=_ALL, casters=None):
+    def draw(self, lights, hair, surfaces, steps=_ALL, casters=None, is_moving=False, chosen=None):
         """Draw the maps and write each light's part in them into its record.
 
         lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: batches;
         steps: what is drawn of each hair for all of it; casters: a light's index → (hair, surfaces) that cast its
-        shadow, None: all.
+        shadow, None: all; is_moving: whether hair is about to change again; chosen: index of the
+        only light whose map is drawn, None: of all.
         """
         lights["light"]["shadow_layer"] = -1
         if not hair:
             return
         loose = drawing.bounding_sphere(hair)
-        for index in range(min(int(lights["count"]), self._layer_count)):
-            view = _aim(lights["light"][index], hair, loose, self._size)
+        self._sphere = loose = _steady(loose, self._sphere) if is_moving and self._sphere else loose
+        for index in range(min(int(lights["count"]), self.layer_count)) if chosen is None else (chosen,):
+            view = self._aimed(index, lights["light"][index], hair, loose)
             if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index
                 view["light_index"] = index
                 cast = (hair, surfaces) if casters is None else casters(index)
                 self._draw_light(index, view, lights, *cast, steps)
 
+    def _aimed(self, index, light, hair, loose):
+        """What `_aim` returns and writes, kept while the light and the sphere stay."""
+        aimed_by = (
+            light["position"].tobytes(),
+            light["axis"].tobytes(),
+            int(light["kind"]),
+            *loose[0].tolist(),
+            loose[1],
+        )
+        before, view, written = self._views.get(index, (None, None, None))
+        if before == aimed_by:
+            for name, value in written.items():
+                light[name] = value
+            return view.copy()
+        view = _aim(light, hair, loose, self._size)
+        if view is not None and (light["kind"] == SUN or not _is_inside(light["position"][:3].astype(float), *loose)):
+            self._views[index] = aimed_by, view.copy(), {name: light[name].copy() for name in _AIMED}
+        return view
+
     def _draw_light(self, layer, view, lights, hair, surfaces, steps):
-        with self._target(self._surface_depth), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-            for surface in surfaces:
-                drawing.draw_surface_depth(surface, view, lights)
-        self._blur(layer, _blur_of(lights["light"][layer], self._size))
-        # The half blurred are free again.
-        self._filter(self._half_blurred, None, shadow_programs.hidden_program(), surface_depth=self._surface_depth)
+        hidden = {"hidden_depth": self._drawn_surfaces(layer, view, lights, surfaces)}
         self._fronts.clear(format="UINT", value=(_NOTHING,))
         self._backs.clear(format="UINT", value=(0,))
         light_block = uniforms.uniform_buffer(lights)
         placed = [(strands, _record(strands, view, to_world, steps)) for strands, to_world in hair]
         if self._in_compute:
-            self._walk(layer, placed, light_block)
+            self._walk(layer, placed, light_block, hidden)
         else:
-            self._draw_strips(layer, placed, light_block)
+            self._draw_strips(layer, placed, light_block, hidden)
 
-    def _walk(self, layer, placed, lights):
+    def _drawn_surfaces(self, layer, view, lights, surfaces):
+        """Draw surfaces into a map, unless they are there; returns the depth behind which they hide strands."""
+        drawn_with = view.tobytes(), lights["light"][layer].tobytes(), tuple(surfaces)
+        before, hidden = self._surfaces.get(layer, (None, None))
+        if before == drawn_with:
+            return hidden
+        if hidden is None:
+            hidden = gpu.types.GPUTexture((self._size, self._size), format="R32F")
+        with self._target(self._surface_depth), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+            for surface in surfaces:
+                drawing.draw_surface_depth(surface, view, lights)
+        self._blur(layer, _blur_of(lights["light"][layer], self._size))
+        self._filter(hidden, None, shadow_programs.hidden_program(), surface_depth=self._surface_depth)
+        self._surfaces[layer] = drawn_with, hidden
+        return hidden
+
+    def _walk(self, layer, placed, lights, hidden):
         """Draw a map of strands by compute programs: integer sums are independent of the order."""
         program = shaders.strand_shadow_program()
-        samplers = {"hair_front": self._hair_front, "hidden_depth": self._half_blurred}
+        samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
         for strands, record in placed:
             drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 1})
@@ -95,9 +137,8 @@ class ShadowMaps:
             drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 0})
         self._filter(self._hair_layers, layer, shadow_programs.counts_program(), counts=self._counts)
 
-    def _draw_strips(self, layer, placed, lights):
+    def _draw_strips(self, layer, placed, lights, hidden):
         """Draw the same map with triangle strips."""
-        hidden = {"hidden_depth": self._half_blurred}
         end = shaders.strip_program("shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden))
         layers = shaders.strip_program("shadow_layers.frag", ("hair_front",), samplers=tuple(hidden))
         for texture, depth, test in ((self._fronts, 1.0, "LESS_EQUAL"), (self._backs, 0.0, "GREATER_EQUAL")):
@@ -136,13 +177,22 @@ class ShadowMaps:
 
     def _filter(self, target, layer, program, **sources):
         """Write all of a texture, or of its layer, with a program that reads others: nothing needs to be cleared."""
-        framebuffer = gpu.types.GPUFrameBuffer(color_slots=_slot(target, layer))
-        with framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
+        if (target, layer) not in self._targets:
+            self._targets[target, layer] = gpu.types.GPUFrameBuffer(color_slots=_slot(target, layer))
+        with self._targets[target, layer].bind(), drawing.gpu_state("NONE", depth_writes=False):
             drawing.draw_cover(program, {}, sources)
 
     def _target(self, texture, layer=None, value=_FAR):
         framebuffer = gpu.types.GPUFrameBuffer(color_slots=_slot(texture, layer), depth_slot=self._depth)
         return drawing.cleared(framebuffer, (value,) * 4)
+
+
+def _steady(sphere, before):
+    """The sphere (centre, radius) that maps are aimed at for what is in one; before: that of the last time."""
+    apart = float(np.linalg.norm(sphere[0] - before[0]))
+    if apart + sphere[1] <= before[1] * (1.0 + 1e-6) and before[1] <= _LOOSEST * sphere[1]:
+        return before
+    return sphere[0], _SPARE * sphere[1]
 
 
 def _slot(texture, layer):

@@ -13,11 +13,10 @@ import numpy as np
 from ...core.interpolation.hair_binding import HairBinding
 from ...core.kernels.checks import require_count, require_indices
 from . import shaders, uniforms
-from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, Moved, StrandsOnGPU, numbers_texture
+from .strand_changes import StrandChanges, empty_rows, new_changes, rows_texture
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU
 
 _GROUP_SIZE = 64
-# Points of strands up to which it is kept where they were, for motion vectors: 128 MiB.
-_MOST_MOVED = 8 << 20
 
 
 @dataclass(frozen=True)
@@ -27,39 +26,72 @@ class StrandMaker:
     bindings: gpu.types.GPUTexture  # of each strand its root, its normal, and its guides with their weights
     guide_normals: gpu.types.GPUTexture
     segments: gpu.types.GPUTexture  # of guides, in their frames; then what their weights are limited by
-    moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; one texel where that is not kept
-    moved_rows: gpu.types.GPUTexture
+    radii: gpu.types.GPUTexture  # along every strand
+    changes: StrandChanges
     record: np.ndarray  # uniforms.MAKING
     block: gpu.types.GPUUniformBuf
     slot_count: int  # guides of a strand
 
-    def make(self, strands: StrandsOnGPU, guide_points: np.ndarray) -> StrandsOnGPU:
+    def make(
+        self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
+    ) -> StrandsOnGPU:
         """Make all strands for guides (G, P, 3) float32, in the coordinates of roots; the `StrandsOnGPU` after it.
 
-        strands: of the same roots, whose texture is changed; their radii stay, and their arrays on this side are as
-        before. Raises `HairError` where counts do not match.
+        strands: of the same roots, whose texture is changed; their arrays on this side are as before, but for their
+        bounds: six numbers that come back; rest: where strands are to be made in place of what is drawn, to be carried
+        from there. Raises `HairError` where counts do not match.
         """
-        require_count("guides", len(guide_points), int(self.record["guide_count"]))
-        require_count("points of a guide", guide_points.shape[1], int(self.record["point_count"]))
+        self.require_fitting(strands)
+        self.put_guides(guide_points)
+        self.fill(strands.texture if rest is None else rest)
+        return self.changes.changed(strands) if rest is None else strands
+
+    def require_fitting(self, strands: StrandsOnGPU) -> None:
+        """Raise `HairError` unless there are as many strands and points."""
         require_count("strands", strands.strand_count, int(self.record["strand_count"]))
         require_count("points of a strand", strands.point_count, int(self.record["point_count"]))
-        self._put_segments(guide_points)
+
+    def fill(self, texture: gpu.types.GPUTexture) -> None:
+        """Make all strands in a texture like that of `StrandsOnGPU`, for the guides of the last `put_guides`."""
         program = _strands_program(self.slot_count)
         program.bind()
         program.uniform_block("making", self.block)
-        for name in ("bindings", "guide_normals", "segments"):
+        for name in ("bindings", "guide_normals", "segments", "radii"):
             program.uniform_sampler(name, getattr(self, name))
-        program.image("strands", strands.texture)
-        program.image("moved_strands", self.moved)
-        groups = -(-strands.strand_count // _GROUP_SIZE)
+        program.image("strands", texture)
+        self.changes.bind(program)
+        groups = -(-int(self.record["strand_count"]) // _GROUP_SIZE)
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
-        return replace(strands, moved=self._moved_since(strands))
 
-    def _put_segments(self, guide_points):
+    def limited(self, fading: tuple[float, float, float, float], keep_length: float) -> "StrandMaker":
+        """The same with other `BoundStrands.fading` and `keep_length`: nothing is uploaded but a record."""
+        record = self.record.copy()
+        record["limits"], record["keep_length"] = fading, keep_length
+        return replace(self, record=record, block=uniforms.uniform_buffer(record))
+
+    def weighed(self, bound: "BoundStrands") -> "StrandMaker":
+        """The same with other guides or weights of the same strands. Raises `HairError` as `new_maker`."""
+        require_count("strands", len(bound.roots), int(self.record["strand_count"]))
+        require_count("guides", len(bound.guide_normals), int(self.record["guide_count"]))
+        record, slot_count = self.record.copy(), bound.indices.shape[1]
+        _strands_program(slot_count)
+        bindings, record["row_bindings"] = rows_texture(_binding_rows(bound), 4)
+        block = uniforms.uniform_buffer(record)
+        return replace(self, bindings=bindings, record=record, block=block, slot_count=slot_count)
+
+    def of_radii(self, radii: np.ndarray) -> "StrandMaker":
+        """The same of strands with radii (P,) float32."""
+        require_count("radii", len(radii), int(self.record["point_count"]))
+        return replace(self, radii=_profile(radii))
+
+    def put_guides(self, guide_points: np.ndarray) -> None:
+        """Upload guides, as `make` does."""
+        require_count("guides", len(guide_points), int(self.record["guide_count"]))
+        require_count("points of a guide", guide_points.shape[1], int(self.record["point_count"]))
         values = np.ascontiguousarray(guide_points, np.float32).reshape(len(guide_points), -1)
-        points, _row = _rows_texture(values, 1)
+        points, _row = rows_texture(values, 1)
         program = _segments_program()
         program.bind()
         program.uniform_block("making", self.block)
@@ -68,13 +100,6 @@ class StrandMaker:
         program.image("segments", self.segments)
         gpu.compute.dispatch(program, -(-len(values) // _GROUP_SIZE), 1, 1)
         gpu.shader.unbind()
-
-    def _moved_since(self, strands):
-        before = strands.moved.turn if strands.moved else 0
-        if self.record["row_moved"]:
-            return Moved(self.moved, int(self.record["row_moved"]), self.moved_rows, before + 1)
-        # It is not known where strands were: as if there had been more changes than one.
-        return Moved(self.moved, 1, self.moved_rows, before + 2)
 
 
 @dataclass(frozen=True)
@@ -97,12 +122,14 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
 
 
-def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> StrandMaker:
+def new_maker(bound: BoundStrands, radii: np.ndarray, axes: np.ndarray, keeps_moved: bool = True) -> StrandMaker:
     """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
 
-    axes: (3, 3), from the coordinates of roots and guides to those of the strands. Raises `HairError` where counts or
-    indices do not match, or the driver lacks something.
+    radii: (P,) float32 along every strand; axes: (3, 3), from the coordinates of roots and guides to those of the
+    strands; keeps_moved: as in `new_changes`. Raises `HairError` where counts or indices do not match, or the driver
+    lacks something.
     """
+    point_count = len(radii)
     bindings = _binding_rows(bound)
     record = uniforms.MAKING.record()
     record["axes"][:3, :3], record["axes"][3, 3] = np.asarray(axes).T, 1.0
@@ -114,16 +141,17 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray) -> Strand
     # Programs first: where there are none, nothing is uploaded.
     slot_count = bound.indices.shape[1]
     _segments_program(), _strands_program(slot_count)
-    bindings_texture, record["row_bindings"] = _rows_texture(bindings, 4)
-    normals_texture, record["row_normals"] = _rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
-    segments, record["row_segments"] = _empty_rows(guide_count, point_count + 1)
-    if strand_count * point_count <= _MOST_MOVED:
-        moved, record["row_moved"] = _empty_rows(strand_count, point_count + 1)
-        moved_rows = numbers_texture(np.arange(1, strand_count + 1), int(record["row_strands"]))
-    else:
-        moved, moved_rows = (_empty_rows(1, 1)[0] for _ in range(2))
-    block = uniforms.uniform_buffer(record)
-    return StrandMaker(bindings_texture, normals_texture, segments, moved, moved_rows, record, block, slot_count)
+    bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
+    normals_texture, record["row_normals"] = rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
+    segments, record["row_segments"] = empty_rows(guide_count, point_count + 1)
+    changes = new_changes(strand_count, point_count, keeps_moved)
+    record["row_moved"] = changes.row_moved
+    block, profile = uniforms.uniform_buffer(record), _profile(radii)
+    return StrandMaker(bindings_texture, normals_texture, segments, profile, changes, record, block, slot_count)
+
+
+def _profile(radii):
+    return rows_texture(np.float32(radii)[None], 1)[0]
 
 
 def _binding_rows(bound):
@@ -140,28 +168,6 @@ def _binding_rows(bound):
     pairs[:, :slot_count, 0] = np.where(is_used, bound.indices, 0)  # exact in single precision up to 16 million
     pairs[:, :slot_count, 1] = np.where(is_used, bound.weights, 0.0)
     return rows.reshape(strand_count, -1)
-
-
-def _rows_texture(values, channels):
-    """(texture, whole rows of values in a row of it) of (N, channels T) float32, T texels each."""
-    texels = values.shape[1] // channels
-    in_row = min(TEXTURE_WIDTH // texels, len(values))
-    height = -(-len(values) // in_row)
-    if height * in_row > len(values):
-        values = np.concatenate([values, np.zeros((height * in_row - len(values), values.shape[1]), np.float32)])
-    data = gpu.types.Buffer("FLOAT", values.size, values.ravel())
-    texture_format = {1: "R32F", 4: "RGBA32F"}[channels]
-    texture = gpu.types.GPUTexture((in_row * texels, height), format=texture_format, data=data)
-    texture.filter_mode(False)
-    return texture, in_row
-
-
-def _empty_rows(count, texels):
-    """The same without values."""
-    in_row = min(TEXTURE_WIDTH // texels, count)
-    texture = gpu.types.GPUTexture((in_row * texels, -(-count // in_row)), format="RGBA32F")
-    texture.filter_mode(False)
-    return texture, in_row
 
 
 def _declared(samplers, images):
@@ -186,7 +192,7 @@ def _segments_program():
 @shaders.kept
 def _strands_program(slot_count):
     """The compute program that makes strands of so many guides each."""
-    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}}
-    info = _declared(("bindings", "guide_normals", "segments"), images)
+    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}, "boxes": {"WRITE"}}
+    info = _declared(("bindings", "guide_normals", "segments", "radii"), images)
     info.define("SLOTS", str(slot_count))
     return shaders.compile_compute(info, "interpolate_strands.comp")

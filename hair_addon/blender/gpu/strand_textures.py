@@ -4,7 +4,7 @@
 A change costs one upload, or only that of the moved strands; a redraw costs none.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import gpu
@@ -54,25 +54,28 @@ class StrandsOnGPU:
     mean_radius: float
     greatest_radius: float
     moved: Moved | None = None  # None where all points are as uploaded
+    has_points: bool = True  # whether `points` are where strands are, which they are not where the GPU made these
+    lengthenings: dict = field(default_factory=dict)  # {number of points: how much longer strands are with all}
 
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
-        """A centre (3,), and the greatest distance of a point from it: read from all points, for who needs it."""
+        """A centre (3,), and the greatest distance of a point from it: read from all points, for who needs it.
+
+        That of a corner of the bounds where points are known to the GPU alone.
+        """
         centre = 0.5 * self.bounds.sum(axis=0, dtype=np.float64)
+        if not self.has_points:
+            return centre, 0.5 * float(np.linalg.norm(np.ptp(self.bounds, axis=0).astype(np.float64)))
         return centre, _farthest(self.points, centre)
 
     def lengthening(self, point_count: int) -> float:
         """How much longer strands are than with as many points, evenly chosen of all: of some strands."""
-        if point_count not in self._lengthenings:
+        if point_count not in self.lengthenings:
             chosen = np.arange(point_count) * (self.point_count - 1) // (point_count - 1)
             some = self.points[:: -(-self.strand_count // _SAMPLED)]
             lengths = _total_length(some), _total_length(some[:, chosen])
-            self._lengthenings[point_count] = lengths[0] / max(lengths[1], 1e-12)
-        return self._lengthenings[point_count]
-
-    @cached_property
-    def _lengthenings(self):
-        return {}
+            self.lengthenings[point_count] = lengths[0] / max(lengths[1], 1e-12)
+        return self.lengthenings[point_count]
 
 
 def upload_strands(points, radii, randoms=None, wetness=None):
@@ -156,6 +159,13 @@ def places_texture(points, radii, row_strands):
     return texture
 
 
+def like(texture):
+    """A texture of the same size for other strands, with nothing in it."""
+    other = gpu.types.GPUTexture((texture.width, texture.height), format="RGBA32F")
+    other.filter_mode(False)
+    return other
+
+
 def seen_points(point_count):
     """Texels of a strand in the visibility textures: SEEN_STEP of shaders/include/strand.glsl, and the tip."""
     return -(-(point_count - 1) // 4) + 1
@@ -190,7 +200,7 @@ def move_strands(strands, moved, points):
     groups = -(-len(moved) * strands.point_count // _MOVE_GROUP_SIZE)
     rows_of_groups = -(-groups // MOST_GROUPS)
     gpu.compute.dispatch(program, -(-groups // rows_of_groups), rows_of_groups, 1)
-    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1))
+    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1), lengthenings={})
 
 
 def _no_rows(strands):

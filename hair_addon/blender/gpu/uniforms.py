@@ -159,6 +159,40 @@ MAKING = Block(
     },
 )
 
+MOST_STEPS = 64  # of the styles of one hair that the GPU applies
+
+STEP = Block(
+    "Step",
+    {
+        "kind": "int",
+        "seed": "int",
+        "mask": "int",
+        "level": "int",
+        "first_centre": "int",
+        "numbers": ("vec4", 6),  # NUMBERS of core/styling/program_rows.py, four by four
+    },
+)
+
+STYLING = Block(
+    "Styling",
+    {
+        "axes": "mat4",  # from the coordinates of strands to the surface's own axes
+        "to_drawn": "mat4",  # from the coordinates of strands to those that are drawn
+        "strand_count": "int",
+        "first_strand": "int",  # of these in the image
+        "row_strands": "int",  # whole strands in a row of each texture
+        "row_known": "int",
+        "row_centres": "int",
+        "row_locks": "int",
+        "known_texels": "int",  # of a strand
+        "level_count": "int",  # of clump centres, those of guides among them
+        "centre_count": "int",  # of all levels, those of guides left out
+        "are_centres": "int",  # whether centres are styled: arc lengths take the place of radii
+        "step_count": "int",
+        "steps": (STEP, MOST_STEPS),
+    },
+)
+
 HISTORY = Block(
     "History",
     {
@@ -216,6 +250,10 @@ def fill(settings):
 
 def uniform_buffer(record):
     """A GPUUniformBuf with the bytes of a record."""
+    return gpu.types.GPUUniformBuf(bytes_of(record))
+
+
+def bytes_of(record):
+    """A Buffer with the bytes of a record: it has no raw kind, and unsigned bytes are copied as they are."""
     data = record.tobytes()
-    # A Buffer has no raw kind; unsigned bytes are copied as they are.
-    return gpu.types.GPUUniformBuf(gpu.types.Buffer("UBYTE", len(data), data))
+    return gpu.types.Buffer("UBYTE", len(data), data)

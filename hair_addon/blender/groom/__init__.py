@@ -29,6 +29,7 @@ if TYPE_CHECKING:
         painted_masks,
         particle_hair,
         pipeline,
+        reweighed_hair,
         selection,
         staleness,
         style_notes,

@@ -87,7 +87,7 @@ class BoundHair:
                 self.is_behind = True
                 self._points_have_moved()
             return moved
-        strand_count = len(_grown(self.shares))
+        strand_count = len(self.binding.positions)
         moves_all = self.is_behind or len(combed) == len(guides)
         moved = np.arange(strand_count) if moves_all else self._reached(combed)
         if len(moved):
@@ -151,10 +151,17 @@ class BoundHair:
             self.points[chosen], shares = following.follow_some(binding, guides, chosen, axes, styling)
             self._take_shares(shares, chosen)
 
-    def restyle(self, styles: StyledHair) -> None:
-        """Apply other styles to the same strands: nothing is searched."""
+    def restyle(self, styles: StyledHair, is_drawn: bool = False) -> None:
+        """Apply other styles to the same strands: nothing is searched.
+
+        is_drawn: whether the GPU makes the strands that are shown; then points grow in `catch_up`.
+        """
+        styles.continue_from(self.styles)
         self.styles = styles
-        self.grow()
+        if is_drawn:
+            self.is_behind = True
+        else:
+            self.grow()
         self.is_written = self.has_moved_only = False
 
     @property

@@ -23,7 +23,7 @@ from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items
 from . import bindings, grown_guides, staleness, styled_hair, writing
 from .bindings import BoundHair
-from .styled_hair import ReadStyles
+from .styled_hair import ReadStyles, StyledHair
 
 
 def distribute_guides(
@@ -115,10 +115,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
             make_trees = _trees_on(surface, guides, settings, ground)
         else:
             binding = hair_binding.weigh_again(known.binding, settings)
-
-            def make_trees():
-                return known.styles.trees.weigh_again(settings)
-
+            make_trees = styled_hair.trees_again(known.styles, settings)
         styles = styled_hair.bind(read, binding, guides, settings, surface, make_trees)
         return _growing(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles), progress)
 
@@ -293,10 +290,13 @@ def _kept_roots(target, surface, key, count):
     return curves.stored_roots(target, surface, is_complete=True)
 
 
-def restyle(target: Curves, depsgraph: Depsgraph) -> bool:
+def restyle(
+    target: Curves, depsgraph: Depsgraph, is_drawn: Callable[[BoundHair, StyledHair], bool] = lambda *_given: False
+) -> bool:
     """Apply the styles of bound hair as they are set now, if nothing else of it has changed; whether that is so.
 
-    Nothing is searched; nothing at all is computed where the styles are those that it has. Raises `HairError`.
+    is_drawn: whether the GPU makes the strands that are shown with other styles. Nothing is searched; nothing at all is
+    computed where the styles are those that it has. Raises `HairError`.
     """
     bound = bindings.of(target)
     guide_curves, settings = inputs_of(target)
@@ -310,8 +310,9 @@ def restyle(target: Curves, depsgraph: Depsgraph) -> bool:
     styles = style_items.styles_of(target.vellus)
     read = styled_hair.read_styles(styles, target.surface, bound.surface, guide_curves, depsgraph)
     if not read.is_same(bound.styles.read):
-        trees = bound.styles
-        bound.restyle(styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: trees.trees))
+        before = bound.styles
+        styles = styled_hair.bind(read, bound.binding, guides, settings, bound.surface, lambda: before.trees)
+        bound.restyle(styles, is_drawn(bound, styles))
     return True
 
 

@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -57,6 +57,11 @@ class StyledHair:
         """By how much styles thicken strands."""
         return np.float32(program.radius_factor(self.read.styles))
 
+    def continue_from(self, other: "StyledHair") -> None:
+        """Keep the guides that another one has computed, where these lean them as it does."""
+        if self.styling is not None and other.styling is not None:
+            self.styling.followed.continue_from(other.styling.followed)
+
     @property
     def clumps(self) -> tuple[np.ndarray, np.ndarray] | None:
         """(S,) int32 and (S,) float32: as `Styling.clumps`."""
@@ -108,6 +113,21 @@ def bind(
         grooming.hair_styles.rotation_of(surface.to_world_axes),
     )
     return StyledHair(read, styling, make_trees)
+
+
+def trees_again(styles: StyledHair, settings: HairSettings) -> Callable[[], ClumpTrees]:
+    """A function that makes the clump trees of a hair for other weights, limits or lengths: nothing is searched."""
+    if styles.styling is None and "trees" not in vars(styles):
+        # Not the settings between: a slider would keep all of them.
+        known = styles.make_trees
+        make = known.args[0] if isinstance(known, partial) and known.func is _weighed_trees else known
+        return partial(_weighed_trees, make, settings)
+    trees = styles.trees.weigh_again(settings)
+    return lambda: trees
+
+
+def _weighed_trees(make_trees, settings):
+    return make_trees().weigh_again(settings)
 
 
 def unstyled(

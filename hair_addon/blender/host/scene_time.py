@@ -28,6 +28,12 @@ def present_frame():
     return frame_of(bpy.context.scene)
 
 
+def is_playing():
+    """Return whether the context's screen plays the animation."""
+    screen = bpy.context.screen
+    return screen is not None and screen.is_animation_playing
+
+
 def present_scene():
     """Return the active scene."""
     return bpy.context.scene

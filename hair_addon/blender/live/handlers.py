@@ -98,6 +98,18 @@ def _is_hair_only(depsgraph):
     return len(depsgraph.updates) > 0 and all(_are_curves(update) for update in depsgraph.updates)
 
 
+def _is_hair_only_in_frame(depsgraph):
+    """The same of a change of the frame, of which Blender reports all that it evaluates, but no images."""
+    if any(image.source in {"SEQUENCE", "MOVIE"} for image in bpy.data.images):
+        return False
+    others = [update for update in depsgraph.updates if not isinstance(update.id, bpy.types.Action | bpy.types.Camera)]
+    return all(_are_curves(update) or _is_camera(update.id) for update in others)
+
+
+def _is_camera(changed):
+    return isinstance(changed, bpy.types.Object) and changed.type == "CAMERA"
+
+
 def _are_curves(update):
     changed = update.id
     if isinstance(changed, bpy.types.Object):
@@ -179,7 +191,7 @@ def before_frame_change(_scene, _depsgraph):
 def after_frame_change(scene, depsgraph):
     """Deform strands with their surfaces in this frame; regenerate animated hair, in renders too."""
     if scene_time.is_shown(depsgraph):
-        events.scene_changed()
+        events.scene_changed(is_hair_only=_is_hair_only_in_frame(depsgraph))
         for surface_object in _deformed(depsgraph):
             events.surface_moved(surface_object)
     if scene_time.may_write(scene, depsgraph) and animated.follow(depsgraph):

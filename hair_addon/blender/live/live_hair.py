@@ -11,7 +11,7 @@ import bpy
 
 from ...core.errors import HairError
 from ..data import curves, simulated_guides
-from ..groom import bindings, hair_outside, painted_masks, pipeline, staleness, writing
+from ..groom import bindings, hair_outside, painted_masks, pipeline, reweighed_hair, staleness, writing
 from ..host import running
 from ..host.notices import text_of
 from ..render import hair_cache
@@ -50,7 +50,10 @@ def follow_guides(hair, depsgraph, local=None):
     if moved is None:
         make_again(hair, depsgraph)
     elif len(moved):
-        hair_cache.move(hair.session_uid, moved, bound.shown, is_made)
+        if is_made:
+            hair_cache.follow_where_drawn(hair.session_uid, bound.shown)
+        else:
+            hair_cache.move(hair.session_uid, moved, bound.shown)
         write_soon(hair)
     elif hair_outside.is_wanted(hair):
         bound.is_due()  # colliders may have moved
@@ -108,8 +111,9 @@ def make_again(hair, depsgraph):
         known = bindings.of(hair)
         if known is None or known.is_written:
             pipeline.require_uncombed(hair)
-        if pipeline.restyle(hair, depsgraph):
-            _restyled(hair)
+        if _restyle(hair, depsgraph):
+            return
+        if hair_cache.may_make(hair.session_uid) and _is_reweighed(hair, depsgraph):
             return
         bindings.keep(hair, pipeline.bind_hair(guide_curves, settings, depsgraph, hair))
         _follow_simulated(hair)
@@ -119,6 +123,17 @@ def make_again(hair, depsgraph):
         return
     events.strands_made(hair)
     write_soon(hair)
+
+
+def _is_reweighed(hair, depsgraph):
+    """Show hair with other weights of its guides, other lengths or radii, if nothing else of it has changed."""
+    bound = None if hair_outside.is_wanted(hair) else reweighed_hair.reweighed(hair, depsgraph)
+    if bound is None:
+        return False
+    bindings.keep(hair, bound)
+    hair_cache.follow_where_drawn(hair.session_uid, bound)
+    write_soon(hair)
+    return True
 
 
 def _follow_linked(hair, depsgraph):
@@ -152,14 +167,24 @@ def _shown_guides(hair, bound, local=None):
     return curves.read_shown_guides(hair.vellus.guide_curves, bound.surface, device, bound.guides, local)
 
 
-def _restyled(hair):
-    """Show and write soon what `pipeline.restyle` has made."""
-    state = hair.vellus
-    if bindings.of(hair).is_written:  # with the same styles as before
-        state.is_stale = False
-        return
-    events.strands_made(hair)
-    write_soon(hair)
+def _restyle(hair, depsgraph):
+    """Show and write soon what `pipeline.restyle` makes; whether it does."""
+
+    def is_drawn(bound, styles):
+        return hair_cache.may_restyle(hair.session_uid, bound, styles) and not hair_outside.is_wanted(hair)
+
+    if not pipeline.restyle(hair, depsgraph, is_drawn):
+        return False
+    bound = bindings.of(hair)
+    if bound.is_written:  # with the same styles as before
+        hair.vellus.is_stale = False
+    else:
+        if bound.is_behind and bound.straight is None:
+            hair_cache.follow_where_drawn(hair.session_uid, bound)
+        else:
+            events.strands_made(hair)
+        write_soon(hair)
+    return True
 
 
 def is_ahead(hair):
@@ -243,8 +268,7 @@ def follow_masks(surfaces, depsgraph):
             if bindings.of(hair) is None:
                 if not staleness.has_other_mask(hair, depsgraph):
                     make_again(hair, depsgraph)
-            elif pipeline.restyle(hair, depsgraph):
-                _restyled(hair)
+            elif _restyle(hair, depsgraph):
                 state.status = ""
         except HairError as error:
             state.status = str(error)

@@ -48,6 +48,7 @@ class DrawnScene:
     clear: tuple = ()  # as `surfaces`, of those that hide nothing
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
+    renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
     hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each of the hair; None: of all
     surface_lights: np.ndarray | None = None  # the same of `surfaces`, then of `clear`
 
@@ -64,13 +65,14 @@ def read(
     before=None,
     is_draft=False,
     is_hair_only=True,
+    former=None,
 ):
     """Bring a scene to the GPU and draw its shadow maps.
 
     viewport: the 3-D viewport whose visibility counts, None for a render; refused: called with the datablock and the
     `HairError` of hair that cannot be drawn, which otherwise is raised; before: the `DrawnScene` from before hair
     changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse; is_hair_only: whether
-    Blender draws the rest of a viewport.
+    Blender draws the rest of a viewport; former: the `DrawnScene` of the frame before of an animation that plays.
     """
     # Where only the geometry of hair has changed, instances are where they were.
     instances = hair_places.read_instances(depsgraph, viewport) if before is None else before.instances
@@ -91,8 +93,17 @@ def read(
     if lamps is None:
         found = light_door.read_lights(depsgraph, for_render=viewport is None)
         lamps = scene_lights.gather(*found, world, hair_receivers)
-    if is_draft and before is not None and _have_same_places(before.hair, hair):
-        seen = before.hair_visibility, before.surface_visibility
+    # Where Warp computes hair that plays, each frame is as at rest.
+    last = before or (former if _are_made(hair) else None)
+    is_draft = is_draft or (former is not None and _are_made(hair))
+    if before is None and last is not None and _fit(last.shadow_maps, lamps):
+        maps = last.shadow_maps
+    renewal = None
+    if is_draft and last is not None and _have_same_places(last, hair, (*surfaces, *clear)):
+        seen = last.hair_visibility, last.surface_visibility
+        if _are_made(hair):
+            renewal = last.renewal or ambient_visibility.Renewal()
+            seen = _renewed(renewal, seen, hair, surfaces, clear)
     else:
         seen = _visibility(hair, surfaces, clear)
     owners, selected = tuple(place.owner for place in places), tuple(place.is_selected for place in places)
@@ -109,17 +120,29 @@ def read(
         surface_owners=surface_owners,
         clear=clear,
         receivers=receivers,
+        renewal=renewal,
     )
-    return _lit(drawn, lamps, maps, hair_receivers, _DRAFT_STEPS if is_draft else _SHADOW_STEPS)
+    return _lit(drawn, lamps, maps, hair_receivers, is_draft)
 
 
-def _lit(drawn, lamps, maps, hair_receivers, steps):
+def _are_made(hair):
+    """Whether the GPU made or carried all hair: there it costs little to draw shadows of as much as at rest."""
+    return bool(hair) and not any(strands.has_points for strands, *_ in hair)
+
+
+def _fit(maps, lamps):
+    return maps is not None and maps.layer_count == max(1, int(lamps.record["count"]))
+
+
+def _lit(drawn, lamps, maps, hair_receivers, is_draft=False):
     """A `DrawnScene` with `SceneLights`: as all that is in it is lit by them, with their shadow maps."""
     maps = maps or scene_lights.new_maps(lamps.record)
     placed, batches = _placed(drawn.hair), [surface.batch for surface, _ in drawn.surfaces]
     hair_owners = [receiver.owner for receiver in hair_receivers]
     surface_owners = [receiver.owner for receiver in drawn.receivers[: len(batches)]]
-    maps.draw(lamps.record, placed, batches, steps, lamps.casters(placed, hair_owners, batches, surface_owners))
+    steps = _DRAFT_STEPS if is_draft and not _are_made(drawn.hair) else _SHADOW_STEPS
+    casters = lamps.casters(placed, hair_owners, batches, surface_owners)
+    maps.draw(lamps.record, placed, batches, steps, casters, is_draft)
     own = {}
     if not lamps.are_alike:
         own = {"hair_lights": lamps.lit(hair_receivers), "surface_lights": lamps.lit(drawn.receivers)}
@@ -147,7 +170,7 @@ def read_render(depsgraph, known, refused):
     lamps = scene_lights.gather(*light_door.read_lights(depsgraph, for_render=True), world, hair_receivers)
     hair_seen, surfaces_seen = _visibility(unlit.hair, unlit.surfaces, unlit.clear)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
-    return _lit(drawn, lamps, None, hair_receivers, _SHADOW_STEPS)
+    return _lit(drawn, lamps, None, hair_receivers)
 
 
 def read_unlit(depsgraph, known, refused):
@@ -191,6 +214,13 @@ def _visibility(hair, surfaces, clear):
     forwards = [shading.forward for _, shading, *_ in hair]
     solid, seen_through = ([surface for surface, _parts in some] for some in (surfaces, clear))
     return ambient_visibility.measure(_placed(hair), solid, opacities, seen_through, forwards)
+
+
+def _renewed(renewal, seen, hair, surfaces, clear):
+    """What `_visibility` returns, with one step of a `Renewal`; seen: before it."""
+    through = [(shading.opacity, shading.forward) for _, shading, *_ in hair]
+    solid, seen_through = ([surface for surface, _parts in some] for some in (surfaces, clear))
+    return renewal.step(seen, _placed(hair), solid, through, seen_through)
 
 
 def _read_rendered_hair(depsgraph, known, refused):
@@ -239,10 +269,13 @@ def _read_hair(places, viewport, refused):
     return hair, drawn_places
 
 
-def _have_same_places(hair, others):
-    """Whether the visibility textures of some hair have a texel for each place of other hair."""
-    sizes, other_sizes = ([(one[0].strand_count, one[0].point_count) for one in many] for many in (hair, others))
-    return sizes == other_sizes
+def _have_same_places(drawn, hair, surfaces):
+    """Whether the visibility textures of a `DrawnScene` have a texel for each place of some hair and surfaces."""
+    sizes, others = ([(one[0].strand_count, one[0].point_count) for one in many] for many in (drawn.hair, hair))
+    corners, other_corners = (
+        [surface.corner_count for surface, _parts in many] for many in ((*drawn.surfaces, *drawn.clear), surfaces)
+    )
+    return sizes == others and corners == other_corners
 
 
 def draw_hiding(drawn, view):

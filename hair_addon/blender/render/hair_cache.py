@@ -99,15 +99,18 @@ def strands_on_gpu(datablock):
     pose = _pose_of(datablock.surface)
     is_elsewhere = kept.on_gpu is None or kept.pose is not pose
     is_due = kept.making.due is not None
-    if is_due and not is_elsewhere and kept.making.make(kept):
-        return kept.on_gpu
-    if is_due or (is_elsewhere and _is_behind(datablock)):
-        kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
+    if is_due or is_elsewhere:
+        is_behind = _is_behind(datablock)
+        if kept.on_gpu is not None and kept.making.bring(kept, pose, is_behind):
+            return kept.on_gpu
+        if is_due or is_behind:
+            kept = strand_cache.keep(datablock.session_uid, _read_shown(datablock))
     moved, kept.moved = kept.moved, []
-    if kept.on_gpu is None or kept.pose is not pose:
+    if moved or is_elsewhere:
+        kept.making.carrier = None  # what it carries is not what is uploaded
+    if kept.on_gpu is None or is_elsewhere or (moved and not kept.on_gpu.has_points):
         points = _carried(kept, pose)
         kept.on_gpu = strand_textures.upload_strands(points, kept.radii, kept.randoms, kept.wetness)
-        kept.making.extent = None
         kept.pose = pose
     elif moved:
         chosen = np.unique(np.concatenate(moved))
@@ -143,19 +146,22 @@ def refuse(datablock, error):
     print(f"Vellus: {error}", file=sys.stderr)
 
 
-def move(session_uid, moved, bound, is_made=False):
+def move(session_uid, moved, bound):
     """Strands of `BoundHair` have moved: with the next redraw they alone are uploaded, which waits for their points.
 
-    moved: (M,) indices of them; is_made: whether the GPU makes all of them instead, as `may_make` says.
+    moved: (M,) indices of them.
     """
     kept = _strands_of(session_uid)
-    if kept is None:
-        return
-    if is_made:
-        kept.making.due = bound
-    else:
+    if kept is not None:
         kept.growing = bound.growing
         kept.moved.append(moved)
+
+
+def follow_where_drawn(session_uid, bound):
+    """Guides of `BoundHair` have moved, or their weights: with the next redraw the GPU makes all strands."""
+    kept = _strands_of(session_uid)
+    if kept is not None:
+        kept.making.due = bound
 
 
 def may_make(session_uid):
@@ -164,15 +170,20 @@ def may_make(session_uid):
     return kept is not None and kept.making.is_chosen and not kept.moved
 
 
+def may_restyle(session_uid, bound, styles):
+    """Whether the GPU makes what viewports show of bound hair with other styles."""
+    kept = _strands_of(session_uid)
+    return may_make(session_uid) and bound.straight is None and kept.making.can_style(styles)
+
+
 def choose_makers():
     """Find out which of the hair that a viewport draws the GPU may make, and is to."""
     is_wanted = made_strands.are_wanted()
     for datablock in bpy.data.hair_curves:
         kept, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
         if kept is not None and kept.on_gpu is not None:
-            is_at_rest = kept.pose is None or kept.pose.motion is None
             is_bound = bound is not None and bound.free is None and kept.points is bound.shown.points
-            kept.making.is_chosen = is_wanted and is_at_rest and is_bound and kept.making.can(kept, bound.shown)
+            kept.making.choose(is_wanted, bound.shown if is_bound else None)
 
 
 def _strands_of(session_uid):
@@ -223,7 +234,7 @@ def _is_same(datablock, kept, bound):
         is_known
         and np.array_equal(kept.radii.ravel(), curves.read_radii(datablock))
         and np.array_equal(kept.randoms, curves.read_randoms(datablock))
-        and _are_equal(kept.wetness, curves.read_wetness(datablock))
+        and made_strands.are_equal(kept.wetness, curves.read_wetness(datablock))
         and kept.rooted_on == _rooted_on(datablock, datablock.vellus.topology)
         and (bound is not None or _are_places(kept.places, curves.read_root_places(datablock, np.inf)))
     )
@@ -239,12 +250,6 @@ def _are_places(places, others):
     if places is None or others is None:
         return places is others
     return all(map(np.array_equal, places, others))
-
-
-def _are_equal(values, others):
-    if values is None or others is None:
-        return values is others
-    return np.array_equal(values, others)
 
 
 def _are_points(datablock, points):

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands that follow combed guides where they are drawn: nothing is computed on this side until they are written.
+"""Strands that follow combed guides, and their surface, where they are drawn: nothing is computed on this side.
 
-That holds for hair that stands still, without styles. All other hair takes the way of points that Warp computes.
+Guides are followed so by hair without styles, or with styles that the GPU can apply; other hair takes points that Warp
+computes. Any hair is carried so.
 """
 
 from dataclasses import dataclass, replace
@@ -10,13 +11,12 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import HairError
-from ..gpu import maker_choice, strand_maker
+from ..data.posed_strands import Pose
+from ..gpu import maker_choice, strand_carrier, strand_maker, strand_textures, style_maker
 from ..groom.bindings import BoundHair
+from ..groom.styled_hair import StyledHair
 from ..host import running
 from ..settings import preferences
-
-# Of how far guides were combed: what strands may be further out of their box than they were.
-_FURTHER = 0.1
 
 
 def are_wanted() -> bool:
@@ -30,76 +30,110 @@ def are_wanted() -> bool:
     return maker_choice.can_make() if chosen == "GPU" else maker_choice.is_faster()
 
 
-@dataclass(frozen=True)
-class _Extent:
-    """Guides (G, P, 3) as strands are drawn, the box (2, 3) around them, and that of the strands that they had."""
-
-    guides: np.ndarray
-    box: np.ndarray
-    bounds: np.ndarray
-
-    def bounds_for(self, guides: np.ndarray) -> np.ndarray:
-        """(2, 3): a box that strands stay in when guides are combed, estimated without them.
-
-        A strand goes no further than the guide that goes furthest, and no further out of a side of the guides' box than
-        any did before, but for turns from root to root: a part of that way.
-        """
-        way = np.linalg.norm(np.abs(_box(guides - self.guides)).max(axis=0))
-        (low, high), (low_before, high_before) = _box(guides), self.box
-        further = _FURTHER * way
-        low = low - np.maximum(low_before - self.bounds[0], 0.0) - further
-        high = high + np.maximum(self.bounds[1] - high_before, 0.0) + further
-        least, greatest = np.maximum(low, self.bounds[0] - way), np.minimum(high, self.bounds[1] + way)
-        return np.stack([np.minimum(self.bounds[0], least), np.maximum(self.bounds[1], greatest)]).astype(np.float32)
-
-
 @dataclass
 class Making:
-    """What makes the strands of one hair, and of which guides."""
+    """What makes the strands of one hair, and of which guides; and what carries them with their surface."""
 
-    maker: strand_maker.StrandMaker | None = None
+    maker: strand_maker.StrandMaker | style_maker.StyleMaker | None = None
+    carrier: strand_carrier.StrandCarrier | None = None  # None while what is drawn is at rest, or was uploaded
     is_chosen: bool = False  # whether it is to make them with the next edit
+    may_carry: bool = False  # whether it is to carry them with the next pose
     is_refused: bool = False  # whether the driver makes no such strands
     due: BoundHair | None = None  # whose guides were combed: the next redraw makes its strands
-    extent: _Extent | None = None  # of the strands when they were uploaded
     _binding: Any = None  # `HairBinding` of the maker
+    _triangles: np.ndarray | None = None  # that the carrier's strands are rooted on
 
-    def can(self, kept: Any, bound: BoundHair) -> bool:
-        """Whether strands that `hair_cache` keeps follow guides as these are: without styles, in as many points."""
-        if self.is_refused or bound.styles.styling is not None:
+    def choose(self, is_wanted: bool, bound: BoundHair | None) -> None:
+        """Choose what it is to do: carry strands, and make those of `BoundHair` with their styles."""
+        self.may_carry = is_wanted and not self.is_refused
+        self.is_chosen = self.may_carry and bound is not None and self.can_style(bound.styles)
+
+    def can_style(self, styles: StyledHair) -> bool:
+        """Whether styles can be applied to strands that are made here: the one place where that is decided."""
+        return styles.styling is None or style_maker.can_style(styles.styling)
+
+    def bring(self, kept: Any, pose: Pose | None, is_behind: bool) -> bool:
+        """Bring the strands that `hair_cache` keeps up to combed guides, and to a pose of their surface.
+
+        is_behind: whether they were made for other guides than their points on this side. False where the driver
+        cannot, or it is not to: strands are then to be uploaded.
+        """
+        if kept.moved:
             return False
-        if self.extent is None:
-            guides = _drawn_guides(bound)
-            self.extent = _Extent(guides, _box(guides), kept.on_gpu.bounds.copy())
-        return True
-
-    def make(self, kept: Any) -> bool:
-        """Make the strands that `hair_cache` keeps. False where the driver cannot, for which they are then due."""
-        bound = self.due
         try:
-            if self.maker is None or self._binding is not bound.binding:
-                strands = strand_maker.bound_strands(bound.binding)
-                self.maker = strand_maker.new_maker(strands, kept.on_gpu.point_count, bound.surface.to_local_axes)
-                self._binding = bound.binding
-            made = self.maker.make(kept.on_gpu, bound.guides.numpy())
+            if not self._can_carry(kept, pose, is_behind):
+                return False
+            if self.due is not None:
+                self._make(kept)
+            if self.carrier is not None:
+                kept.on_gpu = self.carrier.carry(kept.on_gpu, None if pose is None else pose.motion)
         except HairError:
-            self.is_refused, self.is_chosen = True, False
+            self.is_refused, self.is_chosen, self.may_carry, self.carrier = True, False, False, None
             return False
-        self.due = None
-        kept.on_gpu = replace(made, bounds=_joined(made.bounds, self.extent.bounds_for(_drawn_guides(bound))))
+        self.due, kept.pose = None, pose
         return True
 
+    def _make(self, kept):
+        bound, binding, known = self.due, self.due.binding, self._binding
+        before = self.maker if self.maker is not None and known.positions is binding.positions else None
+        axes = bound.surface.to_local_axes
+        self.maker = style_maker.maker_of(binding, bound.styles.styling, bound.radii, axes, before)
+        if known is not binding and self.maker is before:
+            if known.guide_weights is not binding.guide_weights:
+                self.maker = self.maker.weighed(strand_maker.bound_strands(binding))
+            self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
+        self._binding = binding
+        if not np.array_equal(kept.radii[0], bound.radii):
+            self.maker = self.maker.of_radii(bound.radii)
+            kept.radii = np.broadcast_to(bound.radii, kept.radii.shape)
+            sizes = {"mean_radius": float(bound.radii.mean()), "greatest_radius": float(bound.radii.max())}
+            kept.on_gpu = replace(kept.on_gpu, radii=kept.radii, **sizes)
+        wetness = bound.styles.wetness
+        if not are_equal(kept.wetness, wetness):
+            kept.wetness = wetness
+            texture = None if wetness is None else strand_textures.numbers_texture(wetness, kept.on_gpu.row_strands)
+            kept.on_gpu = replace(kept.on_gpu, wetness=texture, wetness_here=wetness)
+        kept.on_gpu = self.maker.make(kept.on_gpu, _followed(bound), self.carrier and self.carrier.rest)
 
-def _drawn_guides(bound):
-    return bound.guides.numpy() @ np.asarray(bound.surface.to_local_axes, np.float32).T
+    def _can_carry(self, kept, pose, is_behind):
+        """Whether there is a carrier to a pose, made now if need be; or none is needed."""
+        if not (_is_deformed(pose) or _is_deformed(kept.pose)):
+            return True
+        surface = None if pose is None else pose.surface
+        if self.carrier is not None:
+            if surface is not None and self._is_carried_on(surface):
+                return True
+            self.carrier = None  # for the surface has other triangles now
+            return False
+        if surface is None or not self.may_carry or (is_behind and self.due is None and _is_deformed(kept.pose)):
+            return False
+        places = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0])
+        drawn = kept.on_gpu
+        if _is_deformed(kept.pose):
+            rest = strand_textures.places_texture(kept.points, kept.radii, drawn.row_strands)
+        else:
+            rest, kept.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
+        self.carrier = strand_carrier.new_carrier(rest, drawn.point_count, places, surface.rest)
+        self._triangles = surface.mesh.triangles
+        return True
+
+    def _is_carried_on(self, surface):
+        mine, its = (self._triangles, self.carrier.vertices), (surface.mesh.triangles, surface.rest)
+        return all(map(np.array_equal, mine, its))
 
 
-def _box(points):
-    """(2, 3): least and greatest coordinates of (G, P, 3) points; NumPy is faster along a flat array's long axis."""
-    flat = points.reshape(len(points), -1)
-    return np.stack([flat.min(axis=0).reshape(-1, 3).min(axis=0), flat.max(axis=0).reshape(-1, 3).max(axis=0)])
+def _is_deformed(pose):
+    return pose is not None and pose.motion is not None
 
 
-def _joined(bounds, others):
-    """A box around two. Boxes only grow, as in `move_strands`, until strands are uploaded again."""
-    return np.stack([np.minimum(bounds[0], others[0]), np.maximum(bounds[1], others[1])])
+def are_equal(values: np.ndarray | None, others: np.ndarray | None) -> bool:
+    """Whether two arrays, either of which may be missing, hold the same."""
+    if values is None or others is None:
+        return values is others
+    return np.array_equal(values, others)
+
+
+def _followed(bound):
+    """(G, P, 3): guides as strands follow them, which styles may lean."""
+    styling = bound.styles.styling
+    return (bound.guides if styling is None else styling.guides(bound.guides)).numpy()

@@ -16,6 +16,7 @@ from ..data import curves_objects, scene
 from ..gpu import drawing, shaders
 from ..gpu.display_transform import DisplayTransform
 from ..groom import bindings
+from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import say
 from ..materials import looks
@@ -40,6 +41,8 @@ class _View:
     shows: tuple  # what it may leave out
     drawn: drawn_scene.DrawnScene | None = None
     outdated: drawn_scene.DrawnScene | None = None  # from before hair changed, and nothing else
+    former: drawn_scene.DrawnScene | None = None  # from before anything changed
+    is_playing: bool = False  # whether it was read while the animation played
 
 
 def register():
@@ -59,6 +62,7 @@ def unregister():
 def invalidate(is_hair_only=False):
     """Something moved: read the scene again with the next redraw. is_hair_only: all but hair is as it was."""
     for view in view_cache.values():
+        view.former = view.drawn or view.former
         view.outdated = (view.drawn or view.outdated) if is_hair_only else None
         view.drawn = None
 
@@ -152,8 +156,13 @@ def drawn_scene_of(context):
     view = view_cache.get(key)
     if view is None or view.shows != shows:  # what one viewport leaves out is no change of the scene
         view = view_cache.keep(key, _View(shows))
+    is_playing = scene_time.is_playing()
+    if view.is_playing and not is_playing and view.drawn is not None:  # refined at rest
+        view.outdated, view.drawn = view.drawn, None
     if view.drawn is None:
         before, view.outdated = view.outdated, None
+        former, view.former = view.former, None
+        view.is_playing = is_playing
         view.drawn = drawn_scene.read(
             context.scene,
             context.view_layer,
@@ -163,6 +172,7 @@ def drawn_scene_of(context):
             before=before,
             is_draft=bindings.has_unwritten(),
             is_hair_only=not is_ours(context),
+            former=former if is_playing else None,
         )
         if view.drawn.hair:
             hair_cache.choose_makers()

@@ -24,7 +24,7 @@ class VellusPreferences(bpy.types.AddonPreferences):
     )
     stroke_device: bpy.props.EnumProperty(
         name="Strands While Combing",
-        description="Device that interpolates strands without styles in viewports while guides are combed",
+        description="Device that makes strands in viewports while guides are combed or styles change",
         translation_context=CONTEXT,
         items=[
             ("AUTOMATIC", "Automatic", "The graphics card where it is faster"),

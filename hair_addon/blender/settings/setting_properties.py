@@ -146,6 +146,7 @@ def plain(value, default, details):
     return value
 
 
+@lru_cache(maxsize=64)
 def as_stored(settings):
     """`Settings` as properties give them back: within Blender's limits, in single precision."""
     values = {

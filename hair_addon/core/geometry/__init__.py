@@ -16,6 +16,7 @@ if TYPE_CHECKING:
         hash_grid,
         landmark_warp,
         mesh,
+        nearest_rotation,
         resampling,
         root_frames,
         sampling,

@@ -16,8 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from ..kernels import kernel_cache
+from ..kernels import kernel_cache, parallel
 from ..kernels.checks import require_count, require_indices
+from ..kernels.parallel import Rows
+from . import nearest_rotation
 from .mesh import Faces, require_finite
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
@@ -71,20 +73,55 @@ def vertex_axes(before: np.ndarray, after: np.ndarray, faces: Faces) -> np.ndarr
     corners = np.stack(
         [faces.corner_vertices[starts], faces.corner_vertices[starts + 1], faces.corner_vertices[faces.starts[1:] - 1]]
     )
-    was, is_now = _bases(before, corners), _bases(after, corners)
-    has_area = abs(np.linalg.det(was)) > 1e-30
-    gradients = np.zeros_like(was)
-    gradients[has_area] = is_now[has_area] @ np.linalg.inv(was[has_area])
-    of_corners = np.repeat(gradients.reshape(-1, 9), np.diff(faces.starts), axis=0)
-    sums = np.stack(
-        [np.bincount(faces.corner_vertices, of_corners[:, i], minlength=len(before)) for i in range(9)], axis=1
-    )
+    of_corners = np.repeat(_gradients(before, after, corners.T), np.diff(faces.starts), axis=0).T.copy()
+    sums = np.stack([np.bincount(faces.corner_vertices, part, minlength=len(before)) for part in of_corners], axis=1)
     # The mean without normalisation, which the nearest rotation ignores; zero where nothing moves.
     is_moved = _has_moving_face(before, after, faces) & sums.any(axis=1)
-    left, _stretches, right = np.linalg.svd(sums[is_moved].reshape(-1, 3, 3))
+    rotations = nearest_rotation.nearest_rotations(sums[is_moved].reshape(-1, 3, 3))
     axes = np.tile(np.eye(3, dtype=np.float32)[:2], (len(before), 1, 1))
-    axes[is_moved] = np.swapaxes(left @ right, 1, 2)[:, :2]
+    axes[is_moved] = np.swapaxes(rotations, 1, 2)[:, :2]
     return axes
+
+
+def _gradients(before, after, corners):
+    """(F, 9) float64: of each face's deformation the gradient, zero of faces without area; corners: (F, 3) int32."""
+    kinds = (corners, np.int32, wp.vec3i), (before, np.float32, wp.vec3), (after, np.float32, wp.vec3)
+    require_count("vertices", len(after), len(before))
+    require_indices("vertices", corners, len(before))
+    corners, before, after = (
+        wp.array(np.ascontiguousarray(array, scalar), dtype=kind, device="cpu", copy=False)
+        for array, scalar, kind in kinds
+    )
+    gradients = wp.empty(len(corners), dtype=wp.mat33d, device="cpu")
+    parallel.launch(_face_gradients, len(corners), [Rows(corners), before, after], [gradients], "cpu")
+    return gradients.numpy().reshape(-1, 9)
+
+
+@wp.func
+def _basis(vertices: wp.array[wp.vec3], corners: wp.vec3i):
+    """Columns are the edges from a face's first corner to the next and to the last, and its normal."""
+    first = wp.vec3d(vertices[corners[0]])
+    along = wp.vec3d(vertices[corners[1]]) - first
+    across = wp.vec3d(vertices[corners[2]]) - first
+    normal = wp.cross(along, across)
+    size = wp.length(normal)
+    return wp.matrix_from_cols(along, across, normal / wp.where(size > wp.float64(0.0), size, wp.float64(1.0)))
+
+
+@wp.kernel
+def _face_gradients(
+    corners: wp.array[wp.vec3i],
+    before: wp.array[wp.vec3],
+    after: wp.array[wp.vec3],
+    # outputs
+    out_gradients: wp.array[wp.mat33d],
+):
+    face = wp.tid()
+    was = _basis(before, corners[face])
+    gradient = wp.mat33d()
+    if wp.abs(wp.determinant(was)) > wp.float64(1e-30):
+        gradient = _basis(after, corners[face]) * wp.inverse(was)
+    out_gradients[face] = gradient
 
 
 def _has_moving_face(before, after, faces):
@@ -94,15 +131,6 @@ def _has_moving_face(before, after, faces):
     is_moved = np.zeros(len(before), bool)
     is_moved[faces.corner_vertices[np.repeat(faces_move, np.diff(faces.starts))]] = True
     return is_moved
-
-
-def _bases(vertices, corners):
-    """(F, 3, 3): columns are the edges from each face's first corner to the next and to the last, and its normal."""
-    first, following, last = vertices.astype(np.float64)[corners]
-    along, across = following - first, last - first
-    normals = np.cross(along, across)
-    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
-    return np.stack([along, across, normals / np.where(lengths > 0.0, lengths, 1.0)], axis=-1)
 
 
 def carry(

@@ -4,7 +4,7 @@
 Warp is imported late, because the import is slow.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -82,6 +82,12 @@ def weighed(
         settings.keep_length,
         is_mirrored,
     )
+
+
+def limited_again(binding: HairBinding, settings: Any) -> HairBinding:
+    """A `HairBinding` with the same weights and other limits or lengths; settings: `HairSettings`."""
+    limits = interpolation.guide_weights.Limits(settings.angle_limit, settings.length_limit)
+    return replace(binding, limits=limits, keep_length=settings.keep_length)
 
 
 def weigh_again(binding: HairBinding, settings: Any) -> HairBinding:

@@ -6,6 +6,7 @@ So are the defaults, but for the pigment: dark blond, which shows its shading in
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ from .fibre.pigment import (
 from .tables import lookup_tables
 
 _WHITE = (1.0, 1.0, 1.0)
+
+_KEPT = 64  # results of functions of looks, which are asked for with every step of a stroke
 
 # What `table_settings` takes from the appearance, of the fields of `lookup_tables.Settings`.
 TABLE_FIELDS = ("mode", "eta", "sigma_a", "tilt", "roughness", "radial_roughness", "coat", "beta_r")
@@ -105,6 +108,7 @@ class Appearance(Settings):
     )
 
 
+@lru_cache(maxsize=_KEPT)
 def wetted(look: Appearance, wetness: float) -> Appearance:
     """The dry look that shows a look at a wetness from 0 to 1, in place of its own: linear to that of soaked hair."""
     if wetness == 0.0:
@@ -151,6 +155,7 @@ def mean_color(appearance: Appearance) -> np.ndarray:
     return color_of_scattering(color, max(scattering, _LEAST_SCATTERING))
 
 
+@lru_cache(maxsize=_KEPT)
 def strand_settings(appearance: Appearance) -> strand_variation.Settings:
     """`Appearance` → `strand_variation.Settings`: absorption from strand to strand and along each."""
     pigment, dye, melanin = _absorption(appearance)
@@ -184,6 +189,7 @@ def _dye(tint, radial_roughness):
     )
 
 
+@lru_cache(maxsize=_KEPT)
 def table_settings(appearance: Appearance, base: lookup_tables.Settings | None = None) -> lookup_tables.Settings:
     """`Appearance` → `lookup_tables.Settings` of an average strand at its root.
 

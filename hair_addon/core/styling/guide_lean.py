@@ -10,7 +10,7 @@ import warp as wp
 
 from ..errors import HairError
 from ..geometry.closest_point import SurfaceQuery
-from ..kernels import kernel_cache
+from ..kernels import parallel
 from ..kernels.checks import require_count
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
@@ -19,6 +19,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 _LEAST_AMOUNT = wp.constant(0.05)  # from which on guides are kept off the surface fully
 _STEEPEST = wp.constant(0.9)  # sine of the angle at which guides rise: near a right angle they would turn in jumps
 _UNKNOWN = wp.constant(1.0e30)
+_LEAST_ROWS = 64  # guides of which a thread is worth it
 _CORRECTIONS = wp.constant(4)  # of a segment: a point that is lifted comes nearer to the surface at another place
 
 
@@ -61,6 +62,7 @@ def _lean(
         for _correction in range(_CORRECTIONS):
             ahead = position + size * forward
             query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * (clearance + size))
+            lift = float(0.0)
             if query.result:
                 face = query.face
                 u = query.u
@@ -89,6 +91,8 @@ def _lean(
                         along = edge - wp.dot(edge, normal) * normal
                     rise = wp.max(rise, wp.min(rise + lift / size, _STEEPEST))
                     forward = rise * normal + wp.sqrt(1.0 - rise * rise) * wp.normalize(along)
+            if lift <= 0.0:
+                break  # so would it be the next time
         position += size * forward
         out_points[guide, i] = position
 
@@ -118,8 +122,9 @@ def leaned(
         for array, kind in ((vertex_normals, wp.vec3), (points, wp.vec3), (amounts, float), (directions, wp.vec3))
     ]
     made = wp.empty(points.shape[:2], dtype=wp.vec3, device=device)
-    inputs = [surface.mesh.id, *there, clearance]
-    kernel_cache.launch(_lean, len(points), inputs=inputs, outputs=[made], device=device)
+    normals, *rows = there
+    inputs = [surface.mesh.id, normals, *map(parallel.Rows, rows), clearance]
+    parallel.launch(_lean, len(points), inputs, [made], device, least_rows=_LEAST_ROWS)
     result = made.numpy()
     is_still = ~(amounts > 0.0).any(axis=1)
     result[is_still] = points[is_still]

@@ -27,13 +27,19 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class Lean:
     """One style on guides.
 
-    amounts (G,): of each guide; course(x): its profile; directions (G, 3): unit; clearance [m].
+    settings: of the style; amounts (G,): of each guide; course(x): its profile; directions (G, 3): unit; clearance [m].
     """
 
+    settings: StyleSettings
     amounts: np.ndarray
     course: Callable[[np.ndarray], np.ndarray]
     directions: np.ndarray
     clearance: float
+
+    def is_same(self, other: "Lean") -> bool:
+        """Whether guides lean alike."""
+        arrays = (self.amounts, other.amounts), (self.directions, other.directions)
+        return self.settings == other.settings and all(np.array_equal(*pair) for pair in arrays)
 
 
 def leans(
@@ -59,11 +65,11 @@ def leans(
         if isinstance(settings, wet.Settings):
             directions = np.tile(DOWN, (len(roots), 1))
             clearance = settings.lock * wet.CLEARANCE
-            found.append(Lean(amounts * settings.cling, _wet_course, directions, clearance))
+            found.append(Lean(settings, amounts * settings.cling, _wet_course, directions, clearance))
             continue
         directions = _directions(settings, mesh, roots, targets)
         if directions is not None:
-            found.append(Lean(amounts, _course(base.profile_of(settings)), directions, settings.clearance))
+            found.append(Lean(settings, amounts, _course(base.profile_of(settings)), directions, settings.clearance))
     return found
 
 
@@ -91,6 +97,17 @@ class FollowedGuides:
         """mesh: that guides keep off."""
         self._mesh, self._leans, self._point_count = mesh, leans, point_count
         self._before, self._after = np.empty((0, 0, 3), np.float32), np.empty((0, 0, 3), np.float32)
+
+    def continue_from(self, other: "FollowedGuides") -> None:
+        """Take over the guides that another has computed, if it would compute the same ones."""
+        is_same = (
+            self._mesh is other._mesh
+            and self._point_count == other._point_count
+            and len(self._leans) == len(other._leans)
+            and all(one.is_same(another) for one, another in zip(self._leans, other._leans, strict=True))
+        )
+        if is_same:
+            self._before, self._after = other._before, other._after
 
     @cached_property
     def _surface(self):

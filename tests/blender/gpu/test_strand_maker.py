@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.blender.gpu import maker_choice, shaders, strand_maker, strand_textures
+from hair_addon.blender.gpu import maker_choice, shaders, strand_bounds, strand_changes, strand_maker, strand_textures
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.mesh import SurfacePoints
@@ -61,12 +61,15 @@ def by_warp(binding, guides, axes):
 
 
 def new_maker(binding, point_count, axes):
-    return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
+    return strand_maker.new_maker(strand_maker.bound_strands(binding), profile(point_count), axes)
 
 
 def uploaded(points):
-    radii = np.broadcast_to(np.linspace(2e-4, 1e-5, points.shape[1], dtype=np.float32), points.shape[:2])
-    return strand_textures.upload_strands(points, radii)
+    return strand_textures.upload_strands(points, np.broadcast_to(profile(points.shape[1]), points.shape[:2]))
+
+
+def profile(point_count):
+    return np.linspace(2e-4, 1e-5, point_count, dtype=np.float32)
 
 
 def texels(texture, count, texels_each):
@@ -100,6 +103,21 @@ def test_strands_are_those_of_warp(blender, rng, point_count, slots, limits):
     # Places of 1 m have half a unit of their last digit beside it, twice.
     assert (error <= CLOSE * lengths + 4.0 * 2.0**-23).all(), error.max()
     np.testing.assert_array_equal(found[..., 3], before.radii)
+    places = found[..., :3].reshape(-1, 3)
+    np.testing.assert_array_equal(made.bounds, [places.min(axis=0), places.max(axis=0)])
+    centre, radius = made.ball
+    assert (np.linalg.norm(places - centre, axis=1) <= radius * (1.0 + 1e-6)).all()
+
+
+@pytest.mark.parametrize("count", [1, 2, 27, 28, 8193])
+def test_joined_boxes_hold_all_boxes(blender, rng, count):
+    bounds = strand_bounds.new_bounds(count)
+    in_row = min(8192, count)
+    boxes = rng.normal(size=(-(-count // in_row) * in_row, 2, 4)).astype(np.float32)
+    texels = gpu.types.Buffer("FLOAT", boxes.size, boxes.ravel())
+    texture = gpu.types.GPUTexture((2 * in_row, len(boxes) // in_row), format="RGBA32F", data=texels)
+    found = replace(bounds, levels=((texture, count), *bounds.levels[1:])).read()
+    np.testing.assert_array_equal(found, [boxes[:count, 0, :3].min(axis=0), boxes[:count, 1, :3].max(axis=0)])
 
 
 def test_an_edit_leaves_where_strands_were(blender, rng):
@@ -120,11 +138,11 @@ def test_an_edit_leaves_where_strands_were(blender, rng):
 
 def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
     """Where its strands were is not known then, as after two changes at once."""
-    monkeypatch.setattr(strand_maker, "_MOST_MOVED", STRANDS * 9 - 1)
+    monkeypatch.setattr(strand_changes, "MOST_MOVED", STRANDS * 9 - 1)
     binding, guides = bound_hair(rng, 9, 4)
     wanted = by_warp(binding, guides, np.eye(3))
     maker = new_maker(binding, 9, np.eye(3))
-    assert maker.moved.width * maker.moved.height == 1
+    assert maker.changes.moved.width * maker.changes.moved.height == 1
     made = maker.make(uploaded(np.zeros_like(wanted)), guides.numpy())
     assert made.moved.turn == 2
     np.testing.assert_allclose(texels(made.texture, STRANDS, 9)[..., :3], wanted, rtol=0.0, atol=CLOSE)

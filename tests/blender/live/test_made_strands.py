@@ -1,68 +1,27 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands that the GPU makes while guides are combed: what is written afterwards is what was shown; counted."""
 
+from itertools import cycle
 from types import SimpleNamespace
 
 import bpy
+import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import maker_choice, strand_maker
-from hair_addon.blender.groom import bindings, pipeline
-from hair_addon.blender.host import running
-from hair_addon.blender.live import invalidation, live_hair
-from hair_addon.blender.render import hair_cache, made_strands, viewport
-from hair_addon.blender.settings import preferences, style_items
+from hair_addon.blender.data import curves
+from hair_addon.blender.gpu import ambient_visibility, drawing, maker_choice, shaders, strand_maker
+from hair_addon.blender.groom import bindings
+from hair_addon.blender.host import running, scene_time
+from hair_addon.blender.live import live_hair
+from hair_addon.blender.render import drawn_scene, hair_cache, made_strands, viewport
+from hair_addon.blender.settings import preferences
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
-from hair_addon.core.styling import lean
 from tests.blender.render.test_hair_places import view3d
 from tests.support.counting import counts_of
-from tests.support.reading import points, write_points
-
-CLOSE = 1e-5  # [m] of strands of half a metre on a ball of one
-
-
-@pytest.fixture
-def window(monkeypatch):
-    """Act as in a window on a graphics card, where hair is written when an interaction is over."""
-    monkeypatch.setattr(running, "has_window", lambda: True)
-    monkeypatch.setattr(maker_choice, "times", lambda: (0.0, 1.0))
-    yield
-    live_hair.cancel_writing()
-    invalidation.data_replaced()
-
-
-@pytest.fixture
-def watched(hair, window):
-    """Hair that is drawn, and bound, as one of its guides was combed already."""
-    drawn(hair)
-    comb(1)
-    drawn(hair)
-    live_hair.write_all()
-    bpy.context.view_layer.update()
-    drawn(hair)
-    return hair
-
-
-def comb(count, along=(0.0, 0.01, 0.02)):
-    guides = bpy.data.objects["Guides"]
-    combed = points(guides)
-    combed[:count, 1:] += np.float32(along)
-    write_points(guides, combed)
-
-
-def drawn(hair):
-    """(S, P, 3) in the texture that the shader reads, after a viewport has drawn it."""
-    on_gpu = hair_cache.strands_on_gpu(hair.data)
-    hair_cache.choose_makers()
-    texels = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)
-    return texels[: on_gpu.strand_count, :, :3]
-
-
-def grown(hair):
-    """(S, P, 3) that interpolation makes of the guides as they are now, from nothing."""
-    return pipeline.bind_hair(*pipeline.inputs_of(hair.data), bpy.context.evaluated_depsgraph_get()).points
+from tests.support.made_strands import CLOSE, comb, drawn, grown
+from tests.support.reading import points
 
 
 def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, monkeypatch):
@@ -88,25 +47,69 @@ def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, m
     assert np.abs(shown - before).max() > 0.01
 
 
-def test_bounds_hold_what_was_combed_out_of_them(watched):
+def test_bounds_are_those_of_what_is_shown(watched):
     first = hair_cache.strands_on_gpu(watched.data)
-    for _ in range(4):
-        comb(60, along=(0.3, 0.0, 0.0))
-        shown = drawn(watched)
-    low, high = hair_cache.strands_on_gpu(watched.data).bounds
+    for along in (0.3, 0.3, -0.6):  # out of the first ones, and back
+        comb(60, along=(along, 0.0, 0.0))
+        shown = drawn(watched).reshape(-1, 3)
+        bounds = hair_cache.strands_on_gpu(watched.data).bounds
+        np.testing.assert_array_equal(bounds, [shown.min(axis=0), shown.max(axis=0)])
     assert first.texture is hair_cache.strands_on_gpu(watched.data).texture
-    assert (shown >= low - CLOSE).all()
-    assert (shown <= high + CLOSE).all()
-    assert shown.max() > first.bounds.max()
 
 
-def test_a_surface_that_moves_meanwhile_carries_the_strands_of_now(watched):
+def test_a_surface_that_is_read_again_at_rest_moves_and_uploads_nothing(watched, monkeypatch):
     comb(30)
-    drawn(watched)
+    shown = drawn(watched)
+    calls = counts_of(monkeypatch)
     hair_cache.invalidate_pose(watched.data.surface)
-    comb_shown = drawn(watched)
-    np.testing.assert_array_equal(comb_shown, bindings.of(watched.data).points)
-    np.testing.assert_array_equal(comb_shown, grown(watched))
+    np.testing.assert_array_equal(drawn(watched), shown)
+    assert not any(calls.values())
+    np.testing.assert_allclose(shown, grown(watched), rtol=0.0, atol=CLOSE)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"keep_length": 0.2},
+        {"angle_limit": 0.4, "length_limit": 1.5},
+        {"neighbour_limit": 3},
+        {"automatic_influence": False, "influence_distance": 0.4},
+        {"radius": 3e-3, "tip_taper": 0.9},
+    ],
+    ids=lambda settings: next(iter(settings)),
+)
+def test_settings_of_weights_are_followed_where_strands_are_drawn(watched, settings, monkeypatch):
+    comb(9)
+    drawn(watched)
+    calls, before = counts_of(monkeypatch), points(watched)
+    for name, value in settings.items():
+        setattr(watched.data.vellus.hair, name, value)
+    bpy.context.view_layer.update()
+    shown = drawn(watched)
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    np.testing.assert_array_equal(points(watched), before)
+    comb(20)
+    shown = drawn(watched)
+    on_gpu = hair_cache.strands_on_gpu(watched.data)
+    radii = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)[: on_gpu.strand_count, :, 3]
+    live_hair.write_all()
+    assert (calls["searches"], calls["uploads"], calls["writes"]) == (0, 0, 1)
+    monkeypatch.undo()
+    assert getattr(bindings.of(watched.data).settings, name) == pytest.approx(value)
+    np.testing.assert_array_equal(points(watched), grown(watched))
+    np.testing.assert_allclose(shown, points(watched), rtol=0.0, atol=CLOSE)
+    np.testing.assert_array_equal(radii.ravel(), curves.read_radii(watched.data))
+    assert on_gpu.greatest_radius == radii.max()
+
+
+def test_settings_of_roots_are_not(watched, monkeypatch):
+    calls = counts_of(monkeypatch)
+    watched.data.vellus.hair.neighbour_limit = 16  # more than were found
+    bpy.context.view_layer.update()
+    assert calls["searches"] == 1
+    watched.data.vellus.hair.strand_count = 300
+    bpy.context.view_layer.update()
+    assert len(drawn(watched)) == 300
 
 
 def test_strands_that_are_read_again_are_those_of_now(watched):
@@ -133,16 +136,6 @@ def test_one_edit_may_go_either_way(watched, monkeypatch):
         assert hair_cache.may_make(watched.data.session_uid) == (choice != "COMPUTE")
         comb(7)
         np.testing.assert_allclose(drawn(watched), grown(watched), rtol=0.0, atol=CLOSE)
-
-
-def test_styled_hair_is_made_as_before(watched):
-    assert hair_cache.may_make(watched.data.session_uid)
-    style_items.add(watched.data.vellus, lean.Settings(amount=0.3))
-    bpy.context.view_layer.update()
-    drawn(watched)
-    assert not hair_cache.may_make(watched.data.session_uid)
-    comb(60)
-    np.testing.assert_array_equal(drawn(watched), bindings.of(watched.data).points)
 
 
 @pytest.mark.parametrize(
@@ -191,3 +184,75 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkey
     assert calls["moves"] == 0
     assert after.moved.turn == 3
     np.testing.assert_allclose(drawn(hair), grown(hair), rtol=0.0, atol=CLOSE)
+
+
+def test_what_played_is_drawn_as_at_rest_when_it_stops(hair, window, coarse_shadows, monkeypatch):
+    viewport.view_cache.clear()
+    measured, real = [], ambient_visibility.measure
+    monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
+    is_playing = [False]
+    monkeypatch.setattr(scene_time, "is_playing", lambda: is_playing[0])
+
+    def view():
+        context = bpy.context
+        of = SimpleNamespace(space_data=view3d(), scene=context.scene, view_layer=context.view_layer)
+        of.evaluated_depsgraph_get = context.evaluated_depsgraph_get
+        return viewport.drawn_scene_of(of)
+
+    comb(9)  # bound
+    view()
+    is_playing[0] = True
+    for _ in range(2):
+        comb(9)
+        view()
+        viewport.invalidate()  # more than hair
+        view()
+    live_hair.write_all()
+    bpy.context.view_layer.update()
+    view()
+    measured.clear()
+    viewport.invalidate()
+    played = view()
+    assert not measured
+    is_playing[0] = False
+    at_rest = view()
+    assert measured == [1]
+    assert at_rest is not played
+    assert view() is at_rest
+
+
+def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watched, coarse_shadows, monkeypatch):
+    """From the comb to shadows and light: one texture of twelve bytes a point of guides; six numbers come back."""
+    bpy.ops.object.light_add(type="SUN")
+
+    def frame(before):
+        context = bpy.context
+        given = context.scene, context.view_layer, context.evaluated_depsgraph_get()
+        return drawn_scene.read(*given, before=before, is_draft=before is not None)
+
+    shown = frame(None)
+    to_and_fro = cycle([np.float32([0.0, 0.01, 0.02]), np.float32([0.0, -0.01, -0.02])])
+    for _ in range(16):  # light has come round once
+        comb(20, next(to_and_fro))
+        shown = frame(shown)
+    programs, maps, calls = len(shaders.program_cache), shown.shadow_maps, counts_of(monkeypatch)
+    textures, sent, surfaces = [], [], []
+    texture, buffer, draw_surface = gpu.types.GPUTexture, gpu.types.Buffer, drawing.draw_surface_depth
+
+    def sized(kind, size, values):
+        if kind == "FLOAT":  # others are blocks of uniforms
+            sent.append(size)
+        return buffer(kind, size, values)
+
+    monkeypatch.setattr(gpu.types, "GPUTexture", lambda *given, **named: textures.append(1) or texture(*given, **named))
+    monkeypatch.setattr(gpu.types, "Buffer", sized)
+    monkeypatch.setattr(drawing, "draw_surface_depth", lambda *given: surfaces.append(1) or draw_surface(*given))
+    for _ in range(3):
+        comb(20, next(to_and_fro))
+        shown = frame(shown)
+    assert sent == [bindings.of(watched.data).guides.numpy().size] * 3
+    assert len(textures) == 3
+    assert len(shaders.program_cache) == programs
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+    assert shown.shadow_maps is maps
+    assert not surfaces  # which stay in the maps of the sun and of the world's directions

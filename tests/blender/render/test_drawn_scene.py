@@ -52,6 +52,34 @@ def test_what_else_changes_is_read_again(change, hair, forgotten):
     assert False in forgotten
 
 
+def key(owner, name, values):
+    for frame, value in enumerate(values, start=1):
+        setattr(owner, name, value)
+        owner.keyframe_insert(name, frame=frame)
+
+
+MOVING = {
+    "nothing": (lambda hair: None, True),
+    "a camera": (lambda hair: key(bpy.data.objects["Camera"], "location", [(0, 0, 1), (0, 0, 2), (0, 0, 3)]), True),
+    "a light": (lambda hair: key(bpy.data.lights["Sun"], "energy", [1.0, 2.0, 3.0]), False),
+    "what is hidden": (lambda hair: key(hair.data.surface, "hide_viewport", [False, True, False]), False),
+    "the hair": (lambda hair: key(hair, "location", [(0, 0, 1), (0, 0, 2), (0, 0, 3)]), False),
+    "an image": (lambda hair: setattr(bpy.data.images.new("Film", 4, 4), "source", "SEQUENCE"), False),
+}
+
+
+@pytest.mark.parametrize("moving", MOVING)
+def test_a_frame_in_which_only_hair_may_move_reads_hair_alone(moving, hair, forgotten):
+    bpy.context.scene.collection.objects.link(bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera")))
+    animate, is_hair_only = MOVING[moving]
+    animate(hair)
+    bpy.context.scene.frame_set(1)
+    for frame in (2, 3):
+        forgotten.clear()
+        bpy.context.scene.frame_set(frame)
+        assert all(forgotten) == is_hair_only
+
+
 def test_a_stroke_reads_no_surfaces_and_draws_coarse_shadows(lit, monkeypatch):
     calls = []
 

@@ -15,7 +15,7 @@ from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.interpolation import guide_weights
 from hair_addon.core.interpolation.regions import Regions
 from hair_addon.core.kernels import kernel_cache
-from hair_addon.core.styling import braid, clump, curl, frizz, lean, program, smooth, steps, wet
+from hair_addon.core.styling import braid, clump, curl, frizz, guide_lean, lean, program, smooth, steps, wet
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.stack import HAIR
 from tests.support.devices import DEVICE
@@ -66,6 +66,22 @@ def test_strands_that_are_reached_are_as_in_a_full_update(hair, name):
     reached = hair.bound(*STACKS[name]).reached(np.array([5, 6]), followers).astype(np.int32)
     full = hair.styled(*STACKS[name], guides=guides)
     np.testing.assert_array_equal(hair.styled(*STACKS[name], guides=guides, chosen=reached), full[reached])
+
+
+def test_guides_that_lean_as_before_are_not_computed_again(hair, monkeypatch):
+    """Where another style of the stack changes; others are, and the bits are the same."""
+    styles = lean.Settings(amount=0.7), curl.Settings()
+    first = hair.bound(*styles)
+    wanted = first.guides(hair.guides).numpy()
+    same, other = hair.bound(styles[0], curl.Settings(radius=0.01)), hair.bound(lean.Settings(amount=0.6), styles[1])
+    computed = []
+    real = guide_lean.leaned
+    monkeypatch.setattr(guide_lean, "leaned", lambda *given: computed.append(1) or real(*given))
+    for styling, count in ((same, 0), (other, 1)):
+        styling.followed.continue_from(first.followed)
+        found = styling.guides(hair.guides).numpy()
+        assert len(computed) == count
+        assert np.array_equal(found, wanted) == (count == 0)
 
 
 @pytest.mark.parametrize("point_count", [41, 81])

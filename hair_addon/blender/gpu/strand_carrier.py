@@ -1,0 +1,102 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands carried with their surface where they are drawn: core/geometry/surface_deform.py as a compute program.
+
+Strands at rest and their roots are uploaded once, or made there; a pose of the surface uploads its vertices alone.
+"""
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import gpu
+import numpy as np
+
+from ...core.kernels.checks import require_count, require_indices
+from . import shaders
+from .strand_changes import StrandChanges, new_changes, rows_texture
+from .strand_textures import MOST_GROUPS, StrandsOnGPU
+
+if TYPE_CHECKING:
+    from ...core.geometry.surface_deform import SurfaceMotion
+
+_GROUP_SIZE = 64
+_NOT_TURNED = np.eye(3, dtype=np.float32)[:2]
+
+
+@dataclass(frozen=True)
+class StrandCarrier:
+    """Strands at rest and where they are rooted; made by `new_carrier`."""
+
+    rest: gpu.types.GPUTexture  # as `StrandsOnGPU.texture`
+    roots: gpu.types.GPUTexture  # shaders/carry_strands.comp
+    vertices: np.ndarray  # (V, 3) of the surface at rest
+    changes: StrandChanges
+
+    def carry(self, strands: StrandsOnGPU, motion: "SurfaceMotion | None") -> StrandsOnGPU:
+        """Carry all strands from their rest; the `StrandsOnGPU` after it.
+
+        strands: of the same roots, whose texture is changed: another one than `rest`; motion: from the same vertices,
+        None for none. Raises `HairError` where counts do not match.
+        """
+        vertices = np.zeros((len(self.vertices), 3, 4), np.float32)
+        if motion is None:
+            vertices[:, 0, :3], vertices[:, 1:, :3] = self.vertices, _NOT_TURNED
+        else:
+            require_count("vertices", len(motion.after), len(self.vertices))
+            require_count("vertices", len(motion.axes), len(self.vertices))
+            vertices[:, 0, :3], vertices[:, 1:, :3] = motion.after, motion.axes
+            is_moved = (motion.after != self.vertices).any(axis=1)
+            vertices[:, 0, 3] = is_moved | (motion.axes != _NOT_TURNED).any(axis=(1, 2))
+        texture, _row = rows_texture(vertices.reshape(len(vertices), -1), 4)
+        program = _carry_program()
+        program.bind()
+        for name, sampled in (("rest", self.rest), ("roots", self.roots), ("vertices", texture)):
+            program.uniform_sampler(name, sampled)
+        program.image("strands", strands.texture)
+        self.changes.bind(program)
+        for name, value in (
+            ("strand_count", strands.strand_count),
+            ("point_count", strands.point_count),
+            ("row_strands", strands.row_strands),
+            ("row_moved", self.changes.row_moved),
+        ):
+            program.uniform_int(name, value)
+        groups = -(-strands.strand_count // _GROUP_SIZE)
+        rows = -(-groups // MOST_GROUPS)
+        gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+        gpu.shader.unbind()
+        return self.changes.changed(strands)
+
+
+def new_carrier(
+    rest: gpu.types.GPUTexture, point_count: int, places: tuple[np.ndarray, np.ndarray], vertices: np.ndarray
+) -> StrandCarrier:
+    """The `StrandCarrier` of S strands.
+
+    rest: their texture; places: (S, 3) int32 vertices around each root and (S, 3) float32 barycentric coordinates;
+    vertices: (V, 3) float32 of the surface at rest. Raises `HairError` where counts or indices do not match, or the
+    driver lacks something.
+    """
+    corners, barycentric = places
+    require_count("barycentric coordinates", len(barycentric), len(corners))
+    require_indices("vertices", corners, len(vertices))
+    _carry_program()  # first: where there is none, nothing is uploaded
+    rows = np.zeros((len(corners), 3, 4), np.float32)
+    rows[:, 0, :3], rows[:, 1, :3] = corners, barycentric  # indices are exact in single precision up to 16 million
+    rows[:, 2, :3] = (barycentric[:, :, None] * vertices[corners]).sum(axis=1)
+    roots, _row = rows_texture(rows.reshape(len(rows), -1), 4)
+    return StrandCarrier(rest, roots, vertices, new_changes(len(corners), point_count))
+
+
+@shaders.kept
+def _carry_program():
+    """The compute program that carries strands."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(_GROUP_SIZE)
+    for slot, name in enumerate(("rest", "roots", "vertices")):
+        info.sampler(slot, "FLOAT_2D", name)
+    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}, "boxes": {"WRITE"}}
+    for slot, (name, qualifiers) in enumerate(images.items()):
+        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=qualifiers)
+    for name in ("strand_count", "point_count", "row_strands", "row_moved"):
+        info.push_constant("INT", name)
+    return shaders.compile_compute(info, "carry_strands.comp")

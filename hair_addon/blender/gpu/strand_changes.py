@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What is known of all strands when a program has changed them: where they were before, and the box around them."""
+
+from dataclasses import dataclass, replace
+
+import gpu
+import numpy as np
+
+from . import strand_bounds
+from .strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, numbers_texture
+
+# Points of strands up to which it is kept where they were, for motion vectors: 128 MiB.
+MOST_MOVED = 8 << 20
+
+
+@dataclass(frozen=True)
+class StrandChanges:
+    """Textures that a program writes beside the strands; made by `new_changes`."""
+
+    moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; one texel where that is not kept
+    row_moved: int  # strands in a row of it, 0 where it is not kept
+    moved_rows: gpu.types.GPUTexture
+    bounds: strand_bounds.StrandBounds
+
+    def bind(self, program: gpu.types.GPUShader) -> None:
+        """Bind `moved_strands` and `boxes` of a program that is bound."""
+        program.image("moved_strands", self.moved)
+        program.image("boxes", self.bounds.boxes)
+
+    def changed(self, strands: StrandsOnGPU) -> StrandsOnGPU:
+        """`StrandsOnGPU` after the program, with exact bounds: waits until it has run, and six numbers come back."""
+        before = strands.moved.turn if strands.moved else 0
+        if self.row_moved:
+            moved = Moved(self.moved, self.row_moved, self.moved_rows, before + 1)
+        else:
+            # It is not known where strands were: as if there had been more changes than one.
+            moved = Moved(self.moved, 1, self.moved_rows, before + 2)
+        return replace(strands, moved=moved, bounds=self.bounds.read(), has_points=False)
+
+
+def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -> StrandChanges:
+    """`StrandChanges` of strands of as many points each; keeps_moved: whether to keep where they were before.
+
+    Raises `HairError` where the driver lacks something.
+    """
+    bounds = strand_bounds.new_bounds(strand_count)
+    if keeps_moved and strand_count * point_count <= MOST_MOVED:
+        moved, row_moved = empty_rows(strand_count, point_count + 1)
+        moved_rows = numbers_texture(np.arange(1, strand_count + 1), TEXTURE_WIDTH // point_count)
+        return StrandChanges(moved, row_moved, moved_rows, bounds)
+    return StrandChanges(empty_rows(1, 1)[0], 0, empty_rows(1, 1)[0], bounds)
+
+
+def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTexture, int]:
+    """(texture, whole rows of values in a row of it) of (N, channels T) float32, T texels each."""
+    texels = values.shape[1] // channels
+    in_row = min(TEXTURE_WIDTH // texels, len(values))
+    height = -(-len(values) // in_row)
+    if height * in_row > len(values):
+        values = np.concatenate([values, np.zeros((height * in_row - len(values), values.shape[1]), np.float32)])
+    data = gpu.types.Buffer("FLOAT", values.size, values.ravel())
+    texture_format = {1: "R32F", 4: "RGBA32F"}[channels]
+    texture = gpu.types.GPUTexture((in_row * texels, height), format=texture_format, data=data)
+    texture.filter_mode(False)
+    return texture, in_row
+
+
+def empty_rows(count: int, texels: int) -> tuple[gpu.types.GPUTexture, int]:
+    """The same of RGBA32F without values."""
+    in_row = min(TEXTURE_WIDTH // texels, count)
+    texture = gpu.types.GPUTexture((in_row * texels, -(-count // in_row)), format="RGBA32F")
+    texture.filter_mode(False)
+    return texture, in_row

@@ -1,0 +1,286 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Styles applied to strands in the texture that they are drawn from, after strand_maker.py has made them there.
+
+The program of a stack is the one that core/styling runs, as the same rows of numbers: a slider uploads these alone.
+Centre strands of clumps are made and styled first, level by level, in a texture of their own.
+shaders/style_strands.comp is the twin of core/styling/steps.cpp.
+"""
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import gpu
+import numpy as np
+
+from ...core.interpolation.hair_binding import HairBinding
+from ...core.kernels.checks import require_count
+from ...core.styling import frizz, program_rows
+from ...core.styling.program_rows import Program
+from ...core.styling.random_numbers import PURPOSES
+from . import shaders, strand_changes, strand_maker, uniforms
+from .strand_maker import StrandMaker
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU
+
+if TYPE_CHECKING:
+    from ...core.styling.stack import Styling
+    from ...core.styling.steps import StrandData
+
+MOST_POINTS = 128  # of a strand: what a thread keeps of it is 32 or 48 bytes a point
+
+_GROUP_SIZE = 64
+_KINDS = {name: getattr(program_rows, name) for name in ("TRIM", "CLUMP", "CURL", "FRIZZ", "BEND", "SMOOTH", "WEAVE")}
+
+
+def can_style(styling: "Styling") -> bool:
+    """Whether the GPU can apply these styles; other stacks are applied by Warp."""
+    return len(styling.program) <= uniforms.MOST_STEPS and 2 <= styling.point_count <= MOST_POINTS
+
+
+@dataclass
+class _Pass:
+    """Strands that are styled together: all of the hair, or the centres of one level of a clump tree."""
+
+    known: gpu.types.GPUTexture  # of each strand its normal, identity, clump centres and masks
+    record: np.ndarray  # uniforms.STYLING
+    block: gpu.types.GPUUniformBuf
+
+    def put_masks(self, data: "StrandData") -> None:
+        """Upload what is known of the strands anew; `put_steps` is due after it."""
+        self.known, self.record["row_known"], self.record["known_texels"] = _known(data)
+
+    def put_steps(self, program: Program) -> None:
+        """Upload the rows of a program."""
+        _put_steps(self.record, program)
+        self.block.update(uniforms.bytes_of(self.record))
+
+
+@dataclass
+class StyleMaker:
+    """Makes strands with styles; made by `new_style_maker`."""
+
+    binding: HairBinding
+    styling: "Styling"
+    maker: StrandMaker
+    centre_maker: StrandMaker | None  # None without clumps
+    centres: gpu.types.GPUTexture | None  # (K, P) points of centre strands, and the arc lengths
+    locks: gpu.types.GPUTexture  # of each clump centre, and of each guide, its normal and identity
+    levels: list[_Pass]
+    hair: _Pass
+    _guide_points: np.ndarray | None = None  # of the last `make`
+
+    def make(
+        self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
+    ) -> StrandsOnGPU:
+        """Make all strands with their styles; as `StrandMaker.make`, for guides as `Styling.guides` gives them."""
+        self.maker.require_fitting(strands)
+        if self._guide_points is None or not np.array_equal(self._guide_points, guide_points):
+            self.maker.put_guides(guide_points)
+            self._guide_points = guide_points.copy()
+        texture = strands.texture if rest is None else rest
+        self.maker.fill(texture)
+        program = _styles_program(strands.point_count, _kinds_of(self.styling.program))
+        if self.centre_maker is not None:
+            self.centre_maker.fill(self.centres)
+            for level in self.levels:
+                self._style(program, level, self.centres, self.centre_maker)
+        self._style(program, self.hair, texture, self.maker)
+        return self.maker.changes.changed(strands) if rest is None else strands
+
+    def _style(self, program, strands, image, maker):
+        program.bind()
+        program.uniform_block("styling", strands.block)
+        program.uniform_sampler("known", strands.known)
+        program.uniform_sampler("locks", self.locks)
+        program.image("strands", image)
+        program.image("centres", image if self.centres is None else self.centres)
+        program.image("boxes", maker.changes.bounds.boxes)
+        groups = -(-int(strands.record["strand_count"]) // _GROUP_SIZE)
+        rows = -(-groups // MOST_GROUPS)
+        gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+        gpu.shader.unbind()
+
+    def of_radii(self, radii: np.ndarray) -> "StyleMaker":
+        """The same of strands with radii (P,) float32."""
+        return replace(self, maker=self.maker.of_radii(radii))
+
+    def rebound(self, binding: HairBinding, styling: "Styling") -> "StyleMaker | None":
+        """The same for other weights or limits of the same strands and clumps; None where these are others.
+
+        Raises `HairError` as `new_style_maker`.
+        """
+        if not can_style(styling) or not _are_alike(styling, self.styling):
+            return None
+        maker, centre_maker = self.maker, self.centre_maker
+        if binding.guide_weights is not self.binding.guide_weights:
+            maker = maker.weighed(strand_maker.bound_strands(binding))
+        maker = maker.limited(binding.limits.fading, binding.keep_length)
+        if centre_maker is not None:
+            centre_maker = centre_maker.weighed(_centres_of(styling)).limited(
+                binding.limits.fading, binding.keep_length
+            )
+        for part, data, program in self._parts(styling):
+            part.put_masks(data)
+            part.put_steps(program)
+        return replace(self, binding=binding, styling=styling, maker=maker, centre_maker=centre_maker)
+
+    def _parts(self, styling):
+        """[(pass, what is known of its strands, their program)]."""
+        levels = [(own, level.data, level.steps) for own, level in zip(self.levels, styling.levels, strict=True)]
+        return [(self.hair, styling.data, styling.program), *levels]
+
+    def restyle(self, styling: "Styling") -> bool:
+        """Take other settings of the same styles: numbers alone are uploaded, and masks that were painted.
+
+        False where more has changed.
+        """
+        if styling is self.styling:
+            return True
+        is_alike = styling.trees is self.styling.trees and _are_alike(styling, self.styling)
+        if not can_style(styling) or not is_alike:
+            return False
+        masks = styling.data.masks.numpy(), self.styling.data.masks.numpy()
+        for part, data, program in self._parts(styling):
+            if not np.array_equal(*masks):
+                part.put_masks(data)
+            part.put_steps(program)
+        self.styling = styling
+        return True
+
+
+def maker_of(
+    binding: HairBinding,
+    styling: "Styling | None",
+    radii: np.ndarray,
+    axes: np.ndarray,
+    before: StrandMaker | StyleMaker | None = None,
+) -> StrandMaker | StyleMaker:
+    """What makes the strands of bound hair, with styles or without: the one before where that still does.
+
+    before: for strands at the same places. radii and axes: as in `new_maker`. Raises `HairError` as it does.
+    """
+    if styling is None or not len(styling.program):  # styles of guides alone are in these
+        if isinstance(before, StrandMaker):
+            return before
+        return strand_maker.new_maker(strand_maker.bound_strands(binding), radii, axes)
+    if isinstance(before, StyleMaker) and before.binding is not binding:
+        before = before.rebound(binding, styling)
+    if isinstance(before, StyleMaker) and before.restyle(styling):
+        return before
+    return new_style_maker(binding, styling, radii, axes)
+
+
+def new_style_maker(binding: HairBinding, styling: "Styling", radii: np.ndarray, axes: np.ndarray) -> StyleMaker:
+    """The `StyleMaker` of bound hair and its styles, of which `can_style` holds.
+
+    radii: (P,) float32; axes: (3, 3), from the coordinates of roots and guides to those that are drawn. Raises
+    `HairError` as `new_maker`.
+    """
+    require_count("radii", len(radii), styling.point_count)
+    point_count = styling.point_count
+    _styles_program(point_count, _kinds_of(styling.program))  # first: where there is none, nothing is uploaded
+    maker = strand_maker.new_maker(strand_maker.bound_strands(binding), radii, np.eye(3))
+    record = uniforms.STYLING.record()
+    record["axes"][:3, :3], record["axes"][3, 3] = styling.axes.T, 1.0
+    record["level_count"] = len(styling.data.members)
+    record["row_centres"] = TEXTURE_WIDTH // point_count
+    locks, record["row_locks"] = _locks(styling.data)
+    centre_maker, centres, levels = None, None, []
+    if styling.levels:
+        bound = _centres_of(styling)
+        record["centre_count"] = len(bound.roots)
+        centre_maker = strand_maker.new_maker(bound, radii, np.eye(3), keeps_moved=False)
+        centre_maker = replace(centre_maker, segments=maker.segments)
+        centres, _in_row = strand_changes.empty_rows(len(bound.roots), point_count)
+        for level in styling.levels:
+            own = record.copy()
+            own["first_strand"], own["are_centres"] = level.first, 1
+            levels.append(_new_pass(own, level.data, level.steps, np.eye(3), point_count))
+    hair = _new_pass(record, styling.data, styling.program, axes, point_count)
+    return StyleMaker(binding, styling, maker, centre_maker, centres, locks, levels, hair)
+
+
+def _new_pass(record, data, program, axes, point_count):
+    known, record["row_known"], record["known_texels"] = _known(data)
+    record["to_drawn"][:3, :3], record["to_drawn"][3, 3] = np.asarray(axes).T, 1.0
+    record["strand_count"] = len(data.normals)
+    record["row_strands"] = TEXTURE_WIDTH // point_count
+    _put_steps(record, program)
+    return _Pass(known, record, uniforms.uniform_buffer(record))
+
+
+def _put_steps(record, program):
+    rows = record["steps"][: len(program)]
+    for column, name in enumerate(("kind", "seed", "mask", "level", "first_centre")):
+        rows[name] = program.choices[:, column]
+    rows["numbers"] = program.numbers.reshape(len(program), program_rows.NUMBERS // 4, 4)
+    record["step_count"] = len(program)
+
+
+def _kinds_of(program):
+    """The kinds of a program's steps, as a program is compiled for them."""
+    present = set(program.choices[:, 0].tolist())
+    return tuple(name for name, kind in _KINDS.items() if kind in present)
+
+
+def _known(data: "StrandData"):
+    """(texture, strands in a row of it, texels of a strand): see shaders/style_strands.comp."""
+    columns = [data.normals.numpy(), _halves(data.identities.numpy()), data.members.numpy().T, data.masks.numpy().T]
+    rows = np.concatenate(columns, axis=1, dtype=np.float32)
+    rows = np.pad(rows, ((0, 0), (0, -rows.shape[1] % 4)))
+    texture, in_row = strand_changes.rows_texture(rows, 4)
+    return texture, in_row, rows.shape[1] // 4
+
+
+def _locks(data):
+    """(texture, centres in a row of it): normal and identity in two texels of each."""
+    identities = _halves(data.centre_identities.numpy())
+    rows = np.concatenate([data.centre_normals.numpy(), identities, np.zeros((len(identities), 3))], axis=1)
+    return strand_changes.rows_texture(rows.astype(np.float32), 4)
+
+
+def _halves(identities):
+    """(N, 2): high and low 16 bits of (N,) int32, which single precision holds exactly."""
+    bits = identities.astype(np.int32).view(np.uint32)
+    return np.stack([bits >> np.uint32(16), bits & np.uint32(0xFFFF)], axis=1)
+
+
+def _centres_of(styling):
+    """`BoundStrands` of the clump centres of all levels, one after the other: all by the same settings."""
+    parts = [strand_maker.bound_strands(level.binding) for level in styling.levels]
+    arrays = {
+        name: np.concatenate([getattr(part, name) for part in parts])
+        for name in ("roots", "normals", "indices", "weights")
+    }
+    return replace(parts[0], **arrays)
+
+
+def _are_alike(styling, other):
+    """Whether two stacks on the same strands differ in their numbers, masks and what clumps follow alone."""
+    return (
+        styling.tree_levels == other.tree_levels
+        and styling.point_count == other.point_count
+        and np.array_equal(styling.axes, other.axes)
+        and np.array_equal(styling.data.normals.numpy(), other.data.normals.numpy())
+    )
+
+
+@shaders.kept
+def _styles_program(point_count, kinds):
+    """The compute program that applies steps of some kinds to strands of so many points."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(_GROUP_SIZE)
+    info.typedef_source(uniforms.STEP.source + uniforms.STYLING.source)
+    info.uniform_buf(0, "Styling", "styling")
+    for slot, name in enumerate(("known", "locks")):
+        info.sampler(slot, "FLOAT_2D", name)
+    both = {"NO_RESTRICT", "READ", "WRITE"}  # centres are read from the image that others are written to
+    for slot, (name, qualifiers) in enumerate({"strands": both, "centres": both, "boxes": {"WRITE"}}.items()):
+        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=qualifiers)
+    numbers = {"POINTS": point_count, "WAVES": frizz.WAVES_AN_OCTAVE, "MOST_OCTAVES": frizz.MOST_OCTAVES}
+    numbers |= {f"KIND_{name}": kind for name, kind in _KINDS.items()}
+    numbers |= {f"RANDOM_{name}": purpose for name, purpose in PURPOSES.items()}
+    numbers |= {f"HAS_{name}": 1 for name in kinds}
+    for name, value in numbers.items():
+        info.define(name, str(value))
+    left_out = {f"include/{name.lower()}.glsl": None for name in _KINDS if name not in kinds}
+    return shaders.compile_compute(info, "style_strands.comp", left_out)

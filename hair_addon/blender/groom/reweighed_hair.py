@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Bound hair with other weights of its guides, other lengths or radii: what sliders change where strands are drawn."""
+
+from dataclasses import replace
+
+from bpy.types import Curves, Depsgraph
+
+from ...core.grooming import following
+from ...core.interpolation import hair_binding
+from ..data import curves
+from ..settings import style_items
+from . import bindings, pipeline, styled_hair
+from .bindings import BoundHair
+
+# Settings that change neither where strands are rooted nor which guides may be theirs: of their weights, and others.
+_WEIGHING = ("automatic_influence", "influence_distance", "neighbour_limit")
+_AFTER_WEIGHING = ("keep_length", "angle_limit", "length_limit", "radius", "tip_taper", "guide_map")
+
+
+def reweighed(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
+    """The `BoundHair` of hair whose weights, lengths or radii are set otherwise; its points have to grow.
+
+    None where more has changed: nothing is read or searched. Raises `HairError`.
+    """
+    known = bindings.of(target)
+    guide_curves, settings = pipeline.inputs_of(target)
+    if known is None or known.guide_uid != guide_curves.session_uid or known.straight is not None:
+        return None
+    if known.free is not None:
+        return None
+    weighing, others = ({name: getattr(settings, name) for name in names} for names in (_WEIGHING, _AFTER_WEIGHING))
+    if replace(known.settings, **weighing, **others) != settings:
+        return None
+    if settings.neighbour_limit >= known.binding.candidates.indices.shape[1]:
+        return None
+    device = known.binding.positions.device
+    guides = curves.read_shown_guides(guide_curves, known.surface, device, known.guides)
+    if following.combed(guides, known.guides) is None:
+        return None
+    styles = style_items.styles_of(target.vellus)
+    read = styled_hair.read_styles(styles, target.surface, known.surface, guide_curves, depsgraph)
+    if not read.is_same(known.styles.read):
+        return None
+    if replace(known.settings, **others) == settings:
+        binding, shares = hair_binding.limited_again(known.binding, settings), known.shares
+    else:
+        binding, shares = hair_binding.weigh_again(known.binding, settings), None
+    make_trees = styled_hair.trees_again(known.styles, settings)
+    styled = styled_hair.bind(read, binding, guides, settings, known.surface, make_trees)
+    styled.continue_from(known.styles)
+    changed = {"settings": settings, "binding": binding, "styles": styled, "shares": shares, "guides": guides}
+    state = {"is_written": False, "has_moved_only": False, "is_map_written": False, "is_behind": True}
+    return replace(known, **changed, **state)

@@ -1,0 +1,113 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands that the GPU carries with their surface are where Warp carries them, and a pose uploads vertices alone."""
+
+from dataclasses import replace
+
+import gpu
+import numpy as np
+import pytest
+
+from hair_addon.blender.gpu import strand_carrier, strand_textures
+from hair_addon.core.errors import HairError
+from hair_addon.core.geometry import surface_deform
+from hair_addon.core.geometry.mesh import Faces
+
+SIDE, STRANDS, POINTS = 9, 700, 7
+CLOSE = 4e-6  # [m] beside places of 1 m
+
+
+def sheet():
+    """(V, 3) vertices and `Faces` of a sheet of quads, 1 m wide."""
+    along = np.linspace(0.0, 1.0, SIDE, dtype=np.float32)
+    x, y = np.meshgrid(along, along)
+    first = (np.arange(SIDE - 1)[:, None] * SIDE + np.arange(SIDE - 1)).ravel()
+    corners = np.stack([first, first + 1, first + SIDE + 1, first + SIDE], axis=1)
+    faces = Faces(corners.ravel().astype(np.int32), np.arange(0, corners.size + 1, 4, dtype=np.int32))
+    return np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3), faces
+
+
+@pytest.fixture
+def rooted(rng):
+    """(vertices, faces, places, points) of strands all over a sheet."""
+    vertices, faces = sheet()
+    quads = faces.corner_vertices.reshape(-1, 4)[rng.integers(0, (SIDE - 1) ** 2, STRANDS)]
+    barycentric = rng.dirichlet(np.ones(3), STRANDS).astype(np.float32)
+    roots = (barycentric[:, :, None] * vertices[quads[:, :3]]).sum(axis=1)
+    steps = 0.02 * rng.normal(size=(STRANDS, POINTS - 1, 3)) + [0.0, 0.0, 0.05]
+    points = roots[:, None] + np.pad(np.cumsum(steps, axis=1), ((0, 0), (1, 0), (0, 0)))
+    return vertices, faces, (np.ascontiguousarray(quads[:, :3]), barycentric), np.float32(points)
+
+
+def bent(vertices, amount):
+    """Rolled up where x is above a half, and as it was elsewhere."""
+    angle = amount * np.maximum(vertices[:, 0] - 0.5, 0.0)
+    moved = vertices.copy()
+    far = angle > 0.0
+    moved[far, 0] = 0.5 + np.sin(angle[far]) / amount
+    moved[far, 2] = (1.0 - np.cos(angle[far])) / amount
+    return moved
+
+
+def uploaded(points):
+    radii = np.broadcast_to(np.linspace(2e-4, 1e-5, points.shape[1], dtype=np.float32), points.shape[:2])
+    return strand_textures.upload_strands(points, radii)
+
+
+def carrier_of(rooted):
+    vertices, _faces, places, points = rooted
+    return strand_carrier.new_carrier(uploaded(points).texture, POINTS, places, vertices)
+
+
+def texels(strands):
+    return np.array(strands.texture.read(), np.float32).reshape(-1, POINTS, 4)[:STRANDS]
+
+
+def test_strands_are_where_warp_carries_them(blender, rooted):
+    vertices, faces, places, points = rooted
+    carrier, strands = carrier_of(rooted), uploaded(np.zeros_like(points))
+    for amount in (2.0, 5.0):
+        motion = surface_deform.motion(vertices, bent(vertices, amount), faces)
+        strands = carrier.carry(strands, motion)
+        wanted = surface_deform.carry(points, motion, *places)
+        found = texels(strands)
+        np.testing.assert_allclose(found[..., :3], wanted, rtol=0.0, atol=CLOSE)
+        still = (motion.after == vertices).all(axis=1) & (motion.axes == np.eye(3)[:2]).all(axis=(1, 2))
+        is_still = still[places[0]].all(axis=1)
+        assert 0.1 < is_still.mean() < 0.9
+        np.testing.assert_array_equal(found[is_still, :, :3], points[is_still])
+        np.testing.assert_array_equal(found[..., 3], strands.radii)
+        corners = found[..., :3].reshape(-1, 3)
+        np.testing.assert_array_equal(strands.bounds, [corners.min(axis=0), corners.max(axis=0)])
+
+
+def test_at_rest_strands_are_the_same_bits(blender, rooted):
+    vertices, faces, _places, points = rooted
+    carrier = carrier_of(rooted)
+    strands = carrier.carry(uploaded(points), surface_deform.motion(vertices, bent(vertices, 3.0), faces))
+    before = texels(strands)
+    strands = carrier.carry(strands, None)
+    np.testing.assert_array_equal(texels(strands)[..., :3], points)
+    moved = np.array(strands.moved.points.read(), np.float32).reshape(-1, POINTS + 1, 4)[:STRANDS, 1:]
+    np.testing.assert_array_equal(moved, before)
+    assert strands.moved.turn == 2
+
+
+def test_a_pose_uploads_vertices_and_nothing_else(blender, rooted, monkeypatch):
+    vertices, faces, _places, points = rooted
+    carrier, strands = carrier_of(rooted), uploaded(points)
+    motion = surface_deform.motion(vertices, bent(vertices, 3.0), faces)
+    strands, sent = carrier.carry(strands, motion), []
+    buffer = gpu.types.Buffer
+    monkeypatch.setattr(gpu.types, "Buffer", lambda kind, size, values: sent.append(size) or buffer(kind, size, values))
+    for _ in range(3):
+        strands = carrier.carry(strands, motion)
+    assert sent == [12 * len(vertices)] * 3
+
+
+def test_another_surface_is_refused(blender, rooted):
+    vertices, faces, places, points = rooted
+    motion = surface_deform.motion(vertices, bent(vertices, 3.0), faces)
+    with pytest.raises(HairError, match="vertices"):
+        replace(carrier_of(rooted), vertices=vertices[1:]).carry(uploaded(points), motion)
+    with pytest.raises(HairError, match="vertices"):
+        strand_carrier.new_carrier(uploaded(points).texture, POINTS, places, vertices[:-1])

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands that the GPU carries with an animated surface: where Warp carries them, and none of them is uploaded."""
+
+import bpy
+import numpy as np
+
+from hair_addon.blender.data import posed_strands
+from hair_addon.blender.gpu import ambient_visibility, maker_choice
+from hair_addon.blender.groom import bindings, pipeline
+from hair_addon.blender.live import live_hair
+from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.settings import style_items
+from hair_addon.core.imaging import ambient_cube
+from hair_addon.core.styling import curl, lean
+from tests.support.counting import counts_of
+from tests.support.made_strands import CLOSE, comb, drawn, grown
+from tests.support.reading import points
+
+
+def bend(surface_object, amount):
+    """Roll the upper half of a surface by a shape key."""
+    if surface_object.data.shape_keys is None:
+        surface_object.shape_key_add(name="Basis")
+        key = surface_object.shape_key_add(name="Bent")
+        places = np.array([point.co for point in key.data], np.float32)
+        places[:, 0] += np.maximum(places[:, 2], 0.0) ** 2
+        key.data.foreach_set("co", places.ravel())
+    surface_object.data.shape_keys.key_blocks["Bent"].value = amount
+    bpy.context.view_layer.update()
+
+
+def carried(hair, target=None):
+    """(S, P, 3): hair that grows between the guides as they are, where Warp carries it; target: whose styles it has."""
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    pose = posed_strands.read_pose(hair.data.surface, depsgraph)
+    bound = pipeline.bind_hair(*pipeline.inputs_of(hair.data), depsgraph, target)
+    return pose.carry(bound.points, bound.surface.topology, bound.surface.places(bound.binding.roots))
+
+
+def test_a_surface_carries_combed_strands_where_they_are_drawn(watched, monkeypatch):
+    surface, calls = watched.data.surface, counts_of(monkeypatch)
+    for amount, count in ((0.0, 9), (0.3, 0), (0.6, 20), (0.6, 40), (0.0, 0)):
+        bend(surface, amount)
+        if count:
+            comb(count)
+        shown = drawn(watched)
+        assert calls["uploads"] == calls["moves"] == 0
+        np.testing.assert_allclose(shown, carried(watched), rtol=0.0, atol=CLOSE)
+    live_hair.write_all()
+    np.testing.assert_allclose(points(watched), grown(watched), rtol=0.0, atol=1e-6)
+
+
+def test_hair_that_was_opened_on_a_bent_surface_is_carried_from_its_second_pose(hair, window, monkeypatch):
+    surface = hair.data.surface
+    bend(surface, 0.2)
+    bindings.invalidate(hair.data)
+    drawn(hair)
+    calls = counts_of(monkeypatch)
+    for amount in (0.5, 0.7, 0.0, 0.4):
+        bend(surface, amount)
+        shown = drawn(hair)
+        assert calls["uploads"] == 0
+        np.testing.assert_allclose(shown, carried(hair), rtol=0.0, atol=CLOSE)
+    monkeypatch.setattr(maker_choice, "times", lambda: (1.0, 0.0))
+    drawn(hair)
+    bend(surface, 0.6)
+    np.testing.assert_allclose(drawn(hair), carried(hair), rtol=0.0, atol=1e-6)
+
+
+def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):
+    """A stroke and a slider on a bent surface upload no strands either."""
+    style_items.add(watched.data.vellus, curl.Settings(radius=0.02, pitch=0.1))
+    bend(watched.data.surface, 0.3)
+    drawn(watched)
+    live_hair.write_all()
+    bend(watched.data.surface, 0.5)
+    drawn(watched)
+    calls = counts_of(monkeypatch)
+    for count, radius in ((60, 0.02), (0, 0.03)):
+        comb(count)
+        watched.data.vellus.styles[0].curl.radius = radius
+        bpy.context.view_layer.update()
+        shown = drawn(watched)
+        assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
+        np.testing.assert_allclose(shown, carried(watched, watched.data), rtol=0.0, atol=CLOSE)
+
+
+def test_styled_hair_is_carried_too(watched, monkeypatch):
+    style_items.add(watched.data.vellus, lean.Settings(amount=0.3))
+    bpy.context.view_layer.update()
+    drawn(watched)
+    calls = counts_of(monkeypatch)
+    for amount in (0.5, 0.7):
+        bend(watched.data.surface, amount)
+        shown = drawn(watched)
+        assert calls["uploads"] == 0
+        np.testing.assert_allclose(shown, carried(watched, watched.data), rtol=0.0, atol=CLOSE)
+    comb(60)  # by uploads
+    np.testing.assert_allclose(drawn(watched), carried(watched, watched.data), rtol=0.0, atol=CLOSE)
+    bend(watched.data.surface, 0.4)
+    np.testing.assert_allclose(drawn(watched), carried(watched, watched.data), rtol=0.0, atol=CLOSE)
+
+
+def read(**details):
+    context = bpy.context
+    return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), **details)
+
+
+def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_shadows, monkeypatch):
+    """A direction with each frame, and after all of them what is measured at rest but for rounding."""
+    measured, real = [], ambient_visibility.measure
+    monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
+    bpy.ops.object.light_add(type="SUN")
+    frame = read()
+    assert measured
+    bend(watched.data.surface, 0.5)
+    frame = read(former=frame)  # made now, and of corners as before
+    measured.clear()
+    maps, first = frame.shadow_maps, frame.hair_visibility[0]["visibility_z"]
+    for _ in range(len(ambient_cube.DIRECTIONS)):
+        frame = read(former=frame)
+    assert frame.shadow_maps is maps
+    assert not measured
+    assert frame.hair_visibility[0]["visibility_z"] is not first
+    at_rest = read(before=frame)
+    assert measured
+    followed, wanted = ((*of.hair_visibility, *of.surface_visibility) for of in (frame, at_rest))
+    for found, texture in zip(followed, wanted, strict=True):
+        for name in found:
+            np.testing.assert_allclose(found[name].read(), texture[name].read(), rtol=0.0, atol=0.02)
+    assert np.abs(np.array(at_rest.hair_visibility[0]["visibility_z"].read()) - np.array(first.read())).max() > 0.02
+
+
+def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, coarse_shadows, monkeypatch):
+    measured, real = [], ambient_visibility.measure
+    monkeypatch.setattr(ambient_visibility, "measure", lambda *given: measured.append(1) or real(*given))
+    read(former=read())
+    assert len(measured) == 2
