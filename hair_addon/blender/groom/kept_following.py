@@ -88,7 +88,7 @@ def follow(hair: Curves, depsgraph: Depsgraph, local: np.ndarray | None = None) 
     """
     state = hair.vellus
     guide_curves = state.guide_curves
-    if guide_curves is None or not len(hair.curves) or attributes.is_from_library(hair):
+    if guide_curves is None or not len(hair.curves):
         return False
     digest, bound = staleness.guides_digest(guide_curves), bindings.kept_cache.get(hair.session_uid)
     is_simulated = simulated_guides.is_shown(guide_curves)
