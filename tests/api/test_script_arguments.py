@@ -185,6 +185,12 @@ REFUSED = {
     "every of none": (lambda: lines_of_arrays(every=0), "Keep Every must be at least 1"),
     "no progress of curves": (lambda: api.use_as_guides(data("Lines"), progress=None), "progress must be a function"),
     "no modifiers": (lambda: api.use_as_guides(data("Lines"), applies_modifiers=None), "must be True or False"),
+    "no modifiers of hair": (lambda: api.use_as_hair(data("Lines"), applies_modifiers=None), "must be True or False"),
+    "text for a switch": (lambda: api.use_as_hair(data("Lines"), follows_guides="no"), "must be True or False"),
+    "a picture of no numbers": (
+        lambda: api.save_groom(data("Hair"), "a.blend", picture=np.full((2, 2, 4), math.nan)),
+        "must be an array (height, width, 4)",
+    ),
     # Arrays.
     "a number for masks": (lambda: masked(3), "masks must be a dictionary"),
     "text for a mask": (lambda: masked({"top": "top"}), "must have a finite weight"),

@@ -115,7 +115,9 @@ def _used_as_hair(path, options, head, strand_count):
     reader = bpy.ops.wm.alembic_import if path.suffix == ".abc" else bpy.ops.wm.usd_import
     imported, _done = _worked(lambda: reader(filepath=str(path), **options))
     bpy.context.view_layer.update()
-    strands = next(o for o in set(bpy.data.objects) - before if o.type == "CURVES" and len(o.data.curves) == strand_count)
+    strands = next(
+        o for o in set(bpy.data.objects) - before if o.type == "CURVES" and len(o.data.curves) == strand_count
+    )
     matrix, points = np.array(strands.matrix_world), np.empty((len(strands.data.points), 3), np.float32)
     strands.data.attributes["position"].data.foreach_get("vector", points.ravel())
     expected = points @ matrix[:3, :3].T + matrix[:3, 3]
