@@ -195,7 +195,7 @@ REFUSED = {
     "a number for masks": (lambda: masked(3), "masks must be a dictionary"),
     "text for a mask": (lambda: masked({"top": "top"}), "must have a finite weight"),
     "a mask that single precision cannot hold": (lambda: masked({"top": [0, 1, 1e300]}), "must have a finite weight"),
-    "lines that single precision cannot hold": (lambda: lines_of_arrays(1e300 * np.eye(3)), "nothing to use"),
+    "lines that single precision cannot hold": (lambda: lines_of_arrays(1e300 * np.eye(3)), "No curve can be used"),
     "one array": (lambda: api.distribute_guides([np.eye(3)]), "pair of arrays"),
     "three arrays": (lambda: api.distribute_guides((1, 2, 3)), "pair of arrays"),
     "fractions of vertices": (lambda: mesh(triangles=[[0, 1, 1.5]]), "must be whole numbers"),

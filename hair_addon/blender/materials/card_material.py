@@ -23,9 +23,9 @@ _ANISOTROPY = 0.8  # highlights run across strands
 # blond, auburn and brown strands with 0, 0.5 to 0.8 with 0.75 to 0.85; beside or behind a sun then 0.9 to 1.4.
 _FORWARD = 0.8
 _SPECULAR = 0.5  # half of a surface's: a texel has strands of many directions
-# In EEVEE: factors of a layer's albedo, of what light from behind adds to that, and of a surface's highlights, which are
-# not stretched across strands there. Of red, green and blue that auburn strands have in Cycles, cards then have, with
-# light from the front, one side and behind, (0.95 0.67 0.6), (1.2 0.9 0.9), (0.5 0.3 0.4); with (1, 0, 0.5) the half.
+# In EEVEE: factors of a layer's albedo, of what light from behind adds to that, and of a surface's highlights, which
+# are not stretched across strands there. Of the red, green and blue of auburn strands in Cycles, cards have, with light
+# from the front, one side and behind, (0.93 0.66 0.61), (1.16 0.91 0.93), (0.50 0.32 0.41); with 1, 0 and 0.5 half.
 _LAYERED, _BEHIND, _UNSTRETCHED = 1.7, 0.4, 1.2
 
 
