@@ -7,6 +7,7 @@ Files are read by others than wrote them: Alembic by the tests' own reader, USD 
 processor time of all cores.
 """
 
+import math
 import sys
 import tempfile
 import time
@@ -21,7 +22,7 @@ from tests.benchmarks.hair_peers import head_with_guides
 from tests.support import alembic_reader
 from tests.support.exported import shape
 
-# Blender takes files as they are: ours for Unreal is in centimeters.
+# Blender takes Alembic files as Y up and in meters: ours for Unreal are Z up, in centimeters.
 _IMPORTERS = {".abc": {"as_background_job": False, "scale": 0.01}, ".usdc": {}}
 
 
@@ -114,10 +115,12 @@ def _used_as_hair(path, options, head, strand_count):
     before = set(bpy.data.objects)
     reader = bpy.ops.wm.alembic_import if path.suffix == ".abc" else bpy.ops.wm.usd_import
     imported, _done = _worked(lambda: reader(filepath=str(path), **options))
+    came = set(bpy.data.objects) - before
+    for root in came if path.suffix == ".abc" else ():
+        if root.parent is None:
+            root.rotation_euler.x -= math.pi / 2
     bpy.context.view_layer.update()
-    strands = next(
-        o for o in set(bpy.data.objects) - before if o.type == "CURVES" and len(o.data.curves) == strand_count
-    )
+    strands = next(o for o in came if o.type == "CURVES" and len(o.data.curves) == strand_count)
     matrix, points = np.array(strands.matrix_world), np.empty((len(strands.data.points), 3), np.float32)
     strands.data.attributes["position"].data.foreach_get("vector", points.ravel())
     expected = points @ matrix[:3, :3].T + matrix[:3, 3]
