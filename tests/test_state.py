@@ -3,7 +3,7 @@
 
 import ast
 
-from tests.test_house import MODULES, name_of, nodes, syntax
+from tests.test_conventions import MODULES, name_of, nodes, syntax
 
 # What is no cache, each with who ends it.
 STATE = {

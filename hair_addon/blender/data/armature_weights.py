@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import geometry
 from ...core.geometry.mesh import interpolate
-from . import scene
+from . import scene, vertex_groups
 
 _LEAST = 1e-4  # weights below it are left out
 
@@ -54,13 +54,8 @@ def _weights_at(places, surface_object, names):
 def _add(mesh_object, names, weights, piece_size, modifiers):
     """Vertex groups with weights of pieces (N, K), and modifiers like others."""
     for name, of_pieces in zip(names, weights.T, strict=True):
-        chosen = np.flatnonzero(of_pieces)
-        if not len(chosen):
-            continue
-        group = mesh_object.vertex_groups.new(name=name)
-        for weight in np.unique(of_pieces[chosen]):
-            own = np.flatnonzero(of_pieces == weight)[:, None] * piece_size + np.arange(piece_size)
-            group.add(own.ravel().tolist(), float(weight), "REPLACE")
+        if of_pieces.any():
+            vertex_groups.paint(mesh_object.vertex_groups.new(name=name), np.repeat(of_pieces, piece_size))
     for modifier in modifiers:
         made = mesh_object.modifiers.new(modifier.name, "ARMATURE")
         made.object, made.use_bone_envelopes = modifier.object, False

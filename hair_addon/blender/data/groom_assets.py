@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.geometry.mesh import TriMesh
 from ..host.notices import name_of
-from . import scene
+from . import scene, vertex_groups
 
 _UV_MAP = "UVMap"
 
@@ -23,14 +23,8 @@ def surface_object(name, mesh, corner_uvs, masks):
         layer.uv.foreach_set("vector", np.ascontiguousarray(corner_uvs, np.float32).ravel())
     owner = bpy.data.objects.new(name, made)
     for mask, weights in masks.items():
-        paint(owner.vertex_groups.new(name=mask), weights)
+        vertex_groups.paint(owner.vertex_groups.new(name=mask), weights)
     return owner
-
-
-def paint(group, weights):
-    """Give a vertex group weights (V,); vertices of no weight stay outside."""
-    for weight in np.unique(weights[weights > 0.0]):
-        group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
 
 
 def read_surface(owner):

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
+from ...core import geometry
 from . import shaders, uniforms
 from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, bare_vertices, places_texture, vertex_count
 
@@ -25,7 +26,7 @@ class SurfaceOnGPU:
     places: gpu.types.GPUTexture
     row_corners: int
     corner_count: int
-    form: int  # equal where all corners are
+    fingerprint: str  # of the corners
 
 
 @dataclass(frozen=True)
@@ -267,8 +268,8 @@ def upload_surface(positions, normals, uvs=None):
         vertices.attr_fill(name, np.ascontiguousarray(values, np.float32))
     row_corners = min(len(positions), TEXTURE_WIDTH)
     places = places_texture(positions[:, None], np.zeros((len(positions), 1), np.float32), row_corners)
-    form = hash(np.ascontiguousarray(positions, np.float32).tobytes())
-    return SurfaceOnGPU(gpu.types.GPUBatch(type="TRIS", buf=vertices), places, row_corners, len(positions), form)
+    batch, fingerprint = gpu.types.GPUBatch(type="TRIS", buf=vertices), geometry.fingerprint.fingerprint(positions)
+    return SurfaceOnGPU(batch, places, row_corners, len(positions), fingerprint)
 
 
 def draw_cover(program, blocks, samplers):

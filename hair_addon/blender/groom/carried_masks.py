@@ -8,7 +8,7 @@ from ...core import grooming
 from ...core.geometry.landmark_warp import Warp
 from ...core.geometry.mesh import interpolate
 from ...core.grooming.groom_transfer import Ground
-from ..data import curves, groom_assets, scene, usable_surfaces
+from ..data import curves, scene, usable_surfaces, vertex_groups
 from ..data.scene import Surface
 from ..host.notices import text_of
 from ..settings import style_items
@@ -59,5 +59,5 @@ def new_group(surface_object: Object, name: str, weights: np.ndarray) -> str:
     """Create a vertex group of weights (V,); its name. Raises `HairError`."""
     usable_surfaces.require_paintable(surface_object)
     group = surface_object.vertex_groups.new(name=name)
-    groom_assets.paint(group, np.round(weights, 6))
+    vertex_groups.paint(group, np.round(weights, 6))
     return group.name

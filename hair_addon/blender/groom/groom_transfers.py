@@ -114,12 +114,12 @@ def transferring(
             new_hair = _copy(hair, target, made, is_rendered=True)
             new_hair.vellus.guide_curves = new_guides
             cleared += transferred_names.clear(new_guides, new_hair, target)
-            new_guides.vellus.is_stale = False
+        new_guides.vellus.is_stale = False  # settings changed with what they describe
+        if new_hair is not None:
             yield from _growing(new_guides, new_hair, surface, places, made)
     except BaseException:  # canceled, too: all is left as it was
         _remove(made)
         raise
-    new_guides.vellus.is_stale = False  # settings changed with what they describe
     looks.evaluate_guides(new_guides)
     cleared = tuple(dict.fromkeys(cleared))
     return TransferredGroom(new_guides, new_hair, len(source.roots), places, tuple(names), cleared, has_overlap)

@@ -21,7 +21,17 @@ from ...core.grooming.groom import HairSettings
 from ...core.grooming.rooted_curves import RootedCurves, reversal
 from ...core.long_work import Work, part_of, run_now
 from ...core.params import Param, plain_value
-from ..data import attributes, curves, curves_objects, follow_nodes, masks, posed_strands, scene, usable_surfaces
+from ..data import (
+    attributes,
+    curves,
+    curves_objects,
+    follow_nodes,
+    masks,
+    posed_strands,
+    scene,
+    usable_surfaces,
+    vertex_groups,
+)
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -163,7 +173,9 @@ def using_as_guides(
 
 
 def require_usable(curves_object: Object, surface_object: Object) -> None:
-    """Raise `HairError` unless an object's curves may be put on a mesh object."""
+    """Raise `HairError` unless an object's curves are not of Vellus yet and may be put on a mesh object."""
+    if not foreign_curves.is_foreign(curves_object):
+        raise HairError('"{name}" is already guides or hair.', name=name_of(curves_object))
     foreign_curves.require_editable(curves_object)
     curves.require_editable(surface_object)
     usable_surfaces.require_evaluated(surface_object)
@@ -202,8 +214,7 @@ def _paint(surface_object, weights):
     """Create a vertex group of weights (V,), which can be painted; returns its name. Raises `HairError`."""
     usable_surfaces.require_paintable(surface_object)
     group = surface_object.vertex_groups.new(name=_GROUP)
-    for weight in np.unique(weights):
-        group.add(np.flatnonzero(weights == weight).tolist(), float(weight), "REPLACE")
+    vertex_groups.paint(group, weights, leaves_out_zero=False)
     bpy.context.view_layer.update()
     return group.name
 

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Guides and hair that are marked as stale: what they read has changed, and they are regenerated when it is time."""
 
+from contextlib import contextmanager
+
 import bpy
 
 from ...core.errors import HairError
@@ -37,13 +39,20 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         state = hair.vellus
         if hair.surface != surface_object or state.kind != "HAIR" or not state.is_live:
             continue
-        try:
+        with _refusal_as_status(state):
             if _may_be_painted(hair, depsgraph) or staleness.has_other_parting(hair, depsgraph):
                 _mark(hair)
             elif has_masks(state):
                 state.is_stale = True
-        except HairError as error:
-            state.status = str(error)
+
+
+@contextmanager
+def _refusal_as_status(state):
+    """Show a `HairError` as the status of guides or hair."""
+    try:
+        yield
+    except HairError as error:
+        state.status = str(error)
 
 
 def _is_carried(datablock):
@@ -63,11 +72,9 @@ def follow_mask(guides, depsgraph):
         state = hair.vellus
         if not state.is_live or hair.surface is None:
             continue
-        try:
+        with _refusal_as_status(state):
             if not masks.own(state.hair) and staleness.has_other_mask(hair, depsgraph):
                 _mark(hair)
-        except HairError as error:
-            state.status = str(error)
 
 
 def follow_partings(changed, depsgraph):
@@ -76,11 +83,9 @@ def follow_partings(changed, depsgraph):
         state = hair.vellus
         if state.kind != "HAIR" or not state.is_live or not _parts_by(state, changed):
             continue
-        try:
+        with _refusal_as_status(state):
             if staleness.has_other_parting(hair, depsgraph):
                 _mark(hair)
-        except HairError as error:
-            state.status = str(error)
 
 
 def follow_flow(changed, depsgraph):
@@ -90,11 +95,9 @@ def follow_flow(changed, depsgraph):
         lines = text_of(state.guides, "flow_lines")
         if state.kind != "GUIDES" or not state.is_live or not drawn_lines.is_among(lines, changed):
             continue
-        try:
+        with _refusal_as_status(state):
             if staleness.has_other_flow(guides, depsgraph):
                 state.is_stale = True
-        except HairError as error:
-            state.status = str(error)
 
 
 def _parts_by(state, changed):
@@ -120,11 +123,9 @@ def follow_images(target, depsgraph):
     state.is_stale = True
     if state.kind != "HAIR" or not text_of(state.hair, "density_image") or target.surface.mode == "TEXTURE_PAINT":
         return
-    try:
+    with _refusal_as_status(state):
         if staleness.has_other_mask(target, depsgraph):
             _mark(target)
-    except HairError as error:
-        state.status = str(error)
 
 
 def has_masks(state):

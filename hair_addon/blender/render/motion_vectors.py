@@ -14,7 +14,7 @@ class Places:
     """Transforms and points of everything drawn at one time.
 
     world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world, how these were moved)};
-    surfaces: {owner: (texture of corners, how many, their form)}. Owners are keys of `_told_apart`.
+    surfaces: {owner: (texture of corners, how many, their fingerprint)}. Owners are keys of `_told_apart`.
     """
 
     world_to_clip: np.ndarray
@@ -116,7 +116,7 @@ def places(drawn, world_to_view, view_to_clip):
         for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _told_apart(drawn.owners), strict=True)
     }
     surfaces = {
-        owner: (surface.places, surface.corner_count, surface.form)
+        owner: (surface.places, surface.corner_count, surface.fingerprint)
         for (surface, _parts), owner in zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True)
     }
     return Places(view_to_clip @ world_to_view, hair, surfaces)

@@ -19,7 +19,7 @@ from tests.blender.gpu.test_world_texture import environment_node
 from tests.blender.render.test_hair_places import view3d
 from tests.support.always import changed
 from tests.support.reading import points, write_points
-from tests.test_house import ADDON, MODULES
+from tests.test_conventions import ADDON, MODULES
 
 SIZE = 24
 

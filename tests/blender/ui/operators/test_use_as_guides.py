@@ -5,6 +5,7 @@ import bpy
 import pytest
 
 from tests.support.layout import redo_panel
+from tests.support.reading import snapshot
 
 
 @pytest.mark.parametrize("name", ["use_as_guides", "use_as_hair"])
@@ -14,6 +15,10 @@ def test_the_redo_panel_is_there_after_a_run(imported, name):
     operator = getattr(bpy.ops.vellus, name)
     assert operator("EXEC_DEFAULT", True) == {"FINISHED"}
     assert operator.poll()
+    before = snapshot()
+    with pytest.raises(RuntimeError, match="is already guides or hair"):  # a click on the button that it shows by then
+        operator("EXEC_DEFAULT", True)
+    assert snapshot() == before
     bpy.ops.object.select_all("EXEC_DEFAULT", True, action="SELECT")
     assert not operator.poll()
 

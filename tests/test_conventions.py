@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The rules of the house (CONTRIBUTING.md): which file may use which, and which room a line belongs to."""
+"""Conventions of CONTRIBUTING.md: which file may import which, and which package code belongs to."""
 
 import ast
 import functools
@@ -117,7 +117,7 @@ def test_the_addon_imports_itself_relatively(path):
     assert [(line, name) for line, name in outside_imports(path) if name.split(".")[0] == "hair_addon"] == []
 
 
-# --------------------------------------------------------------------------------- does a line know its room?
+# ------------------------------------------------------------------------------- which package code belongs to
 
 
 def attribute_lines(tree, *chains):
@@ -146,7 +146,7 @@ def array_lines(path):
 
 LAYOUT = [f"layout.{part}" for part in ("prop", "prop_search", "row", "column", "box", "label", "operator", "split")]
 
-ROOMS = {
+OWNERS = {
     "bpy": (lambda path: import_lines(path, "bpy", "mathutils", "bmesh", "bl_ui", "bpy_extras"), r"blender/.*"),
     "gpu": (lambda path: import_lines(path, "gpu", "gpu_extras"), r"blender/(gpu|render)/.*"),
     "bpy.props": (
@@ -190,8 +190,8 @@ ROOMS = {
 
 @each_file(MODULES)
 def test_code_is_in_its_package(path):
-    elsewhere = {rule: row for rule, row in ROOMS.items() if not re.fullmatch(row[1], name_of(path))}
-    found = {f"{rule} belongs in {rooms}": lines_of(path) for rule, (lines_of, rooms) in elsewhere.items()}
+    others = {rule: row for rule, row in OWNERS.items() if not re.fullmatch(row[1], name_of(path))}
+    found = {f"{rule} belongs in {places}": lines_of(path) for rule, (lines_of, places) in others.items()}
     assert {rule: lines for rule, lines in found.items() if lines} == {}
 
 
@@ -310,7 +310,7 @@ def test_nothing_from_a_file_can_become_code(path):
     assert list(attribute_lines(tree, ".driver_namespace")) == []
 
 
-# ------------------------------------------------------------------------------------------------------ the pages
+# ----------------------------------------------------------------------------------------- files and their sources
 
 
 @each_file(CODE)

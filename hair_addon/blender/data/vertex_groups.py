@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Weights ↔ vertex groups of mesh objects."""
+
+import numpy as np
+from bpy.types import VertexGroup
+
+
+def paint(group: VertexGroup, weights: np.ndarray, leaves_out_zero: bool = True) -> None:
+    """Give a vertex group weights (V,) of 0 to 1; with leaves_out_zero vertices of no weight stay outside."""
+    order = np.argsort(weights, kind="stable")
+    if leaves_out_zero:
+        order = order[np.count_nonzero(weights <= 0.0) :]
+    levels, starts = np.unique(weights[order], return_index=True)
+    for level, vertices in zip(levels, np.split(order, starts[1:]), strict=True):
+        group.add(vertices.tolist(), float(level), "REPLACE")
