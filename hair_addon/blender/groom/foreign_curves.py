@@ -38,6 +38,12 @@ def is_foreign(curves_object: Object) -> bool:
     )
 
 
+def require_foreign(curves_object: Object) -> None:
+    """Raise `HairError` for guides and hair, which the redo panel's operator would take a second time."""
+    if not is_foreign(curves_object):
+        raise HairError('"{name}" is already guides or hair.', name=name_of(curves_object))
+
+
 def require_editable(curves_object: Object) -> None:
     """Raise `HairError` unless the object and its curves may be changed without a change to any other object."""
     for datablock in (curves_object, curves_object.data):

@@ -173,9 +173,7 @@ def using_as_guides(
 
 
 def require_usable(curves_object: Object, surface_object: Object) -> None:
-    """Raise `HairError` unless an object's curves are not of Vellus yet and may be put on a mesh object."""
-    if not foreign_curves.is_foreign(curves_object):
-        raise HairError('"{name}" is already guides or hair.', name=name_of(curves_object))
+    """Raise `HairError` unless an object's curves may be put on a mesh object."""
     foreign_curves.require_editable(curves_object)
     curves.require_editable(surface_object)
     usable_surfaces.require_evaluated(surface_object)
