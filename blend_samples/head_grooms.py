@@ -292,7 +292,9 @@ def _long(head_object, longest, volume, is_lifted=False):
         return shoulders.clear(place, 0.008, slide)
 
     start = (1.2 if is_lifted else 0.55) * normals + unit(sweep)
-    _keep_apart(guides, (side > 0.0) & (not is_lifted))  # strands between both sides would hang before the throat
+    # Strands between what falls in front of both shoulders, and behind them, would hang before the throat.
+    is_front = (roots[:, 1] <= -0.02) & (not is_lifted)
+    _keep_apart(guides, np.where(is_front, side, 0.0))
     return march(roots, start, lengths, aim, clear), guides, roots
 
 
