@@ -16,6 +16,8 @@ from pathlib import Path
 import bpy
 import numpy as np
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
 import hair_addon
 from hair_addon import api
 from tests.benchmarks.hair_peers import head_with_guides
