@@ -92,11 +92,11 @@ def long_wavy(head_object, strand_count):
     combing.write(guides, points)
     styles = [
         api.Trim(random=0.15, seed=1),
-        api.Clump(size=0.026, amount=0.72, fine_amount=0.6, thickness=0.28, shape=0.25, stray=0.05, seed=2),
-        api.Curl(radius=0.0125, pitch=0.105, flatness=0.55, coherence=0.93, root=0.0, tip=1.0, start=0.15, seed=3),
-        api.Frizz(amplitude=0.0005, wavelength=0.05, stray=0.03, stray_gain=6.0, tip=0.6, seed=4),
+        api.Clump(size=0.026, amount=0.72, fine_amount=0.6, thickness=0.28, shape=0.25, stray=0.03, seed=2),
+        api.Curl(radius=0.0125, pitch=0.105, flatness=0.55, coherence=0.93, root=0.0, tip=1.0, start=0.2, seed=3),
+        api.Frizz(amplitude=0.0005, wavelength=0.05, stray=0.02, stray_gain=3.0, tip=0.6, seed=4),
     ]
-    return _hair(guides, styles, "LIGHT_BROWN", strand_count, tip_taper=0.25, point_count=81)
+    return _hair(guides, styles, "LIGHT_BROWN", strand_count, tip_taper=0.25, point_count=81, region_attribute="part")
 
 
 def curly(head_object, strand_count):
@@ -105,9 +105,9 @@ def curly(head_object, strand_count):
     combing.write(guides, points)
     styles = [
         api.Trim(random=0.25, seed=1),
-        api.Clump(size=0.017, levels=1, amount=0.96, thickness=0.07, shape=0.16, crossover=0.04, stray=0.03, seed=2),
-        api.Curl(radius=0.0078, pitch=0.034, coherence=0.97, vary=0.15, root=0.3, start=0.0, seed=3),
-        api.Frizz(amplitude=0.0004, wavelength=0.025, stray=0.05, stray_gain=4.0, seed=4),
+        api.Clump(size=0.017, levels=1, amount=0.96, thickness=0.09, shape=0.16, crossover=0.04, stray=0.02, seed=2),
+        api.Curl(radius=0.0078, pitch=0.034, coherence=0.97, vary=0.15, root=0.15, start=0.08, left_handed=0.0, seed=3),
+        api.Frizz(amplitude=0.0004, wavelength=0.025, stray=0.03, stray_gain=3.0, seed=4),
     ]
     return _hair(guides, styles, "AUBURN", strand_count, tip_taper=0.2, point_count=121)
 
@@ -119,7 +119,7 @@ def coily(head_object, strand_count):
     outward = unit(roots - (_CENTER + np.array([0.0, 0.015, 0.0])))
     outward = unit(outward + columns(0.0, 0.25 * part(-roots[:, 1], 0.06, 0.14), 0.10))
     above = part(head.above_hairline(roots), 0.0, 0.03)
-    lengths = (0.075 + 0.060 * above) * rng.uniform(0.92, 1.06, len(roots))
+    lengths = (0.075 + 0.060 * above) * rng.uniform(0.97, 1.03, len(roots))
     points = march(
         roots,
         0.6 * normals + outward,
@@ -129,9 +129,9 @@ def coily(head_object, strand_count):
     )
     combing.write(guides, points)
     styles = [
-        api.Frizz(amplitude=0.006, wavelength=0.05, octaves=1, seed=1),
-        api.Clump(size=0.008, levels=1, amount=0.9, thickness=0.14, shape=0.12, crossover=0.08, stray=0.04, seed=2),
-        api.Curl(radius=0.0038, pitch=0.0092, coherence=0.95, root=0.8, vary=0.15, seed=3),
+        api.Frizz(amplitude=0.004, wavelength=0.05, octaves=1, seed=1),
+        api.Clump(size=0.008, levels=1, amount=0.9, thickness=0.14, shape=0.12, crossover=0.08, stray=0.02, seed=2),
+        api.Curl(radius=0.0038, pitch=0.0092, coherence=0.95, root=0.8, vary=0.1, left_handed=0.0, seed=3),
         api.Frizz(amplitude=0.0005, wavelength=0.014, seed=4),
     ]
     return _hair(guides, styles, "BLACK", strand_count, tip_taper=0.2, point_count=201)
@@ -292,6 +292,9 @@ def _long(head_object, longest, volume, is_lifted=False):
         return shoulders.clear(place, 0.008, slide)
 
     start = (1.2 if is_lifted else 0.55) * normals + unit(sweep)
+    # Strands between what falls in front of both shoulders, and behind them, would hang before the throat.
+    is_front = (roots[:, 1] <= -0.02) & (not is_lifted)
+    _keep_apart(guides, np.where(is_front, side, 0.0))
     return march(roots, start, lengths, aim, clear), guides, roots
 
 

@@ -66,8 +66,8 @@ SAMPLES = {
     "Braid": Sample(dressed_head, head_grooms.braid, 30_000, "Hair/Head", (0.0, -0.05, 0.640), 108.0),
     "Beard": Sample(dressed_head, face_grooms.beard, 12_000, "Hair/Face", (0.010, -0.060, 0.712), 150.0),
     "Eyebrows": Sample(dressed_head, face_grooms.eyebrows, 1600, "Hair/Face", (0.004, -0.135, 0.738), 360.0),
-    "Short Fur": Sample(fur_grooms.build, fur_grooms.short_fur, 60_000, "Hair/Fur", (0.010, -0.040, 0.712), 165.0),
-    "Long Fur": Sample(fur_grooms.build, fur_grooms.long_fur, 60_000, "Hair/Fur", (0.010, -0.040, 0.708), 145.0),
+    "Short Fur": Sample(fur_grooms.build, fur_grooms.short_fur, 60_000, "Hair/Fur", (0.026, -0.040, 0.712), 146.0),
+    "Long Fur": Sample(fur_grooms.build, fur_grooms.long_fur, 60_000, "Hair/Fur", (0.026, -0.040, 0.708), 134.0),
 }
 
 

@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""docs/transfer.png: a combed head, a second head of another topology and other proportions, and the groom on it.
+"""docs/transfer.png: a groom, a second head of another topology and other proportions, and the groom on it.
 
-The second head is the first one, remeshed in voxels and deformed: a broader jaw, a higher and longer skull, and a nod.
+The second head is the first one with other triangles, deformed: a broader jaw, a higher and longer skull, and a nod.
+Its eyes, brows and bust go with it.
 """
 
+import argparse
 import os
 import sys
 import tempfile
@@ -16,7 +18,10 @@ from mathutils import Matrix, Vector
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import head  # beside this file
+import head_grooms
+import portrait
 import ratio_plot
+import styles
 from guide_tool_pictures import compress
 
 import hair_addon
@@ -24,73 +29,104 @@ from hair_addon import api
 
 OUT = Path(__file__).resolve().parent.parent / "docs" / "transfer.png"
 PAGE = OUT.parent / "manual" / "transfer_groom.png"
-WIDTH, HEIGHT, CAPTION = 280, 320, 24  # pixels of a picture, and of the words above it
-VOXEL = 0.0042  # [m]
+SIZE, CAPTION = (280, 320), 24  # pixels of a picture, and of the words above it
+KEPT_TRIANGLES = 0.6  # of the first head's, subdivided
 
 # Places on the first head [m] that both have by name: those on the middle, and those beside it on both sides.
 _MIDDLE = {"nose": (-0.19, 0.72), "chin": (-0.15, 0.63), "forehead": (-0.16, 0.80), "crown": (-0.05, 0.87)}
 _MIDDLE |= {"back": (0.06, 0.77), "nape": (0.05, 0.68)}
 _BESIDE = {"temple": (0.075, -0.09, 0.78), "ear": (0.085, -0.03, 0.72), "jaw": (0.06, -0.07, 0.66)}
+_SECOND = "Second"  # the collection of the second head
 
 
 def main():
     """Groom, build the second head, transfer, and draw."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--groom", default="Long Wavy", choices=list(head_grooms.GROOMS))
+    parser.add_argument("--strands", type=int, default=24_000)
+    parser.add_argument("--samples", type=int, default=16)
+    parser.add_argument("--out", type=Path, default=OUT)
+    parser.add_argument("--page", type=Path, default=PAGE)
+    given = parser.parse_args()
     hair_addon.register()
-    first = head.build()
-    guides, hair = head.grow(first, guide_count=260, strand_count=14_000)
-    hair.data.vellus.hair.radius = 1.3e-4
-    hair.data.vellus.marschner.size = 64
-    api.add_style(hair, "CLUMP", size=0.02, amount=0.6)
-    api.add_style(hair, "WAVE", radius=0.006, pitch=0.06)
-    second = second_head(first)
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "second.blend"
+        save_second_head(path)
+        first = dressed_head()
+        hair = head_grooms.GROOMS[given.groom](first, given.strands)
+        second = append_second_head(path)
     mark(first, second)
     light()
-    pictures, words = [], ("Groom", "Second head", "Landmarks", "Bounding boxes")
-    shown = (first, guides, hair), (second,)
-    made = [api.transfer_groom(hair, second, method="LANDMARKS"), api.transfer_groom(hair, second, method="NEAREST")]
+    both = {*bpy.data.collections[_SECOND].objects}
+    own = {*bpy.context.scene.objects} - both
+    made = [api.transfer_groom(hair, second, method=method) for method in ("LANDMARKS", "NEAREST")]
     bpy.context.view_layer.update()
+    shown = [own, both]
     for one in made:
         print(one.notes(), one.places.scale)
-        shown += ((second, *(o for o in bpy.data.objects if o.data in (one.guides, one.hair))),)
-    with tempfile.TemporaryDirectory() as folder:
-        pictures += [drawn(objects, os.path.join(folder, "drawn.png")) for objects in shown]
-    titles = [(word, WIDTH * place + 8, 17) for place, word in enumerate(words)]
-    for path, columns in ((OUT, (0, 1, 2, 3)), (PAGE, (0, 1, 2))):
+        shown.append(both | {o for o in bpy.data.objects if o.data in (one.guides, one.hair)})
+    pictures = [drawn(objects, given.samples) for objects in shown]
+    words = "Groom", "Second head", "Landmarks", "Bounding boxes"
+    titles = [(word, SIZE[0] * place + 8, 17) for place, word in enumerate(words)]
+    for path, columns in ((given.out, (0, 1, 2, 3)), (given.page, (0, 1, 2))):
         sheet = np.concatenate([pictures[column] for column in columns], axis=1)
         ratio_plot.save(sheet & 0xF8, titles[: len(columns)], path)
         compress(path)
 
 
-def second_head(first):
-    """A new object: the first head's shape as voxels see it, in other proportions."""
-    second = first.copy()
-    second.data = first.data.copy()
-    second.name = second.data.name = "Second"
-    bpy.context.scene.collection.objects.link(second)
-    second.vertex_groups.clear()
-    bpy.context.view_layer.objects.active = second
-    bpy.ops.object.mode_set(mode="EDIT")
-    bpy.ops.mesh.select_all(action="SELECT")
-    bpy.ops.mesh.fill_holes(sides=0)  # voxels have no inside where the neck is open
-    bpy.ops.object.mode_set(mode="OBJECT")
-    remesh = second.modifiers.new("Remesh", "REMESH")
-    remesh.mode, remesh.voxel_size, remesh.use_smooth_shade = "VOXEL", VOXEL, True
-    bpy.ops.object.modifier_apply(modifier=remesh.name)
-    for vertex in second.data.vertices:
-        vertex.co = deformed(vertex.co)
-    second.data.materials.clear()
-    second.data.materials.append(head.skin())
+def dressed_head():
+    """The sample's head with a face and a bust, in an empty scene."""
+    made = head.build()
+    portrait.dress(made)
+    return made
+
+
+def save_second_head(path):
+    """Build the second head and save it with all that belongs to it, in a collection."""
+    made = dressed_head()
+    made.modifiers.new("Subdivision", "SUBSURF").levels = 1
+    made.modifiers.new("Triangles", "DECIMATE").ratio = KEPT_TRIANGLES
+    for changed in (made, bpy.data.objects["Bust"]):
+        bpy.context.view_layer.objects.active = changed
+        for modifier in [one.name for one in changed.modifiers]:
+            bpy.ops.object.modifier_apply(modifier=modifier)
+    made.vertex_groups.clear()
+    collection = bpy.data.collections.new(_SECOND)
+    for owner in list(bpy.context.scene.objects):
+        collection.objects.link(owner)
+        _deform(owner.data)
     bpy.context.view_layer.update()
-    return second
+    bpy.data.libraries.write(str(path), {collection})
+
+
+def append_second_head(path):
+    """Add what `save_second_head` saved to the scene; returns the head."""
+    with bpy.data.libraries.load(str(path)) as (_there, here):
+        here.collections = [_SECOND]
+    bpy.context.scene.collection.children.link(here.collections[0])
+    bpy.context.view_layer.update()
+    return next(one for one in here.collections[0].objects if one.name.startswith("Head"))
+
+
+def _deform(data):
+    """Move the points of a mesh or of Curves as `deformed` says."""
+    places = data.attributes["position"].data
+    points = np.empty((len(places), 3), np.float32)
+    places.foreach_get("vector", points.ravel())
+    moved = np.array([deformed(point) for point in points.tolist()], np.float32)
+    places.foreach_set("vector", moved.ravel())
+    data.update_tag()
 
 
 def deformed(place):
     """Where a point of the first head is on the second."""
     x, y, z = place
     high, low = max(z - 0.74, 0.0), max(0.70 - z, 0.0)
-    moved = Vector((x * (1.05 + 2.0 * low), y * 1.08 + 0.012 * max(y, 0.0), z + 0.22 * high - 0.1 * low))
+    jaw = 2.0 * min(low, 0.06) - 2.0 * min(max(low - 0.06, 0.0), 0.06)  # the neck is as narrow as it was
+    moved = Vector((x * (1.05 + jaw), y * 1.08 + 0.012 * max(y, 0.0), z + 0.22 * high - 0.1 * low))
     pivot = Vector((0.0, 0.0, 0.70))
-    return Matrix.Rotation(0.1, 3, "X") @ (moved - pivot) + pivot
+    nod = 0.1 * min(max((z - 0.58) / 0.06, 0.0), 1.0)  # of the head, not of the shoulders
+    return Matrix.Rotation(nod, 3, "X") @ (moved - pivot) + pivot
 
 
 def mark(first, second):
@@ -108,30 +144,25 @@ def mark(first, second):
 
 
 def light():
-    """The sample's lights, and a camera aside in front."""
-    head.light()
+    """The portrait's lights, and a camera aside in front."""
+    portrait.light()
     camera = bpy.context.scene.camera
-    camera.data.lens = 128.0
-    camera.location = (0.75, -1.15, 0.80)
-    camera.rotation_euler = (Vector((0.0, -0.03, 0.72)) - camera.location).to_track_quat("-Z", "Y").to_euler()
-    background = next(n for n in bpy.context.scene.world.node_tree.nodes if n.type == "BACKGROUND")
-    background.inputs["Color"].default_value = (0.22, 0.22, 0.22, 1.0)
+    camera.data.lens, camera.data.dof.use_dof = 112.0, False
+    camera.location = (0.70, -1.28, 0.76)
+    camera.rotation_euler = (Vector((0.004, -0.04, 0.690)) - camera.location).to_track_quat("-Z", "Y").to_euler()
     bpy.context.view_layer.update()
 
 
-def drawn(objects, path):
-    """(CAPTION + HEIGHT, WIDTH, 3) uint8: only some objects of the scene, with room for words above them."""
-    for other in bpy.context.scene.objects:
-        if other.type in {"MESH", "CURVES"}:
-            other.hide_render = other.hide_viewport = other not in objects
+def drawn(objects, samples):
+    """(CAPTION + height, width, 3) uint8: only some objects of the scene, with room for words above them."""
+    was = {one: one.hide_render for one in bpy.context.scene.objects if one.type in {"MESH", "CURVES"}}
+    for other in was:
+        other.hide_render = other.hide_render or other not in objects
     bpy.context.view_layer.update()
-    bpy.ops.vellus.render_picture(filepath=path, width=WIDTH, height=HEIGHT, samples_per_side=3)
-    image = bpy.data.images.load(path, check_existing=False)
-    pixels = np.empty((HEIGHT, WIDTH, image.channels), np.float32)
-    image.pixels.foreach_get(pixels.ravel())
-    bpy.data.images.remove(image)
-    shown = np.round(255.0 * pixels[::-1, :, :3]).astype(np.uint8)
-    return np.concatenate([np.full((CAPTION, WIDTH, 3), 24, np.uint8), shown])
+    shown = styles.drawn(SIZE, samples)
+    for other, is_hidden in was.items():
+        other.hide_render = is_hidden
+    return np.concatenate([np.full((CAPTION, SIZE[0], 3), 24, np.uint8), shown])
 
 
 if __name__ == "__main__":

@@ -51,8 +51,8 @@ def _pixels(picture):
         pixels = np.asarray(picture, np.float32)
     except (TypeError, ValueError, OverflowError):
         pixels = np.zeros(0)
-    if pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size:
-        raise HairError("picture must be an array (height, width, 4).")
+    if pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size or not np.isfinite(pixels).all():
+        raise HairError("picture must be an array (height, width, 4) of finite numbers.")
     return pixels
 
 

@@ -185,11 +185,17 @@ REFUSED = {
     "every of none": (lambda: lines_of_arrays(every=0), "Keep Every must be at least 1"),
     "no progress of curves": (lambda: api.use_as_guides(data("Lines"), progress=None), "progress must be a function"),
     "no modifiers": (lambda: api.use_as_guides(data("Lines"), applies_modifiers=None), "must be True or False"),
+    "no modifiers of hair": (lambda: api.use_as_hair(data("Lines"), applies_modifiers=None), "must be True or False"),
+    "text for a switch": (lambda: api.use_as_hair(data("Lines"), follows_guides="no"), "must be True or False"),
+    "a picture of no numbers": (
+        lambda: api.save_groom(data("Hair"), "a.blend", picture=np.full((2, 2, 4), math.nan)),
+        "must be an array (height, width, 4)",
+    ),
     # Arrays.
     "a number for masks": (lambda: masked(3), "masks must be a dictionary"),
     "text for a mask": (lambda: masked({"top": "top"}), "must have a finite weight"),
     "a mask that single precision cannot hold": (lambda: masked({"top": [0, 1, 1e300]}), "must have a finite weight"),
-    "lines that single precision cannot hold": (lambda: lines_of_arrays(1e300 * np.eye(3)), "nothing to use"),
+    "lines that single precision cannot hold": (lambda: lines_of_arrays(1e300 * np.eye(3)), "No curve can be used"),
     "one array": (lambda: api.distribute_guides([np.eye(3)]), "pair of arrays"),
     "three arrays": (lambda: api.distribute_guides((1, 2, 3)), "pair of arrays"),
     "fractions of vertices": (lambda: mesh(triangles=[[0, 1, 1.5]]), "must be whole numbers"),

@@ -6,6 +6,7 @@ import bpy
 from ...core.errors import HairError
 from ...core.params import described
 from ..host.notices import name_of
+from . import usable_surfaces
 
 _KINDS = {"GUIDES": "Vellus guides", "HAIR": "Vellus hair", None: "Vellus guides or hair"}
 
@@ -42,7 +43,7 @@ def guides_of(given):
     """Return guide Curves as `curves_of` does, if their surface is evaluated."""
     guides = curves_of(given, "GUIDES")
     if guides.surface is not None:
-        _require_evaluated(guides.surface)
+        usable_surfaces.require_evaluated(guides.surface)
     return guides
 
 
@@ -51,7 +52,7 @@ def surface_object(given):
     found = _original(given)
     if not isinstance(found, bpy.types.Object) or found.type != "MESH":
         raise HairError(f"{_called(given)} is neither a mesh object nor the arrays of a mesh.")
-    _require_evaluated(found)
+    usable_surfaces.require_evaluated(found)
     return found
 
 
@@ -64,12 +65,6 @@ def _original(given):
     except ReferenceError as error:
         kind = type(given).__name__
         raise HairError(f"The {kind} was removed from the file or replaced by an undo: look it up again.") from error
-
-
-def _require_evaluated(surface):
-    """Raise `HairError` for a mesh object of another scene or hidden in viewports: its modifiers are not evaluated."""
-    if not surface.evaluated_get(bpy.context.evaluated_depsgraph_get()).is_evaluated:
-        raise HairError(f"{_called(surface)} is hidden in viewports or is not in this scene: unhide it or link it.")
 
 
 def _called(given):

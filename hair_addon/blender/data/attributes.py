@@ -41,9 +41,12 @@ def write(curves, name, data_type, domain, values):
     attribute.data.foreach_set(value_name, values)
 
 
-def write_positions(curves, points):
-    """Write float32 points (..., 3) of all curves, those of linked and overridden Curves too, which no file keeps."""
-    data, points = curves.attributes["position"].data, np.ascontiguousarray(points, np.float32)
+def write_positions(curves, points, name="position"):
+    """Write float32 points (..., 3) of all curves, those of linked and overridden Curves too, which no file keeps.
+
+    name: of the attribute, which is there.
+    """
+    data, points = curves.attributes[name].data, np.ascontiguousarray(points, np.float32)
     if not is_from_library(curves):
         data.foreach_set("vector", points.ravel())
         return

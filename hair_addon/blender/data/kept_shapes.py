@@ -18,8 +18,14 @@ def read(datablock):
 
 
 def keep(datablock, points):
-    """Keep (N, 3) points as the shape of Curves."""
-    attributes.write(datablock, _SHAPE, "FLOAT_VECTOR", "POINT", points)
+    """Keep (N, 3) points as the shape of Curves; of linked and overridden ones until their file is read again."""
+    if not attributes.is_from_library(datablock):
+        attributes.write(datablock, _SHAPE, "FLOAT_VECTOR", "POINT", points)
+        return
+    if not attributes.has(datablock, _SHAPE, "FLOAT_VECTOR", "POINT"):
+        datablock.attributes.new(_SHAPE, "FLOAT_VECTOR", "POINT")
+    if not np.array_equal(read(datablock), points):
+        attributes.write_positions(datablock, points, _SHAPE)
 
 
 def forget(datablock):

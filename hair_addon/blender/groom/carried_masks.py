@@ -8,7 +8,7 @@ from ...core import grooming
 from ...core.geometry.landmark_warp import Warp
 from ...core.geometry.mesh import interpolate
 from ...core.grooming.groom_transfer import Ground
-from ..data import curves, scene, vertex_groups
+from ..data import curves, scene, usable_surfaces, vertex_groups
 from ..data.scene import Surface
 from ..host.notices import text_of
 from ..settings import style_items
@@ -56,7 +56,8 @@ def at_own_vertices(surface_object: Object, surface: Surface, values: np.ndarray
 
 
 def new_group(surface_object: Object, name: str, weights: np.ndarray) -> str:
-    """Create a vertex group of weights (V,); its name."""
+    """Create a vertex group of weights (V,); its name. Raises `HairError`."""
+    usable_surfaces.require_paintable(surface_object)
     group = surface_object.vertex_groups.new(name=name)
     vertex_groups.paint(group, np.round(weights, 6))
     return group.name

@@ -38,6 +38,12 @@ def is_foreign(curves_object: Object) -> bool:
     )
 
 
+def require_foreign(curves_object: Object) -> None:
+    """Raise `HairError` for guides and hair, which the redo panel's operator would take a second time."""
+    if not is_foreign(curves_object):
+        raise HairError('"{name}" is already guides or hair.', name=name_of(curves_object))
+
+
 def require_editable(curves_object: Object) -> None:
     """Raise `HairError` unless the object and its curves may be changed without a change to any other object."""
     for datablock in (curves_object, curves_object.data):
@@ -71,9 +77,11 @@ def take(curves_object: Object, applies_modifiers: bool) -> Curves:
     Modifiers that were applied are gone, the others are switched off.
     """
     if _is_evaluated(curves_object, applies_modifiers):
+        bevel = curves_object.data.bevel_depth if curves_object.type == "CURVE" else None
         with _as_polylines(curves_object, applies_modifiers):
-            if curves_object.type == "CURVE":
+            if bevel is not None:
                 _convert(curves_object)
+                _write_radii(curves_object.data, bevel)
             else:
                 geometry = _evaluated(curves_object)
                 _replace_data(curves_object, geometry.curves.copy())
@@ -100,6 +108,8 @@ def _read(datablock):
 def _evaluated(curves_object):
     """The `GeometrySet` of an object after its modifiers, which has curves."""
     geometry = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).evaluated_geometry()
+    if geometry.curves is None and curves_object.type == "CURVE" and not curves_object.data.splines:
+        raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
     if geometry.curves is None:
         sentence = '"{name}" has no curves after its modifiers: turn off the modifiers that convert them.'
         raise HairError(sentence, name=name_of(curves_object))
@@ -166,6 +176,17 @@ def _convert(curves_object):
     layer.update()
     if curves_object.type != "CURVES":
         raise HairError('"{name}" cannot be converted to a Curves object.', name=name_of(curves_object))
+
+
+def _write_radii(datablock, bevel):
+    """Curve objects have factors of their bevel in place of radii: make radii of them, none where there is no bevel."""
+    radii = attributes.read(datablock, "radius", "FLOAT", "POINT")
+    if radii is None:
+        return
+    if bevel > 0.0:
+        attributes.write(datablock, "radius", "FLOAT", "POINT", radii * np.float32(bevel))
+    else:
+        datablock.attributes.remove(datablock.attributes["radius"])
 
 
 def _replace_data(curves_object, replacement):

@@ -15,12 +15,12 @@ from bpy.types import Curves, Depsgraph, Object
 from ...core import geometry, grooming
 from ...core.errors import HairError
 from ...core.geometry.landmark_warp import Warp
-from ...core.geometry.mesh import positions
+from ...core.geometry.mesh import check_mesh, positions
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.groom_transfer import Ground, Places
 from ...core.grooming.transfer_settings import TransferSettings
 from ...core.long_work import Work
-from ..data import attributes, curves, curves_objects, guide_curves, kept_shapes, landmarks, scene
+from ..data import attributes, curves, curves_objects, guide_curves, kept_shapes, landmarks, scene, usable_surfaces
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -79,11 +79,14 @@ def transferring(
     if target.type != "MESH" or target == guides.surface:
         raise HairError("Pick another mesh to transfer the groom to.")
     curves.require_editable(target)
+    usable_surfaces.require_evaluated(target)
+    usable_surfaces.require_object_mode(target)
     if hair is not None:
         pipeline.inputs_of(hair)
     source = guide_tools.open_guides(guides, depsgraph)
     curves_objects.keep_rest(target)
     surface = scene.read_surface(target, bpy.context.evaluated_depsgraph_get())
+    check_mesh(surface.mesh)
     warp = _warp(guides.surface, source.surface, target, surface, settings, depsgraph)
     own_ground, ground = (Ground(one.mesh, one.corner_uvs) for one in (source.surface, surface))
     masks = carried_masks.read(guides, hair, target, depsgraph)

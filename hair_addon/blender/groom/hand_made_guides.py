@@ -21,7 +21,17 @@ from ...core.grooming.groom import HairSettings
 from ...core.grooming.rooted_curves import RootedCurves, reversal
 from ...core.long_work import Work, part_of, run_now
 from ...core.params import Param, plain_value
-from ..data import attributes, curves, curves_objects, follow_nodes, masks, posed_strands, scene, vertex_groups
+from ..data import (
+    attributes,
+    curves,
+    curves_objects,
+    follow_nodes,
+    masks,
+    posed_strands,
+    scene,
+    usable_surfaces,
+    vertex_groups,
+)
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -153,6 +163,8 @@ def using_as_guides(
         return guides, grow(there, part_of(progress, 0.2, 1.0), density)
 
     guides, bound = yield compute
+    if bound is not None and is_unmasked and _area(its_surface.find(), surface, guides.rooted.roots) is not None:
+        usable_surfaces.require_paintable(its_surface.find())
     datablock = write(place.find(), its_surface.find(), surface, guides, seen, applies_modifiers)
     if bound is not None and is_unmasked:
         _bind_to_group(bound, datablock.surface, guides.rooted.roots)
@@ -161,11 +173,10 @@ def using_as_guides(
 
 
 def require_usable(curves_object: Object, surface_object: Object) -> None:
-    """Raise `HairError` unless an object's curves are not of Vellus yet and may be put on a mesh object."""
-    if not foreign_curves.is_foreign(curves_object):
-        raise HairError('"{name}" is already guides or hair.', name=name_of(curves_object))
+    """Raise `HairError` unless an object's curves may be put on a mesh object."""
     foreign_curves.require_editable(curves_object)
     curves.require_editable(surface_object)
+    usable_surfaces.require_evaluated(surface_object)
     ancestor = surface_object
     while ancestor is not None:
         if ancestor == curves_object:
@@ -198,7 +209,8 @@ def _coverage(mesh, roots):
 
 
 def _paint(surface_object, weights):
-    """Create a vertex group of weights (V,), which can be painted; returns its name."""
+    """Create a vertex group of weights (V,), which can be painted; returns its name. Raises `HairError`."""
+    usable_surfaces.require_paintable(surface_object)
     group = surface_object.vertex_groups.new(name=_GROUP)
     vertex_groups.paint(group, weights, leaves_out_zero=False)
     bpy.context.view_layer.update()
@@ -207,9 +219,14 @@ def _paint(surface_object, weights):
 
 def paint_area(surface_object: Object, surface: Surface, roots: SurfacePoints) -> str:
     """Create a vertex group of the area around roots of guides; its name, empty where they are all over the mesh."""
-    own_mesh = scene.read_own_mesh(surface_object, surface.to_world_axes)
-    weights = _coverage(own_mesh, positions(surface.mesh, roots))
+    weights = _area(surface_object, surface, roots)
     return "" if weights is None else _paint(surface_object, weights)
+
+
+def _area(surface_object, surface, roots):
+    """(V,) weights of the area around roots of guides at an object's own vertices; None where it is all of them."""
+    own_mesh = scene.read_own_mesh(surface_object, surface.to_world_axes)
+    return _coverage(own_mesh, positions(surface.mesh, roots))
 
 
 def _bind_to_group(bound, surface_object, roots):

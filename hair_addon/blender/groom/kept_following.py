@@ -88,7 +88,7 @@ def follow(hair: Curves, depsgraph: Depsgraph, local: np.ndarray | None = None) 
     """
     state = hair.vellus
     guide_curves = state.guide_curves
-    if guide_curves is None or not len(hair.curves) or attributes.is_from_library(hair):
+    if guide_curves is None or not len(hair.curves):
         return False
     digest, bound = staleness.guides_digest(guide_curves), bindings.kept_cache.get(hair.session_uid)
     is_simulated = simulated_guides.is_shown(guide_curves)
@@ -96,6 +96,8 @@ def follow(hair: Curves, depsgraph: Depsgraph, local: np.ndarray | None = None) 
         return False
     present = curves.read_points(hair)
     bound, guides = _up_to_date(bound, hair, present, depsgraph, local)
+    # Strands that follow a simulation are to come back after it, though guides are as they were.
+    digest = "" if is_simulated else digest
     is_other = state.followed != digest or len(_combed(guides, bound.followed)) > 0
     points = bound.points_for(guides)
     if not np.array_equal(points, present):

@@ -21,6 +21,7 @@ from ...core.grooming.derived_guides import DerivationSettings, DerivedGuides
 from ...core.grooming.groom import HairSettings
 from ...core.grooming.rooted_curves import RootedCurves
 from ...core.long_work import Work, part_of
+from ...core.params import Param, declared, plain_value
 from ..data import attributes, curves, curves_objects, kept_shapes, scene
 from ..data.scene import Surface
 from ..host.datablocks import Remembered
@@ -29,6 +30,9 @@ from ..materials import looks
 from ..settings import setting_properties
 from . import foreign_curves, hand_made_guides, pipeline, staleness, writing
 from .hand_made_guides import HandMade, PlacedCurves
+
+_SWITCH = Param("")
+_MOST_RADIUS = next(details.high for name, _default, details in declared(HairSettings) if name == "radius")
 
 
 @dataclass(frozen=True)
@@ -60,6 +64,8 @@ def using_as_hair(
     applies_modifiers: as of `hand_made_guides.using_as_guides`; follows_guides: regenerate the strands, on their roots,
     by the guides. Raises `HairError` before anything changes.
     """
+    applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
+    follows_guides = plain_value("Follow Guides", follows_guides, False, _SWITCH)
     hand_made_guides.require_usable(curves_object, surface_object)
     curves_objects.keep_rest(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
@@ -125,4 +131,5 @@ def _write_widths(hair, surface: Surface, placed: PlacedCurves, settings) -> flo
         along = geometry.strands.places_along(placed.points, starts)
         taper = groom.strand_radii(settings)[[0, -1]] / np.float32(surface.scale)
         attributes.write(hair, "radius", "FLOAT", "POINT", taper[0] + (taper[1] - taper[0]) * along)
-    return float(curves.read_radii(hair)[starts[:-1]].mean() * surface.scale) or groom_defaults.known(settings.radius)
+    found = float(curves.read_radii(hair)[starts[:-1]].mean() * surface.scale)
+    return min(found, _MOST_RADIUS) or groom_defaults.known(settings.radius)

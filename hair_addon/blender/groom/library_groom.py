@@ -18,9 +18,9 @@ from ...core import grooming
 from ...core.errors import HairError
 from ...core.files import library_settings
 from ...core.files.settings_file import GroomSettings
-from ...core.geometry.mesh import SurfacePoints, TriMesh
+from ...core.geometry.mesh import SurfacePoints, TriMesh, check_mesh
 from ...core.long_work import Work
-from ..data import attributes, curves, scene, surface_collections
+from ..data import attributes, curves, scene, surface_collections, usable_surfaces
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import setting_properties
@@ -152,7 +152,10 @@ def adding_groom(
     `HairError`, when nothing is left in the scene.
     """
     curves.require_editable(surface_object)
+    usable_surfaces.require_evaluated(surface_object)
+    usable_surfaces.require_object_mode(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)
+    check_mesh(surface.posed_mesh)
     rotation = _rotation(surface)
     target = grooming.groom_transfer.Ground(_turned_mesh(surface.posed_mesh, rotation.T), surface.corner_uvs)
     found = grooming.groom_passage.passage(groom.ground, target, groom.roots, method)

@@ -97,8 +97,8 @@ def write(path: Path, grooms: Iterable[tuple[LibraryGroom, np.ndarray | None]], 
 
 
 def _make_way(name):
-    """Rename an object of a name that an asset is to have; returns [(object, its name)]."""
-    other = bpy.data.objects.get(name)
+    """Rename an object of this file of a name that an asset is to have; returns [(object, its name)]."""
+    other = bpy.data.objects.get((name, None))
     if other is None:
         return []
     other.name = f".{name[:50]} "

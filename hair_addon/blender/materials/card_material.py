@@ -9,7 +9,8 @@ relation (1 - R)² / (2 R) = K / S, with K = 1 - a and S = (1 - t) a / 2, a stac
 
 The textures have the color R of a head of hair. Engines that let no light through a surface show R itself: exporters
 find a plain shader, Cycles and EEVEE shaders of their own. EEVEE takes transmission from what the picture shows behind
-a surface, not from the layers that are there, so t = 0.
+a surface, not from the layers that are there, so t = 0. Light reaches one layer there, and does not go on to the next:
+each layer scatters more than all of its light, for those that it stands for.
 """
 
 import bpy
@@ -22,6 +23,10 @@ _ANISOTROPY = 0.8  # highlights run across strands
 # blond, auburn and brown strands with 0, 0.5 to 0.8 with 0.75 to 0.85; beside or behind a sun then 0.9 to 1.4.
 _FORWARD = 0.8
 _SPECULAR = 0.5  # half of a surface's: a texel has strands of many directions
+# In EEVEE: factors of a layer's albedo, of what light from behind adds to that, and of a surface's highlights, which
+# are not stretched across strands there. Of the red, green and blue of auburn strands in Cycles, cards have, with light
+# from the front, one side and behind, (0.93 0.66 0.61), (1.16 0.91 0.93), (0.50 0.32 0.41); with 1, 0 and 0.5 half.
+_LAYERED, _BEHIND, _UNSTRETCHED = 1.7, 0.4, 1.2
 
 
 def new_material(name, look, images=None):
@@ -44,12 +49,15 @@ def new_material(name, look, images=None):
             albedo = _albedo(tree, nodes["color"].outputs["Color"], forward, -720.0 * row - 120.0)
             tree.links.new(albedo, shown.inputs["Base Color"])
             shaders.append(shown)
+            if target == "EEVEE":
+                _let_through(tree, shown, albedo, nodes)
         for shader in shaders:
             tree.links.new(nodes["color"].outputs["Alpha"], shader.inputs["Alpha"])
             tree.links.new(nodes["bump"].outputs["Normal"], shader.inputs["Normal"])
             tree.links.new(nodes["tangent"].outputs["Tangent"], shader.inputs["Tangent"])
             shader.inputs["Anisotropic"].default_value = _ANISOTROPY
             shader.inputs["Specular IOR Level"].default_value = 0.5 * _SPECULAR
+        shaders[-1].inputs["Specular IOR Level"].default_value = 0.5 * _UNSTRETCHED
     return material
 
 
@@ -78,6 +86,29 @@ def _new_images(tree, images):
     tangent = nodes["tangent"] = tree.nodes.new("ShaderNodeTangent")
     tangent.direction_type, tangent.uv_map, tangent.location = "UV_MAP", UV_MAP, (-560.0, -400.0)
     return nodes
+
+
+def _let_through(tree, shader, albedo, nodes):
+    """Let a shader for EEVEE stand for layers behind it, and let light from behind through."""
+    place = shader.location
+    layered, behind, covered = (tree.nodes.new("ShaderNodeVectorMath") for _ in range(3))
+    through, total = tree.nodes.new("ShaderNodeBsdfTranslucent"), tree.nodes.new("ShaderNodeAddShader")
+    for row, node in enumerate((layered, behind, covered)):
+        node.operation, node.location = "SCALE", (-260.0, place.y - 160.0 * row)
+    through.location, total.location = (0.0, place.y - 520.0), (240.0, place.y - 520.0)
+    for node, factor in ((layered, _LAYERED), (behind, _BEHIND)):
+        node.inputs["Scale"].default_value = factor
+        tree.links.new(albedo, node.inputs[0])
+    tree.links.new(layered.outputs[0], shader.inputs["Base Color"])
+    tree.links.new(behind.outputs[0], covered.inputs[0])
+    tree.links.new(nodes["color"].outputs["Alpha"], covered.inputs["Scale"])
+    tree.links.new(covered.outputs[0], through.inputs["Color"])
+    tree.links.new(nodes["bump"].outputs["Normal"], through.inputs["Normal"])
+    (shown,) = shader.outputs["BSDF"].links
+    output = shown.to_socket
+    tree.links.new(shader.outputs["BSDF"], total.inputs[0])
+    tree.links.new(through.outputs["BSDF"], total.inputs[1])
+    tree.links.new(total.outputs["Shader"], output)
 
 
 def _albedo(tree, color, forward, height):

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from .. import grooming, interpolation
+from ..errors import HairError
 from ..geometry.mesh import SurfacePoints, TriMesh, positions
 from ..geometry.strands import Strands, from_numpy, lengths
 from ..interpolation.hair_binding import HairBinding
@@ -94,7 +95,10 @@ def derive(
     found = best
     for step in range(_STEPS):
         fitting("Fitting guides", step / _STEPS)
-        present = interpolation.guide_fitting.fitted(binding, found.weights, rooted, present, chosen, found.stretches)
+        stretches = found.stretches
+        if not np.isfinite(stretches).all():  # single precision does not hold them so far from the surface
+            raise HairError("The curves are too small or too far away for the surface: check the scales of both.")
+        present = interpolation.guide_fitting.fitted(binding, found.weights, rooted, present, chosen, stretches)
         found = _Reproduction(binding, guides_of(present), points, scale)
         if found.mean < best.mean:
             best = found
@@ -117,7 +121,8 @@ class _Reproduction:
         """(S,) float64: how much longer strands are for their kept lengths."""
         binding = replace(self._binding, keep_length=0.0)
         plain = lengths(following.strands_now(binding, self.guides, self.weights).numpy())
-        return lengths(self.points) / np.maximum(plain, 1e-3 * lengths(self.points))
+        with np.errstate(invalid="ignore"):
+            return lengths(self.points) / np.maximum(plain, 1e-3 * lengths(self.points))
 
     @property
     def guide_map(self):

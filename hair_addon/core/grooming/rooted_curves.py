@@ -72,7 +72,7 @@ def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) 
     points, starts = np.asarray(points, np.float32), np.asarray(starts, np.int64)
     usable = _usable(points, starts)
     if not len(usable):
-        raise HairError("All curves have zero length: there is nothing to use as guides.")
+        raise HairError("No curve can be used: all have zero length or non-finite points.")
     kept = usable[::every]
 
     ends = points[np.concatenate([starts[:-1][kept], starts[1:][kept] - 1])]

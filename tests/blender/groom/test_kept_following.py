@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data import curves
+from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import live_hair
 from tests.support.following import update
 from tests.support.imported import curves_object, lines_on, select, stored, world
@@ -172,3 +173,29 @@ def test_a_file_keeps_what_the_strands_were(kept, tmp_path):
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "kept.blend"))
     write(bpy.data.hair_curves[guides_name], combed)
     assert np.array_equal(stored(bpy.data.objects[name]), before)
+
+
+@pytest.mark.parametrize("is_overridden", [False, True])
+def test_linked_strands_follow_simulated_guides_and_come_back(kept, tmp_path, is_overridden):
+    """As other hair of a linked character does; nothing of it is kept in the file that links it."""
+    path = tmp_path / "character.blend"
+    bpy.data.libraries.write(str(path), {kept})
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    with bpy.data.libraries.load(str(path), link=True) as (there, here):
+        here.objects = list(there.objects)
+    for linked in here.objects:
+        bpy.context.scene.collection.objects.link(linked)
+    if is_overridden:
+        here.objects[0].override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    update()
+    found = [one for one in bpy.data.hair_curves if one.vellus.kind == "HAIR"]
+    hair = next(one for one in found if (one.override_library is not None) == is_overridden)
+    before, guides = curves.read_points(hair), hair.vellus.guide_curves
+    points = curves.read_points(guides).reshape(len(guides.curves), -1, 3)
+    for factor in (1.2, 0.9):
+        swung = points[:, :1] + factor * (points - points[:, :1])
+        live_hair.show_guides(guides, swung, bpy.context.evaluated_depsgraph_get())
+        assert np.abs(curves.read_points(hair) - before).max() > 0.03 and hair.vellus.status == ""
+    bindings.kept_cache.clear()
+    live_hair.show_guides(guides, None, bpy.context.evaluated_depsgraph_get())
+    assert np.array_equal(curves.read_points(hair), before)

@@ -58,3 +58,12 @@ def test_exporters_find_one_shader_with_the_texture(card):
     plain = outputs["ALL"].inputs["Surface"].links[0].from_node
     assert plain.inputs["Base Color"].links[0].from_node.image.name.startswith("color")
     assert plain.inputs["Transmission Weight"].default_value == 0.0
+
+
+def test_light_from_behind_reaches_the_eye_in_eevee(card):
+    """EEVEE lights one layer, so that half the light that strands have was missing there, from behind four fifths."""
+    nodes = card.data.materials[0].node_tree.nodes
+    output = next(n for n in nodes if n.bl_idname == "ShaderNodeOutputMaterial" and n.target == "EEVEE")
+    total = output.inputs["Surface"].links[0].from_node
+    kinds = {one.links[0].from_node.bl_idname for one in total.inputs}
+    assert kinds == {"ShaderNodeBsdfPrincipled", "ShaderNodeBsdfTranslucent"}

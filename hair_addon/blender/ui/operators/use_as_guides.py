@@ -8,7 +8,7 @@ from ....core.grooming import cost
 from ....core.grooming.groom import HairSettings
 from ...data import scene
 from ...groom import hand_made_guides
-from ...groom.foreign_curves import is_foreign
+from ...groom.foreign_curves import is_foreign, require_foreign
 from ...settings import properties, setting_properties
 from ...settings.translations import report_text
 from .. import setting_rows
@@ -53,6 +53,7 @@ class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):
         return cost.hair_seconds(self._hair_settings(), face_count)
 
     def work(self, context):
+        require_foreign(context.object)
         return hand_made_guides.using_as_guides(
             context.object,
             self._surface(context),

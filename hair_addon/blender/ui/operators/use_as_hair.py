@@ -5,7 +5,7 @@ import bpy
 
 from ....core.grooming.derived_guides import DerivationSettings
 from ...groom import hand_made_guides, kept_hair
-from ...groom.foreign_curves import is_foreign
+from ...groom.foreign_curves import is_foreign, require_foreign
 from ...groom.selection import make_active, object_of
 from ...settings import properties, setting_properties
 from ...settings.translations import report_text
@@ -43,6 +43,7 @@ class VELLUS_OT_use_as_hair(LongOperator, bpy.types.Operator):
         return 1.0  # more than a moment for any hair
 
     def work(self, context):
+        require_foreign(context.object)
         return kept_hair.using_as_hair(
             context.object,
             self._surface(context),
