@@ -36,12 +36,14 @@ def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, m
         shown = drawn(watched)
     assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
     assert not computed
+    loose = hair_cache.strands_on_gpu(watched.data).ball[1]
     np.testing.assert_array_equal(points(watched), before)
     live_hair.write_all()
     bpy.context.view_layer.update()
     assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 1}
     np.testing.assert_array_equal(drawn(watched), shown)  # nor is it uploaded
     assert calls["uploads"] == 0
+    assert loose > hair_cache.strands_on_gpu(watched.data).ball[1]
     monkeypatch.undo()
     np.testing.assert_array_equal(points(watched), grown(watched))
     np.testing.assert_allclose(shown, points(watched), rtol=0.0, atol=CLOSE)
