@@ -127,7 +127,7 @@ def read(
 
 def _are_made(hair):
     """Whether the GPU made or carried all hair: there it costs little to draw shadows of as much as at rest."""
-    return bool(hair) and not any(strands.has_points for strands, *_ in hair)
+    return bool(hair) and all(strands.is_made for strands, *_ in hair)
 
 
 def _fit(maps, lamps):
