@@ -65,7 +65,7 @@ class Renewal:
         for target, place in zip(self._targets, places, strict=True):
             target.view, target.places = place
         batches, turn = [surface.batch for surface in surfaces], self._turn
-        self._maps.draw(self._lights, hair, batches, _steps(hair), is_moving=True, chosen=turn)
+        self._maps.draw(self._lights, hair, batches, _steps(hair), is_steady=True, chosen=turn)
         one = self._lights.copy()
         one["count"], one["light"][0] = 1, self._lights["light"][turn]
         for target in self._targets:

@@ -57,19 +57,19 @@ class ShadowMaps:
         textures = (self._hair_front, self._hair_layers, self._surface_moments)
         return dict(zip(shaders.SHADOW_SAMPLERS, textures, strict=True))
 
-    def draw(self, lights, hair, surfaces, steps=_ALL, casters=None, is_moving=False, chosen=None):
+    def draw(self, lights, hair, surfaces, steps=_ALL, casters=None, is_steady=False, chosen=None):
         """Draw the maps and write each light's part in them into its record.
 
         lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: batches;
         steps: what is drawn of each hair for all of it; casters: a light's index → (hair, surfaces) that cast its
-        shadow, None: all; is_moving: whether hair is about to change again; chosen: index of the
+        shadow, None: all; is_steady: whether maps stay aimed where they are as long as hair fits; chosen: index of the
         only light whose map is drawn, None: of all.
         """
         lights["light"]["shadow_layer"] = -1
         if not hair:
             return
         loose = drawing.bounding_sphere(hair)
-        self._sphere = loose = _steady(loose, self._sphere) if is_moving and self._sphere else loose
+        self._sphere = loose = _steady(loose, self._sphere) if is_steady and self._sphere else loose
         for index in range(min(int(lights["count"]), self.layer_count)) if chosen is None else (chosen,):
             view = self._aimed(index, lights["light"][index], hair, loose)
             if view is not None and lights["light"][index]["casts_shadow"]:

@@ -35,7 +35,7 @@ class StrandChanges:
         else:
             # It is not known where strands were: as if there had been more changes than one.
             moved = Moved(self.moved, 1, self.moved_rows, before + 2)
-        return replace(strands, moved=moved, bounds=self.bounds.read(), has_points=False)
+        return replace(strands, moved=moved, bounds=self.bounds.read(), is_made=True, has_points=False)
 
 
 def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -> StrandChanges:

@@ -54,7 +54,8 @@ class StrandsOnGPU:
     mean_radius: float
     greatest_radius: float
     moved: Moved | None = None  # None where all points are as uploaded
-    has_points: bool = True  # whether `points` are where strands are, which they are not where the GPU made these
+    is_made: bool = False  # whether the GPU has made or carried them
+    has_points: bool = True  # whether `points` are where strands are, which they are not while the GPU alone knows it
     lengthenings: dict = field(default_factory=dict)  # {number of points: how much longer strands are with all}
 
     @cached_property
@@ -200,7 +201,7 @@ def move_strands(strands, moved, points):
     groups = -(-len(moved) * strands.point_count // _MOVE_GROUP_SIZE)
     rows_of_groups = -(-groups // MOST_GROUPS)
     gpu.compute.dispatch(program, -(-groups // rows_of_groups), rows_of_groups, 1)
-    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1), lengthenings={})
+    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1), lengthenings={}, is_made=False)
 
 
 def _no_rows(strands):

@@ -127,7 +127,7 @@ def read(
 
 def _are_made(hair):
     """Whether the GPU made or carried all hair: there it costs little to draw shadows of as much as at rest."""
-    return bool(hair) and not any(strands.has_points for strands, *_ in hair)
+    return bool(hair) and all(strands.is_made for strands, *_ in hair)
 
 
 def _fit(maps, lamps):
@@ -142,7 +142,8 @@ def _lit(drawn, lamps, maps, hair_receivers, is_draft=False):
     surface_owners = [receiver.owner for receiver in drawn.receivers[: len(batches)]]
     steps = _DRAFT_STEPS if is_draft and not _are_made(drawn.hair) else _SHADOW_STEPS
     casters = lamps.casters(placed, hair_owners, batches, surface_owners)
-    maps.draw(lamps.record, placed, batches, steps, casters, is_draft)
+    # Where strands are made, what is drawn at rest is what was drawn while they moved.
+    maps.draw(lamps.record, placed, batches, steps, casters, is_steady=is_draft or _are_made(drawn.hair))
     own = {}
     if not lamps.are_alike:
         own = {"hair_lights": lamps.lit(hair_receivers), "surface_lights": lamps.lit(drawn.receivers)}

@@ -7,7 +7,7 @@ random numbers, wetness and roots are read and replaced together.
 
 import sys
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import bpy
@@ -116,6 +116,8 @@ def strands_on_gpu(datablock):
         chosen = np.unique(np.concatenate(moved))
         require_indices("strands", chosen, len(kept.points))
         kept.on_gpu = strand_textures.move_strands(kept.on_gpu, chosen, _carried(kept, pose, chosen))
+    elif not kept.on_gpu.has_points and kept.making.carrier is None and not _is_behind(datablock):
+        kept.on_gpu = replace(kept.on_gpu, points=kept.points, has_points=True)  # which have followed meanwhile
     return kept.on_gpu
 
 

@@ -35,12 +35,14 @@ def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, m
         shown = drawn(watched)
     assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
     assert not computed
+    loose = hair_cache.strands_on_gpu(watched.data).ball[1]
     np.testing.assert_array_equal(points(watched), before)
     live_hair.write_all()
     bpy.context.view_layer.update()
     assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 1}
     np.testing.assert_array_equal(drawn(watched), shown)  # nor is it uploaded
     assert calls["uploads"] == 0
+    assert loose > hair_cache.strands_on_gpu(watched.data).ball[1]
     monkeypatch.undo()
     np.testing.assert_array_equal(points(watched), grown(watched))
     np.testing.assert_allclose(shown, points(watched), rtol=0.0, atol=CLOSE)
@@ -225,10 +227,11 @@ def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watc
     """From the comb to shadows and light: one texture of twelve bytes a point of guides; six numbers come back."""
     bpy.ops.object.light_add(type="SUN")
 
+    def scene_now():
+        return bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get()
+
     def frame(before):
-        context = bpy.context
-        given = context.scene, context.view_layer, context.evaluated_depsgraph_get()
-        return drawn_scene.read(*given, before=before, is_draft=before is not None)
+        return drawn_scene.read(*scene_now(), before=before, is_draft=before is not None)
 
     shown = frame(None)
     to_and_fro = cycle([np.float32([0.0, 0.01, 0.02]), np.float32([0.0, -0.01, -0.02])])
@@ -256,3 +259,7 @@ def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watc
     assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
     assert shown.shadow_maps is maps
     assert not surfaces  # which stay in the maps of the sun and of the world's directions
+    moving = [np.array(map_.read()) for map_ in maps.samplers.values()]
+    drawn_scene.read(*scene_now(), before=shown)
+    for map_, wanted in zip(maps.samplers.values(), moving, strict=True):  # at rest shadows are the same
+        np.testing.assert_array_equal(map_.read(), wanted)

@@ -13,7 +13,9 @@ def by_decomposition(matrices):
 
 def test_they_are_polar_factors_of_any_scale(rng):
     matrices = rng.normal(size=(500, 3, 3)) * 10.0 ** rng.uniform(-20, 20, (500, 1, 1))
-    matrices[:9] = np.diag([1.0, -1.0, 1.0]), np.eye(3), 0.0, *[np.diag([1.0, 10.0**-n, 1.0]) for n in range(3, 9)]
+    matrices[0] = np.diag([1.0, -1.0, 1.0])
+    matrices[1] = 0.0
+    matrices[2:8] = [np.diag([1.0, 10.0**-n, 1.0]) for n in range(3, 9)]
     found = nearest_rotation.nearest_rotations(matrices)
     np.testing.assert_allclose(found, by_decomposition(matrices), rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(found @ np.swapaxes(found, 1, 2), np.tile(np.eye(3), (500, 1, 1)), rtol=0.0, atol=1e-12)
