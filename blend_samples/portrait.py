@@ -19,8 +19,10 @@ from hair_addon.core.shading.fibre.principled import roughness_from_beta_r
 SIZE = 760, 760  # pixels of a picture
 CAMERA, LOOK_AT, LENS = (0.42, -1.40, 0.745), Vector((0.0, -0.033, 0.692)), 126.0  # [m], [m], [mm]
 NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
-# Absorption per fibre radius at the roots; the sun has bleached the tips.
-AUBURN, CHESTNUT = (0.62, 1.22, 2.30), (0.25, 0.60, 1.50)
+# Absorption per fibre radius at the roots, which a key light from above would else show brighter than the lengths, and
+# the part of it at the tips, which the sun has bleached.
+AUBURN, CHESTNUT = (1.05, 2.07, 3.91), (0.42, 1.02, 2.55)
+_TIP_ABSORPTION = 0.18
 GAZE = CAMERA  # [m]: what the eyes look at
 FSTOP = 8.0
 
@@ -69,7 +71,7 @@ def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
     look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", CHESTNUT
     look.cuticle_angle, look.roughness = math.radians(5.0), roughness_from_beta_r(math.radians(7.5))
     look.random_color = 0.2
-    look.tip_absorption, look.gradient_start, look.gradient_end = 0.30, 0.02, 0.42
+    look.tip_absorption, look.gradient_start, look.gradient_end = _TIP_ABSORPTION, 0.05, 0.42
     return guides, hair
 
 
