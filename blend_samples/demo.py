@@ -21,10 +21,8 @@ import warp as wp
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import head  # beside this file
-import portrait
-
 import hair_addon
+from blend_samples.heads import head, portrait
 from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import ambient_visibility, drawing, visibility_buffer
@@ -185,8 +183,17 @@ def _head_and_hair(drawn):
     )
 
 
-def _frames_per_second(drawn, width=1280, height=720):
+def _frames_per_second(drawn):
     bpy.context.scene.camera.data.sensor_fit = "VERTICAL"  # the frame shows all of the head
+    _frame(drawn, 64, 36)()  # compiles and fills caches
+    draw = _frame(drawn, 1280, 720)
+    seconds, frame_count = _seconds(draw), 20
+    # Software drivers take seconds for a frame: one of them tells as much.
+    return 1.0 / seconds if seconds > 0.5 else frame_count / _seconds(lambda: [draw() for _ in range(frame_count)])
+
+
+def _frame(drawn, width, height):
+    """A function that draws a frame, one sample a pixel, and waits until it is drawn."""
     depsgraph = bpy.context.evaluated_depsgraph_get()
     camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
     view = drawing.view_record(*camera, height, least_width=1.0)
@@ -200,12 +207,9 @@ def _frames_per_second(drawn, width=1280, height=720):
         drawn_scene.draw_hair(drawn, view, buffer)
         with end.bind():
             drawing.resolve(buffer.color, 1)
-            end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # waits until the frame is drawn
+            end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
 
-    draw()  # compiles and fills caches
-    seconds, frame_count = _seconds(draw), 20
-    # Software drivers take seconds for a frame: one of them tells as much.
-    return 1.0 / seconds if seconds > 0.5 else frame_count / _seconds(lambda: [draw() for _ in range(frame_count)])
+    return draw
 
 
 def _seconds(work):

@@ -16,11 +16,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import head  # beside this file
 import OpenEXR
-import portrait
 
 import hair_addon
+from blend_samples.heads import head, portrait
 from hair_addon.blender.render import offscreen
 from hair_addon.core.files.whole_file import whole_file
 

@@ -22,11 +22,9 @@ import warp as wp
 from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
-
-import head  # the samples' scene
 
 import hair_addon
+from blend_samples.heads import head
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import display_transform
 from hair_addon.blender.render import drawn_scene, hair_picture, offscreen, view_film
