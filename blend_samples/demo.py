@@ -185,31 +185,30 @@ def _head_and_hair(drawn):
 
 def _frames_per_second(drawn):
     bpy.context.scene.camera.data.sensor_fit = "VERTICAL"  # the frame shows all of the head
-    _frame(drawn, 64, 36)()  # compiles and fills caches
-    draw = _frame(drawn, 1280, 720)
-    seconds, frame_count = _seconds(draw), 20
-    # Software drivers take seconds for a frame: one of them tells as much.
-    return 1.0 / seconds if seconds > 0.5 else frame_count / _seconds(lambda: [draw() for _ in range(frame_count)])
-
-
-def _frame(drawn, width, height):
-    """A function that draws a frame, one sample a pixel, and waits until it is drawn."""
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
-    view = drawing.view_record(*camera, height, least_width=1.0)
-    buffer = visibility_buffer.VisibilityBuffer(width, height)
     pixel = gpu.types.GPUTexture((1, 1), format="RGBA16F")
     end = gpu.types.GPUFrameBuffer(color_slots=pixel)
 
-    def draw():
+    def draw(view, buffer):
         with buffer.surfaces((0.0, 0.0, 0.0, 1.0)):
             drawn_scene.draw_surfaces(drawn, view)
         drawn_scene.draw_hair(drawn, view, buffer)
         with end.bind():
             drawing.resolve(buffer.color, 1)
-            end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")
+            end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # waits until the frame is drawn
 
-    return draw
+    draw(*_view_and_buffer(64, 36))  # compiles and fills caches
+    frame = _view_and_buffer(1280, 720)
+    seconds, frame_count = _seconds(lambda: draw(*frame)), 20
+    # Software drivers take seconds for a frame: one of them tells as much.
+    return (
+        1.0 / seconds if seconds > 0.5 else frame_count / _seconds(lambda: [draw(*frame) for _ in range(frame_count)])
+    )
+
+
+def _view_and_buffer(width, height):
+    camera = scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), width, height)
+    view = drawing.view_record(*camera, height, least_width=1.0)
+    return view, visibility_buffer.VisibilityBuffer(width, height)
 
 
 def _seconds(work):
