@@ -22,7 +22,7 @@ import warp as wp
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 import hair_addon
-from blend_samples.heads import head, portrait
+from blend_samples.heads import portrait
 from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import ambient_visibility, drawing, visibility_buffer
@@ -53,9 +53,7 @@ def main():
     hair_addon.register()
     gpu.init()
     wp.config.log_level = wp.LOG_WARNING
-    head_object = head.build()
-    portrait.dress(head_object)
-    guides, hair = portrait.grow(head_object)
+    _head, guides, hair = portrait.build()
     portrait.light()
     print(f"{len(guides.data.curves)} guides, {len(hair.data.curves)} strands in {time.perf_counter() - started:.1f} s")
     bpy.context.view_layer.objects.active = hair

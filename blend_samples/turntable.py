@@ -57,9 +57,7 @@ def main():
 
 def _build(path):
     """The head with its hair, which turns once about the vertical in front of a camera and lights that stay."""
-    skull = head.build()
-    head.grow(skull)
-    portrait.dress(skull)
+    skull, _guides, _hair = portrait.build(portrait.AHEAD)
     head.light()
     scene = bpy.context.scene
     # The last frame is followed by the first: it is a step short of a whole turn.

@@ -19,7 +19,7 @@ NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
 # the part of it at the tips, which the sun has bleached.
 AUBURN, CHESTNUT = (1.05, 2.07, 3.91), (0.42, 1.02, 2.55)
 _TIP_ABSORPTION = 0.18
-GAZE = CAMERA  # [m]: what the eyes look at
+GAZE, AHEAD = CAMERA, (0.0, -1.50, 0.735)  # [m]: what the eyes look at; straight ahead
 FSTOP = 8.0
 
 LENGTH = 0.34  # [m] of guides on the crown
@@ -30,6 +30,13 @@ _STEPS = 41  # points of a guide
 _EAR = Vector((0.080, -0.042, 0.712)), Vector((0.030, 0.052, 0.054))  # [m]: middle and radii of what hair goes behind
 
 
+def build(target=GAZE):
+    """The dressed head with shoulder-length hair; returns the objects `Head`, `Guides` and `Hair`."""
+    head_object = head.build()
+    dress(head_object, target)
+    return head_object, *grow(head_object)
+
+
 def dress(head_object, target=GAZE):
     """Give the sample's head eyes that look at a point [m], brows, lashes, skin and a bust."""
     openings = eyes.openings(head_object)
@@ -37,15 +44,6 @@ def dress(head_object, target=GAZE):
     skin.paint(head_object)
     bust.build(head_object)
     brows.build(head_object, openings)
-
-
-def undress(head_object):
-    """Remove what `dress` added, but the skin."""
-    for name in ("Brows", "Lashes", "Bust", "Eyes", "Corneas", "Lids"):
-        bpy.data.objects.remove(bpy.data.objects[name])
-    for made in [o for o in head_object.children_recursive if o.name.startswith(("Brows", "Lashes"))]:
-        bpy.data.objects.remove(made)
-    bpy.context.view_layer.update()
 
 
 def grow(head_object, guide_count=400, strand_count=30_000, seed=1):

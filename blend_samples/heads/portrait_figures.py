@@ -17,7 +17,7 @@ from mathutils.bvhtree import BVHTree
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import hair_addon
-from blend_samples.heads import head, portrait
+from blend_samples.heads import portrait
 from hair_addon import api
 
 _SOLID_COUNT = 3  # strands in a pixel of the closed mass of hair
@@ -35,9 +35,7 @@ def main():
     parser.add_argument("picture", type=Path)
     luminance = _luminance(parser.parse_args().picture)
     hair_addon.register()
-    head_object = head.build()
-    portrait.dress(head_object)
-    _guides, hair = portrait.grow(head_object)
+    head_object, _guides, hair = portrait.build()
     portrait.light()
     strands = api.points(hair.data)
     column, row, depth = _projected(strands, luminance.shape)

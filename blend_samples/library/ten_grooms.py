@@ -29,12 +29,13 @@ ROOT = Path(__file__).resolve().parents[2]
 SIZE = 288, 340  # pixels of a picture
 SAMPLE_COUNT = 24  # of a pixel
 COLUMNS = 5
+_LOCATION = (0.70, -1.28, 0.73)  # [m]: of the camera
 
 
 def dressed_head():
     """The sample's head with a face and a bust."""
     head_object = head.build()
-    portrait.dress(head_object)
+    portrait.dress(head_object, _LOCATION)
     return head_object
 
 
@@ -51,7 +52,6 @@ class Sample:
 
 
 _HEAD, _LOW = (0.004, -0.045, 0.725), (0.004, -0.050, 0.690)
-_LOCATION = (0.70, -1.28, 0.73)  # [m]: of the camera
 
 SAMPLES = {
     "Pixie": Sample(dressed_head, head_grooms.pixie, 30_000, "Hair/Head", _HEAD, 150.0),

@@ -40,7 +40,7 @@ def main():
     hair_addon.register()
     gpu.init()
     hair = build()
-    portrait.dress(bpy.data.objects["Head"])
+    portrait.dress(bpy.data.objects["Head"], portrait.AHEAD)
     out = given.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
     chosen = [name for name in GALLERY if not given.names or name in given.names]
