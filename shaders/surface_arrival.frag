@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility of the lights from a surface, including its own shadow where it faces away.
+// Visibility of the lights from a surface, including its own shadow where it faces away. It is at most one: hair sends light
+// to where a light grazes a surface.
 
 #include "include/arrival.glsl"
 #include "include/surface_visibility.glsl"
