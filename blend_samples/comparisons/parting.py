@@ -129,7 +129,7 @@ def light():
     camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
     camera.data.lens, camera.data.clip_start = 90.0, 0.01
     camera.location = top + Vector((0.0, -0.14, 0.75))
-    camera.rotation_euler = (top - camera.location).to_track_quat("-Z", "Y").to_euler()
+    head.point_at(camera, top)
     scene.collection.objects.link(camera)
     scene.camera = camera
     for direction, strength in (((-0.7, -0.5, 0.6), 3.0), ((0.5, 0.9, 0.6), 1.5)):

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -89,7 +88,7 @@ def _light():
     camera.data.lens = 165.0
     camera.data.clip_start = 0.01
     camera.location = (0.45, 0.75, 1.25)
-    camera.rotation_euler = (Vector((0.0, -0.01, 0.765)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    head.point_at(camera, (0.0, -0.01, 0.765))
     bpy.context.scene.collection.objects.link(camera)
     lamp = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     lamp.data.energy = 2.0

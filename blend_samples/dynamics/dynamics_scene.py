@@ -8,7 +8,6 @@ import math
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 from blend_samples.heads import head
 from blend_samples.sheets import picture_files
@@ -42,7 +41,7 @@ def build(strand_count=STRAND_COUNT):
     for name, (location, watts) in LIGHTS.items():
         lamp = bpy.data.objects[name]
         lamp.location, lamp.data.energy = location, watts
-        lamp.rotation_euler = (Vector(SEEN) - lamp.location).to_track_quat("-Z", "Y").to_euler()
+        head.point_at(lamp, SEEN)
     look = hair.data.vellus.appearance
     look.mode, look.absorption, look.roughness, look.random_color = "energy", BROWN, 0.3, 0.2
     hair.data.vellus.hair.radius = 1.1e-4
@@ -57,7 +56,7 @@ def see_from(location, target, lens):
     camera = bpy.context.scene.camera
     camera.location, camera.data.lens = location, lens
     camera.data.sensor_fit = "VERTICAL"
-    camera.rotation_euler = (Vector(target) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    head.point_at(camera, target)
 
 
 def objects():

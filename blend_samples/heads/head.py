@@ -90,7 +90,7 @@ def light():
     camera.data.lens = 78.0
     camera.data.clip_start = 0.01
     camera.location = (0.80, -1.12, 0.80)
-    _point_at(camera, LOOK_AT)
+    point_at(camera, LOOK_AT)
     scene.collection.objects.link(camera)
     scene.camera = camera
     _add_light("Key", (1.35, -0.80, 1.10), 26.0, (1.0, 0.95, 0.88))
@@ -108,12 +108,13 @@ def _add_light(name, location, watts, color):
     lamp.energy, lamp.color, lamp.size = watts, color, 0.4
     lamp_object = bpy.data.objects.new(name, lamp)
     lamp_object.location = location
-    _point_at(lamp_object, LOOK_AT)
+    point_at(lamp_object, LOOK_AT)
     bpy.context.scene.collection.objects.link(lamp_object)
 
 
-def _point_at(turned, target):
-    turned.rotation_euler = (target - turned.location).to_track_quat("-Z", "Y").to_euler()
+def point_at(turned, target):
+    """Turn a camera or a light towards a place [m]."""
+    turned.rotation_euler = (Vector(target) - turned.location).to_track_quat("-Z", "Y").to_euler()
 
 
 def grow(head, guide_count=200, strand_count=30_000, seed=1):

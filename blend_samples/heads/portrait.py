@@ -184,7 +184,7 @@ def light():
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     camera = scene.camera
     camera.location, camera.data.lens = CAMERA, LENS
-    _point_at(camera)
+    head.point_at(camera, LOOK_AT)
     lens = camera.data.dof
     lens.use_dof, lens.aperture_fstop, lens.aperture_blades = True, FSTOP, 7
     lens.focus_distance = _distance_to(camera, NEAR_EYE)
@@ -206,8 +206,4 @@ def _distance_to(camera, place):
 def _place(name, location, watts, size):
     lamp = bpy.data.objects[name]
     lamp.location, lamp.data.energy, lamp.data.size = location, watts, size
-    _point_at(lamp)
-
-
-def _point_at(turned):
-    turned.rotation_euler = (LOOK_AT - turned.location).to_track_quat("-Z", "Y").to_euler()
+    head.point_at(lamp, LOOK_AT)

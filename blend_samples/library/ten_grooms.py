@@ -15,7 +15,6 @@ from pathlib import Path
 import bpy
 import gpu
 import numpy as np
-from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -113,8 +112,8 @@ def build(name, strands=1.0):
     camera = bpy.context.scene.camera
     camera.data.dof.use_dof = False
     camera.data.lens = sample.lens
-    camera.rotation_euler = (Vector(sample.look_at) - Vector(_LOCATION)).to_track_quat("-Z", "Y").to_euler()
     camera.location = _LOCATION
+    head.point_at(camera, sample.look_at)
     bpy.context.view_layer.update()
     return hair
 

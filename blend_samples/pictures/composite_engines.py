@@ -57,7 +57,7 @@ def build(options):
     for name, watts, location in (("Key", 34.0, (0.75, 0.15, 1.75)), ("Rim", 18.0, (-0.35, 1.05, 1.25))):
         bpy.data.lights[name].energy, bpy.data.lights[name].size = watts, 0.15
         bpy.data.objects[name].location = location
-        head._point_at(bpy.data.objects[name], head.LOOK_AT)
+        head.point_at(bpy.data.objects[name], head.LOOK_AT)
     bpy.data.lights["Fill"].energy = 6.0
     scene = bpy.context.scene
     scene.camera.data.lens = 105.0

@@ -11,7 +11,6 @@ from pathlib import Path
 
 import bpy
 import numpy as np
-from mathutils import Vector
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
@@ -103,7 +102,7 @@ def light():
     camera = bpy.context.scene.camera
     camera.data.lens = 118.0
     camera.location = (0.0, -1.35, 0.76)
-    camera.rotation_euler = (Vector((0.0, -0.04, 0.735)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    head.point_at(camera, (0.0, -0.04, 0.735))
     background = next(n for n in bpy.context.scene.world.node_tree.nodes if n.type == "BACKGROUND")
     background.inputs["Color"].default_value = (0.22, 0.22, 0.22, 1.0)
     bpy.context.view_layer.update()

@@ -68,7 +68,7 @@ def light(hair):
     """The gallery's camera, lights and look, of the sample's scene and hair Curves."""
     camera = bpy.context.scene.camera
     camera.location = CAMERA
-    camera.rotation_euler = (head.LOOK_AT - camera.location).to_track_quat("-Z", "Y").to_euler()
+    head.point_at(camera, head.LOOK_AT)
     camera.data.lens, camera.data.sensor_fit, camera.data.shift_x, camera.data.shift_y = LENS, "VERTICAL", 0.02, -0.035
     for name, watts in LIGHTS.items():
         bpy.data.objects[name].data.energy = watts

@@ -108,7 +108,7 @@ def light():
     camera = bpy.context.scene.camera
     camera.data.lens = 128.0
     camera.location = (0.75, -1.15, 0.80)
-    camera.rotation_euler = (Vector((0.0, -0.03, 0.72)) - camera.location).to_track_quat("-Z", "Y").to_euler()
+    head.point_at(camera, (0.0, -0.03, 0.72))
     background = next(n for n in bpy.context.scene.world.node_tree.nodes if n.type == "BACKGROUND")
     background.inputs["Color"].default_value = (0.22, 0.22, 0.22, 1.0)
     bpy.context.view_layer.update()
