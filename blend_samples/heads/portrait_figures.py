@@ -23,6 +23,7 @@ from hair_addon import api
 _SOLID_COUNT = 3  # strands in a pixel of the closed mass of hair
 _FLYING_DISTANCE = 3  # pixels beyond that mass: about two millimeters
 _DEPTH_TOLERANCE = 0.004  # [m] of the strands that are seen
+_SKIN_DEPTH = 0.004  # [m] of hair through which skin is not seen
 _SQUARE = 4  # pixels for which one ray finds the surface
 # Places of skin [m]: lit, and in the shadow of hair or chin.
 _CHEEK, _NECK = (-0.030, -0.14, 0.69), (0.010, -0.075, 0.625)
@@ -48,7 +49,8 @@ def main():
     hair_seen = _closed((counts >= _SOLID_COUNT) & (nearest < surface))
     seen = (depth < nearest[row, column] + _DEPTH_TOLERANCE) & hair_seen[row, column]
     value, part = luminance[row, column], np.broadcast_to(np.linspace(0.0, 1.0, strands.shape[1]), depth.shape)
-    roots, middles = (value[seen & (part >= low) & (part < high)].mean() for low, high in ((0.01, 0.1), (0.25, 0.6)))
+    covered = seen & (surface - nearest > _SKIN_DEPTH)[row, column]
+    roots, middles = (value[covered & (part >= low) & (part < high)].mean() for low, high in ((0.01, 0.1), (0.25, 0.6)))
     solid = dense | np.isfinite(surface)
     border = dense & _grown(~solid, 1)
     flying = (~_grown(solid, _FLYING_DISTANCE)[row, column]).any(axis=1)
