@@ -49,7 +49,7 @@ def main():
     hair_seen = _closed((counts >= _SOLID_COUNT) & (nearest < surface))
     seen = (depth < nearest[row, column] + _DEPTH_TOLERANCE) & hair_seen[row, column]
     value, part = luminance[row, column], np.broadcast_to(np.linspace(0.0, 1.0, strands.shape[1]), depth.shape)
-    covered = seen & (surface - nearest > _SKIN_DEPTH)[row, column]
+    covered = seen & (surface > nearest + _SKIN_DEPTH)[row, column]
     roots, middles = (value[covered & (part >= low) & (part < high)].mean() for low, high in ((0.01, 0.1), (0.25, 0.6)))
     solid = dense | np.isfinite(surface)
     border = dense & _grown(~solid, 1)
