@@ -109,7 +109,7 @@ def as_auburn(hair):
     """Auburn hair by the energy-conserving model, in a context."""
     look = hair.vellus.appearance
     before = look.mode, tuple(look.absorption), look.roughness
-    look.mode, look.absorption, look.roughness = "energy", portrait.AUBURN, 0.25
+    portrait.make_auburn(hair)
     try:
         yield
     finally:

@@ -57,7 +57,8 @@ def main():
 
 def _build(path):
     """The head with its hair, which turns once about the vertical in front of a camera and lights that stay."""
-    skull, _guides, _hair = portrait.build(portrait.AHEAD)
+    skull, _guides, hair = portrait.build(portrait.AHEAD)
+    portrait.make_auburn(hair.data)
     head.light()
     scene = bpy.context.scene
     # The last frame is followed by the first: it is a step short of a whole turn.

@@ -69,6 +69,12 @@ def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
     return guides, hair
 
 
+def make_auburn(hair):
+    """Give hair Curves the look of the picture that README begins with."""
+    look = hair.vellus.appearance
+    look.mode, look.absorption, look.roughness = "energy", AUBURN, 0.25
+
+
 def set_styles(hair):
     """The portrait's own styles: loose waves in soft locks, uneven tips, some strands that fly away."""
     api.set_styles(
