@@ -33,13 +33,13 @@ bench: $(installed) $(peers) ## the benchmarks, with their figures
 	$(python) -m pytest tests/benchmarks -s $(ARGS)
 
 compare: $(installed) ## the head rendered by Cycles and Vellus: mean colours and both images, in out/compare
-	$(python) blend_samples/compare.py --out out/compare $(ARGS)
+	$(python) blend_samples/comparisons/compare.py --out out/compare $(ARGS)
 
 turntable: $(installed) ## a turntable of the head, 24 frames by the command line, in out/turntable; resumable
 	$(python) blend_samples/turntable.py --out out/turntable $(ARGS)
 
 dynamics: $(installed) ## hair that moves: strips, plots and a film in out/dynamics; ARGS="shaking plots" for some
-	$(python) blend_samples/dynamics.py --out out/dynamics $(ARGS)
+	$(python) blend_samples/dynamics/dynamics.py --out out/dynamics $(ARGS)
 
 build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
 	$(python) tools/build_extension.py $(PLATFORM)

@@ -8,14 +8,11 @@ import bpy
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import dynamics_film  # beside this file
-import dynamics_scene
-import head
-import parting
-import portrait
-import ten_grooms
-
 import hair_addon
+from blend_samples.comparisons import parting
+from blend_samples.dynamics import dynamics_film, dynamics_scene
+from blend_samples.heads import head, portrait
+from blend_samples.library import ten_grooms
 
 FOLDER = Path(__file__).resolve().parent
 

@@ -21,15 +21,14 @@ import warp as wp
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import head  # beside this file
-import portrait
-
 import hair_addon
+from blend_samples.heads import portrait
 from hair_addon import api
 from hair_addon.blender.data import scene
-from hair_addon.blender.gpu import drawing, visibility_buffer
-from hair_addon.blender.render import drawn_scene, hair_cache
+from hair_addon.blender.gpu import ambient_visibility, drawing, visibility_buffer
+from hair_addon.blender.render import drawn_scene, hair_cache, offscreen
 from hair_addon.core.geometry import bspline
+from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
 STYLE = "CURLY"  # of styled.png
 SAMPLES_PER_SIDE = 3  # of each pixel
@@ -37,6 +36,7 @@ PORTRAIT_SAMPLES_PER_SIDE = 4  # of dual_scattering.png
 CYCLES_SAMPLES = 32  # and denoised, as Blender does unless told otherwise
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
 REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
+STRAND_COUNTS = (30_000, 10_000)  # the portrait's own first, whose shadows are there
 REPORT_FRAMES = {("Marschner", 10_000): 25, ("Kajiya-Kay", 10_000): 36}
 
 
@@ -53,9 +53,7 @@ def main():
     hair_addon.register()
     gpu.init()
     wp.config.log_level = wp.LOG_WARNING
-    head_object = head.build()
-    portrait.dress(head_object)
-    guides, hair = portrait.grow(head_object)
+    _head, guides, hair = portrait.build()
     portrait.light()
     print(f"{len(guides.data.curves)} guides, {len(hair.data.curves)} strands in {time.perf_counter() - started:.1f} s")
     bpy.context.view_layer.objects.active = hair
@@ -65,23 +63,45 @@ def main():
         return
     bpy.ops.vellus.bake_tables(directory=str(out / "tables"))
     bpy.ops.wm.save_as_mainfile(filepath=str(out / "head.blend"), compress=True)
+    drawn = read()
     for model in MODELS.values():
         hair.data.vellus.model = model
-        draw(out / f"{model.lower()}.png", has_blur=False)
+        draw(with_look(drawn, hair.data), out / f"{model.lower()}.png", has_blur=False)
     with as_auburn(hair.data):
-        draw(out / "dual_scattering.png", samples_per_side=PORTRAIT_SAMPLES_PER_SIDE)
+        auburn = with_world(with_look(drawn, hair.data))
+        draw(auburn, out / "dual_scattering.png", samples_per_side=PORTRAIT_SAMPLES_PER_SIDE)
         draw_styled(hair.data, out / "styled.png")
     print_spline_table()
-    portrait.undress(head_object)
-    print_frame_table(guides, hair)
+    print_frame_table(drawn, hair.data)
     print(f"\nmade in {time.perf_counter() - started:.1f} s: {out}")
 
 
-def draw(path, has_blur=True, samples_per_side=SAMPLES_PER_SIDE):
-    """Draw the portrait; has_blur: with depth of field, which takes a third longer."""
-    width, height = portrait.SIZE
+def read():
+    """The scene as it is, on the GPU, with its shadows."""
+    context = bpy.context
+    return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get())
+
+
+def with_look(drawn, hair):
+    """The scene with the look that the head's hair has now: light reaches it as before."""
+    index = ambient_visibility.densest([strands for strands, *_ in drawn.hair])
+    strands, _shading, *placed = drawn.hair[index]
+    shaded = (strands, hair_cache.shading_of(hair), *placed)
+    return replace(drawn, hair=[*drawn.hair[:index], shaded, *drawn.hair[index + 1 :]])
+
+
+def with_world(drawn):
+    """The scene with the light of the world as its hair lets it through, whose color has changed."""
+    of_hair, of_surfaces = drawn_scene.visibility(drawn.hair, drawn.surfaces, drawn.clear)
+    return replace(drawn, hair_visibility=of_hair, surface_visibility=of_surfaces)
+
+
+def draw(drawn, path, has_blur=True, samples_per_side=SAMPLES_PER_SIDE):
+    """Draw a scene through the portrait's camera; has_blur: with depth of field, which takes a third longer."""
     bpy.context.scene.camera.data.dof.use_dof = has_blur
-    bpy.ops.vellus.render_picture(filepath=str(path), width=width, height=height, samples_per_side=samples_per_side)
+    settings = PictureSettings(*portrait.SIZE, samples_per_side)
+    offscreen.write_picture(offscreen.draw_picture(settings, drawn), path, bpy.context.scene)
+    print(f"drawn: {path.name}", flush=True)
 
 
 @contextmanager
@@ -89,7 +109,7 @@ def as_auburn(hair):
     """Auburn hair by the energy-conserving model, in a context."""
     look = hair.vellus.appearance
     before = look.mode, tuple(look.absorption), look.roughness
-    look.mode, look.absorption, look.roughness = "energy", portrait.AUBURN, 0.25
+    portrait.make_auburn(hair)
     try:
         yield
     finally:
@@ -110,7 +130,7 @@ def draw_styled(hair, path):
     before = settings.point_count, settings.tip_taper
     api.apply_style_preset(hair, STYLE)
     bpy.context.view_layer.update()
-    draw(path, has_blur=False)
+    draw(read(), path, has_blur=False)
     portrait.set_styles(hair)
     settings.point_count, settings.tip_taper = before
     bpy.context.view_layer.update()
@@ -132,31 +152,41 @@ def print_spline_table():
         print(f"  {name:42} {reported if reported else '-':>10}  {1e3 * best:10.3f}")
 
 
-def print_frame_table(guides, hair):
+def print_frame_table(drawn, hair):
     """The report's second table: frames a second, one sample a pixel, shadow maps as they are from frame to frame."""
     print(f"\n1280 × 720 on {gpu.platform.renderer_get()}      report [frames/s]   here [frames/s]")
-    for strand_count in (10_000, 30_000):
-        bpy.context.view_layer.objects.active = guides
-        hair.data.vellus.hair.strand_count = strand_count
-        bpy.context.view_layer.update()
-        drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+    for strand_count in STRAND_COUNTS:
+        if strand_count != hair.vellus.hair.strand_count:
+            hair.vellus.hair.strand_count = strand_count
+            bpy.context.view_layer.update()
+            drawn = read()
         for label, model in MODELS.items():
-            hair.data.vellus.model = model
-            (strands, _shading, *placed), *_ = drawn.hair
-            shaded = replace(drawn, hair=[(strands, hair_cache.shading_of(hair.data), *placed)])
+            hair.vellus.model = model
             reported = REPORT_FRAMES.get((label, strand_count), "-")
-            print(f"  {strand_count:6} strands, {label:30} {reported:>10} {_frames_per_second(shaded):17.1f}")
+            speed = _frames_per_second(_head_and_hair(with_look(drawn, hair)))
+            print(f"  {strand_count:6} strands, {label:30} {reported:>10} {speed:17.1f}")
 
 
-def _frames_per_second(drawn, width=1280, height=720):
-    depsgraph = bpy.context.evaluated_depsgraph_get()
-    camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
-    view = drawing.view_record(*camera, height, least_width=1.0)
-    buffer = visibility_buffer.VisibilityBuffer(width, height)
+def _head_and_hair(drawn):
+    """The scene without what the portrait adds to them."""
+    hair = ambient_visibility.densest([strands for strands, *_ in drawn.hair])
+    head_index = [owner[0] for owner in drawn.surface_owners].index(bpy.data.objects["Head"].session_uid)
+    return replace(
+        drawn,
+        hair=[drawn.hair[hair]],
+        hair_visibility=[drawn.hair_visibility[hair]],
+        surfaces=[drawn.surfaces[head_index]],
+        surface_visibility=[drawn.surface_visibility[head_index]],
+        clear=(),
+    )
+
+
+def _frames_per_second(drawn):
+    bpy.context.scene.camera.data.sensor_fit = "VERTICAL"  # the frame shows all of the head
     pixel = gpu.types.GPUTexture((1, 1), format="RGBA16F")
     end = gpu.types.GPUFrameBuffer(color_slots=pixel)
 
-    def draw():
+    def draw(view, buffer):
         with buffer.surfaces((0.0, 0.0, 0.0, 1.0)):
             drawn_scene.draw_surfaces(drawn, view)
         drawn_scene.draw_hair(drawn, view, buffer)
@@ -164,10 +194,19 @@ def _frames_per_second(drawn, width=1280, height=720):
             drawing.resolve(buffer.color, 1)
             end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # waits until the frame is drawn
 
-    draw()  # compiles and fills caches
-    seconds, frame_count = _seconds(draw), 20
+    draw(*_view_and_buffer(64, 36))  # compiles and fills caches
+    frame = _view_and_buffer(1280, 720)
+    seconds, frame_count = _seconds(lambda: draw(*frame)), 20
     # Software drivers take seconds for a frame: one of them tells as much.
-    return 1.0 / seconds if seconds > 0.5 else frame_count / _seconds(lambda: [draw() for _ in range(frame_count)])
+    return (
+        1.0 / seconds if seconds > 0.5 else frame_count / _seconds(lambda: [draw(*frame) for _ in range(frame_count)])
+    )
+
+
+def _view_and_buffer(width, height):
+    camera = scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), width, height)
+    view = drawing.view_record(*camera, height, least_width=1.0)
+    return view, visibility_buffer.VisibilityBuffer(width, height)
 
 
 def _seconds(work):

@@ -16,11 +16,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
-import head  # beside this file
 import OpenEXR
-import portrait
 
 import hair_addon
+from blend_samples.heads import head, portrait
 from hair_addon.blender.render import offscreen
 from hair_addon.core.files.whole_file import whole_file
 
@@ -58,9 +57,8 @@ def main():
 
 def _build(path):
     """The head with its hair, which turns once about the vertical in front of a camera and lights that stay."""
-    skull = head.build()
-    head.grow(skull)
-    portrait.dress(skull)
+    skull, _guides, hair = portrait.build(portrait.AHEAD)
+    portrait.make_auburn(hair.data)
     head.light()
     scene = bpy.context.scene
     # The last frame is followed by the first: it is a step short of a whole turn.

@@ -5,5 +5,5 @@
 
 void main()
 {
-  color = vec4(part_past_hair(1), 1.0);
+  color = vec4(part_past_hair(true), 1.0);
 }

@@ -5,5 +5,5 @@
 
 void main()
 {
-  color = vec4(vec3(0.0), 1.0 - dot(part_past_hair(0), vec3(1.0 / 3.0)));
+  color = vec4(vec3(0.0), 1.0 - dot(part_past_hair(false), vec3(1.0 / 3.0)));
 }

@@ -2,7 +2,7 @@
 // The surface under the hair, a Principled BSDF: diffuse below a rough dielectric, or metal. Of a clear one, what it
 // reflects, and as alpha the part that it does not let through.
 
-#include "include/shadow.glsl"
+#include "include/surface_visibility.glsl"
 #include "include/world.glsl"
 #include "include/surface_reflection.glsl"
 #include "include/surface_material.glsl"
@@ -42,11 +42,14 @@ void main()
   world_sides(corner_seen_x_y, corner_seen_z.xy, view.seen_opacity, view.hair_forward.rgb, plus, minus);
   vec3 irradiance = surface_irradiance(plus, minus, N);
   vec3 highlight = reflected * surface_irradiance(plus, minus, reflect(-V, N)) / PI;
+  vec2 turn = sample_turn();
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
-    float n_dot_l = dot(N, L);
-    if (n_dot_l > 0.0) {
+    float past_surfaces;
+    vec3 past_hair;
+    surface_visibility(light, drawn_position, N, view.hair_forward.rgb, turn, past_surfaces, past_hair);
+    if (any(greaterThan(past_hair, vec3(0.0)))) {
       vec3 facing = light_irradiance(light.kind,
                                      light.position.xyz,
                                      light.axis.xyz,
@@ -55,8 +58,9 @@ void main()
                                      light.blend,
                                      light.radius,
                                      drawn_position);
-      vec3 arriving = n_dot_l * facing * surface_visibility(light, drawn_position, view.hair_forward.rgb);
+      vec3 arriving = facing * past_hair;
       irradiance += arriving;
+      float n_dot_l = max(dot(N, L), 1e-3);
       vec3 H = normalize(L + V);
       float v_dot_h = clamp(dot(V, H), 0.0, 1.0);
       // A light's size widens its highlight: half its angle, seen by the microfacets' normals.

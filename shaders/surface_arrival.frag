@@ -1,21 +1,24 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility of the lights from a surface, including its own shadow where it faces away.
+// Visibility of the lights from a surface, including its own shadow where it faces away. It is at most one: hair sends light
+// to where a light grazes a surface.
 
 #include "include/arrival.glsl"
+#include "include/surface_visibility.glsl"
 
 void main()
 {
   vec3 N = normalize(gl_FrontFacing ? surface_normal : -surface_normal);
   vec3 sent = vec3(0.0);
   vec3 arriving = vec3(0.0);
+  vec2 turn = sample_turn();
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
-    float cosine = dot(N, to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position));
-    vec3 irradiance = abs(cosine) * irradiance_of(light, drawn_position);
-    sent += irradiance;
-    if (cosine > 0.0) {
-      arriving += irradiance * surface_visibility(light, drawn_position, view.hair_forward.rgb);
-    }
+    vec3 irradiance = irradiance_of(light, drawn_position);
+    float past_surfaces;
+    vec3 past_hair;
+    surface_visibility(light, drawn_position, N, view.hair_forward.rgb, turn, past_surfaces, past_hair);
+    sent += irradiance * abs(dot(N, to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position)));
+    arriving += irradiance * past_hair;
   }
-  color = vec4(part_of(arriving, sent), 1.0);
+  color = vec4(min(part_of(arriving, sent), vec3(1.0)), 1.0);
 }

@@ -131,11 +131,11 @@ def write(path, pixels, size=None):
 
 def save_sample(path):
     """Grow hair on the head, draw hair.png, and save the scene with less hair, which a window draws quickly."""
-    sys.path.insert(0, str(ROOT / "blend_samples"))
+    sys.path.insert(0, str(ROOT))
     import bpy
-    import head
 
     import hair_addon
+    from blend_samples.heads import head
 
     hair_addon.register()
     head_object = head.build()

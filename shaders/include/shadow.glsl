@@ -117,22 +117,3 @@ vec3 surface_bounce(vec3 N, float part, vec3 L, vec3 T, float front, float behin
   way *= between_hair_and_surface(front + behind);
   return view.surface_color.rgb * way * (min(2.0 * part, 1.0) * cosine / PI);
 }
-
-// Visibility of a light from a surface: the mean over 3 × 3 texels. forward: the forward scattering of one strand.
-vec3 surface_visibility(Light light, vec3 position, vec3 forward)
-{
-  vec3 at;
-  float depth;
-  if (!shadow_place(light, position, at, depth)) {
-    return vec3(1.0);
-  }
-  float texel = 1.0 / float(textureSize(hair_front, 0).x);
-  vec3 total = vec3(0.0);
-  for (int y = -1; y <= 1; y++) {
-    for (int x = -1; x <= 1; x++) {
-      vec3 near = at + vec3(float(x), float(y), 0.0) * texel;
-      total += lit_part(near, depth, SURFACE_BIAS) * transmitted(crossed_before_surface(near, depth), forward);
-    }
-  }
-  return total / 9.0;
-}

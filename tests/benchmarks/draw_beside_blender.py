@@ -21,12 +21,11 @@ import warp as wp
 from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
 
-import head  # the samples' scene
 from draw_frames import median_milliseconds  # beside this file
 
 import hair_addon
+from blend_samples.heads import head
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu.display_transform import DisplayTransform
 from hair_addon.blender.render import drawn_scene, hair_picture, viewport

@@ -17,11 +17,9 @@ import numpy as np
 import warp as wp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
-
-import head  # the samples' scene
 
 import hair_addon
+from blend_samples.heads import head
 from hair_addon.blender.data import curves, scene
 from hair_addon.blender.gpu import ambient_visibility, drawing, hair_shading, strand_textures, visibility_buffer
 from hair_addon.blender.render import drawn_scene

@@ -20,11 +20,9 @@ import numpy as np
 import warp as wp
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
-
-import head  # the samples' scene
 
 import hair_addon
+from blend_samples.heads import head
 from hair_addon.blender.data import curves
 from hair_addon.blender.gpu import maker_choice, strand_maker
 from hair_addon.blender.gpu.shadows import ShadowMaps

@@ -13,6 +13,7 @@ picture's distance from it.
 import argparse
 import os
 import sys
+import tempfile
 from pathlib import Path
 
 import bpy
@@ -22,11 +23,11 @@ import warp as wp
 from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "blend_samples"))
-
-import head  # the samples' scene
 
 import hair_addon
+from blend_samples.dynamics import dynamics_scene
+from blend_samples.heads import head
+from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import display_transform
 from hair_addon.blender.render import drawn_scene, hair_picture, offscreen, view_film
@@ -120,7 +121,45 @@ class Combing(Movement):
         self.step(0)
 
 
-MOVEMENTS = {one.__name__: one for one in (Orbit, Sway, Zoom, Turntable, MovingLight, Combing)}
+class StyleSlider(Movement):
+    """The radius of curls grows by a tenth of a millimeter with each frame."""
+
+    def __init__(self):
+        super().__init__()
+        self.hair = bpy.data.objects["Hair"].data
+        api.set_styles(self.hair, [api.Clump(size=0.02, amount=0.6), api.Curl(radius=0.003, pitch=0.04)])
+
+    def step(self, frame):
+        self.hair.vellus.styles[1].curl.radius = 0.003 + 1e-4 * frame
+
+    def end(self):
+        api.set_styles(self.hair, [])
+
+
+class Playback(Movement):
+    """Baked guides of a head that turns to and fro by three degrees, once a second."""
+
+    def __init__(self):
+        super().__init__()
+        self.head, guides = bpy.data.objects["Head"], bpy.data.objects["Guides"]
+        bpy.context.scene.render.fps = dynamics_scene.RATE
+        api.set_dynamics(guides, simulates=True, bend_stiffness=dynamics_scene.STIFFNESS)
+        dynamics_scene.turn(self.head, 2, dynamics_scene.shaking(degrees=3.0, rate=1.0), dynamics_scene.RATE)
+        self.folder = tempfile.TemporaryDirectory()
+        dynamics_scene.bake(guides, dynamics_scene.RATE, self.folder.name)
+        self.guides = guides
+
+    def step(self, frame):
+        bpy.context.scene.frame_set(dynamics_scene.FIRST + frame)
+
+    def end(self):
+        self.step(0)
+        api.set_dynamics(self.guides, simulates=False)
+        self.head.animation_data_clear()
+        self.folder.cleanup()
+
+
+MOVEMENTS = {one.__name__: one for one in (Orbit, Sway, Zoom, Turntable, MovingLight, Combing, StyleSlider, Playback)}
 
 
 class HairFrames:

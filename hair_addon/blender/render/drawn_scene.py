@@ -105,7 +105,7 @@ def read(
             renewal = last.renewal or ambient_visibility.Renewal()
             seen = _renewed(renewal, seen, hair, surfaces, clear)
     else:
-        seen = _visibility(hair, surfaces, clear)
+        seen = visibility(hair, surfaces, clear)
     owners, selected = tuple(place.owner for place in places), tuple(place.is_selected for place in places)
     drawn = replace(
         _EMPTY,
@@ -169,7 +169,7 @@ def read_render(depsgraph, known, refused):
     world = light_door.read_world(depsgraph.scene_eval)
     hair_receivers = _hair_receivers(unlit.hair, [owner[1::-1] for owner in unlit.owners])
     lamps = scene_lights.gather(*light_door.read_lights(depsgraph, for_render=True), world, hair_receivers)
-    hair_seen, surfaces_seen = _visibility(unlit.hair, unlit.surfaces, unlit.clear)
+    hair_seen, surfaces_seen = visibility(unlit.hair, unlit.surfaces, unlit.clear)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
     return _lit(drawn, lamps, None, hair_receivers)
 
@@ -210,7 +210,8 @@ def _placed(hair):
     return [(strands, to_world) for strands, _, to_world, *_ in hair]
 
 
-def _visibility(hair, surfaces, clear):
+def visibility(hair, surfaces, clear):
+    """(of hair, of surfaces) of a `DrawnScene`: how much of the world is seen from each place."""
     opacities = [shading.opacity for _, shading, *_ in hair]
     forwards = [shading.forward for _, shading, *_ in hair]
     solid, seen_through = ([surface for surface, _parts in some] for some in (surfaces, clear))
@@ -370,10 +371,26 @@ def _see_through_hair(drawn, view):
         view["hair_forward"][:3], view["seen_opacity"] = shading.forward, shading.opacity
 
 
+# By how much of the depth range surfaces are drawn farther at first: more than rounding, so that none hides itself.
+_FARTHER = 1e-5
+
+
+def _farther(view):
+    """A view that sees all in the same places, but a little farther away."""
+    record = view.copy()
+    record["world_to_clip"][:, 2] += _FARTHER * record["world_to_clip"][:, 3]  # transposed
+    return record
+
+
 def draw_surfaces(drawn, view):
-    """Draw all surfaces with depth test into the bound framebuffer, and over them those that are clear."""
+    """Draw all surfaces with depth test into the bound framebuffer, and over them those that are clear.
+
+    Their depths are drawn first, so that what is behind another surface is not shaded.
+    """
     _see_through_hair(drawn, view)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        with drawing.depth_alone():
+            draw_hiding(drawn, _farther(view))
         for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
             if parts is None:
                 drawing.draw_surface_depth(surface.batch, view, lights, "surface_hides.frag")

@@ -15,15 +15,16 @@ from ..gpu import drawing, world_texture
 from . import drawn_scene, film
 
 
-def draw_picture(settings):
+def draw_picture(settings, drawn=None):
     """(height, width, 4) float32 of the context's scene: scene-linear, premultiplied, first row at the bottom.
 
-    settings: `PictureSettings`, but `FRAME_FIELDS`. Raises `HairError`.
+    settings: `PictureSettings`, but `FRAME_FIELDS`; drawn: the `DrawnScene` of the context's scene, None: read it here.
+    Raises `HairError`.
     """
-    return run_now(drawing_picture(settings))
+    return run_now(drawing_picture(settings, drawn))
 
 
-def drawing_picture(settings):
+def drawing_picture(settings, drawn=None):
     """`draw_picture` as work in stages (core/long_work.py), all of which run where the graphics are."""
     if max(settings.width, settings.height) > MOST_DRAWN:
         raise HairError(
@@ -46,7 +47,8 @@ def drawing_picture(settings):
     if context.scene.camera is not None and panoramic_camera.is_panoramic(context.scene.camera):
         raise HairError("Pictures are drawn by perspective and orthographic cameras: render a frame instead.")
     camera = scene.read_camera(context.scene, depsgraph, width, height)
-    drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
+    if drawn is None:
+        drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
     picture = film.Film(size, per_side, ("Combined",), settings.is_transparent)
     for turn in range(pass_count):
         yield Stage("Drawing", 0.4 + 0.55 * turn / pass_count)

@@ -16,7 +16,7 @@ from ...core.files import style_presets
 from ...core.shading import appearance
 from ..settings import saved_looks
 
-# Drawn by blend_samples/look_pictures.py.
+# Drawn by blend_samples/pictures/look_pictures.py.
 FOLDER = Path(__file__).parent / "look_pictures"
 
 _SWATCH_SIZE = 32  # pixels

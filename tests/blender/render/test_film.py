@@ -58,7 +58,8 @@ def test_shadow_is_the_part_of_light_that_arrives(lit, tmp_path):
     is_surface = shaded["Hair Mask"] == 0.0
     faces_light = is_surface & (open_to_light["Shadow"].min(axis=-1) > 0.99)
     arriving = shaded["Combined"][..., :3] / np.maximum(open_to_light["Combined"][..., :3], 1e-6)
-    np.testing.assert_allclose(shaded["Shadow"][faces_light], arriving[faces_light], atol=5e-3)
+    # Hair also sends light to where the sun grazes a surface, which is no shadow.
+    np.testing.assert_allclose(shaded["Shadow"][faces_light], np.minimum(arriving[faces_light], 1.0), atol=5e-3)
     assert shaded["Shadow"][faces_light].min() < 0.1 and shaded["Shadow"][faces_light].max() == 1.0
     is_hair = shaded["Hair Mask"] > 0.9
     assert is_hair.any() and shaded["Shadow"][is_hair].min() < 0.5

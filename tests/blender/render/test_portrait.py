@@ -1,33 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The face of the sample head: eyes behind their lids that look at a point, hair of brows and lashes at the skin."""
 
-import importlib
-import sys
-from pathlib import Path
-
 import bpy
 import numpy as np
 import pytest
 from mathutils.bvhtree import BVHTree
 
+from blend_samples.heads import eyes, head, portrait
 from hair_addon import api
 
-SAMPLES = Path(__file__).resolve().parents[3] / "blend_samples"
 TARGET = np.array([0.3, -1.0, 0.74])
 
 
 @pytest.fixture(scope="module")
 def samples():
-    """The modules of blend_samples, with a dressed head in the scene."""
-    sys.path.insert(0, str(SAMPLES))
-    try:
-        eyes, head, portrait = map(importlib.import_module, ("eyes", "head", "portrait"))
-    finally:
-        sys.path.remove(str(SAMPLES))
+    """(the head, dressed; its places before)."""
     built = head.build()
     before = places(built)
     portrait.dress(built, TARGET)
-    return eyes, built, before
+    return built, before
 
 
 def places(mesh_object):
@@ -43,12 +34,12 @@ def halves(positions):
 
 
 def test_a_face_leaves_the_head_as_it_is(samples):
-    _eyes, built, before = samples
+    built, before = samples
     np.testing.assert_array_equal(places(built), before)
 
 
 def test_eyes_are_behind_their_lids_and_fill_the_hole(samples):
-    eyes, built, _before = samples
+    built, _before = samples
     for opening, ball in zip(eyes.openings(built), halves(places(bpy.data.objects["Eyes"])), strict=True):
         border = np.concatenate([opening.upper, opening.lower])
         assert np.ptp(border[:, 0]) > 0.02  # both corners were found
@@ -59,7 +50,7 @@ def test_eyes_are_behind_their_lids_and_fill_the_hole(samples):
 
 
 def test_lids_reach_from_their_edge_to_the_eyeball(samples):
-    eyes, built, _before = samples
+    built, _before = samples
     parts = (*(halves(places(bpy.data.objects[name])) for name in ("Eyes", "Lids")), eyes.openings(built))
     for ball, lid, opening in zip(*parts, strict=True):
         rings = lid.reshape(3, -1, 3)  # from the edge inward
@@ -85,7 +76,7 @@ def test_both_eyes_look_at_the_point(samples):
 
 @pytest.mark.parametrize("name", ["Brows", "Lashes"])
 def test_brows_and_lashes_grow_out_of_the_skin(name, samples):
-    _eyes, built, _before = samples
+    built, _before = samples
     skin = BVHTree.FromObject(built, bpy.context.evaluated_depsgraph_get())
     roots = api.points(bpy.data.objects[name])[:, 0]
     away = [skin.find_nearest(root.tolist())[3] for root in roots[::7]]

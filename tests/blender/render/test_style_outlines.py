@@ -1,18 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Presets on the sample head, as pictures: coily hair is narrower than curly, frizz wider than straight, wet darker."""
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import bpy
 import pytest
 
+from blend_samples.pictures import styles
 from hair_addon import api
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
-SAMPLES = Path(__file__).resolve().parents[3] / "blend_samples"
 STYLES = ("STRAIGHT", "CURLY", "COILY", "FRIZZY", "WET")
 WIDTH, HEIGHT = 96, 112
 
@@ -20,14 +16,7 @@ WIDTH, HEIGHT = 96, 112
 @pytest.fixture(scope="module")
 def pictures():
     """{preset: (HEIGHT, WIDTH, 4) linear pixels} of the hair alone, with the light and camera of the gallery."""
-    sys.path.insert(0, str(SAMPLES))
-    try:
-        spec = importlib.util.spec_from_file_location("gallery_of_styles", SAMPLES / "styles.py")
-        gallery = importlib.util.module_from_spec(spec)
-        spec.loader.exec_module(gallery)
-    finally:
-        sys.path.remove(str(SAMPLES))
-    hair = gallery.build(strand_count=4000)
+    hair = styles.build(strand_count=4000)
     bpy.data.objects["Head"].hide_render = True
     return {name: drawn(hair, name) for name in STYLES}
 

@@ -206,8 +206,8 @@ def test_a_viewport_s_surfaces_are_darkened_by_what_hair_stops(lit, fine_shadows
     expected = 1.0 - passes["Hair Shadow"].mean(axis=-1)
     shaded = (passes["Hair Mask"] < 1e-3) & (bare[..., 3] < 1e-3) & (expected > 0.1)
     assert shaded.sum() > 50
-    # The pass blurs a shadow by a texel of its map.
-    np.testing.assert_allclose(dark[..., 3][shaded].mean(), expected[shaded].mean(), rtol=0.06)
+    # The pass spreads light that hair passes on, also to where the surface has no shadow.
+    np.testing.assert_allclose(dark[..., 3][shaded].mean(), expected[shaded].mean(), rtol=0.15)
 
 
 # ------------------------------------------------------------------------------------------------- when it is drawn

@@ -1,0 +1,171 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Scenes drawn at random, by Cycles and by Vellus: python blend_samples/comparisons/random_scenes.py --seeds 0 30.
+
+Prints each scene with the ratio of its hair's mean colour (Vellus / Cycles, channel by channel) and the structural
+similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and
+distribution.png, the part of the scenes up to each deviation, beside that of an earlier scenes.json with --before.
+Cycles' pictures are kept by the scene and the points of its hair: another run renders only what has changed.
+"""
+
+import argparse
+import hashlib
+import json
+import os
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import gpu
+import numpy as np
+import warp as wp
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+import hair_addon
+from blend_samples.comparisons import random_scene
+from blend_samples.sheets import line_plot, picture_pairs
+from hair_addon import api
+
+_VERSION = 1  # of how references are rendered
+
+
+def main():
+    """Render, draw, measure."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--out", type=Path, default=Path("out/random_scenes"))
+    parser.add_argument("--seeds", type=int, nargs=2, default=(0, 30), metavar=("FIRST", "END"))
+    parser.add_argument("--size", type=int, default=144, help="pixels along a side")
+    parser.add_argument("--samples", type=int, default=48, help="samples a pixel, of Cycles")
+    parser.add_argument("--before", type=Path, help="scenes.json of an earlier run, for the plot")
+    options = parser.parse_args()
+    (options.out / "cycles").mkdir(parents=True, exist_ok=True)
+    prepare()
+    rows, pairs = [], []
+    for seed in range(*options.seeds):
+        values = random_scene.recipe(seed)
+        curves = random_scene.build(values)
+        reference = by_cycles(values, curves, options)
+        started = time.process_time()
+        picture = by_vellus(options.size)
+        row = {
+            "scene": values,
+            "ratio": picture_pairs.ratio(reference, picture).round(4).tolist(),
+            "deviation": picture_pairs.deviation(reference, picture),
+            "structure": picture_pairs.structure(reference, picture),
+            "coverage": float(picture[..., 3].sum() / reference[..., 3].sum()),
+            "cycles": picture_pairs.mean(reference).round(5).tolist(),
+            "seconds": time.process_time() - started,
+        }
+        print(line(row), flush=True)
+        rows.append(row)
+        pairs.append((f"{seed}: " + " ".join(f"{value:.2f}" for value in row["ratio"]), reference, picture))
+    (options.out / "scenes.json").write_text(json.dumps(rows, indent=1))
+    print(summary(rows))
+    before = [] if options.before is None else json.loads(options.before.read_text())
+    write_distribution({"now": rows, "before": before}, options.out / "distribution.png")
+    worst = sorted(zip(rows, pairs, strict=True), key=lambda both: -both[0]["deviation"])[:10]
+    picture_pairs.write_sheet([pair for _row, pair in worst], options.out / "worst.png")
+
+
+def prepare():
+    """Start Vellus and the graphics context."""
+    hair_addon.register()
+    gpu.init()
+    wp.config.log_level = wp.LOG_WARNING
+
+
+def by_cycles(values, curves, options):
+    """(H, W, 4) linear premultiplied pixels of the hair, path traced, or kept from an earlier run."""
+    path = options.out / "cycles" / f"{values['seed']}_{key(values, curves, options)}.npy"
+    if path.is_file():
+        return np.load(path)
+    blender_scene = bpy.context.scene
+    render, cycles = blender_scene.render, blender_scene.cycles
+    render.engine, render.film_transparent = "CYCLES", True
+    render.resolution_x = render.resolution_y = options.size
+    render.image_settings.file_format = "OPEN_EXR"
+    render.image_settings.color_mode, render.image_settings.color_depth = "RGBA", "32"
+    cycles.samples, cycles.seed = options.samples, 1
+    cycles.use_denoising = cycles.use_adaptive_sampling = False
+    cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = cycles.diffuse_bounces = 64
+    cycles.sample_clamp_indirect = cycles.sample_clamp_direct = 0.0
+    cycles.blur_glossy = 0.0  # Filter Glossy would make hair rougher after the first bounce
+    render.filepath = str(path.with_suffix(".exr").resolve())
+    bpy.ops.render.render(write_still=True)
+    image = bpy.data.images.load(render.filepath, check_existing=False)
+    pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
+    image.pixels.foreach_get(pixels)
+    bpy.data.images.remove(image)
+    Path(render.filepath).unlink()
+    pixels = pixels.reshape(options.size, options.size, 4)
+    np.save(path, pixels)
+    return pixels
+
+
+def key(values, curves, options):
+    """A key of a reference: the scene's values, the hair's points to a tenth of a millimetre, and the sampling."""
+    found = hashlib.sha256(json.dumps([_VERSION, values, options.size, options.samples]).encode())
+    for hair in curves:
+        found.update(np.rint(api.points(hair) * 1e4).astype(np.int32).tobytes())
+    return found.hexdigest()[:16]
+
+
+def by_vellus(size):
+    """(H, W, 4) linear premultiplied pixels of the hair, as a render has them."""
+    return api.draw(width=size, height=size, samples_per_side=4, is_transparent=True)
+
+
+def line(row):
+    """A scene in one line."""
+    values = row["scene"]
+    hair = ", ".join(
+        " ".join(
+            [
+                *(one["area"], one["look"].lower()),
+                *(f"{one['length']:.2f} m", f"{one['strand_count'] // 1000}k"),
+                *one["styles"],
+            ]
+        ).strip()
+        for one in values["hair"]
+    )
+    lights = " ".join(light["kind"].lower() for light in values["lights"]) or "no light"
+    ratios = " ".join(f"{value:5.2f}" for value in row["ratio"])
+    return (
+        f"{values['seed']:4}  {ratios}  structure {row['structure']:.3f}  {values['body']}: {hair}; {lights}, "
+        f"{values['world']['kind']} world"
+    )
+
+
+def summary(rows):
+    """The distribution of the largest deviations in a channel."""
+    deviations = np.array([row["deviation"] for row in rows])
+    structures = np.array([row["structure"] for row in rows])
+    return (
+        f"{len(rows)} scenes: within 8 % {np.mean(deviations < 0.08):.0%}, "
+        f"within 15 % {np.mean(deviations < 0.15):.0%}, "
+        f"median {np.median(deviations):.1%}, worst {deviations.max():.0%}; "
+        f"structure median {np.median(structures):.3f}, worst {structures.min():.3f}"
+    )
+
+
+def write_distribution(runs, path):
+    """Plot the part of the scenes whose largest deviation in a channel is up to a value; runs: {label: rows}."""
+    ticks = (0, 8, 15, 25, 50, 75, 100, 125), (0, 25, 50, 75, 100)
+    words = "% of scenes up to a deviation", (0, 130), (0, 102), ticks, "% of Cycles, in the worst channel"
+    plot = line_plot.Plot(*words, size=(560, 260), legend=(0.75, 0.75))
+    for (label, rows), color in zip(runs.items(), line_plot.COLORS[1::-1], strict=True):
+        if rows:
+            deviations = np.sort([100.0 * row["deviation"] for row in rows])
+            parts = np.linspace(0.0, 100.0, len(rows) + 1)
+            steps = np.stack([np.repeat(deviations, 2), np.repeat(parts, 2)[1:-1]], axis=-1)
+            plot.line([(0.0, 0.0), (deviations[0], 0.0), *steps, (130.0, 100.0)], color)
+            plot.name(color, label)
+    line_plot.write([plot], path)
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    # Blender's module may crash while it is torn down after drawing; all files are closed by now.
+    os._exit(0)

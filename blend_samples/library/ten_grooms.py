@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The ten grooms of the library, by code: `python blend_samples/library/ten_grooms.py` draws the sheet docs/grooms.png.
+
+From the left: pixie, bob, long wavy, curly, coily; braid, beard, eyebrows, short fur, long fur. Vellus draws each
+picture in half a minute. With --library FOLDER (or `make samples`) each is saved there as an asset, with its picture.
+"""
+
+import argparse
+import os
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import bpy
+import gpu
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+import hair_addon
+from blend_samples.heads import head, portrait
+from blend_samples.library import face_grooms, fur_grooms, head_grooms
+from blend_samples.sheets import picture_files
+from hair_addon import api
+
+ROOT = Path(__file__).resolve().parents[2]
+SIZE = 288, 340  # pixels of a picture
+SAMPLE_COUNT = 24  # of a pixel
+COLUMNS = 5
+_LOCATION = (0.70, -1.28, 0.73)  # [m]: of the camera
+
+
+def dressed_head():
+    """The sample's head with a face and a bust."""
+    head_object = head.build()
+    portrait.dress(head_object, _LOCATION)
+    return head_object
+
+
+@dataclass(frozen=True)
+class Sample:
+    """How a groom is made and seen."""
+
+    surface: Callable  # () → the object that it grows on
+    groom: Callable  # (the object, number of strands) → hair Curves
+    strand_count: int
+    catalog: str
+    look_at: tuple[float, float, float]  # [m]
+    lens: float  # [mm]
+
+
+_HEAD, _LOW = (0.004, -0.045, 0.725), (0.004, -0.050, 0.690)
+
+SAMPLES = {
+    "Pixie": Sample(dressed_head, head_grooms.pixie, 30_000, "Hair/Head", _HEAD, 150.0),
+    "Bob": Sample(dressed_head, head_grooms.bob, 30_000, "Hair/Head", _HEAD, 150.0),
+    "Long Wavy": Sample(dressed_head, head_grooms.long_wavy, 30_000, "Hair/Head", (0.0, -0.05, 0.655), 112.0),
+    "Curly": Sample(dressed_head, head_grooms.curly, 30_000, "Hair/Head", (0.0, -0.05, 0.710), 128.0),
+    "Coily": Sample(dressed_head, head_grooms.coily, 24_000, "Hair/Head", (0.0, -0.05, 0.750), 122.0),
+    "Braid": Sample(dressed_head, head_grooms.braid, 30_000, "Hair/Head", (0.0, -0.05, 0.640), 108.0),
+    "Beard": Sample(dressed_head, face_grooms.beard, 12_000, "Hair/Face", (0.010, -0.060, 0.712), 150.0),
+    "Eyebrows": Sample(dressed_head, face_grooms.eyebrows, 1600, "Hair/Face", (0.004, -0.135, 0.738), 360.0),
+    "Short Fur": Sample(fur_grooms.build, fur_grooms.short_fur, 60_000, "Hair/Fur", (0.026, -0.040, 0.712), 146.0),
+    "Long Fur": Sample(fur_grooms.build, fur_grooms.long_fur, 60_000, "Hair/Fur", (0.026, -0.040, 0.708), 134.0),
+}
+
+
+def main():
+    """Draw what is asked for, all by default; the sheet is written only if all of it was drawn."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*", help="grooms such as Pixie; all by default")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "grooms.png")
+    parser.add_argument("--library", type=Path, help="folder of an asset library that the grooms are saved to")
+    parser.add_argument("--strands", type=float, default=1.0, help="factor of the numbers of strands")
+    parser.add_argument("--samples", type=int, default=SAMPLE_COUNT)
+    given = parser.parse_args()
+    hair_addon.register()
+    gpu.init()
+    pictures = []
+    for name in given.names or list(SAMPLES):
+        hair = build(name, given.strands)
+        pictures.append(picture_files.drawn(*SIZE, sample_count=given.samples))
+        if given.library:
+            save(name, hair, given.library.resolve(), pictures[-1])
+    sheet = picture_files.rows(pictures, min(COLUMNS, len(pictures)))
+    picture_files.write(sheet, given.out.resolve(), kept_bits=picture_files.PAGE_BITS)
+
+
+def build_library(folder):
+    """Save all grooms to a folder, with small pictures."""
+    gpu.init()
+    for name in SAMPLES:
+        hair = build(name)
+        save(name, hair, folder, picture_files.drawn(SIZE[0], SIZE[0], sample_count=SAMPLE_COUNT // 3))
+
+
+def save(name, hair, folder, picture):
+    """Save a groom with the middle of a picture (height, width, 3) uint8, the top row first."""
+    edge = (picture.shape[0] - picture.shape[1]) // 2
+    square = picture[edge : edge + picture.shape[1]][::-1] / np.float32(255.0)
+    opaque = np.dstack([square, np.ones(square.shape[:2], np.float32)])
+    path = api.save_groom(hair, folder, name=name, catalog=SAMPLES[name].catalog, picture=opaque)
+    print(f"{path.name}: {path.stat().st_size / 1e6:.1f} MB")
+
+
+def build(name, strands=1.0):
+    """Build a groom of `SAMPLES` with its camera and lights; strands: factor of their number. Returns the hair."""
+    sample = SAMPLES[name]
+    hair = sample.groom(sample.surface(), int(strands * sample.strand_count))
+    portrait.light()
+    camera = bpy.context.scene.camera
+    camera.data.dof.use_dof = False
+    camera.data.lens = sample.lens
+    camera.location = _LOCATION
+    head.point_at(camera, sample.look_at)
+    bpy.context.view_layer.update()
+    return hair
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    # Blender's module may crash while it is torn down after drawing; all files are closed by now.
+    os._exit(0)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How far two pictures of the same hair differ, in colour and in structure, and sheets of such pairs."""
+
+import numpy as np
+
+from blend_samples.sheets import picture_files
+
+_WINDOW = 2.0  # deviation [pixels] of the blur before structure is compared
+_GREY = 0.22  # display value that the mean of the first picture is brought to
+
+
+def mean(picture):
+    """(3,) mean colour of the hair in a premultiplied picture (H, W, 4)."""
+    return picture[..., :3].sum(axis=(0, 1)) / max(float(picture[..., 3].sum()), 1e-9)
+
+
+def ratio(reference, picture):
+    """(3,) mean colour of a picture, relative to that of a reference."""
+    return mean(picture) / np.maximum(mean(reference), 1e-9)
+
+
+def deviation(reference, picture):
+    """The largest deviation of `ratio` from one in a channel."""
+    return float(np.abs(ratio(reference, picture) - 1.0).max())
+
+
+def structure(reference, picture):
+    """Structural similarity [Wang04] of the brightness as displayed, both blurred: one for equal pictures."""
+    exposure = _exposure(reference)
+    first, second = (_blurred(_displayed(one, exposure).mean(axis=-1)) for one in (reference, picture))
+    means = _blurred(first, 3.0), _blurred(second, 3.0)
+    variances = [_blurred(one * one, 3.0) - mean * mean for one, mean in zip((first, second), means, strict=True)]
+    covariance = _blurred(first * second, 3.0) - means[0] * means[1]
+    similarity = (2.0 * means[0] * means[1] + 1e-4) * (2.0 * covariance + 9e-4)
+    similarity /= (means[0] ** 2 + means[1] ** 2 + 1e-4) * (sum(variances) + 9e-4)
+    weights = _blurred(np.maximum(reference[..., 3], picture[..., 3]), 3.0)
+    return float((similarity * weights).sum() / weights.sum())
+
+
+def _blurred(values, deviation=_WINDOW):
+    taps = np.arange(-int(3 * deviation), int(3 * deviation) + 1)
+    weights = np.exp(-0.5 * np.square(taps / deviation))
+    for axis in (0, 1):
+        padded = np.pad(values, [(len(taps) // 2,) * 2 if one == axis else (0, 0) for one in (0, 1)], mode="edge")
+        values = np.apply_along_axis(np.convolve, axis, padded, weights / weights.sum(), "valid")
+    return values
+
+
+def _exposure(reference):
+    return _GREY / max(float(mean(reference).mean()), 1e-4)
+
+
+def _displayed(picture, exposure):
+    """(H, W, 3) from 0 to 1: premultiplied light over black, as sRGB with a soft shoulder."""
+    light = np.maximum(picture[..., :3], 0.0) * exposure
+    light = light * (1.0 + light / 9.0) / (1.0 + light)  # white at three times the middle of the curve
+    return np.where(light < 0.0031308, 12.92 * light, 1.055 * np.power(np.maximum(light, 1e-9), 1 / 2.4) - 0.055).clip(
+        0.0, 1.0
+    )
+
+
+def write_sheet(pairs, path, columns=5):
+    """Write [(caption, reference, picture), ...] as a PNG, each reference above its picture, first rows first."""
+    height, width = pairs[0][1].shape[:2]
+    line, gap = 20, 4
+    cell = (2 * height + line + gap, width + gap)
+    rows = -(-len(pairs) // columns)
+    sheet = np.full((rows * cell[0], columns * cell[1], 3), 24, np.uint8)
+    words = []
+    for index, (caption, *pictures) in enumerate(pairs):
+        top, left = (index // columns) * cell[0], (index % columns) * cell[1]
+        words.append((caption, left + 4, top + 15))
+        for turn, picture in enumerate(pictures):
+            shown = np.rint(255.0 * _displayed(picture, _exposure(pictures[0]))[::-1])
+            start = top + line + turn * height
+            sheet[start : start + height, left : left + width] = shown.astype(np.uint8)
+    picture_files.write(sheet, path, words)

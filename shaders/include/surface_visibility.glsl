@@ -1,0 +1,107 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Light of a lamp on a surface, past other surfaces and through hair. What passes between strands casts a shadow as soft as
+// the lamp is wide; what strands pass on leaves the hair in all directions and is spread over the surface by its distance.
+// Needs the samplers of include/shadow.glsl.
+
+#include "include/shadow.glsl"
+
+const int TAP_COUNT = 4;
+// Distances of hair from the surface, as parts of the hair's extent: where it is looked for first, and the largest.
+const float FIRST_DISTANCE = 0.06;
+const float LARGEST_DISTANCE = 0.25;
+// Of surfaces that face away from the light more than this, hair sends it to none.
+const float LEAST_COSINE = -0.3;
+
+// Noise from 0 to 1 that is even in any few samples next to each other: interleaved gradient noise, by Jimenez, 2014.
+float gradient_noise(vec2 place)
+{
+  return fract(52.9829189 * fract(dot(place, vec2(0.06711056, 0.00583715))));
+}
+
+// Mean of the positive cosines between a normal and the directions to a disk; cosine: to its middle; sine: of its angular
+// radius.
+float disk_cosine(float cosine, float sine)
+{
+  float above = max(cosine + sine, 0.0);
+  return (cosine >= sine) ? cosine : 0.25 * above * above / max(sine, 1e-4);
+}
+
+// Places across a light's direction, for distances in meters.
+struct Across {
+  vec3 right;
+  vec3 up;
+  float scale;  // of the map, times the distance to the light's plane
+  float w;
+};
+
+Across across_of(Light light, vec3 position)
+{
+  mat4 m = light.world_to_shadow;
+  vec3 right = vec3(m[0][0], m[1][0], m[2][0]);
+  vec3 up = vec3(m[0][1], m[1][1], m[2][1]);
+  float w = dot(vec4(m[0][3], m[1][3], m[2][3], m[3][3]), vec4(position, 1.0));
+  return Across(normalize(right), normalize(up), 0.5 * length(right), w);
+}
+
+// A direction for the samples of a place in the picture, another one in each pass.
+vec2 sample_turn()
+{
+  vec2 place = gl_FragCoord.xy + vec2(view.first_column, view.first_row);
+  float angle = 2.0 * PI * fract(gradient_noise(place) + view.coverage_turn);
+  return vec2(cos(angle), sin(angle));
+}
+
+// Irradiance of a surface past surfaces alone, and past hair too, as parts of that of a small ball. N: the surface's
+// normal; forward: what a strand passes on; turn: of `sample_turn`.
+void surface_visibility(
+    Light light, vec3 position, vec3 N, vec3 forward, vec2 turn, out float past_surfaces, out vec3 past_hair)
+{
+  vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, position);
+  float cosine = dot(N, L);
+  float tangent = 2.0 * sqrt(light_blur(light.kind, light.position.xyz, light.radius, position));
+  float direct = disk_cosine(cosine, tangent * inversesqrt(1.0 + tangent * tangent));
+  past_surfaces = direct;
+  past_hair = vec3(direct);
+  if (cosine < LEAST_COSINE) {
+    return;
+  }
+  vec3 at;
+  float depth;
+  if (!shadow_place(light, position, at, depth)) {
+    return;
+  }
+  Across across = across_of(light, position);
+  float texel = 1.0 / float(textureSize(hair_front, 0).x);
+  vec2 aside = turn;
+  float away = FIRST_DISTANCE;
+  float lit = 0.0;
+  float between = 0.0;
+  vec3 through = vec3(0.0);
+  for (int tap = 0; tap < TAP_COUNT; tap++) {
+    float part = (float(tap) + 0.5) / float(TAP_COUNT);
+    aside = vec2(-aside.y, aside.x);
+    float meters = away * light.extent;
+    float reach = meters * across.scale / max(across.w - meters, 0.25 * across.w);
+    if (direct > 0.0) {
+      // The maps of surfaces are blurred already.
+      float seen = lit_part(at + vec3(aside * texel, 0.0), depth, SURFACE_BIAS);
+      vec3 near = at + vec3(aside * (sqrt(part) * max(tangent * reach, texel)), 0.0);
+      lit += seen;
+      between += seen * exp(-crossed_before_surface(near, depth));
+    }
+    // Half of the light of an even sheet of hair arrives from within 45 degrees.
+    float spread = sqrt(part / (1.0 - part));
+    vec2 offset = aside * (spread * reach);
+    vec2 ends = textureLod(hair_front, at + vec3(offset, 0.0), 0.0).rg;
+    if (ends.x < min(depth, 1.0)) {
+      // Its direction, per the cosine between that and the light's.
+      float scattered = max(dot(N, L + spread * (aside.x * across.right + aside.y * across.up)), 0.0);
+      scattered *= lit_part(at + vec3(0.5 * offset, 0.0), depth - 0.5 * away, SURFACE_BIAS);
+      float count = crossed_before_surface(at + vec3(offset, 0.0), depth);
+      through += scattered * (transmitted(count, forward) - exp(-count));
+      away = clamp(depth - ends.y, 0.0, LARGEST_DISTANCE);
+    }
+  }
+  past_surfaces = direct * lit / float(TAP_COUNT);
+  past_hair = (vec3(direct * between) + through) / float(TAP_COUNT);
+}
