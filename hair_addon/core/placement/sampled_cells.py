@@ -92,7 +92,7 @@ def _nearest_two(
         return
     second = int(-1)
     second_square = float(wp.inf)
-    for slot in range(sites.around.shape[1]):
+    for slot in range(sites.counts[site]):
         # The rest are farther from the sample than the second so far.
         if sites.apart[site, slot] > wp.length(offset) + wp.sqrt(second_square):
             break
