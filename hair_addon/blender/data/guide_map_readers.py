@@ -11,7 +11,7 @@ from ..host.caches import Cache
 _BEGINNINGS = ("guide_index", "guide_weight")
 _PROPERTIES = ("attribute_name", "string")  # of nodes that are not inputs
 
-# What `_key` gives → "read" or "unread", until nodes change: `events.nodes_changed`.
+# What `_key` gives → "read" or "unread", until nodes change: `stored_guide_maps.follow`.
 reading_cache = Cache()
 
 

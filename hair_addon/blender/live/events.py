@@ -4,7 +4,6 @@
 After an event nothing is drawn or computed from what was cached before it.
 """
 
-from ..data import guide_map_readers
 from ..gpu import world_texture
 from ..render import hair_cache, viewport
 
@@ -32,8 +31,3 @@ def surface_moved(surface_object):
 def image_changed():
     """Pixels of images, or a world, may be others: the world's light. Each render looks by itself."""
     world_texture.check_image()
-
-
-def nodes_changed():
-    """Nodes of geometry or a material were changed: which attributes they read."""
-    guide_map_readers.reading_cache.clear()

@@ -6,14 +6,14 @@ import bpy
 from ..data import attributes, curves, guide_map_readers
 from ..groom import bindings, guide_maps
 from ..host.notices import text_of
-from . import events, live_hair
+from . import live_hair
 
 
 def follow(depsgraph):
     """Store the guide weights of hair that nodes read them of, and that has none."""
     changed = [update.id for update in depsgraph.updates]
     if any(_may_have_nodes(datablock) for datablock in changed):
-        events.nodes_changed()
+        guide_map_readers.reading_cache.clear()
     if not any(isinstance(i, bpy.types.Object | bpy.types.NodeTree | bpy.types.Material) for i in changed):
         return
     for hair in bpy.data.hair_curves:
