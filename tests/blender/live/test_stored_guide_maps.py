@@ -97,7 +97,7 @@ def test_a_material_reads_them(hair):
 
 def test_nodes_of_a_file_that_was_opened_find_them(modified, tmp_path):
     """Where hair is bound to nothing yet, and does not change."""
-    hair, tree = modified
+    hair, _tree = modified
     expected = [array.copy() for array in bindings.of(hair.data).guide_map]
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "groom.blend"))
     bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "groom.blend"))
