@@ -11,6 +11,8 @@ from .voronoi import Sites, Sums, detour_of, detours, fixed, nearest_site, some_
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
+MOST_GROWTH = 1.25  # of the number of sites between two sums that begin with the same cells
+
 
 @wp.struct
 class Samples:
@@ -43,10 +45,11 @@ class SampledCells:
 
     def sums(self, sites: Sites, with_seconds: bool = False) -> Sums:
         """`Sums` for `Sites`."""
-        # Cells begin with the sites that they had: with fewer sites, an index may be past the last.
-        if self._site_count != len(sites.places):
-            self._site_count = len(sites.places)
+        # Cells begin with the sites that they had: with fewer sites, an index may be past the last, and where many have
+        # come, another search is quicker.
+        if not self._site_count <= len(sites.places) <= MOST_GROWTH * self._site_count:
             self._cells = some_sites(self._ground, sites, self._samples.places)
+        self._site_count = len(sites.places)
         inputs, outputs = [self._samples, sites, with_seconds], [self._cells, self._seconds]
         return sum_cells(_nearest_two, len(self.places), inputs, outputs, sites, self._device)
 
