@@ -226,6 +226,10 @@ def _thinned(domain, cells, sites, device):
     for rank in np.argsort(amounts[crowded], kind="stable"):
         if is_kept[rings[rank]].all():
             is_kept[crowded[rank]] = False
+    numbers = np.maximum(np.cumsum(is_kept) - 1, 0)
+    gone = np.flatnonzero(~is_kept[crowded])
+    numbers[crowded[gone]] = numbers[rings[gone, -1]]  # those near it have its cell now
+    cells.renumber(numbers)
     return sites[is_kept]
 
 

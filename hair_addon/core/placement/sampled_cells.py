@@ -53,6 +53,11 @@ class SampledCells:
         inputs, outputs = [self._samples, sites, with_seconds], [self._cells, self._seconds]
         return sum_cells(_nearest_two, len(self.places), inputs, outputs, sites, self._device)
 
+    def renumber(self, numbers: np.ndarray) -> None:
+        """Begin the next sums with other numbers (n,) of the sites that the last were of."""
+        self._site_count = int(numbers.max()) + 1
+        self._cells = wp.array(numbers[self._cells.numpy()], dtype=int, device=self._device)
+
     def nearest(self, sites: Sites) -> np.ndarray:
         """(Q,) the nearest of `Sites` to each point."""
         self.sums(sites)
