@@ -18,6 +18,7 @@ if TYPE_CHECKING:
         groom_transfers,
         grown_guides,
         guide_additions,
+        guide_maps,
         guide_regions,
         guide_tools,
         hair_styles,

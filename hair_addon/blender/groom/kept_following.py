@@ -5,7 +5,7 @@ The shapes that guides and strands had when the hair came are kept with them (`k
 guides are now and not on where they were in between, and are the original ones, to the last bit, where guides are.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,7 +29,8 @@ class KeptBinding:
     """Kept strands bound to guides.
 
     shape: `Strands` of the guides as the hair came, on the roots that they have now; rest: (N, 3) float32 local points
-    of the strands then; starts: (S+1,); followed: the guides that the strands have followed last.
+    of the strands then; starts: (S+1,); followed: the guides that the strands have followed last. Another `rest` takes
+    another `KeptBinding`: what follows from it is computed once.
     """
 
     surface: Surface
@@ -47,9 +48,19 @@ class KeptBinding:
     def _course(self):
         return self._interpolated(self.shape)
 
+    @cached_property
+    def _places(self):
+        return strands.places_along(self.surface.from_local(self.rest), self.starts)
+
     def _interpolated(self, guides):
         weights = following.weights_now(self.binding, guides)
         return following.strands_now(self.binding, guides, weights).numpy()
+
+    def _some_interpolated(self, guides, chosen):
+        """(M, P, 3) rows of `_interpolated` for (M,) indices; where most are wanted, all are computed."""
+        if len(chosen) > len(self.binding.positions) // 2:
+            return self._interpolated(guides)[chosen]
+        return following.follow_some(self.binding, guides, chosen)[0]
 
     def points_for(self, guides: Strands, points: np.ndarray | None = None, is_back: bool = False) -> np.ndarray:
         """(N, 3) float32 local: the strands where guides carry them; points: others to carry than `rest`.
@@ -64,15 +75,12 @@ class KeptBinding:
         is_moved = np.zeros(len(counts), bool)
         is_moved[moved] = True
         rows = np.repeat(is_moved, counts)
-        given = self.surface.from_local(points[rows])
-        starts = strands.curve_offsets(counts[moved])
-        before, now = (courses[moved] for courses in (self._course, self._interpolated(guides)))
         made = interpolation.carried_strands.carried(
-            given,
-            starts,
-            strands.places_along(self.surface.from_local(self.rest[rows]), starts),
-            before,
-            now,
+            self.surface.from_local(points[rows]),
+            strands.curve_offsets(counts[moved]),
+            self._places[rows],
+            self._course[moved],
+            self._some_interpolated(guides, moved),
             self.binding.normals.numpy()[moved],
             is_back=is_back,
         )
@@ -156,7 +164,7 @@ def _bind(hair, present, depsgraph, followed):
     if rest is not None and kept_shapes.is_edited(hair, present):
         if followed is None or following.combed(followed, shape) is None:
             followed = guides
-        bound.rest = _rest_of_edited(bound, followed, present)
+        bound = replace(bound, rest=_rest_of_edited(bound, followed, present))
         kept_shapes.keep(hair, bound.rest)
     return bound
 

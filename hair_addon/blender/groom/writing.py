@@ -11,7 +11,7 @@ from ...core.errors import HairError
 from ...core.geometry.strands import Strands, lengths
 from ...core.grooming.groom import GuideSettings
 from ...core.styling.base import StyleSettings
-from ..data import attributes, curves, curves_objects, kept_shapes
+from ..data import attributes, curves, curves_objects, guide_map_readers, kept_shapes
 from ..data.scene import Surface
 from ..host.notices import name_of
 from ..materials import looks
@@ -105,13 +105,18 @@ def write_hair(target: Curves) -> None:
         if curves.write_wetness(target, bound.styles.wetness):
             looks.evaluate_shading(target)
     if not bound.is_map_written and not attributes.is_from_library(target):
-        curves.write_guide_map(target, bound.guide_map if bound.settings.guide_map else None)
+        curves.write_guide_map(target, bound.guide_map if _is_map_wanted(target, bound.settings) else None)
     hair_outside.keep_outside(target, bound)
     curves.write_points(target, bound.growing)
     state.is_stale = False  # as another choice of guides marks it
     state.followed = staleness.guides_digest(state.guide_curves)
     bound.is_written = bound.has_moved_only = bound.is_map_written = bound.is_report_due = True
     _store_roots(state.guide_curves, bound)
+
+
+def _is_map_wanted(target, settings):
+    """Whether hair Curves are to store their guide map: exporters compute what they need (`guide_maps.of`)."""
+    return settings.guide_map or guide_map_readers.are_read(target)
 
 
 def fits(target: Curves, bound: BoundHair) -> bool:

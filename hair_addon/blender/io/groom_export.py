@@ -65,7 +65,7 @@ def exporting(path, chosen, settings, blender_scene):
         strand_arrays.bring_up_to_date()
         chosen = [one.find() for one in remembered]
         sources = groom_sources.sources_of(chosen, settings, per_metre)
-        notes, instances = list(groom_sources.notes_of(chosen, settings)), groom_sources.instances_of(chosen)
+        notes, instances = list(groom_sources.notes_of(chosen, sources, settings)), groom_sources.instances_of(chosen)
         if not sources:
             raise HairError("Neither hair nor guides would be exported: choose one of them.")
         with whole_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:

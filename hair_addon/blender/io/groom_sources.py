@@ -11,7 +11,7 @@ from ...core.files import groom_curves
 from ...core.files.groom_curves import GroomCurves
 from ...core.shading import strand_colors
 from ..data import attributes, curves, exported_curves, simulated_guides
-from ..groom import hair_systems, selection
+from ..groom import guide_maps, hair_systems, selection
 from ..groom.dynamics import frame_folders
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
@@ -86,7 +86,8 @@ def _strand_curves(hair, group, name, first_id, per_metre, settings):
     guides = hair.vellus.guide_curves
     guide_count = 0 if guides is None else len(guides.curves)
     # Without guides in the file there are none to name.
-    guide_map = exported_curves.read_guide_map(hair, guide_count) if guide_count and settings.has_guides else None
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    guide_map = guide_maps.of(hair, depsgraph) if guide_count and settings.has_guides else None
     ids, weights = (None, None) if guide_map is None else groom_curves.closest_guides(*guide_map, first_id)
     curve_count, point_count, _ = strand_arrays.shape_of(hair)
     look, randoms = properties.look_of(hair.vellus), curves.read_randoms(hair)
@@ -152,17 +153,17 @@ def counts_of(sources):
     return tuple(sum(c.curve_count for c in every if c.is_guide == is_guide) for is_guide in (True, False))
 
 
-def notes_of(chosen, settings):
-    """What importers do with hair that has less than it could."""
-    for hair, name in zip(chosen, group_names(chosen), strict=True):
+def notes_of(chosen, sources, settings):
+    """What importers do with hair that has less than it could; sources: `sources_of` the same hair."""
+    without_map = {s.curves.group_id for s in sources if not s.curves.is_guide and s.curves.guide_ids is None}
+    for group, (hair, name) in enumerate(zip(chosen, group_names(chosen), strict=True)):
         if name_of(hair) != name:
             yield HairError('"{name}" is called {group} in the file.', name=name_of(hair), group=name)
         if not (settings.has_hair and settings.has_guides):
             continue
-        guides = hair.vellus.guide_curves
-        if guides is None:
+        if hair.vellus.guide_curves is None:
             yield HairError('"{name}" has no guides: Unreal makes some of its strands.', name=name)
-        elif exported_curves.read_guide_map(hair, len(guides.curves)) is None:
+        elif group in without_map:
             yield HairError(
-                '"{name}" stores no guide weights: Unreal computes its own. Switch on Store Guide Weights.', name=name
+                '"{name}" has no guide weights: Unreal computes its own. Regenerate the strands first.', name=name
             )

@@ -84,7 +84,7 @@ def _changed_parts(guides, manifest):
 
 def _hair(datablock):
     state = datablock.vellus
-    slots = state.hair.neighbour_limit if state.hair.guide_map else 0
+    slots = state.hair.neighbour_limit if "guide_index_0" in datablock.attributes else 0
     points = len(datablock.points) // max(1, len(datablock.curves))
     return {
         **_counts(datablock),

@@ -22,6 +22,7 @@ from . import (
     reported,
     simulated_hair,
     stale_marks,
+    stored_guide_maps,
     unlocked_renders,
 )
 
@@ -80,6 +81,7 @@ def after_depsgraph_update(scene, depsgraph):
     simulated_hair.follow_settings(scene, depsgraph)
     _evaluate(depsgraph, combed)
     if running.job() is None:
+        stored_guide_maps.follow(depsgraph)
         live_hair.follow_masks(_painted(depsgraph), depsgraph)
 
 

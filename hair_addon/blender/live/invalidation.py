@@ -5,7 +5,7 @@ What makes single ones stale is in `events`. Functions of their arguments alone,
 stale.
 """
 
-from ..data import simulated_guides, subdivided_surfaces
+from ..data import guide_map_readers, simulated_guides, subdivided_surfaces
 from ..gpu import lights, shaders, surface_shading, world_texture
 from ..groom import bindings
 from ..groom.dynamics import frame_folders, guide_simulation
@@ -28,6 +28,7 @@ COPIES = (
     reported.guide_cache,
     reported.painting_cache,
     reported.axes_cache,
+    guide_map_readers.reading_cache,
 )
 
 # Values keyed by everything they depend on, or that check by themselves whether they are up to date.

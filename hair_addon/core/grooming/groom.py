@@ -198,7 +198,7 @@ class HairSettings(Settings):
         "", "Curve object on the surface that parts the hair; strands do not blend guides across its curves"
     )
     guide_map: bool = param(
-        True, "Store the guides of each strand and their weights as curve attributes", label="Store guide weights"
+        False, "Store the guides of each strand and their weights as curve attributes", label="Store guide weights"
     )
     radius: float | None = param_from_surface(
         0.00004,

@@ -33,6 +33,8 @@ from .voronoi import EVERYWHERE, sites_on
 STEPS_KEPT = 7
 LONGEST_STEP = 0.5  # of the way to the next site
 FEWEST_SITES = 260  # minimum count for multilevel placement
+LEAST_CELL = 0.75  # of the mean amount in a cell: sites of smaller ones are crowded
+RING = 7  # a site and its neighbours in a honeycomb
 LEAST_PAIR = 0.4  # of the part of the surface that two neighbours share in a honeycomb: others get no site between
 GAP_ROUNDS = 4  # adjacent gaps are filled one after the other
 START_SAMPLES = 16  # for each site of the start
@@ -211,6 +213,26 @@ def _pair_count(domain, cells, sites, device):
     return len(np.unique(pairs[pairs >= 0]))
 
 
+def _thinned(domain, cells, sites, device):
+    """Sites without crowded ones, of which the most crowded go first, and no neighbours of those that go.
+
+    Thin parts and corners hold more sites of a coarse level than their share, which no descent moves elsewhere.
+    """
+    on = sites_on(domain, sites, device)
+    amounts = np.bincount(cells.nearest(on), minlength=len(sites))
+    crowded = np.flatnonzero(amounts < LEAST_CELL * amounts.mean())
+    rings = on.around.numpy()[crowded, :RING]
+    is_kept = np.ones(len(sites), bool)
+    for rank in np.argsort(amounts[crowded], kind="stable"):
+        if is_kept[rings[rank]].all():
+            is_kept[crowded[rank]] = False
+    numbers = np.maximum(np.cumsum(is_kept) - 1, 0)
+    gone = np.flatnonzero(~is_kept[crowded])
+    numbers[crowded[gone]] = numbers[rings[gone, -1]]  # those near it have its cell now
+    cells.renumber(numbers)
+    return sites[is_kept]
+
+
 def _refined(domain, cells, points, sites, count, device):
     """Refine to `count` sites: one between each pair of neighbours, and the rest in the widest gaps.
 
@@ -218,6 +240,7 @@ def _refined(domain, cells, points, sites, count, device):
     surface bends faster than its cells are wide. New sites are some of the `points` that sampled cells are made of, so
     they have density.
     """
+    sites = _thinned(domain, cells, sites, device)
     pairs = _pairs(domain, cells, sites, device)
     known, which, sizes = np.unique(pairs, return_inverse=True, return_counts=True)
     places = positions(domain.mesh, sites)

@@ -142,11 +142,11 @@ def _add_cut(
         reach = wp.sqrt(radius_sq) + wp.sqrt(radius_sq + own_detour)
 
         slot = int(0)
-        while slot < candidate_count(sites.around, sites.places) and count > 0:
-            if slot < sites.around.shape[1]:
+        while slot < candidate_count(sites, site) and count > 0:
+            if slot < sites.counts[site]:
                 if sites.apart[site, slot] > reach:
                     break
-            other = candidate(sites.around, site, slot)
+            other = candidate(sites, site, slot)
             slot += 1
             if other != site:
                 other_offset = sites.places[other] - centre
@@ -267,11 +267,11 @@ def _cells(
     is_whole = detour_of(normal, island, detour, sites.normals[nearest], sites.islands[nearest]) == 0.0
     reach = 2.0 * (wp.sqrt(square) + radius)
     slot = int(0)
-    while is_whole and slot < candidate_count(sites.around, sites.places):
-        if slot < sites.around.shape[1]:
+    while is_whole and slot < candidate_count(sites, nearest):
+        if slot < sites.counts[nearest]:
             if sites.apart[nearest, slot] > reach:
                 break
-        other = candidate(sites.around, nearest, slot)
+        other = candidate(sites, nearest, slot)
         slot += 1
         if other != nearest:
             apart = 2.0 * radius * wp.length(sites.places[other] - sites.places[nearest])

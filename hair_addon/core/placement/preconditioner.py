@@ -94,7 +94,7 @@ def _shares(
 ):
     site = wp.tid()
     total = float(0.0)
-    for slot in range(sites.around.shape[1]):
+    for slot in range(sites.counts[site]):
         total += _nearness(sites, site, slot)
     out_shares[site] = masses[site] / wp.max(total, FEWEST_SPRINGS)
 
@@ -110,7 +110,7 @@ def _stiffness(
 ):
     site = wp.tid()
     total = float(0.0)
-    for slot in range(sites.around.shape[1]):
+    for slot in range(sites.counts[site]):
         stiffness = float(0.0)
         nearness = _nearness(sites, site, slot)
         if nearness > 0.0:
@@ -135,7 +135,7 @@ def _pull(
     place = sites.places[site]
     move = moves[site]
     pull = holds[site] * move
-    for slot in range(sites.around.shape[1]):
+    for slot in range(sites.counts[site]):
         if stiffness[site, slot] > 0.0:
             other = sites.around[site, slot]
             towards = sites.places[other] - place

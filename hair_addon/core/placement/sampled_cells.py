@@ -11,6 +11,8 @@ from .voronoi import Sites, Sums, detour_of, detours, fixed, nearest_site, some_
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
+MOST_GROWTH = 1.25  # of the number of sites between two sums that begin with the same cells
+
 
 @wp.struct
 class Samples:
@@ -43,12 +45,18 @@ class SampledCells:
 
     def sums(self, sites: Sites, with_seconds: bool = False) -> Sums:
         """`Sums` for `Sites`."""
-        # Cells begin with the sites that they had: with fewer sites, an index may be past the last.
-        if self._site_count != len(sites.places):
-            self._site_count = len(sites.places)
+        # Cells begin with the sites that they had: with fewer sites, an index may be past the last, and where many have
+        # come, another search is quicker.
+        if not self._site_count <= len(sites.places) <= MOST_GROWTH * self._site_count:
             self._cells = some_sites(self._ground, sites, self._samples.places)
+        self._site_count = len(sites.places)
         inputs, outputs = [self._samples, sites, with_seconds], [self._cells, self._seconds]
         return sum_cells(_nearest_two, len(self.places), inputs, outputs, sites, self._device)
+
+    def renumber(self, numbers: np.ndarray) -> None:
+        """Begin the next sums with other numbers (n,) of the sites that the last were of."""
+        self._site_count = int(numbers.max()) + 1
+        self._cells = wp.array(numbers[self._cells.numpy()], dtype=int, device=self._device)
 
     def nearest(self, sites: Sites) -> np.ndarray:
         """(Q,) the nearest of `Sites` to each point."""
@@ -92,7 +100,7 @@ def _nearest_two(
         return
     second = int(-1)
     second_square = float(wp.inf)
-    for slot in range(sites.around.shape[1]):
+    for slot in range(sites.counts[site]):
         # The rest are farther from the sample than the second so far.
         if sites.apart[site, slot] > wp.length(offset) + wp.sqrt(second_square):
             break

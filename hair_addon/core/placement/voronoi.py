@@ -23,8 +23,10 @@ from .domain import Domain
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-SITES_AROUND = 16  # how many neighbours of a site (itself among them) are looked at before all sites are
-FIRST_RING = 7  # a site and its neighbours in a honeycomb
+SITES_AROUND = 16  # neighbours of a site (itself among them) that are found at once
+MOST_AROUND = 48  # that are looked at before all sites are: a thin part has neighbours on its other side too
+ENOUGH_AROUND = 12  # on the site's own side
+FIRST_RING = 6  # neighbours in a honeycomb
 EVERYWHERE = 4.0  # a distance that reaches across a surface of unit size
 SEARCH_RADIUS = 2.6  # by the square root of a cell's area: more than SITES_AROUND of a honeycomb
 DETOUR = 2.0  # by which a site on the other side of a thin part counts as farther, in spacings of sites
@@ -36,13 +38,19 @@ near_keys = wp.types.vector(length=SITES_AROUND, dtype=wp.uint64)
 
 @wp.struct
 class Sites:
-    """Positions of sites, their sides, their neighbours, and the mean distance of the first ring of these."""
+    """Positions of sites, their sides, and `counts` neighbours of each in order of distance.
+
+    Of neighbours on a site's own side: the distance of the nearest (`gaps`), and the mean of the first ring's
+    (`spacings`).
+    """
 
     places: wp.array[wp.vec3]
     normals: wp.array[wp.vec3]
     islands: wp.array[int]
     around: wp.array2d[int]
     apart: wp.array2d[float]
+    counts: wp.array[int]
+    gaps: wp.array[float]
     spacings: wp.array[float]
 
 
@@ -56,19 +64,19 @@ def detour_of(normal: wp.vec3, island: int, detour: float, site_normal: wp.vec3,
 
 
 @wp.func
-def candidate(around: wp.array2d[int], site: int, slot: int):
+def candidate(sites: Sites, site: int, slot: int):
     """Another site: first those around it, in order of distance, then all."""
-    if slot < around.shape[1]:
-        return around[site, slot]
-    return slot - around.shape[1]
+    if slot < sites.counts[site]:
+        return sites.around[site, slot]
+    return slot - sites.counts[site]
 
 
 @wp.func
-def candidate_count(around: wp.array2d[int], places: wp.array[wp.vec3]):
+def candidate_count(sites: Sites, site: int):
     """Number of slots of `candidate`."""
-    if around.shape[1] < places.shape[0]:
-        return around.shape[1] + places.shape[0]
-    return around.shape[1]
+    if sites.counts[site] < sites.places.shape[0]:
+        return sites.counts[site] + sites.places.shape[0]
+    return sites.counts[site]
 
 
 @wp.func
@@ -83,11 +91,11 @@ def nearest_site(point: wp.vec3, normal: wp.vec3, island: int, detour: float, si
         # Sites farther from this one than that are farther from the point than the nearest so far [Elkan03].
         reach = wp.length(sites.places[site] - point) + wp.sqrt(square)
         slot = int(0)
-        while slot < candidate_count(sites.around, sites.places):
-            if slot < sites.around.shape[1]:
+        while slot < candidate_count(sites, site):
+            if slot < sites.counts[site]:
                 if sites.apart[site, slot] > reach:
                     break
-            other = candidate(sites.around, site, slot)
+            other = candidate(sites, site, slot)
             other_square = wp.length_sq(sites.places[other] - point)
             if other_square < square:
                 other_square += detour_of(normal, island, detour, sites.normals[other], sites.islands[other])
@@ -110,7 +118,7 @@ def fixed(value: float):
 class Sums:
     """Of every cell: masses (n,), moments (n, 3) of its places about its site, energies (n,); all float64.
 
-    spacing: (n,) distance from a site to the next, infinite for one alone.
+    spacing: (n,) distance from a site to the next on its side, infinite for one alone.
     """
 
     masses: np.ndarray
@@ -130,17 +138,20 @@ def sites_on(domain: Domain, points: SurfacePoints, device: wp.DeviceLike) -> Si
     sites.places = wp.array(positions(domain.mesh, points), dtype=wp.vec3, device=device)
     sites.normals = wp.array(domain.normals[points.triangle], dtype=wp.vec3, device=device)
     sites.islands = wp.array(domain.islands[points.triangle], dtype=int, device=device)
-    shape = (len(points), min(SITES_AROUND, len(points)))
+    shape = (len(points), min(MOST_AROUND, len(points)))
     sites.around = wp.empty(shape, dtype=int, device=device)
     sites.apart = wp.empty(shape, dtype=float, device=device)
+    sites.counts = wp.empty(len(points), dtype=int, device=device)
+    sites.gaps = wp.empty(len(points), dtype=float, device=device)
     sites.spacings = wp.empty(len(points), dtype=float, device=device)
     radius = SEARCH_RADIUS * float(np.sqrt(domain.parts.areas.sum() / len(points)))
     domain.grid.build(sites.places, CELLS_PER_RADIUS * radius)
+    own = sites.places, sites.normals, sites.islands
     parallel.launch(
         _find_around,
         len(points),
-        inputs=[Rows(sites.places), sites.places, domain.grid.id, radius],
-        outputs=[sites.around, sites.apart, sites.spacings],
+        inputs=[*map(Rows, own), *own, domain.grid.id, radius, min(SITES_AROUND, len(points))],
+        outputs=[sites.around, sites.apart, sites.counts, sites.gaps, sites.spacings],
         device=device,
         least_rows=512,
     )
@@ -166,8 +177,7 @@ def sum_cells(
     kernel: wp.Kernel, count: int, inputs: list[Any], outputs: list[wp.array], sites: Sites, device: wp.DeviceLike
 ) -> Sums:
     """`Sums` of a kernel that adds to the masses, moments and energies of cells; every thread adds up its own."""
-    site_count = len(sites.places)
-    shapes = (site_count, (site_count, 3), site_count)
+    shapes = (len(sites.places), (len(sites.places), 3), len(sites.places))
     sums = [
         [wp.zeros(shape, dtype=wp.int64, device=device) for shape in shapes]
         for _ in range(parallel.share_count(count, device))
@@ -176,8 +186,7 @@ def sum_cells(
     masses, moments, energies = (
         np.sum([array.numpy() for array in arrays], axis=0) / float(UNIT) for arrays in zip(*sums, strict=True)
     )
-    spacing = sites.apart.numpy()[:, 1] if site_count > 1 else np.full(1, np.inf)
-    return Sums(masses, moments, energies, spacing)
+    return Sums(masses, moments, energies, sites.gaps.numpy())
 
 
 @wp.kernel
@@ -208,40 +217,67 @@ def _some_site(
 @wp.kernel
 def _find_around(
     own_places: wp.array[wp.vec3],
+    own_normals: wp.array[wp.vec3],
+    own_islands: wp.array[int],
     places: wp.array[wp.vec3],
+    normals: wp.array[wp.vec3],
+    islands: wp.array[int],
     grid: wp.uint64,
     first_radius: float,
+    at_once: int,
     # outputs
     out_around: wp.array2d[int],
     out_apart: wp.array2d[float],
+    out_counts: wp.array[int],
+    out_gaps: wp.array[float],
     out_spacings: wp.array[float],
 ):
     site = wp.tid()
-    limit = out_around.shape[1]
     place = own_places[site]
-    nearest = near_keys()
+    last = wp.uint64(0)  # the farthest of those that are known
     radius = first_radius
-    count = int(0)
-    while count < limit:
-        nearest = near_keys(NO_KEY)
-        count = int(0)
-        for other in wp.hash_grid_query(grid, place, radius):
-            square = wp.length_sq(places[other] - place)
-            if square <= radius * radius:
-                key = key_of(square, other)
-                # Insert in order and drop the last, without an unpredictable branch.
-                for slot in range(wp.static(SITES_AROUND)):
-                    kept = nearest[slot]
-                    nearest[slot] = wp.min(kept, key)
-                    key = wp.max(kept, key)
-                count += 1
-        radius = 1.5 * radius
-    ring = wp.min(FIRST_RING, limit)
+    known = int(0)
+    own_count = int(0)
+    gap = float(wp.inf)
     total = float(0.0)
-    for slot in range(limit):
-        apart = wp.sqrt(square_of(nearest[slot]))
-        out_around[site, slot] = point_of(nearest[slot])
-        out_apart[site, slot] = apart
-        if slot > 0 and slot < ring:
-            total += apart
-    out_spacings[site] = total / float(wp.max(ring - 1, 1))
+    ring = float(0.0)
+    while known < out_around.shape[1] and (known == 0 or own_count < wp.static(ENOUGH_AROUND)):
+        wanted = wp.min(at_once, out_around.shape[1] - known)
+        nearest = near_keys()
+        count = int(0)
+        while count < wanted:
+            nearest = near_keys(NO_KEY)
+            count = int(0)
+            for other in wp.hash_grid_query(grid, place, radius):
+                square = wp.length_sq(places[other] - place)
+                if square <= radius * radius:
+                    key = key_of(square, other)
+                    if known == 0 or key > last:
+                        # Insert in order and drop the last, without an unpredictable branch.
+                        for slot in range(wp.static(SITES_AROUND)):
+                            kept = nearest[slot]
+                            nearest[slot] = wp.min(kept, key)
+                            key = wp.max(kept, key)
+                        count += 1
+            if count < wanted:
+                radius = 1.5 * radius
+        for slot in range(wanted):
+            other = point_of(nearest[slot])
+            apart = wp.sqrt(square_of(nearest[slot]))
+            out_around[site, known + slot] = other
+            out_apart[site, known + slot] = apart
+            if known + slot > 0:
+                if detour_of(own_normals[site], own_islands[site], 1.0, normals[other], islands[other]) == 0.0:
+                    gap = wp.min(gap, apart)
+                    if own_count < wp.static(FIRST_RING):
+                        total += apart
+                        ring += 1.0
+                    own_count += 1
+        last = nearest[wanted - 1]
+        known += wanted
+    out_counts[site] = known
+    if ring == 0.0 and known > 1:  # all that are near are on the other side
+        gap = out_apart[site, known - 1]
+        total = gap
+    out_gaps[site] = gap
+    out_spacings[site] = total / wp.max(ring, 1.0)

@@ -149,7 +149,7 @@ def test_regions_of_a_group_and_of_numbers_are_kept_apart_alike(guides, ground):
     ground.vertex_groups.new(name="back").add([v.index for v in ground.data.vertices if v.co.y > 0.001], 1.0, "REPLACE")
     sides = [int(p.center.x > 0.0) for p in ground.data.polygons]
     ground.data.attributes.new("side", "INT", "FACE").data.foreach_set("value", sides)
-    grown(region_group="back", region_attribute="side", **FREE)
+    grown(region_group="back", region_attribute="side", guide_map=True, **FREE)
     indices, weights = guide_map(bpy.data.hair_curves["Hair"])
     roots, its_roots = points(bpy.data.objects["Hair"])[:, 0], points(guides)[:, 0]
     for axis, border in ((0, 0.0), (1, 0.0125)):
@@ -280,7 +280,7 @@ def test_hair_follows_the_regions_of_its_guides(guides):
 
 
 def test_the_guide_map_is_what_strands_follow(guides):
-    grown()
+    grown(guide_map=True)
     hair = bpy.data.objects["Hair"]
 
     def assert_stored():
@@ -300,7 +300,7 @@ def test_the_guide_map_is_what_strands_follow(guides):
 
 
 def test_the_guide_map_survives_a_file(guides, tmp_path):
-    grown()
+    grown(guide_map=True)
     stored = guide_map(bpy.data.hair_curves["Hair"])
     path = str(tmp_path / "map.blend")
     bpy.ops.wm.save_as_mainfile(filepath=path)
@@ -310,7 +310,7 @@ def test_the_guide_map_survives_a_file(guides, tmp_path):
 
 
 def test_the_guide_map_has_as_many_slots_as_are_wanted(guides):
-    grown(neighbour_limit=5)
+    grown(neighbour_limit=5, guide_map=True)
     hair = bpy.data.hair_curves["Hair"]
     assert guide_map(hair)[0].shape == (6000, 5)
     hair.vellus.hair.neighbour_limit = 3

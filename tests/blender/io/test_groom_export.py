@@ -9,6 +9,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.data import curves, guide_poses, scene
+from hair_addon.blender.groom import bindings
 from hair_addon.blender.groom.dynamics import frame_folders
 from hair_addon.blender.io import groom_export, groom_sources
 from hair_addon.core.errors import HairError
@@ -17,7 +18,7 @@ from hair_addon.core.long_work import Stopped, run_now
 from tests.support import alembic_reader
 from tests.support.exported import LAST, bake, export, shape, twist, widths, world
 from tests.support.following import update
-from tests.support.reading import attribute, evaluated_points, write_points
+from tests.support.reading import attribute, evaluated_points, points, write_points
 
 NAMES = ("P", "nVertices", "curveBasisAndType", "width", ".selfBnds")  # of curves in any Alembic file
 
@@ -86,6 +87,8 @@ def test_blender_takes_the_curves_back(twisted, tmp_path):
 
 
 def test_strands_are_given_the_guides_that_weigh_most(hair, tmp_path):
+    hair.data.vellus.hair.guide_map = True
+    update()
     export(tmp_path / "groom.abc")
     archive = alembic_reader.read(tmp_path / "groom.abc")
     found, of_guides = shape(archive, "Hair"), shape(archive, "Hair_guides")["groom_id"].only
@@ -100,6 +103,37 @@ def test_strands_are_given_the_guides_that_weigh_most(hair, tmp_path):
         named = [int(np.flatnonzero(of_guides == i)[0]) for i in ids[strand][shares[strand] > 0.0]]
         largest = sorted((w for i, w in of_strand.items() if i >= 0), reverse=True)[: len(named)]
         np.testing.assert_allclose([of_strand[i] for i in named], largest, rtol=1e-6)
+
+
+def test_guide_weights_are_exported_whether_hair_stores_them_or_not(hair, tmp_path):
+    """The same as stored ones, after guides were combed, and from a file that was opened a moment ago."""
+    guides = bpy.data.objects["Guides"]
+    combed = points(guides).copy()
+    combed[::2, 1:] += np.linspace(0.0, 0.2, combed.shape[1] - 1)[:, None] * np.float32([1.0, 0.5, 0.0])
+    before = exported_map(tmp_path / "before.abc")
+    write_points(guides, combed)
+    update()
+    assert "guide_index_0" not in hair.data.attributes
+    computed = exported_map(tmp_path / "computed.abc")
+    assert "guide_index_0" not in hair.data.attributes
+    assert not np.array_equal(computed[1], before[1])
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "groom.blend"))
+    bpy.ops.wm.open_mainfile(filepath=str(tmp_path / "groom.blend"))
+    opened = exported_map(tmp_path / "opened.abc")
+    bpy.data.hair_curves["Hair"].vellus.hair.guide_map = True
+    update()
+    assert "guide_index_0" in bpy.data.hair_curves["Hair"].attributes
+    stored = exported_map(tmp_path / "stored.abc")
+    for found in (computed, opened):
+        for array, expected in zip(found, stored, strict=True):
+            np.testing.assert_array_equal(array, expected)
+
+
+def exported_map(path):
+    """Guides of strands, and their weights, of the groom in a new Alembic file."""
+    export(path)
+    found = shape(alembic_reader.read(path), "Hair")
+    return found["groom_closest_guides"].only, found["groom_guide_weights"].only
 
 
 def test_hair_whose_settings_have_just_changed_is_exported_as_they_are(hair, tmp_path):
@@ -343,11 +377,11 @@ def test_what_cannot_be_exported_is_one_sentence(hair, tmp_path):
 def test_what_importers_do_is_said(hair, tmp_path):
     sphere = bpy.data.objects["Sphere"]
     sphere.data.uv_layers.remove(sphere.data.uv_layers[0])
-    hair.data.vellus.hair.guide_map = False
-    update()
+    hair.data.vellus.root_key = "of other strands"
+    bindings.invalidate(hair.data)
     notes = [str(note) for note in export(tmp_path / "groom.abc").notes]
     assert sum("no UV coordinates" in note for note in notes) == 2
-    assert any("stores no guide weights" in note for note in notes)
+    assert any("has no guide weights" in note for note in notes)
     found = shape(alembic_reader.read(tmp_path / "groom.abc"), "Hair")
     assert not {"groom_root_uv", "groom_closest_guides", "groom_guide_weights"} & set(found)
 

@@ -104,13 +104,14 @@ def test_the_tab_follows_the_pipeline():
     assert {panel.bl_category for panel in TAB} == {"Hair"}
 
 
-@pytest.mark.parametrize("strand_count", [1, 1000, 7777])
-def test_the_cost_that_is_shown_is_what_curves_take(guides, strand_count):
-    bpy.ops.vellus.interpolate_hair(strand_count=strand_count)
+@pytest.mark.parametrize(("strand_count", "guide_map"), [(1, True), (1000, False), (7777, True)])
+def test_the_cost_that_is_shown_is_what_curves_take(guides, strand_count, guide_map):
+    bpy.ops.vellus.interpolate_hair(strand_count=strand_count, guide_map=guide_map)
     curves = bpy.data.hair_curves["Hair"]
     widths = {"FLOAT": 4, "INT": 4, "INT8": 1, "FLOAT2": 8, "FLOAT_VECTOR": 12, "BOOLEAN": 1}
     taken = sum(len(a.data) * widths[a.data_type] for a in curves.attributes) + 4 * strand_count
-    assert cost.curves_bytes(strand_count, slot_count=curves.vellus.hair.neighbour_limit) == taken
+    slot_count = curves.vellus.hair.neighbour_limit if guide_map else 0
+    assert cost.curves_bytes(strand_count, slot_count=slot_count) == taken
 
 
 WARNINGS = {

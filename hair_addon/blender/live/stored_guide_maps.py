@@ -1,0 +1,49 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Guide weights are stored with hair when nodes begin to read them."""
+
+import bpy
+
+from ..data import attributes, curves, guide_map_readers
+from ..groom import bindings, guide_maps
+from ..host.notices import text_of
+from . import live_hair
+
+
+def follow(depsgraph):
+    """Store the guide weights of hair that nodes read them of, and that has none."""
+    changed = [update.id for update in depsgraph.updates]
+    if any(_may_have_nodes(datablock) for datablock in changed):
+        guide_map_readers.reading_cache.clear()
+    if not any(isinstance(i, bpy.types.Object | bpy.types.NodeTree | bpy.types.Material) for i in changed):
+        return
+    for hair in bpy.data.hair_curves:
+        if _lacks_map(hair) and guide_map_readers.are_read(hair):
+            _store(hair, depsgraph)
+
+
+def _may_have_nodes(datablock):
+    if isinstance(datablock, bpy.types.Object):
+        return datablock.type != "CURVES"  # whose modifiers are looked at each time
+    return isinstance(datablock, bpy.types.NodeTree | bpy.types.Material)
+
+
+def _lacks_map(hair):
+    state = hair.vellus
+    if state.kind != "HAIR" or state.guide_curves is None or not len(hair.curves) or text_of(state, "status"):
+        return False
+    if curves.is_hand_made(hair) or attributes.is_from_library(hair):
+        return False
+    return not attributes.has(hair, "guide_index_0", "INT", "CURVE")
+
+
+def _store(hair, depsgraph):
+    bound = bindings.of(hair)
+    if bound is not None:
+        bound.is_map_written = False
+        bound.is_due()
+        live_hair.write_soon(hair)
+        return
+    found = guide_maps.of(hair, depsgraph)
+    if found is not None:
+        curves.write_guide_map(hair, found)
+        hair.update_tag()
