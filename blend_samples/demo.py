@@ -26,7 +26,7 @@ from blend_samples.heads import portrait
 from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import ambient_visibility, drawing, visibility_buffer
-from hair_addon.blender.render import drawn_scene, hair_cache, offscreen
+from hair_addon.blender.render import drawn_scene, hair_cache, offscreen, scene_drawing
 from hair_addon.core.geometry import bspline
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
@@ -188,8 +188,8 @@ def _frames_per_second(drawn):
 
     def draw(view, buffer):
         with buffer.surfaces((0.0, 0.0, 0.0, 1.0)):
-            drawn_scene.draw_surfaces(drawn, view)
-        drawn_scene.draw_hair(drawn, view, buffer)
+            scene_drawing.draw_surfaces(drawn, view)
+        scene_drawing.draw_hair(drawn, view, buffer)
         with end.bind():
             drawing.resolve(buffer.color, 1)
             end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # waits until the frame is drawn

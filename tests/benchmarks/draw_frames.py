@@ -22,7 +22,7 @@ import hair_addon
 from blend_samples.heads import head
 from hair_addon.blender.data import curves, scene
 from hair_addon.blender.gpu import ambient_visibility, drawing, hair_shading, strand_textures, visibility_buffer
-from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render import drawn_scene, scene_drawing
 from hair_addon.core.grooming import following, groom
 from hair_addon.core.shading.fibre import kajiya_kay, strand_variation
 from hair_addon.core.shading.tables import lookup_tables, strand_tables
@@ -55,8 +55,8 @@ class Frame:
     def draw(self, drawn):
         """Draw a `DrawnScene` as a viewport does, whose surfaces Blender shades, and wait until that is done."""
         with self._buffer.surfaces():
-            drawn_scene.draw_hiding(drawn, self.view)
-        drawn_scene.draw_hair(drawn, self.view, self._buffer)
+            scene_drawing.draw_hiding(drawn, self.view)
+        scene_drawing.draw_hair(drawn, self.view, self._buffer)
         self.wait()
 
     def wait(self):

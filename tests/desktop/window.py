@@ -123,8 +123,8 @@ def offscreen_light(blender):
     record = drawing.view_record(*matrices, size[1], least_width=1.0)
     buffer = blender.gpu.visibility_buffer.VisibilityBuffer(*size)
     with buffer.surfaces():
-        drawn_scene.draw_hiding(drawn, record)
-    drawn_scene.draw_hair(drawn, record, buffer)
+        blender.render.scene_drawing.draw_hiding(drawn, record)
+    blender.render.scene_drawing.draw_hair(drawn, record, buffer)
     resolved = gpu.types.GPUTexture((region.width, region.height), format="RGBA32F")
     target = gpu.types.GPUFrameBuffer(color_slots=resolved)
     with target.bind():

@@ -10,13 +10,9 @@ from ..data import drawn_meshes
 from ..gpu import (
     ambient_visibility,
     drawing,
-    level_of_detail,
-    render_programs,
     scene_lights,
     strand_textures,
-    surface_shading,
     uniforms,
-    world_texture,
 )
 from ..gpu import lights as light_door
 from ..gpu.shadows import ShadowMaps
@@ -278,124 +274,3 @@ def _have_same_places(drawn, hair, surfaces):
         [surface.corner_count for surface, _parts in many] for many in ((*drawn.surfaces, *drawn.clear), surfaces)
     )
     return sizes == others and corners == other_corners
-
-
-def draw_hiding(drawn, view):
-    """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer."""
-    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for surface, _parts in drawn.surfaces:
-            drawing.draw_surface_depth(surface.batch, view, drawn.lights, "surface_hides.frag")
-
-
-def draw_hair(drawn, view, buffer, is_viewport=False):
-    """Draw all hair in front of the surfaces of a `VisibilityBuffer`.
-
-    view: a `uniforms.VIEW` record; is_viewport: only as much of it as is seen from there, and as the artist wants.
-    """
-    lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
-    buffer.add_hair(_hair_in_view(drawn, view, is_viewport), lights, view)
-
-
-def find_hair(drawn, view, buffer, chosen=None):
-    """Find the nearest strands of hair for a `VisibilityBuffer` as a viewport shows them, and shade none.
-
-    chosen: indices of the hair, None for all.
-    """
-    hair = _hair_in_view(drawn, view, is_viewport=True)
-    buffer.find_hair(hair if chosen is None else [hair[index] for index in chosen], drawn.lights, view)
-
-
-def _hair_in_view(drawn, view, is_viewport):
-    hair = []
-    for (strands, shading, to_world, color, part), seen in zip(drawn.hair, drawn.hair_visibility, strict=True):
-        steps = level_of_detail.steps_of(strands, view, to_world, part) if is_viewport else drawing.Steps()
-        hair.append((strands, shading, to_world, color, drawn.shadow_maps.samplers | seen, steps))
-    return hair
-
-
-def draw_behind_hair(drawn, view, buffer, is_transparent):
-    """Fill a `VisibilityBuffer` with the background, unless it is to be left empty, and with all surfaces."""
-    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
-    with buffer.surfaces(background):
-        if drawn.world.image is not None and not is_transparent:
-            world_texture.draw_background(drawn.world, view, *buffer.size)
-        draw_surfaces(drawn, view)
-
-
-def draw_arrival(drawn, view, buffer):
-    """Return a texture of light visibility for the content of a `VisibilityBuffer`, to which hair was added last."""
-    with buffer.surfaces_of_part(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "surface_arrival.frag", are_holdouts_left_out=True)
-    return buffer.part_by(render_programs.strand_arrival_program())
-
-
-def draw_hair_shadow(drawn, view, buffer):
-    """Return a texture of the part of the light on surfaces that hair lets through; 1 where there is no surface."""
-    white = (1.0, 1.0, 1.0, 1.0)
-    with buffer.surfaces_of_part(background=white), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "hair_shadow.frag")
-    return buffer.part(background=white)
-
-
-def draw_viewport_shadow(drawn, view):
-    """As `draw_hiding`, and as black over what Blender draws, whose alpha is the part of the light that hair stops."""
-    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        _draw_by_lights(drawn, view, "hair_shadow_view.frag")
-
-
-def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
-    """Draw how much of the light reaches surfaces; are_holdouts_left_out: leave the picture empty where they are."""
-    _see_through_hair(drawn, view)
-    program = render_programs.lit_surface_program(fragment)
-    for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
-        if parts is None and are_holdouts_left_out:
-            drawing.draw_surface_depth(surface.batch, view, lights, "surface_hides.frag")
-            continue
-        placed = view.copy()
-        placed["row_strands"] = surface.row_corners
-        drawing.draw_triangles(surface.batch, program, placed, lights, samplers)
-
-
-def _light_of(drawn, solid):
-    """(`uniforms.LIGHTS` records, {sampler: texture} dictionaries) of each surface that is solid, or of each clear."""
-    count = len(drawn.surfaces)
-    of_all = [drawn.lights] * len(drawn.surface_visibility) if drawn.surface_lights is None else drawn.surface_lights
-    chosen = slice(count) if solid else slice(count, None)
-    return of_all[chosen], [drawn.shadow_maps.samplers | seen for seen in drawn.surface_visibility[chosen]]
-
-
-def _see_through_hair(drawn, view):
-    """The hair's shadow on a surface takes the colour of the hair with most strands: one colour a draw call."""
-    if drawn.hair:
-        shading = drawn.hair[ambient_visibility.densest([strands for strands, *_ in drawn.hair])][1]
-        view["hair_forward"][:3], view["seen_opacity"] = shading.forward, shading.opacity
-
-
-# By how much of the depth range surfaces are drawn farther at first: more than rounding, so that none hides itself.
-_FARTHER = 1e-5
-
-
-def _farther(view):
-    """A view that sees all in the same places, but a little farther away."""
-    record = view.copy()
-    record["world_to_clip"][:, 2] += _FARTHER * record["world_to_clip"][:, 3]  # transposed
-    return record
-
-
-def draw_surfaces(drawn, view):
-    """Draw all surfaces with depth test into the bound framebuffer, and over them those that are clear.
-
-    Their depths are drawn first, so that what is behind another surface is not shaded.
-    """
-    _see_through_hair(drawn, view)
-    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        with drawing.depth_alone():
-            draw_hiding(drawn, _farther(view))
-        for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
-            if parts is None:
-                drawing.draw_surface_depth(surface.batch, view, lights, "surface_hides.frag")
-                continue
-            surface_shading.draw(surface, parts, view, lights, samplers)
-    with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA_PREMULT"):
-        for (surface, parts), lights, samplers in zip(drawn.clear, *_light_of(drawn, solid=False), strict=True):
-            surface_shading.draw(surface, parts, view, lights, samplers)

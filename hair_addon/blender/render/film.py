@@ -7,7 +7,7 @@ import numpy as np
 from ...core.imaging import pixel_sampling
 from ..gpu import drawing, render_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
-from . import drawn_scene, motion_vectors
+from . import motion_vectors, scene_drawing
 
 _MOST_SAMPLES = 4096  # along a tile's side: its textures take 340 MB, 870 with all passes
 
@@ -77,8 +77,8 @@ class Film:
         whole = tuple(length * self._per_side for length in size)
         corner = (length * self._per_side - self._margin for length in place)
         view = drawing.pass_record(world_to_view, view_to_clip, whole, turn, (*corner, *self.samples.size))
-        drawn_scene.draw_behind_hair(drawn, view, self.samples, self.is_transparent)
-        drawn_scene.draw_hair(drawn, view, self.samples)
+        scene_drawing.draw_behind_hair(drawn, view, self.samples, self.is_transparent)
+        scene_drawing.draw_hair(drawn, view, self.samples)
         weights = [
             pixel_sampling.filter_weights(self._per_side, self._filter_width, shift)
             for shift in drawing.pass_shift(turn)
@@ -110,9 +110,9 @@ class Film:
         if name == "Vector":
             return motion_vectors.draw(drawn, self.motion, view, self.samples)
         if name == "Shadow":
-            return drawn_scene.draw_arrival(drawn, view, self.samples)
+            return scene_drawing.draw_arrival(drawn, view, self.samples)
         if name == "Hair Shadow":
-            return drawn_scene.draw_hair_shadow(drawn, view, self.samples)
+            return scene_drawing.draw_hair_shadow(drawn, view, self.samples)
         return self.samples.part_of_light(*LOBES[name])
 
     def _add(self, program, samplers, sums):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..gpu import drawing, shaders
 from ..gpu.visibility_buffer import VisibilityBuffer
-from . import drawn_scene
+from . import scene_drawing
 from .history import History
 
 SAMPLE_COUNT = 32  # of a pixel, in all passes of a picture
@@ -67,10 +67,10 @@ class HairPicture:
             outline.add_pass(drawn, view, self._pass)
         with self._pass.surfaces():
             if is_shadowed and not is_see_through:
-                drawn_scene.draw_viewport_shadow(drawn, view)
+                scene_drawing.draw_viewport_shadow(drawn, view)
             elif not is_see_through:
-                drawn_scene.draw_hiding(drawn, view)
-        drawn_scene.draw_hair(drawn, view, self._pass, is_viewport=True)
+                scene_drawing.draw_hiding(drawn, view)
+        scene_drawing.draw_hair(drawn, view, self._pass, is_viewport=True)
         if is_outlined:
             outline.add_seen(self._pass)
         with self._sum.bind():

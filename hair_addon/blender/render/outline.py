@@ -11,7 +11,7 @@ import gpu
 import numpy as np
 
 from ..gpu import drawing, shaders
-from . import drawn_scene
+from . import scene_drawing
 
 # Passes after which the line no longer changes: thin strands are in some samples and not in others.
 _PASS_COUNT = 4
@@ -84,7 +84,7 @@ class HairOutline:
         """Find the hair where nothing hides it in a `VisibilityBuffer`; view: a `uniforms.VIEW` record."""
         with buffer.surfaces():
             pass
-        drawn_scene.find_hair(drawn, view, buffer, self._channels)
+        scene_drawing.find_hair(drawn, view, buffer, self._channels)
         self._add(buffer, zip(self._channels.values(), buffer.segment_ranges, strict=True))
         self._pass_count += 1
 

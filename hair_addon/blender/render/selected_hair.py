@@ -3,7 +3,7 @@
 
 from ..gpu import drawing
 from ..gpu.visibility_buffer import VisibilityBuffer
-from . import drawn_scene, hair_picture
+from . import hair_picture, scene_drawing
 from .outline import HairOutline, OutlineStyle
 
 # Blender does not outline sculpted or edited objects, and strokes of the comb should be visible.
@@ -71,8 +71,8 @@ class LoneOutline:
         view = drawing.pass_record(world_to_view, view_to_clip, self._buffer.size, self._pass_count)
         self._outline.add_pass(drawn, view, self._buffer)
         with self._buffer.surfaces():
-            drawn_scene.draw_hiding(drawn, view)
-        drawn_scene.find_hair(drawn, view, self._buffer)
+            scene_drawing.draw_hiding(drawn, view)
+        scene_drawing.find_hair(drawn, view, self._buffer)
         self._outline.add_seen(self._buffer)
         self._pass_count += 1
 

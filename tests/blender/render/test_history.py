@@ -9,7 +9,7 @@ from scipy.ndimage import binary_dilation
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import drawing, strand_textures
 from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
-from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture, motion_vectors, view_film
+from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture, motion_vectors, scene_drawing, view_film
 from tests.support.reading import points, write_points
 
 SIZE = 80
@@ -145,8 +145,8 @@ def seen(drawn, view):
     """(record of a pass over a scene, buffer that hair was found for)."""
     buffer, record = VisibilityBuffer(SIZE, SIZE), drawing.pass_record(*view, (SIZE, SIZE))
     with buffer.surfaces():
-        drawn_scene.draw_hiding(drawn, record)
-    drawn_scene.find_hair(drawn, record, buffer)
+        scene_drawing.draw_hiding(drawn, record)
+    scene_drawing.find_hair(drawn, record, buffer)
     return record, buffer
 
 

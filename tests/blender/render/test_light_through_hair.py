@@ -9,7 +9,7 @@ from hair_addon import api
 from hair_addon.blender.data import scene as scene_data
 from hair_addon.blender.gpu import drawing
 from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
-from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render import drawn_scene, scene_drawing
 
 PERIOD = 0.04  # [m] of a sheet of hair that is thin and thick in turns
 STRAND_COUNT = 10_000
@@ -67,7 +67,7 @@ def light_along_x(pass_count=4):
     buffer, light = VisibilityBuffer(*SIZE), 0.0
     for turn in range(pass_count):
         with buffer.surfaces():
-            drawn_scene.draw_surfaces(drawn, drawing.pass_record(*camera, SIZE, turn))
+            scene_drawing.draw_surfaces(drawn, drawing.pass_record(*camera, SIZE, turn))
         light = light + np.array(buffer.color.read(), np.float32).reshape(*SIZE[::-1], 4)[..., :3].mean(axis=0)
     return light / pass_count
 

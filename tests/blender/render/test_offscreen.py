@@ -20,7 +20,7 @@ from hair_addon.blender.gpu import (
 )
 from hair_addon.blender.gpu.lights import World
 from hair_addon.blender.groom import pipeline
-from hair_addon.blender.render import drawn_scene, hair_cache, offscreen
+from hair_addon.blender.render import drawn_scene, hair_cache, offscreen, scene_drawing
 from hair_addon.blender.settings import preferences
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.shading.fibre import kajiya_kay
@@ -153,7 +153,7 @@ def seen_from_behind(drawn):
     buffer = visibility_buffer.VisibilityBuffer(64, 64)
     with buffer.surfaces():
         pass
-    drawn_scene.draw_hair(drawn, view, buffer)
+    scene_drawing.draw_hair(drawn, view, buffer)
     pixels = np.array(buffer.color.read(), np.float32).reshape(-1, 4)
     return pixels[pixels[:, 3] > 0.0][:, :3].mean(axis=0)
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.ndimage import distance_transform_edt, label
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.render import drawn_scene, hair_picture, region_pictures, selected_hair, viewport
+from hair_addon.blender.render import drawn_scene, hair_picture, region_pictures, scene_drawing, selected_hair, viewport
 from hair_addon.blender.render.outline import HairOutline, OutlineStyle
 
 SIZE = 160
@@ -147,8 +147,8 @@ def region(lit):
 def test_a_redraw_finds_hair_again_only_for_another_outline(region, lit, monkeypatch):
     lit.select_set(True)
     drawn, finds, measures = read(), [], []
-    real, real_measure = drawn_scene.find_hair, HairOutline._measure
-    monkeypatch.setattr(drawn_scene, "find_hair", lambda *arguments: (finds.append(1), real(*arguments)))
+    real, real_measure = scene_drawing.find_hair, HairOutline._measure
+    monkeypatch.setattr(scene_drawing, "find_hair", lambda *arguments: (finds.append(1), real(*arguments)))
     monkeypatch.setattr(HairOutline, "_measure", lambda outline: (measures.append(1), real_measure(outline)))
     place, view = region
     wanted = selected_hair.outlined(Context(), drawn)

@@ -11,7 +11,7 @@ from hair_addon.blender.data import surface_materials
 from hair_addon.blender.data.scene import read_camera
 from hair_addon.blender.gpu import drawing, visibility_buffer
 from hair_addon.blender.host import notices
-from hair_addon.blender.render import drawn_scene, offscreen
+from hair_addon.blender.render import drawn_scene, offscreen, scene_drawing
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
 SIZE = 48
@@ -203,7 +203,7 @@ def test_a_frame_of_an_unchanged_scene_reads_no_material(stage, monkeypatch):
     camera = read_camera(stage, depsgraph, SIZE, SIZE)
     for _frame in range(2):
         buffer = visibility_buffer.VisibilityBuffer(SIZE, SIZE)
-        drawn_scene.draw_behind_hair(drawn, drawing.view_record(*camera, SIZE), buffer, is_transparent=True)
+        scene_drawing.draw_behind_hair(drawn, drawing.view_record(*camera, SIZE), buffer, is_transparent=True)
 
 
 def test_what_is_behind_a_clear_surface_is_seen_through_its_highlight(stage):

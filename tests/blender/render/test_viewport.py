@@ -18,7 +18,7 @@ from hair_addon.blender.gpu import display_transform, shaders
 from hair_addon.blender.host import notices
 from hair_addon.blender.host.caches import Cache
 from hair_addon.blender.live import invalidation
-from hair_addon.blender.render import drawn_scene, hair_picture, region_pictures, viewport
+from hair_addon.blender.render import drawn_scene, hair_picture, region_pictures, scene_drawing, viewport
 from hair_addon.core.errors import HairError
 from tests.support import glsl
 from tests.support.rendering import rendered
@@ -227,8 +227,8 @@ def test_a_view_at_rest_is_drawn_until_it_is_fine_and_no_more(region, monkeypatc
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
     draws = []
-    real = drawn_scene.draw_hair
-    monkeypatch.setattr(drawn_scene, "draw_hair", lambda *args, **kwargs: (draws.append(1), real(*args, **kwargs)))
+    real = scene_drawing.draw_hair
+    monkeypatch.setattr(scene_drawing, "draw_hair", lambda *args, **kwargs: (draws.append(1), real(*args, **kwargs)))
     place, view = region
     pass_count = hair_picture.SAMPLE_COUNT // hair_picture.samples_per_side() ** 2
 
