@@ -33,6 +33,15 @@ class RenderSettings(Settings):
         high=1024,
         soft_high=64,
     )
+    multiple_scattering: str = param(
+        "GRID",
+        "How renders find light that comes to a strand from other strands and from surfaces",
+        label="Multiple Scattering",
+        choices=(
+            ("GRID", "Light Grid", "Paths of light through a grid of strands, in a few seconds for each frame"),
+            ("DUAL", "Dual Scattering", "As in the viewport: from the number of strands before and behind each"),
+        ),
+    )
     is_hair_only: bool = param(
         False,
         "Render hair without surfaces: they hide it and cast shadows on it, and leave the picture empty",
