@@ -38,7 +38,7 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
     grid = strand_grid.build(systems, fibres)
     sums = gather.gather(grid, _surroundings(drawn), rays, count, len(systems), seed, preferences.device())
     seen = [
-        {**textures, "light_grid": light_grid.upload(voxel_means.smooth_means(of_hair))}
+        {**textures, "light_grid": light_grid.upload(voxel_means.smooth_ratios(of_hair, count))}
         for textures, of_hair in zip(drawn.hair_visibility, sums, strict=True)
     ]
     lights = drawn.lights.copy()

@@ -150,13 +150,16 @@ def even_return(fibre: Fibre, viewer: wp.vec3):
     sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
     cos_o = wp.sqrt(1.0 - sin_o * sin_o)
     total = wp.vec3(0.0, 0.0, 0.0)
+    in_all = float(0.0)
     for step in range(8):
-        h = (float(step) + 0.5) / 8.0
-        fresnel = reflectance(cos_o * wp.sqrt(1.0 - h * h), fibre.eta)
-        crossing = transmittance(h, sin_o, cos_o, fibre.eta, fibre.sigma_a)
+        gamma = (float(step) + 0.5) * (PI / 16.0)  # in which reflection at the edges is smooth
+        weight = wp.cos(gamma)
+        fresnel = reflectance(cos_o * weight, fibre.eta)
+        crossing = transmittance(wp.sin(gamma), sin_o, cos_o, fibre.eta, fibre.sigma_a)
         for path in range(4):
-            total += attenuation(path, fresnel, crossing)
-    return total / 8.0
+            total += weight * attenuation(path, fresnel, crossing)
+        in_all += weight
+    return total / in_all
 
 
 @wp.func

@@ -2,8 +2,9 @@
 """Light among strands: paths from the viewer through a grid of their pieces, gathered at the strands that are seen.
 
 Light of lamps that meets a seen strand without having met anything is left out: it is drawn with sharp shadows. All
-other light is here: what strands, surfaces and the world send to the seen strands, after any number of events. It is
-divided by what each strand would send back of even light, so that its mean over a voxel serves all strands there.
+other light is here: what strands, surfaces and the world send to the seen strands, after any number of events. Beside it
+is what the same strands would send back of even light: by the ratio of both each strand of a voxel is shaded as itself, and
+their mean is that of the paths.
 """
 
 from dataclasses import dataclass
@@ -23,7 +24,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
-_LEAST_RETURN = wp.constant(1e-4)
 _FAR = wp.constant(grid_walk.FAR)
 _VOXEL = wp.constant(float(CELLS_A_VOXEL))
 _LEAST_PATHS = 4096  # fewer are not worth a thread
@@ -105,6 +105,7 @@ def _gather(
     voxels: wp.vec3i,
     out_voxel: wp.array[int],
     out_light: wp.array[wp.vec3],
+    out_even: wp.array[wp.vec3],
     first: int,
 ):
     path = first + wp.tid()
@@ -115,7 +116,6 @@ def _gather(
     direction = wp.normalize(rays.far + x * rays.far_x + y * rays.far_y - position)
     weight = wp.vec3(1.0, 1.0, 1.0)
     light = wp.vec3(0.0, 0.0, 0.0)
-    even = wp.vec3(1.0, 1.0, 1.0)
     event = int(0)
     while event < _MOST_EVENTS:
         met, after = walk(medium, position, direction, _FAR, state)
@@ -135,7 +135,7 @@ def _gather(
                 vy = wp.clamp(int(at[1]), 0, voxels[1] - 1)
                 vz = wp.clamp(int(at[2]), 0, voxels[2] - 1)
                 out_voxel[path] = ((medium.systems[met.index] * voxels[2] + vz) * voxels[1] + vy) * voxels[0] + vx
-                even = even_return(fibre, viewer)
+                out_even[path] = even_return(fibre, viewer)
                 first_lamp = sources.drawn_count
             if first_lamp < sources.count:
                 towards, arriving, after = _light_of_lamps(
@@ -164,8 +164,7 @@ def _gather(
             if wp.randf(state) * _DIM >= brightest:
                 event = _MOST_EVENTS
             weight = weight * (_DIM / wp.max(brightest, 1e-12))
-    for channel in range(3):
-        out_light[path][channel] = light[channel] / wp.max(even[channel], _LEAST_RETURN)
+    out_light[path] = light
 
 
 def gather(
@@ -177,7 +176,7 @@ def gather(
     seed: int = 0,
     device: wp.DeviceLike = "cpu",
 ) -> np.ndarray:
-    """(systems, Z, Y, X, 4) float64 by voxel: the sum over paths of their light RGB, and how many there are.
+    """(systems, Z, Y, X, 6) float64 by voxel: sums over paths of their light RGB, and of what even light would give.
 
     path_count: of rays over the picture, rounded to a square; system_count: how many hair systems the grid is of.
     """
@@ -186,21 +185,21 @@ def gather(
         mesh = _mesh(surroundings)
         medium, sources = _medium(grid, surroundings, mesh), _sources(surroundings)
         voxel = wp.full(side * side, -1, dtype=int)
-        light = wp.zeros(side * side, dtype=wp.vec3)
+        light, even = (wp.zeros(side * side, dtype=wp.vec3) for _ in range(2))
         corners = [wp.vec3(*map(float, getattr(rays, name))) for name in ("near", "near_x", "near_y")]
         corners += [wp.vec3(*map(float, getattr(rays, name))) for name in ("far", "far_x", "far_y")]
         lens = _Rays()
         lens.near, lens.near_x, lens.near_y, lens.far, lens.far_x, lens.far_y = corners
         lens.side = side
-        inputs = [medium, sources, lens, seed, wp.vec3i(*grid.voxels), voxel, light]
+        inputs = [medium, sources, lens, seed, wp.vec3i(*grid.voxels), voxel, light, even]
         shares = parallel.share_count(side * side, wp.get_device(device), _LEAST_PATHS)
         parallel.launch_shares(_gather, side * side, inputs, [[] for _ in range(shares)], device)
-        found, light = voxel.numpy(), light.numpy().astype(np.float64)
+        found, light, even = (array.numpy() for array in (voxel, light, even))
     is_hair = found >= 0
     count = system_count * int(np.prod(grid.voxels))
-    channels = [*light[is_hair].T, np.ones(np.count_nonzero(is_hair))]
+    channels = [*light[is_hair].T, *even[is_hair].T]
     sums = [np.bincount(found[is_hair], weights=values, minlength=count) for values in channels]
-    return np.stack(sums, axis=-1).reshape(system_count, *grid.voxels[::-1], 4)
+    return np.stack(sums, axis=-1).reshape(system_count, *grid.voxels[::-1], 6)
 
 
 def _mesh(surroundings):

@@ -1,32 +1,34 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Sums over paths by voxel → means without holes: where there are few paths, those of larger voxels count as well."""
+"""Sums over paths by voxel → ratios without holes: where there are few paths, those of larger voxels count as well."""
 
 import numpy as np
 
-_PRIOR = 16.0  # paths that the mean of the voxels around stands for
+_PRIOR = 16.0  # paths that the ratio of the voxels around stands for
 
 
-def smooth_means(sums: np.ndarray) -> np.ndarray:
-    """(Z, Y, X, 4) sums of RGB and their count → (Z, Y, X, 3) means; black where there is nothing at all.
+def smooth_ratios(sums: np.ndarray, path_count: int) -> np.ndarray:
+    """(Z, Y, X, 6) sums of light RGB and of even light RGB over some paths → (Z, Y, X, 3) ratios of both.
 
-    From large voxels to small ones each mean is drawn to that of the voxel around it, by a fixed number of paths.
+    From large voxels to small ones each ratio is drawn to that of the voxel around it, by a fixed number of average paths.
+    Black where there is no light at all.
     """
     levels = [np.asarray(sums, np.float64)]
     while max(levels[-1].shape[:3]) > 1:
         levels.append(_halved(levels[-1]))
     total = levels.pop()
-    means = total[..., :3] / np.maximum(total[..., 3:], 1.0)
+    ratios = total[..., :3] / np.maximum(total[..., 3:], 1e-12)
+    prior = np.maximum(_PRIOR / max(path_count, 1) * total[0, 0, 0, 3:], 1e-12)
     for level in reversed(levels):
-        around = _doubled(means, level.shape)
-        means = (level[..., :3] + _PRIOR * around) / (level[..., 3:] + _PRIOR)
-    return means
+        around = _doubled(ratios, level.shape)
+        ratios = (level[..., :3] + prior * around) / (level[..., 3:] + prior)
+    return ratios
 
 
 def _halved(sums):
     """Sums over blocks of 2 × 2 × 2 voxels."""
     padded = np.pad(sums, [(0, length % 2) for length in sums.shape[:3]] + [(0, 0)])
     z, y, x = (length // 2 for length in padded.shape[:3])
-    return padded.reshape(z, 2, y, 2, x, 2, 4).sum(axis=(1, 3, 5))
+    return padded.reshape(z, 2, y, 2, x, 2, -1).sum(axis=(1, 3, 5))
 
 
 def _doubled(values, shape):
