@@ -3,12 +3,11 @@
 
 bool has_light_grid()
 {
-  return lights.grid_corner.w > 0.0;
+  return lights.grid_scale.x > 0.0;
 }
 
 // Radiance that arrives at visible strands around a place, as even light that they would send to the viewer alike.
 vec3 light_among_strands(vec3 position)
 {
-  vec3 at = (position - lights.grid_corner.xyz) * lights.grid_corner.w;
-  return textureLod(light_grid, at / vec3(textureSize(light_grid, 0)), 0.0).rgb;
+  return textureLod(light_grid, (position - lights.grid_corner.xyz) * lights.grid_scale.xyz, 0.0).rgb;
 }

@@ -95,7 +95,7 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
         has_lens = camera_lens.read_lens(blender_scene, depsgraph, self.camera_override) is not None
         lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
-        path_count = -(-light_paths.path_count(blender_scene) // len(offsets))
+        path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
         film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count
         frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
         others = self._others(depsgraph, size, views) if "Vector" in passes else {}

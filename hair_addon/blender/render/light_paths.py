@@ -6,19 +6,21 @@ from dataclasses import replace
 import numpy as np
 
 from ...core.imaging import lamps
-from ...core.shading import appearance
+from ...core.shading import appearance, light_paths
 from ...core.shading.fibre import strand_variation
 from ...core.shading.fibre.principled import varied_roughness
-from ...core.shading.light_paths import gather, strand_grid, voxel_means
 from ..gpu import drawing, light_grid, world_texture
 from ..settings import preferences
 
-_PATH_COUNT = 400_000  # of rays over the part of the picture that holds the hair
+_PATHS_A_PIXEL = 16
+_LEAST_PATHS, _MOST_PATHS = 50_000, 400_000  # over the part of the picture that holds the hair
 
 
-def path_count(blender_scene):
-    """How many paths a picture takes, 0 with dual scattering."""
-    return _PATH_COUNT if blender_scene.vellus.multiple_scattering == "GRID" else 0
+def path_count(blender_scene, size):
+    """How many paths a picture of a size (width, height) [pixels] takes, 0 with dual scattering."""
+    if blender_scene.vellus.multiple_scattering == "DUAL":
+        return 0
+    return min(max(_PATHS_A_PIXEL * size[0] * size[1], _LEAST_PATHS), _MOST_PATHS)
 
 
 def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
@@ -27,22 +29,24 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
     The same scene for no paths, without hair in view, where lights are linked, and unless all hair is shaded by the
     energy-conserving model: dual scattering lights all of it then.
     """
+    if not count or not drawn.hair:
+        return drawn
     looks = [layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers]
     is_usual = all(layer.fibre is not None for layer in looks) and drawn.lamps.are_linked_to_all
-    rays = rays_of(drawn.hair, world_to_view, view_to_clip) if count and drawn.hair and is_usual else None
+    rays = rays_of(drawn.hair, world_to_view, view_to_clip) if is_usual else None
     if rays is None:
         return drawn
     fibres = [layer.fibre[0] for layer in looks]
     firsts = np.cumsum([0, *(len(shading.layers) for _strands, shading, *_ in drawn.hair)])
     systems = [_strands_of(*hair[:3], first) for hair, first in zip(drawn.hair, firsts[:-1], strict=True)]
-    grid = strand_grid.build(systems, fibres)
-    sums = gather.gather(grid, _surroundings(drawn), rays, count, len(systems), seed, preferences.device())
+    grid = light_paths.strand_grid.build(systems, fibres)
+    sums = light_paths.gather.gather(grid, _surroundings(drawn), rays, count, len(systems), seed, preferences.device())
     seen = [
-        {**textures, "light_grid": light_grid.upload(voxel_means.smooth_ratios(of_hair, count))}
+        {**textures, "light_grid": light_grid.upload(light_paths.voxel_means.smooth_ratios(of_hair, count))}
         for textures, of_hair in zip(drawn.hair_visibility, sums, strict=True)
     ]
     lights = drawn.lights.copy()
-    lights["grid_corner"] = *grid.corner, 1.0 / (grid.cell * strand_grid.CELLS_A_VOXEL)
+    lights["grid_corner"][:3], lights["grid_scale"][:3] = grid.corner, 1.0 / (grid.cell * grid.shape)
     return replace(drawn, lights=lights, hair_lights=None, hair_visibility=seen)
 
 
@@ -64,7 +68,7 @@ def rays_of(hair, world_to_view, view_to_clip):
             point = np.linalg.solve(world_to_clip, [x, y, depth, 1.0])
             corners.append(point[:3] / point[3])
     near, near_x, near_y, far, far_x, far_y = corners
-    return gather.Rays(near, near_x - near, near_y - near, far, far_x - far, far_y - far)
+    return light_paths.gather.Rays(near, near_x - near, near_y - near, far, far_x - far, far_y - far)
 
 
 def _strands_of(strands, shading, to_world, first):
@@ -89,7 +93,7 @@ def _strands_of(strands, shading, to_world, first):
             return np.broadcast_to(np.asarray(settings.sigma_a, float), (len(strand), 3))
         return strand_variation.strand_sigma_a(variation, randoms[strand], place)
 
-    return strand_grid.Strands(
+    return light_paths.strand_grid.Strands(
         points,
         strands.radii * drawing.scale_of(to_world),
         absorption,
@@ -108,7 +112,7 @@ def _surroundings(drawn):
     importance = lamps.irradiance(found, places).mean(axis=(1, 2)) if len(found) else np.zeros(0)
     corners = [corners for corners, _color in drawn.meshes]
     colors = [np.tile(color, (len(corners) // 3, 1)) for corners, color in drawn.meshes]
-    return gather.Surroundings(
+    return light_paths.gather.Surroundings(
         np.concatenate([np.zeros((0, 3), np.float32), *corners]),
         np.concatenate([np.zeros((0, 3)), *colors]),
         found,

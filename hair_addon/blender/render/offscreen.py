@@ -47,7 +47,7 @@ def drawing_picture(settings):
         raise HairError("Pictures are drawn by perspective and orthographic cameras: render a frame instead.")
     camera = scene.read_camera(context.scene, depsgraph, width, height)
     drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
-    drawn = light_paths.with_grid(drawn, *camera, light_paths.path_count(context.scene))
+    drawn = light_paths.with_grid(drawn, *camera, light_paths.path_count(context.scene, size))
     picture = film.Film(size, per_side, ("Combined",), settings.is_transparent)
     for turn in range(pass_count):
         yield Stage("Drawing", 0.4 + 0.55 * turn / pass_count)

@@ -34,12 +34,12 @@ class RenderSettings(Settings):
         soft_high=64,
     )
     multiple_scattering: str = param(
-        "GRID",
+        "DUAL",
         "How renders find light that comes to a strand from other strands and from surfaces",
         label="Multiple Scattering",
         choices=(
-            ("GRID", "Light Grid", "Paths of light through a grid of strands, in a few seconds for each frame"),
-            ("DUAL", "Dual Scattering", "As in the viewport: from the number of strands before and behind each"),
+            ("DUAL", "Dual", "As in the viewport: by how many strands are before and behind each"),
+            ("GRID", "Light Grid", "Paths of light through a grid of strands; takes some seconds more for each frame"),
         ),
     )
     is_hair_only: bool = param(

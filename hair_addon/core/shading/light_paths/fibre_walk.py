@@ -190,7 +190,7 @@ def turn(fibre: Fibre, viewer: wp.vec3, weight: wp.vec3, random: wp.uint32):
     sin_turned = sin_o * wp.cos(shift) - cos_o * wp.sin(shift)
     cos_turned = wp.abs(cos_o * wp.cos(shift) + sin_o * wp.sin(shift))
     u = wp.max(wp.randf(state), 1e-6)
-    cos_t = 1.0 + v * wp.log(u + (1.0 - u) * wp.exp(-2.0 / v))  # [DEon13]
+    cos_t = 1.0 + v * wp.log(u + (1.0 - u) * wp.exp(-2.0 / v))
     sin_t = wp.sqrt(wp.max(0.0, 1.0 - cos_t * cos_t))
     sin_i = -cos_t * sin_turned + sin_t * wp.cos(2.0 * PI * wp.randf(state)) * cos_turned
     sin_i = wp.clamp(sin_i, -_STEEPEST, _STEEPEST)

@@ -2,9 +2,9 @@
 """Light among strands: paths from the viewer through a grid of their pieces, gathered at the strands that are seen.
 
 Light of lamps that meets a seen strand without having met anything is left out: it is drawn with sharp shadows. All
-other light is here: what strands, surfaces and the world send to the seen strands, after any number of events. Beside it
-is what the same strands would send back of even light: by the ratio of both each strand of a voxel is shaded as itself, and
-their mean is that of the paths.
+other light is here: what strands, surfaces and the world send to the seen strands, after any number of events. Beside
+it is what the same strands would send back of even light: by the ratio of both each strand of a voxel is shaded as
+itself, and their mean is that of the paths.
 """
 
 from dataclasses import dataclass
@@ -33,9 +33,10 @@ _LEAST_PATHS = 4096  # fewer are not worth a thread
 class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
-    corners: (3 F, 3) of triangles [m]; albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light` in
-    shaders/include/lights.glsl; drawn_count: how many of the first light seen strands elsewhere; importance: (N,) of
-    lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, as core/imaging/environment.py has pictures.
+    corners: (3 F, 3) of triangles [m]; albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light`
+    in shaders/include/lights.glsl; drawn_count: of how many, the first, light on seen strands is left out; importance:
+    (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude and latitude
+    as core/imaging/environment.py takes it apart.
     """
 
     corners: np.ndarray
@@ -71,15 +72,15 @@ class _Rays:
 
 @wp.func
 def _light_of_lamps(
-    medium: Medium, sources: Sources, first: int, position: wp.vec3, normal: wp.vec3, random: wp.uint32
+    medium: Medium, sources: Sources, first: int, position: wp.vec3, normal: wp.vec3, own: int, random: wp.uint32
 ):
-    """(direction, irradiance, random state) of a lamp's light that arrives; normal: of a surface, 0 on strands."""
-    lit, state = lit_by(sources, first, position, 0.5 * medium.cell, random)
+    """(direction, irradiance, random state) of a lamp's light that arrives; normal: of a surface, 0 on strand `own`."""
+    lit, state = lit_by(sources, first, position, 0.5 * medium.least_cell, random)
     arriving = lit.irradiance
     if wp.dot(normal, normal) > 0.0:
         arriving = arriving * (wp.max(wp.dot(normal, lit.direction), 0.0) / PI)
     if lit.casts_shadow > 0 and wp.max(arriving) > 0.0:
-        met, after = walk(medium, position, lit.direction, lit.distance, state)
+        met, after = walk(medium, position, lit.direction, lit.distance, own, state)
         state = after
         if met.kind != PASSED:
             arriving = wp.vec3(0.0, 0.0, 0.0)
@@ -117,8 +118,9 @@ def _gather(
     weight = wp.vec3(1.0, 1.0, 1.0)
     light = wp.vec3(0.0, 0.0, 0.0)
     event = int(0)
+    own = int(-1)
     while event < _MOST_EVENTS:
-        met, after = walk(medium, position, direction, _FAR, state)
+        met, after = walk(medium, position, direction, _FAR, own, state)
         state = after
         if met.kind == PASSED:
             if event > 0:
@@ -128,9 +130,10 @@ def _gather(
             fibre = fibre_of(medium, met.index)
             viewer = -direction
             position = met.position
+            own = medium.strands[met.index]
             first_lamp = int(0)
             if event == 0:
-                at = (position - medium.corner) / (medium.cell * _VOXEL)
+                at = wp.cw_div(position - medium.corner, medium.cell) / _VOXEL
                 vx = wp.clamp(int(at[0]), 0, voxels[0] - 1)
                 vy = wp.clamp(int(at[1]), 0, voxels[1] - 1)
                 vz = wp.clamp(int(at[2]), 0, voxels[2] - 1)
@@ -139,7 +142,7 @@ def _gather(
                 first_lamp = sources.drawn_count
             if first_lamp < sources.count:
                 towards, arriving, after = _light_of_lamps(
-                    medium, sources, first_lamp, position, wp.vec3(0.0, 0.0, 0.0), state
+                    medium, sources, first_lamp, position, wp.vec3(0.0, 0.0, 0.0), own, state
                 )
                 state = after
                 if wp.max(arriving) > 0.0:
@@ -150,10 +153,11 @@ def _gather(
         elif event == 0:
             event = _MOST_EVENTS  # a surface is seen
         else:
-            position = met.position + met.normal * (1e-4 * medium.cell)
+            position = met.position + met.normal * (1e-4 * medium.least_cell)
+            own = -1
             weight = wp.cw_mul(weight, medium.albedo[met.index])
             if sources.count > 0:
-                towards, arriving, after = _light_of_lamps(medium, sources, 0, position, met.normal, state)
+                towards, arriving, after = _light_of_lamps(medium, sources, 0, position, met.normal, own, state)
                 state = after
                 light += wp.cw_mul(weight, arriving)
             direction, after = _off_surface(met.normal, state)
@@ -213,13 +217,16 @@ def _mesh(surroundings):
 
 def _medium(grid, surroundings, mesh):
     medium = Medium()
-    medium.corner, medium.cell = wp.vec3(*grid.corner.tolist()), grid.cell
-    medium.shape, medium.density = wp.vec3i(*grid.shape), grid.area / grid.cell**3
+    medium.corner, medium.cell = wp.vec3(*grid.corner.tolist()), wp.vec3(*grid.cell.tolist())
+    medium.shape, medium.density = wp.vec3i(*grid.shape), float(grid.area / np.prod(grid.cell))
+    medium.least_cell = float(grid.cell.min())
     medium.starts = wp.array(grid.starts, dtype=int)
     medium.tangents = wp.array(grid.tangents, dtype=wp.vec3)
     medium.sigma_a = wp.array(grid.sigma_a, dtype=wp.vec3)
     medium.roughness = wp.array(grid.roughness, dtype=float)
-    medium.fibres, medium.systems = wp.array(grid.fibres, dtype=int), wp.array(grid.systems, dtype=int)
+    medium.fibres, medium.systems, medium.strands = (
+        wp.array(indices, dtype=int) for indices in (grid.fibres, grid.systems, grid.strands)
+    )
     medium.fibre_rows = wp.array(grid.fibre_rows, dtype=float)
     medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
     medium.albedo = _vectors(surroundings.albedo)

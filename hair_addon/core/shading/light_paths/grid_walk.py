@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's way through the grid to the next strand or surface, cell by cell [Amanatides87].
+"""A path's way through the grid to the next strand or surface, cell by cell (Amanatides and Woo 1987).
 
 In a cell strands stand anywhere, with equal chance. A path meets their pieces as if all lay across it, and each of them
-with a chance of the sine between its tangent and the path [Woodcock65].
+with a chance of the sine between its tangent and the path (Woodcock et al. 1965).
 """
 
 import warp as wp
@@ -21,7 +21,8 @@ class Medium:
     """A `StrandGrid` and triangles on a device."""
 
     corner: wp.vec3
-    cell: float
+    cell: wp.vec3
+    least_cell: float
     shape: wp.vec3i
     density: float  # [1/m] of one piece in a cell
     starts: wp.array[int]
@@ -30,6 +31,7 @@ class Medium:
     roughness: wp.array[float]
     fibres: wp.array[int]
     systems: wp.array[int]
+    strands: wp.array[int]
     fibre_rows: wp.array2d[float]
     mesh: wp.uint64
     has_mesh: int
@@ -69,8 +71,8 @@ def random_way(random: float):
 
 
 @wp.func
-def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, random: wp.uint32):
-    """(`Met` within a distance [m], random state) of a ray."""
+def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int, random: wp.uint32):
+    """(`Met` within a distance [m], random state) of a ray; own: the strand that it leaves, which it does not meet."""
     state = random
     met = Met()
     met.kind = PASSED
@@ -89,7 +91,7 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, ran
     here = float(0.0)
     last = end
     for axis in range(3):
-        size = float(medium.shape[axis]) * medium.cell
+        size = float(medium.shape[axis]) * medium.cell[axis]
         if wp.abs(direction[axis]) < _LEAST:
             if position[axis] < medium.corner[axis] or position[axis] > medium.corner[axis] + size:
                 last = -1.0
@@ -103,15 +105,15 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, ran
     across = wp.vec3(FAR, FAR, FAR)  # length of a cell along the ray
     leave = wp.vec3(FAR, FAR, FAR)  # where the ray leaves the cell
     for axis in range(3):
-        inside = (position[axis] + direction[axis] * here - medium.corner[axis]) / medium.cell
+        inside = (position[axis] + direction[axis] * here - medium.corner[axis]) / medium.cell[axis]
         cell[axis] = wp.clamp(int(wp.floor(inside)), 0, medium.shape[axis] - 1)
         if wp.abs(direction[axis]) >= _LEAST:
-            across[axis] = medium.cell / wp.abs(direction[axis])
+            across[axis] = medium.cell[axis] / wp.abs(direction[axis])
             far_side = float(cell[axis] + 1)
             if direction[axis] < 0.0:
                 step[axis] = -1
                 far_side = float(cell[axis])
-            leave[axis] = (medium.corner[axis] + far_side * medium.cell - position[axis]) / direction[axis]
+            leave[axis] = (medium.corner[axis] + far_side * medium.cell[axis] - position[axis]) / direction[axis]
 
     left = random_way(wp.randf(state))
     going = int(1)
@@ -129,7 +131,8 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, ran
                 here += left / density
                 piece = first + wp.min(int(wp.randf(state) * float(count)), count - 1)
                 along = wp.dot(medium.tangents[piece], direction)
-                if wp.randf(state) < wp.sqrt(wp.max(0.0, 1.0 - along * along)):
+                is_met = wp.randf(state) < wp.sqrt(wp.max(0.0, 1.0 - along * along))
+                if is_met and medium.strands[piece] != own:
                     met.kind = STRAND
                     met.index = piece
                     end = here

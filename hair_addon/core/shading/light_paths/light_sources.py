@@ -28,7 +28,7 @@ class Sources:
 
 @wp.struct
 class Lit:
-    """Light of a lamp at a place: unit vector towards it, distance [m], irradiance per chance, whether it casts shadows."""
+    """Light of a lamp at a place: unit vector towards it, distance [m], irradiance over the lamp's chance."""
 
     direction: wp.vec3
     distance: float
@@ -83,7 +83,7 @@ def area_falloff(cosine: float, cos_cone: float):
 
 @wp.func
 def lit_by(sources: Sources, first: int, position: wp.vec3, least: float, random: wp.uint32):
-    """(`Lit` by one of the lamps from `first` on, random state); least: distance [m] below which light does not grow."""
+    """(`Lit` by one of the lamps from `first` on, random state); least: distance [m] below which no light grows."""
     state = random
     lit = Lit()
     in_all = float(0.0)

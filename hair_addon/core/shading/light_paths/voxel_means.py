@@ -9,8 +9,8 @@ _PRIOR = 16.0  # paths that the ratio of the voxels around stands for
 def smooth_ratios(sums: np.ndarray, path_count: int) -> np.ndarray:
     """(Z, Y, X, 6) sums of light RGB and of even light RGB over some paths → (Z, Y, X, 3) ratios of both.
 
-    From large voxels to small ones each ratio is drawn to that of the voxel around it, by a fixed number of average paths.
-    Black where there is no light at all.
+    From large voxels to small ones each ratio is drawn to that of the voxel around it, by a fixed number of average
+    paths. Black where there is no light at all.
     """
     levels = [np.asarray(sums, np.float64)]
     while max(levels[-1].shape[:3]) > 1:
