@@ -16,7 +16,7 @@ from ...kernels.checks import require_count, require_indices
 from ..fibre import marschner
 from ..fibre.principled import scale_from_radial_roughness
 
-PIECE_COUNT = 1_500_000  # of all strands: tens in a cell
+PIECE_COUNT = 1_500_000  # of all strands: most cells are empty
 _PIECES_A_SEGMENT = 64  # of few strands, at most
 CELL_COUNT = 3_000_000
 MOST_CELLS = 400  # along a side
