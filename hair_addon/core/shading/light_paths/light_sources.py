@@ -83,7 +83,10 @@ def area_falloff(cosine: float, cos_cone: float):
 
 @wp.func
 def lit_by(sources: Sources, first: int, position: wp.vec3, least: float, random: wp.uint32):
-    """(`Lit` by one of the lamps from `first` on, random state); least: distance [m] below which no light grows."""
+    """(`Lit` by one of the lamps from `first` on, random state); least: distance [m] below which no light grows.
+
+    Nor does it nearer than half the lamp's radius: few paths with very much light would be noise.
+    """
     state = random
     lit = Lit()
     in_all = float(0.0)
@@ -113,7 +116,7 @@ def lit_by(sources: Sources, first: int, position: wp.vec3, least: float, random
         distance = wp.max(wp.length(offset), 1e-6)
         lit.direction = offset / distance
         lit.distance = distance
-        far = wp.max(distance, least)
+        far = wp.max(distance, wp.max(least, 0.5 * shape[0]))
         cosine = -wp.dot(lit.direction, axis)
         part = 1.0 / (4.0 * PI * far * far)
         if kind == SPOT:
