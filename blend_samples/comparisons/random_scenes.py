@@ -37,6 +37,7 @@ def main():
     parser.add_argument("--seeds", type=int, nargs=2, default=(0, 30), metavar=("FIRST", "END"))
     parser.add_argument("--size", type=int, default=144, help="pixels along a side")
     parser.add_argument("--samples", type=int, default=48, help="samples a pixel, of Cycles")
+    parser.add_argument("--scattering", default="GRID", choices=("GRID", "DUAL"), help="of the scene's render settings")
     parser.add_argument("--before", type=Path, help="scenes.json of an earlier run, for the plot")
     options = parser.parse_args()
     (options.out / "cycles").mkdir(parents=True, exist_ok=True)
@@ -45,6 +46,7 @@ def main():
     for seed in range(*options.seeds):
         values = random_scene.recipe(seed)
         curves = random_scene.build(values)
+        bpy.context.scene.vellus.multiple_scattering = options.scattering
         reference = by_cycles(values, curves, options)
         started = time.process_time()
         picture = by_vellus(options.size)

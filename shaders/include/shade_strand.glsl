@@ -11,19 +11,57 @@
 // vec3 returned_from_behind(float sin_theta_o, float behind)
 //     what `behind` strands beyond add to the first
 
+#include "include/arrival.glsl"
 #include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
-#include "include/shadow.glsl"
+#include "include/light_grid.glsl"
 #include "include/strand_samples.glsl"
 #include "include/world.glsl"
 
 const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not visible
 
-// Radiance towards the viewer of the place that `find_place` found.
+vec3 towards_viewer()
+{
+  return view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
+}
+
+// Radiance towards the viewer of the place that `find_place` found, where paths through a grid have found all light but
+// that which comes straight from lamps.
+vec3 strand_light_on_grid()
+{
+  vec3 T = strand_tangent;
+  vec3 V = towards_viewer();
+  vec3 R = root_direction(strand_index);
+  vec3 returned;
+  vec3 towards;
+  vec3 zonal_1;
+  vec3 zonal_2;
+  hair_return(dot(T, V), returned, towards, zonal_1, zonal_2);
+  vec3 radiance = drawn_lobes.w * light_among_strands(drawn_position) * returned;
+  for (int index = 0; index < lights.count; index++) {
+    Light light = lights.light[index];
+    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
+    vec3 irradiance = irradiance_of(light, drawn_position);
+    vec3 at;
+    float depth;
+    if (shadow_place(light, drawn_position, at, depth)) {
+      float behind;
+      float front = crossed_strands(at, depth, own_count(light, drawn_position, drawn_radius), behind);
+      irradiance *= lit_part(at, depth, strand_bias(R, L)) * exp(-front);
+    }
+    if (max(irradiance.r, max(irradiance.g, irradiance.b)) > LEAST_IRRADIANCE) {
+      float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
+      radiance += irradiance * hair_bsdf(T, L, V, blur);
+    }
+  }
+  return radiance;
+}
+
+// The same by dual scattering.
 vec3 strand_light()
 {
   vec3 T = strand_tangent;
-  vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
+  vec3 V = towards_viewer();
   vec3 R = root_direction(strand_index);
   vec3 returned;
   vec3 towards;
@@ -55,14 +93,7 @@ vec3 strand_light()
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
-    vec3 irradiance = light_irradiance(light.kind,
-                                       light.position.xyz,
-                                       light.axis.xyz,
-                                       light.power.rgb,
-                                       light.cos_cone,
-                                       light.blend,
-                                       light.radius,
-                                       drawn_position);
+    vec3 irradiance = irradiance_of(light, drawn_position);
     vec3 at;
     float depth;
     float front = 0.0;
@@ -93,5 +124,5 @@ vec3 strand_light()
 
 vec4 sample_value()
 {
-  return vec4(strand_light(), 1.0);
+  return vec4(has_light_grid() ? strand_light_on_grid() : strand_light(), 1.0);
 }

@@ -13,6 +13,8 @@ _COMPONENTS = {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 # The parts of a shading model that are no function of their arguments.
 _MAIN = (
     "include/shade_strand.glsl",
+    "include/arrival.glsl",
+    "include/light_grid.glsl",
     "include/shadow.glsl",
     "include/strand_samples.glsl",
     "include/world.glsl",

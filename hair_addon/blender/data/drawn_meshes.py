@@ -22,6 +22,7 @@ class DrawnMesh:
     uvs: np.ndarray
     parts: tuple | None
     owner: tuple = ()
+    color: tuple = (0.0, 0.0, 0.0)  # `surface_color` of its object
 
     @property
     def is_clear(self):
@@ -80,7 +81,9 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout):
     positions = vertices[corners] @ to_world[:3, :3].T + to_world[:3, 3]
     normals = loop_normals[loops] @ np.linalg.pinv(to_world[:3, :3])
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), uvs, None if is_holdout else parts)
+    shown = None if is_holdout else parts
+    color = surface_color(mesh_object)
+    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), uvs, shown, color=color)
 
 
 def _material_runs(mesh_object, mesh):

@@ -2,7 +2,7 @@
 """A model's settings and tables → the shader program of strands and its inputs."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import gpu
@@ -32,6 +32,8 @@ class Shading:
     forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # passed on to strands behind
     reflectance: np.ndarray = field(default_factory=lambda: np.zeros(3))  # of infinitely many strands
     is_varied: bool = False  # whether strands differ by their random numbers
+    # Of the energy-conserving model: `lookup_tables.Settings` and, where strands differ, `strand_variation.Settings`.
+    fibre: tuple | None = None
 
     @property
     def opacity(self):
@@ -113,7 +115,8 @@ def marschner_shading(tables):
         dual = dual_scattering.bake(tables)
         arrays |= {"dual_table": dual.theta, "n_g_table": dual.n_g, "n_g_trt_table": dual.n_g_trt}
     arrays["return_table"] = albedo.azimuthal_moments(tables)
-    return _shading(file, {"settings": tables.settings}, arrays, *_deep(tables.settings, forward, backward))
+    shading = _shading(file, {"settings": tables.settings}, arrays, *_deep(tables.settings, forward, backward))
+    return replace(shading, fibre=_fibre(tables.settings, None))
 
 
 def marschner_strand_shading(tables):
@@ -127,7 +130,12 @@ def marschner_strand_shading(tables):
     if slices.n_trt is not None:
         file, arrays["n_trt_slices"] = "marschner_elliptic.comp", slices.n_trt
     deep = _deep(tables.settings, tables.forward, tables.backward)
-    return _shading(file, blocks, arrays, *deep, is_varied=True)
+    shading = _shading(file, blocks, arrays, *deep, is_varied=True)
+    return replace(shading, fibre=_fibre(tables.settings, tables.variation))
+
+
+def _fibre(settings, variation):
+    return (settings, variation) if settings.mode == "energy" else None
 
 
 def _deep(settings, forward, backward):

@@ -52,6 +52,11 @@ class SceneLights:
         """Whether all receivers have the same light."""
         return not len(self.rest) and all(receivers == ALL for receivers, _blockers in self.links)
 
+    @property
+    def are_linked_to_all(self):
+        """Whether every light lights everything, and everything blocks every light."""
+        return all(pair == (ALL, ALL) for pair in (*self.links, *self.rest_links))
+
     def casters(self, hair, hair_owners, surfaces, surface_owners):
         """Return the function of a light's index → (hair, surfaces) that cast its shadow; None: all do."""
         if all(blockers == ALL for _receivers, blockers in self.links):

@@ -189,7 +189,8 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, 
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     declare_scene(info, structs)
     first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
-    for slot, (name, kind) in enumerate((("segments", "UINT_2D"), ("strands", "FLOAT_2D"), *samplers), start=first):
+    read = (("segments", "UINT_2D"), ("strands", "FLOAT_2D"), ("light_grid", "FLOAT_3D"), *samplers)
+    for slot, (name, kind) in enumerate(read, start=first):
         info.sampler(slot, kind, name)
     info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"} if is_mixed else {"WRITE"})
     for name in ("first_segment", "segment_count", "window_left", "window_bottom"):

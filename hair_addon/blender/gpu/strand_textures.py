@@ -53,6 +53,7 @@ class StrandsOnGPU:
     mean_length: float  # of strands, in the coordinate system of the points
     mean_radius: float
     greatest_radius: float
+    randoms_here: np.ndarray | None = None  # (S,), None where all strands are average
     moved: Moved | None = None  # None where all points are as uploaded
     is_made: bool = False  # whether the GPU has made or carried them
     has_points: bool = True  # whether `points` are where strands are, which they are not while the GPU alone knows it
@@ -112,6 +113,7 @@ def upload_strands(points, radii, randoms=None, wetness=None):
         mean_length,
         float(radii[some].mean()),
         float(radii.max()),
+        randoms,
     )
 
 

@@ -110,6 +110,8 @@ LIGHTS = Block(
         "light": (LIGHT, LIGHT_CAPACITY),
         "world": ("vec4", 6),  # mean radiance of the world's sides, in the order of `sphere.SIDES`
         "count": "int",
+        "grid_corner": "vec4",  # of the grid of light [m]
+        "grid_scale": "vec4",  # one over its sides [1/m]: 0 without
     },
 )
 

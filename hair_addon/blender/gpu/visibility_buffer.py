@@ -11,7 +11,7 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from . import drawing, shaders, uniforms
+from . import drawing, light_grid, shaders, uniforms
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
@@ -209,7 +209,9 @@ class VisibilityBuffer:
             return
         record = placed.record if record is None else record
         blocks = {"view": uniforms.uniform_buffer(record), "lights": placed.lights, **blocks}
-        textures = {"segments": self.segments, "strands": placed.strands.texture, **placed.samplers, **textures}
+        grid = light_grid.none()
+        textures = {"light_grid": grid, **placed.samplers, **textures}
+        textures |= {"segments": self.segments, "strands": placed.strands.texture}
         with drawing.bound(program, blocks, textures):
             program.image("picture", picture)
             program.uniform_int("first_segment", placed.first)

@@ -41,6 +41,13 @@ def light_of(world):
     return kept.light
 
 
+def picture_of(world):
+    """(H, W, 3) radiance of a `lights.World` without its lobes, in pictures as core/imaging/environment.py has them."""
+    if world.image is None:
+        return np.asarray(world.color, float).reshape(1, 1, 3)
+    return environment.without_lobes(_unrolled(world))
+
+
 def check_image():
     """Compare the pixels of the world's image on the next read: they may have changed."""
     for kept in light_cache.values():

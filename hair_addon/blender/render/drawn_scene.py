@@ -41,6 +41,7 @@ class DrawnScene:
     selected: tuple = ()  # whether that object is selected
     instances: tuple = ()  # of hair, as `hair_places.read_instances` found them
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
+    meshes: tuple = ()  # (corner positions, linear RGB) of each of `surfaces`, of a render
     clear: tuple = ()  # as `surfaces`, of those that hide nothing
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
@@ -70,6 +71,7 @@ def read(
     changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse; is_hair_only: whether
     Blender draws the rest of a viewport; former: the `DrawnScene` of the frame before of an animation that plays.
     """
+    corners = () if before is None else before.meshes
     # Where only the geometry of hair has changed, instances are where they were.
     instances = hair_places.read_instances(depsgraph, viewport) if before is None else before.instances
     hair, places = _read_hair(hair_places.hair_places(view_layer, viewport, instances), viewport, refused)
@@ -79,6 +81,8 @@ def read(
     if before is None or before.shadow_maps is None:
         meshes, is_shaded = drawn_meshes.read_drawn_meshes(depsgraph, viewport), viewport is None or not is_hair_only
         surfaces, clear, receivers = _upload(meshes, is_shaded)
+        if viewport is None:
+            corners = _corners_of(meshes)
         surface_owners = tuple(mesh.owner for mesh in meshes if not (is_shaded and mesh.is_clear))
         world = light_door.read_world(blender_scene)
         lamps = maps = None
@@ -114,6 +118,7 @@ def read(
         selected=selected,
         instances=instances,
         surface_owners=surface_owners,
+        meshes=corners,
         clear=clear,
         receivers=receivers,
         renewal=renewal,
@@ -187,7 +192,13 @@ def read_unlit(depsgraph, known, refused):
         receivers=receivers,
         owners=owners,
         surface_owners=surface_owners,
+        meshes=_corners_of(meshes),
     )
+
+
+def _corners_of(meshes):
+    """`DrawnScene.meshes`."""
+    return tuple((mesh.positions, mesh.color) for mesh in meshes if not mesh.is_clear)
 
 
 def _upload(meshes, is_shaded):

@@ -16,7 +16,7 @@ from ..groom.dynamics import frame_folders
 from ..host import scene_time
 from ..settings import setting_properties
 from ..settings.translations import error_text, interface_text
-from . import composite, drawn_scene, film, motion_vectors, rendered_view, viewport
+from . import composite, drawn_scene, film, light_paths, motion_vectors, rendered_view, viewport
 from .panoramic_frame import PanoramicFrame
 from .tiled_frame import Frame
 
@@ -95,7 +95,8 @@ class VellusRenderEngine(bpy.types.RenderEngine):
         film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
         has_lens = camera_lens.read_lens(blender_scene, depsgraph, self.camera_override) is not None
         lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
-        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes
+        path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
+        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count
         frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
         others = self._others(depsgraph, size, views) if "Vector" in passes else {}
         world_texture.check_image()

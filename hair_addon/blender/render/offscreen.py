@@ -12,7 +12,7 @@ from ...core.imaging.pixel_sampling import MOST_DRAWN
 from ...core.long_work import Stage, run_now
 from ..data import camera_lens, panoramic_camera, scene
 from ..gpu import drawing, world_texture
-from . import drawn_scene, film
+from . import drawn_scene, film, light_paths
 
 
 def draw_picture(settings, drawn=None):
@@ -49,6 +49,7 @@ def drawing_picture(settings, drawn=None):
     camera = scene.read_camera(context.scene, depsgraph, width, height)
     if drawn is None:
         drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
+    drawn = light_paths.with_grid(drawn, *camera, light_paths.path_count(context.scene, size))
     picture = film.Film(size, per_side, ("Combined",), settings.is_transparent)
     for turn in range(pass_count):
         yield Stage("Drawing", 0.4 + 0.55 * turn / pass_count)

@@ -5,7 +5,7 @@ import numpy as np
 
 from ...core.imaging import pixel_sampling
 from ..gpu import drawing
-from . import film
+from . import film, light_paths
 
 
 class Frame:
@@ -13,11 +13,13 @@ class Frame:
 
     size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of what is rendered;
     sample_count: of a pixel in each moment; passes, is_transparent, filter_width: of `film.Film`; lens_passes: how many
-    passes a moment has at least, for depth of field.
+    passes a moment has at least, for depth of field; path_count: of paths through the grid of light in each, 0: none.
     """
 
-    def __init__(self, size, window, sample_count, passes, is_transparent, filter_width=0.0, lens_passes=1):
-        self._size, self._window = size, window
+    def __init__(
+        self, size, window, sample_count, passes, is_transparent, filter_width=0.0, lens_passes=1, path_count=0
+    ):
+        self._size, self._window, self._path_count = size, window, path_count
         self._per_side = pixel_sampling.samples_per_side(sample_count, lens_passes)
         self._turns = sample_count // self._per_side**2
         self._tiles = pixel_sampling.tiles(window, film.largest_tile(self._per_side, filter_width))
@@ -35,6 +37,7 @@ class Frame:
         drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector"; lens: `Lens`, None: all
         in focus.
         """
+        drawn = light_paths.with_grid(drawn, world_to_view, view_to_clip, self._path_count, self._moment_count)
         for tile in self._tiles:
             if self._film is None or self._film.size != tile[2:]:
                 self._film = self._new_film(tile)

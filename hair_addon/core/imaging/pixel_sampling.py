@@ -33,6 +33,15 @@ class RenderSettings(Settings):
         high=1024,
         soft_high=64,
     )
+    multiple_scattering: str = param(
+        "DUAL",
+        "How renders find light that comes to a strand from other strands and from surfaces",
+        label="Multiple Scattering",
+        choices=(
+            ("DUAL", "Dual", "As in the viewport: by how many strands are before and behind each"),
+            ("GRID", "Light Grid", "Paths of light through a grid of strands; takes some seconds more for each frame"),
+        ),
+    )
     is_hair_only: bool = param(
         False,
         "Render hair without surfaces: they hide it and cast shadows on it, and leave the picture empty",

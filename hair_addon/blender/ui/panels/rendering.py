@@ -29,7 +29,9 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
     bl_idname = "VELLUS_PT_sampling"
 
     def draw(self, context):
-        split(self.layout).prop(context.scene.vellus, "sample_count")
+        layout, state = split(self.layout), context.scene.vellus
+        layout.prop(state, "sample_count")
+        layout.prop(state, "multiple_scattering")
 
 
 class VELLUS_PT_film(_OfEngine, bpy.types.Panel):

@@ -55,8 +55,11 @@ def test_white_fur_sends_light_back_off_the_mirror_cone(rng):
     assert np.average(found, weights=seen) == pytest.approx(expected, rel=0.3)
 
 
-def walked(rng, settings, view, light, depth, count=8000, most_events=120):
-    """Mean radiance of fur seen from the azimuth of its light, by paths from the viewer towards the light."""
+def walked(rng, settings, view, light, depth, count=8000, most_events=120, blur=0.02):
+    """Mean radiance of fur seen from the azimuth of its light, by paths from the viewer towards the light.
+
+    blur: variance of the direction of the light [rad²].
+    """
     cosines, phi = np.linspace(0.02, 1.0, 33), np.pi * (np.arange(180) + 0.5) / 180
     n = energy_conserving.n_lobes(phi, cosines[:, None], settings)[..., 0]  # (33, 180, 4)
     below = np.cumsum(n, axis=1) / n.sum(axis=1, keepdims=True)
@@ -73,7 +76,7 @@ def walked(rng, settings, view, light, depth, count=8000, most_events=120):
             break
         row = np.rint((np.cos(theta) - 0.02) / 0.98 * 32).clip(0, 32).astype(int)
         column = np.minimum(np.abs((azimuth + np.pi) % (2.0 * np.pi) - np.pi) / np.pi * 180, 179).astype(int)
-        m = energy_conserving.m_lobes(np.full(len(theta), light), theta, settings, None, 0.02)  # a light of some size
+        m = energy_conserving.m_lobes(np.full(len(theta), light), theta, settings, None, blur)
         total += (weight * (m * n[row, column]).sum(axis=-1) * np.exp(height / np.tan(light))).sum()
         parts = np.cumsum(albedos[row], axis=1)
         weight = weight * parts[:, -1]

@@ -1,0 +1,122 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light among strands for a render: `core.shading.light_paths` of a `DrawnScene`, as a camera sees it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core.imaging import lamps
+from ...core.shading import appearance, light_paths
+from ...core.shading.fibre import strand_variation
+from ...core.shading.fibre.principled import varied_roughness
+from ..gpu import drawing, light_grid, world_texture
+from ..settings import preferences
+
+_PATHS_A_PIXEL = 16
+_LEAST_PATHS, _MOST_PATHS = 50_000, 400_000  # over the part of the picture that holds the hair
+
+
+def path_count(blender_scene, size):
+    """How many paths a picture of a size (width, height) [pixels] takes, 0 with dual scattering."""
+    if blender_scene.vellus.multiple_scattering == "DUAL":
+        return 0
+    return min(max(_PATHS_A_PIXEL * size[0] * size[1], _LEAST_PATHS), _MOST_PATHS)
+
+
+def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
+    """A `DrawnScene` whose hair is lit by `count` paths through a grid, as a view of these (4, 4) sees it.
+
+    The same scene for no paths, without hair in view, where lights are linked, and unless all hair is shaded by the
+    energy-conserving model: dual scattering lights all of it then.
+    """
+    if not count or not drawn.hair:
+        return drawn
+    looks = [layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers]
+    is_usual = all(layer.fibre is not None for layer in looks) and drawn.lamps.are_linked_to_all
+    rays = rays_of(drawn.hair, world_to_view, view_to_clip) if is_usual else None
+    if rays is None:
+        return drawn
+    fibres = [layer.fibre[0] for layer in looks]
+    firsts = np.cumsum([0, *(len(shading.layers) for _strands, shading, *_ in drawn.hair)])
+    systems = [_strands_of(*hair[:3], first) for hair, first in zip(drawn.hair, firsts[:-1], strict=True)]
+    grid = light_paths.strand_grid.build(systems, fibres)
+    sums = light_paths.gather.gather(grid, _surroundings(drawn), rays, count, len(systems), seed, preferences.device())
+    seen = [
+        {**textures, "light_grid": light_grid.upload(light_paths.voxel_means.smooth_ratios(of_hair, count))}
+        for textures, of_hair in zip(drawn.hair_visibility, sums, strict=True)
+    ]
+    lights = drawn.lights.copy()
+    lights["grid_corner"][:3], lights["grid_scale"][:3] = grid.corner, 1.0 / (grid.cell * grid.shape)
+    return replace(drawn, lights=lights, hair_lights=None, hair_visibility=seen)
+
+
+def rays_of(hair, world_to_view, view_to_clip):
+    """`gather.Rays` over the rectangle of a picture that holds all hair; None where it is outside."""
+    world_to_clip = np.asarray(view_to_clip, float) @ np.asarray(world_to_view, float)
+    centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in hair])
+    box = centre + radius * (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1.0)
+    clip = np.concatenate([box, np.ones((8, 1))], axis=1) @ world_to_clip.T
+    low, high = np.full(2, -1.0), np.full(2, 1.0)
+    if (clip[:, 3] > 1e-6).all():
+        at = clip[:, :2] / clip[:, 3:]
+        low, high = np.clip(at.min(axis=0), -1.0, 1.0), np.clip(at.max(axis=0), -1.0, 1.0)
+    if (high <= low).any():
+        return None
+    corners = []
+    for depth in (-1.0, 1.0):
+        for x, y in ((low[0], low[1]), (high[0], low[1]), (low[0], high[1])):
+            point = np.linalg.solve(world_to_clip, [x, y, depth, 1.0])
+            corners.append(point[:3] / point[3])
+    near, near_x, near_y, far, far_x, far_y = corners
+    return light_paths.gather.Rays(near, near_x - near, near_y - near, far, far_x - far, far_y - far)
+
+
+def _strands_of(strands, shading, to_world, first):
+    """`strand_grid.Strands` of hair on the GPU; first: index of its first look."""
+    points = strands.points @ to_world[:3, :3].T.astype(np.float32) + to_world[:3, 3].astype(np.float32)
+    count = len(points)
+    randoms = np.full(count, 0.5) if strands.randoms_here is None else strands.randoms_here
+    layers = shading.layers
+    is_wettest = np.zeros(count, int)
+    if len(layers) > 1:  # strands between two looks take either, by their share
+        shares = appearance.wet_share(strands.wetness_here, *shading.wetness_range)
+        is_wettest = (np.random.default_rng(0).random(count) < shares).astype(int)
+    fibres = [layer.fibre for layer, _mix in layers]
+    roughness = [
+        varied_roughness(settings.roughness, 0.0 if variation is None else variation.random_roughness, randoms)
+        for settings, variation in fibres
+    ]
+
+    def absorption(strand, place):
+        settings, variation = fibres[0]  # water changes no pigment
+        if variation is None:
+            return np.broadcast_to(np.asarray(settings.sigma_a, float), (len(strand), 3))
+        return strand_variation.strand_sigma_a(variation, randoms[strand], place)
+
+    return light_paths.strand_grid.Strands(
+        points,
+        strands.radii * drawing.scale_of(to_world),
+        absorption,
+        np.stack(roughness)[is_wettest, np.arange(count)],
+        first + is_wettest,
+    )
+
+
+def _surroundings(drawn):
+    """`gather.Surroundings` of a `DrawnScene`."""
+    record = drawn.lights
+    drawn_count = int(record["count"])
+    found = np.concatenate([record["light"][:drawn_count], drawn.lamps.rest])
+    centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in drawn.hair])
+    places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    importance = lamps.irradiance(found, places).mean(axis=(1, 2)) if len(found) else np.zeros(0)
+    corners = [corners for corners, _color in drawn.meshes]
+    colors = [np.tile(color, (len(corners) // 3, 1)) for corners, color in drawn.meshes]
+    return light_paths.gather.Surroundings(
+        np.concatenate([np.zeros((0, 3), np.float32), *corners]),
+        np.concatenate([np.zeros((0, 3)), *colors]),
+        found,
+        drawn_count,
+        importance,
+        world_texture.picture_of(drawn.world),
+    )

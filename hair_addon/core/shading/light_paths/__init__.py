@@ -1,0 +1,11 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light among strands: paths from the viewer through a grid of fibres, and their means by voxel."""
+
+from typing import TYPE_CHECKING
+
+from ...lazy import submodules
+
+if TYPE_CHECKING:
+    from . import fibre_walk, gather, grid_walk, light_sources, strand_grid, voxel_means
+else:
+    __getattr__ = submodules(__name__)

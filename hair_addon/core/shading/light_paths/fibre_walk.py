@@ -1,0 +1,207 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A path's turn at a fibre: the energy-conserving model of `energy_conserving` [DEon11] [Chiang16], its value and its
+sampling, for one offset h of the ray in the fibre's width. The mean over h is the fibre's.
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+PI = wp.constant(wp.pi)
+_STEEPEST = wp.constant(0.99999)  # sine of an inclination
+_RESIDUAL = wp.constant(3)  # the path of all longer ones
+
+
+@wp.struct
+class Fibre:
+    """A fibre's settings where a path meets it."""
+
+    tangent: wp.vec3
+    sigma_a: wp.vec3
+    roughness: float
+    eta: float
+    scale: float  # of the azimuthal logistic [rad]
+    tilt: float
+    tilt_trt: float
+    coat: float
+
+
+@wp.func
+def variance_of(roughness: float):
+    """`principled.variance_from_roughness`."""
+    deviation = roughness * (0.726 + 0.812 * roughness) + 3.7 * wp.pow(roughness, 20.0)
+    return wp.max(deviation * deviation, 1e-4)
+
+
+@wp.func
+def reflectance(cosine: float, eta: float):
+    """`fresnel.dielectric_reflectance`, from outside."""
+    c = wp.clamp(cosine, 0.0, 1.0)
+    inside = wp.sqrt(wp.max(0.0, 1.0 - (1.0 - c * c) / (eta * eta)))
+    parallel = (eta * c - inside) / (eta * c + inside)
+    perpendicular = (c - eta * inside) / (c + eta * inside)
+    return 0.5 * (parallel * parallel + perpendicular * perpendicular)
+
+
+@wp.func
+def transmittance(h: float, sin_o: float, cos_o: float, eta: float, sigma_a: wp.vec3):
+    """Light left after one crossing of the fibre."""
+    root = wp.sqrt(eta * eta - sin_o * sin_o)
+    offset = h * cos_o / root
+    length = 2.0 * wp.sqrt(wp.max(0.0, 1.0 - offset * offset)) * eta / root
+    return wp.vec3(wp.exp(-sigma_a[0] * length), wp.exp(-sigma_a[1] * length), wp.exp(-sigma_a[2] * length))
+
+
+@wp.func
+def attenuation(path: int, fresnel: float, crossing: wp.vec3):
+    """Light of R, TT, TRT or all longer paths: `paths.path_attenuation`."""
+    if path == 0:
+        return wp.vec3(fresnel, fresnel, fresnel)
+    left = (1.0 - fresnel) * (1.0 - fresnel) * crossing
+    if path == 1:
+        return left
+    left = fresnel * wp.cw_mul(left, crossing)
+    if path == 2:
+        return left
+    once = fresnel * crossing
+    return wp.cw_div(wp.cw_mul(left, once), wp.vec3(1.0, 1.0, 1.0) - once)
+
+
+@wp.func
+def lobe(path: int, fibre: Fibre):
+    """(shift, variance) of a lobe: `energy_conserving.lobes`."""
+    v = variance_of(fibre.roughness)
+    if path == 0:
+        return -2.0 * fibre.tilt, variance_of((1.0 - fibre.coat) * fibre.roughness)
+    if path == 1:
+        return fibre.tilt, wp.max(0.25 * v, 1e-4)
+    if path == 2:
+        return fibre.tilt_trt * fibre.tilt, 4.0 * v
+    return 0.0, 4.0 * v
+
+
+@wp.func
+def exit_angle(path: int, h: float, sin_o: float, cos_o: float, eta: float):
+    """Azimuth in which a path leaves."""
+    inside = wp.asin(wp.clamp(h * cos_o / wp.sqrt(eta * eta - sin_o * sin_o), -1.0, 1.0))
+    return float(path) * (2.0 * inside + PI) - 2.0 * wp.asin(h)
+
+
+@wp.func
+def i0e(x: float):
+    """exp(-x) I0(x) for x >= 0 [Abramowitz64, 9.8.1-2]."""
+    t = x / 3.75
+    if t <= 1.0:
+        s = t * t
+        series = 0.2659732 + s * (0.0360768 + s * 0.0045813)
+        return wp.exp(-x) * (1.0 + s * (3.5156229 + s * (3.0899424 + s * (1.2067492 + s * series))))
+    r = 1.0 / t
+    series = 0.00916281 + r * (-0.02057706 + r * (0.02635537 + r * (-0.01647633 + r * 0.00392377)))
+    return (0.39894228 + r * (0.01328592 + r * (0.00225319 + r * (-0.00157565 + r * series)))) / wp.sqrt(x)
+
+
+@wp.func
+def longitudinal(sin_i: float, sin_o: float, shift: float, v: float):
+    """`longitudinal.d_eon_lobe`, the view's inclination shifted back."""
+    cos_i = wp.sqrt(1.0 - sin_i * sin_i)
+    cos_o = wp.sqrt(1.0 - sin_o * sin_o)
+    sin_turned = sin_o * wp.cos(shift) - cos_o * wp.sin(shift)
+    cos_turned = wp.abs(cos_o * wp.cos(shift) + sin_o * wp.sin(shift))
+    along = sin_i + sin_turned
+    across = cos_i - cos_turned
+    beside_cone = -0.5 * (along * along + across * across)
+    return i0e(cos_i * cos_turned / v) * wp.exp(beside_cone / v) / (v * (1.0 - wp.exp(-2.0 / v)))
+
+
+@wp.func
+def logistic_part(scale: float):
+    """Part of a logistic beyond pi, on either side."""
+    return 1.0 / (1.0 + wp.exp(PI / scale))
+
+
+@wp.func
+def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float):
+    """Radiance towards the viewer, for unit irradiance from the light; both are unit vectors from the fibre."""
+    sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
+    sin_i = wp.clamp(wp.dot(fibre.tangent, light), -_STEEPEST, _STEEPEST)
+    cos_o = wp.sqrt(1.0 - sin_o * sin_o)
+    x = wp.normalize(viewer - sin_o * fibre.tangent)
+    phi = wp.atan2(wp.dot(light, wp.cross(fibre.tangent, x)), wp.dot(light, x))
+    fresnel = reflectance(cos_o * wp.sqrt(1.0 - h * h), fibre.eta)
+    crossing = transmittance(h, sin_o, cos_o, fibre.eta, fibre.sigma_a)
+    total = wp.vec3(0.0, 0.0, 0.0)
+    for path in range(4):
+        shift, v = lobe(path, fibre)
+        part = longitudinal(sin_i, sin_o, shift, v)
+        if path == _RESIDUAL:
+            part = part / (2.0 * PI)
+        else:
+            turned = phi - exit_angle(path, h, sin_o, cos_o, fibre.eta)
+            turned = turned - 2.0 * PI * wp.floor(turned / (2.0 * PI) + 0.5)
+            e = wp.exp(-wp.abs(turned) / fibre.scale)
+            part = part * e / (fibre.scale * (1.0 + e) * (1.0 + e) * (1.0 - 2.0 * logistic_part(fibre.scale)))
+        total += part * attenuation(path, fresnel, crossing)
+    return total
+
+
+@wp.func
+def even_return(fibre: Fibre, viewer: wp.vec3):
+    """Radiance towards the viewer in even light of radiance one, the mean over the width."""
+    sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
+    cos_o = wp.sqrt(1.0 - sin_o * sin_o)
+    total = wp.vec3(0.0, 0.0, 0.0)
+    in_all = float(0.0)
+    for step in range(8):
+        gamma = (float(step) + 0.5) * (PI / 16.0)  # in which reflection at the edges is smooth
+        weight = wp.cos(gamma)
+        fresnel = reflectance(cos_o * weight, fibre.eta)
+        crossing = transmittance(wp.sin(gamma), sin_o, cos_o, fibre.eta, fibre.sigma_a)
+        for path in range(4):
+            total += weight * attenuation(path, fresnel, crossing)
+        in_all += weight
+    return total / in_all
+
+
+@wp.func
+def turn(fibre: Fibre, viewer: wp.vec3, weight: wp.vec3, random: wp.uint32):
+    """(direction of light that goes to the viewer, the path's weight then, random state)."""
+    state = random
+    sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
+    cos_o = wp.sqrt(1.0 - sin_o * sin_o)
+    h = 2.0 * wp.randf(state) - 1.0
+    fresnel = reflectance(cos_o * wp.sqrt(1.0 - h * h), fibre.eta)
+    crossing = transmittance(h, sin_o, cos_o, fibre.eta, fibre.sigma_a)
+    of_r = wp.dot(weight, attenuation(0, fresnel, crossing))
+    of_tt = wp.dot(weight, attenuation(1, fresnel, crossing))
+    of_trt = wp.dot(weight, attenuation(2, fresnel, crossing))
+    total = of_r + of_tt + of_trt + wp.dot(weight, attenuation(3, fresnel, crossing))
+    chosen = wp.randf(state) * total
+    path = int(_RESIDUAL)
+    if chosen < of_r:
+        path = 0
+    elif chosen < of_r + of_tt:
+        path = 1
+    elif chosen < of_r + of_tt + of_trt:
+        path = 2
+    left = wp.cw_mul(weight, attenuation(path, fresnel, crossing))
+    left = left * (total / wp.max(left[0] + left[1] + left[2], 1e-30))
+
+    shift, v = lobe(path, fibre)
+    sin_turned = sin_o * wp.cos(shift) - cos_o * wp.sin(shift)
+    cos_turned = wp.abs(cos_o * wp.cos(shift) + sin_o * wp.sin(shift))
+    u = wp.max(wp.randf(state), 1e-6)
+    cos_t = 1.0 + v * wp.log(u + (1.0 - u) * wp.exp(-2.0 / v))
+    sin_t = wp.sqrt(wp.max(0.0, 1.0 - cos_t * cos_t))
+    sin_i = -cos_t * sin_turned + sin_t * wp.cos(2.0 * PI * wp.randf(state)) * cos_turned
+    sin_i = wp.clamp(sin_i, -_STEEPEST, _STEEPEST)
+    cos_i = wp.sqrt(1.0 - sin_i * sin_i)
+
+    phi = 2.0 * PI * wp.randf(state)
+    if path != _RESIDUAL:
+        low = logistic_part(fibre.scale)
+        q = wp.clamp(low + wp.randf(state) * (1.0 - 2.0 * low), 1e-7, 1.0 - 1e-7)
+        phi = exit_angle(path, h, sin_o, cos_o, fibre.eta) - fibre.scale * wp.log(1.0 / q - 1.0)
+    x = wp.normalize(viewer - sin_o * fibre.tangent)
+    y = wp.cross(fibre.tangent, x)
+    direction = sin_i * fibre.tangent + cos_i * (wp.cos(phi) * x + wp.sin(phi) * y)
+    return wp.normalize(direction), left, state

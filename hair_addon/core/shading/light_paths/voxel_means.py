@@ -1,0 +1,42 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Sums over paths by voxel → ratios without holes: where there are few paths, those of larger voxels count as well."""
+
+import numpy as np
+
+_PRIOR = 16.0  # paths that the ratio of the voxels around stands for
+
+
+def smooth_ratios(sums: np.ndarray, path_count: int) -> np.ndarray:
+    """(Z, Y, X, 6) sums of light RGB and of even light RGB over some paths → (Z, Y, X, 3) ratios of both.
+
+    From large voxels to small ones each ratio is drawn to that of the voxel around it, by a fixed number of average
+    paths. Black where there is no light at all.
+    """
+    levels = [np.asarray(sums, np.float64)]
+    while max(levels[-1].shape[:3]) > 1:
+        levels.append(_halved(levels[-1]))
+    total = levels.pop()
+    ratios = total[..., :3] / np.maximum(total[..., 3:], 1e-12)
+    prior = np.maximum(_PRIOR / max(path_count, 1) * total[0, 0, 0, 3:], 1e-12)
+    for level in reversed(levels):
+        around = _doubled(ratios, level.shape)
+        ratios = (level[..., :3] + prior * around) / (level[..., 3:] + prior)
+    return ratios
+
+
+def _halved(sums):
+    """Sums over blocks of 2 × 2 × 2 voxels."""
+    padded = np.pad(sums, [(0, length % 2) for length in sums.shape[:3]] + [(0, 0)])
+    z, y, x = (length // 2 for length in padded.shape[:3])
+    return padded.reshape(z, 2, y, 2, x, 2, -1).sum(axis=(1, 3, 5))
+
+
+def _doubled(values, shape):
+    """Values (..., 3) of voxels at the centres of those of half the size, linear between them."""
+    for axis in range(3):
+        places = 0.5 * (np.arange(shape[axis]) + 0.5) - 0.5
+        below = np.clip(np.floor(places).astype(int), 0, values.shape[axis] - 1)
+        above = np.minimum(below + 1, values.shape[axis] - 1)
+        part = np.clip(places - below, 0.0, 1.0).reshape([-1 if axis == one else 1 for one in range(4)])
+        values = np.take(values, below, axis) * (1.0 - part) + np.take(values, above, axis) * part
+    return values

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light among strands by paths: pictures with it, where their colors are known."""
+
+from dataclasses import replace
+
+import bpy
+import numpy as np
+import pytest
+from mathutils import Vector
+
+from hair_addon import api
+from hair_addon.core.shading import presets
+
+WHITE = replace(
+    presets.PRESETS["WHITE"][1],
+    parametrization="ABSORPTION",
+    absorption=(0.0, 0.0, 0.0),
+    random_color=0.0,
+    roughness=0.3,
+)
+BROWN = replace(presets.PRESETS["BROWN"][1], random_color=0.0, roughness=0.3)
+
+
+def hair_of(scene, middles, look, length=0.5, radius=0.004, model="MARSCHNER", mode="energy"):
+    """Upright strands around middles (S, 3)."""
+    points = middles[:, None] + np.linspace(-0.5, 0.5, 9)[:, None] * np.array([0.0, 0.0, length])
+    curves = bpy.data.hair_curves.new("Hair")
+    curves.add_curves([9] * len(points))
+    curves.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
+    radii = np.full(9 * len(points), radius, np.float32)
+    curves.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", radii)
+    scene.collection.objects.link(bpy.data.objects.new("Hair", curves))
+    curves.vellus.kind = "HAIR"
+    api.shade(curves, look, model=model, mode=mode)
+    return curves
+
+
+def light(scene, world=0.0, sun=0.0):
+    scene.world = bpy.data.worlds.new("World")
+    background = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+    background.inputs["Color"].default_value = (world, world, world, 1.0)
+    if sun:
+        lamp = bpy.data.lights.new("Sun", "SUN")
+        lamp.energy, lamp.angle = sun, 0.0
+        placed = bpy.data.objects.new("Sun", lamp)
+        placed.rotation_euler = Vector((-0.4, -1.0, 0.5)).to_track_quat("Z", "Y").to_euler()
+        scene.collection.objects.link(placed)
+    camera = bpy.data.cameras.new("Camera")
+    camera.type, camera.ortho_scale = "ORTHO", 1.6
+    scene.camera = bpy.data.objects.new("Camera", camera)
+    scene.camera.location = 0.0, -4.0, 0.0
+    scene.camera.rotation_euler = np.pi / 2, 0.0, 0.0
+    scene.collection.objects.link(scene.camera)
+
+
+def picture(scene, scattering):
+    scene.vellus.multiple_scattering = scattering
+    bpy.context.view_layer.update()
+    return api.draw(width=64, height=64, samples_per_side=2, is_transparent=True)
+
+
+def mean_color(drawn):
+    return drawn[..., :3].sum(axis=(0, 1)) / drawn[..., 3].sum()
+
+
+def test_white_hair_in_a_white_world_is_white(scene, rng):
+    hair_of(scene, rng.uniform(-0.5, 0.5, (600, 3)), WHITE)
+    light(scene, world=0.8)
+    drawn = picture(scene, "GRID")
+    np.testing.assert_allclose(mean_color(drawn), 0.8, rtol=0.01)
+    inside = drawn[..., 3] > 0.9
+    np.testing.assert_allclose(drawn[inside][:, :3] / drawn[inside][:, 3:], 0.8, rtol=0.05)
+
+
+def test_strands_far_from_each_other_are_as_with_dual_scattering(scene):
+    """They light each other little: what a lamp sends to each is drawn alike."""
+    x = np.linspace(-0.6, 0.6, 5)
+    hair_of(scene, np.stack([x, 0.0 * x, 0.0 * x], axis=-1), BROWN)
+    light(scene, sun=3.0)
+    found, expected = (mean_color(picture(scene, scattering)) for scattering in ("GRID", "DUAL"))
+    np.testing.assert_allclose(found, expected, rtol=0.04)
+
+
+@pytest.mark.parametrize("shading", [{"mode": "classic"}, {"model": "KAJIYA_KAY"}])
+def test_other_models_take_dual_scattering(scene, rng, shading):
+    hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN, **shading)
+    light(scene, world=0.3, sun=2.0)
+    np.testing.assert_array_equal(picture(scene, "GRID"), picture(scene, "DUAL"))
