@@ -222,7 +222,7 @@ def add_hair(
     """
     settings = GroomSettings() if settings is None else settings
     require_class(settings, GroomSettings, "settings")
-    work = blender.groom.groom_settings.adding_hair(_surface_object(surface), settings, _depsgraph())
+    work = blender.groom.transfer.groom_settings.adding_hair(_surface_object(surface), settings, _depsgraph())
     return run_now(work, heard(progress))
 
 
@@ -261,7 +261,7 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
     wanted = changed(Appearance, present if look is None else look, changes)
     if model is not None:
         choice(model, "model", [identifier for identifier, _label, _description in blender.settings.properties.MODELS])
-    blender.groom.groom_settings.assign_look(target, wanted)
+    blender.groom.transfer.groom_settings.assign_look(target, wanted)
     if model is not None:
         target.vellus.model = model
 
@@ -271,7 +271,7 @@ def shade(hair: Curves, look: Appearance | str | None = None, *, model: str | No
 
 def settings_of(hair: Curves) -> GroomSettings:
     """Return the `GroomSettings` of hair Curves and their guides."""
-    return blender.groom.groom_settings.settings_of(_curves(hair, "HAIR"))
+    return blender.groom.transfer.groom_settings.settings_of(_curves(hair, "HAIR"))
 
 
 def save_settings(path: str | os.PathLike, settings: GroomSettings) -> None:
@@ -300,7 +300,7 @@ def apply_settings(hair: Curves, settings: GroomSettings) -> None:
     >>> bpy.context.view_layer.update()  # the strands are made here
     """
     require_class(settings, GroomSettings, "settings")
-    blender.groom.groom_settings.apply_settings(_curves(hair, "HAIR"), settings)
+    blender.groom.transfer.groom_settings.apply_settings(_curves(hair, "HAIR"), settings)
 
 
 # What is given.

@@ -88,6 +88,6 @@ def curves_object_of(given: Any) -> Any:
     """Return a curves object that is neither guides nor hair, given as such or as its Curves. Raises `HairError`."""
     view_layer = blender.data.scene.present_depsgraph().view_layer
     curves_object = blender.data.arguments.object_with_curves(given, view_layer)
-    if not blender.groom.foreign_curves.is_foreign(curves_object):
+    if not blender.groom.foreign.foreign_curves.is_foreign(curves_object):
         raise HairError(f"{blender.host.notices.name_of(curves_object)!r} is already guides or hair.")
     return curves_object

@@ -70,7 +70,7 @@ def set_dynamics(
     wanted = changed(DynamicsSettings, settings, changes)
     if simulates is not None:
         simulates = plain_value("simulates", simulates, False, _SWITCH)
-    blender.groom.groom_settings.assign_dynamics(target, wanted)
+    blender.groom.transfer.groom_settings.assign_dynamics(target, wanted)
     if simulates is not None:
         target.vellus.simulates = simulates
     return wanted

@@ -49,7 +49,7 @@ def change_guides(
         require_class(settings, settings_class, "settings")
     wanted = changed(settings_class, settings, changes)
     target, depsgraph = blender.data.arguments.guides_of(guides), blender.data.scene.present_depsgraph()
-    tools, additions = blender.groom.guide_tools, blender.groom.guide_additions
+    tools, additions = blender.groom.guides.guide_tools, blender.groom.guides.guide_additions
     functions = {
         "LENGTH": tools.change_lengths,
         "TRIM": tools.trim,

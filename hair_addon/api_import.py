@@ -17,8 +17,8 @@ from .core.grooming.transfer_settings import TransferSettings
 from .core.long_work import Progress, no_progress, run_now
 
 if TYPE_CHECKING:
-    from .blender.groom.groom_transfers import TransferredGroom
-    from .blender.groom.kept_hair import KeptHair
+    from .blender.groom.foreign.kept_hair import KeptHair
+    from .blender.groom.transfer.groom_transfers import TransferredGroom
 
 blender = lazy.Package(".blender", __package__)
 
@@ -59,10 +59,10 @@ def use_as_guides(
 
     curves_object = curves_object_of(curves)
     if surface is None:
-        surface = blender.groom.hand_made_guides.find_surface(
+        surface = blender.groom.foreign.hand_made_guides.find_surface(
             curves_object, blender.data.scene.present_depsgraph().view_layer
         )
-    work = blender.groom.hand_made_guides.using_as_guides(
+    work = blender.groom.foreign.hand_made_guides.using_as_guides(
         curves_object,
         blender.data.arguments.surface_object(surface),
         blender.data.scene.present_depsgraph(),
@@ -107,8 +107,8 @@ def use_as_hair(
     curves_object = curves_object_of(curves)
     depsgraph = blender.data.scene.present_depsgraph()
     if surface is None:
-        surface = blender.groom.hand_made_guides.find_surface(curves_object, depsgraph.view_layer)
-    work = blender.groom.kept_hair.using_as_hair(
+        surface = blender.groom.foreign.hand_made_guides.find_surface(curves_object, depsgraph.view_layer)
+    work = blender.groom.foreign.kept_hair.using_as_hair(
         curves_object,
         blender.data.arguments.surface_object(surface),
         depsgraph,
@@ -145,5 +145,7 @@ def transfer_groom(
     guides = blender.groom.pipeline.inputs_of(given)[0] if is_hair else blender.data.arguments.guides_of(given)
     target = blender.data.arguments.surface_object(surface)
     depsgraph = blender.data.scene.present_depsgraph()
-    work = blender.groom.groom_transfers.transferring(guides, given if is_hair else None, target, wanted, depsgraph)
+    work = blender.groom.transfer.groom_transfers.transferring(
+        guides, given if is_hair else None, target, wanted, depsgraph
+    )
     return run_now(work, progress)

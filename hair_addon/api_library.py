@@ -88,6 +88,8 @@ def apply_groom(
         raise HairError(f"name must be a string, not {described(name)}.")
     target = blender.data.arguments.surface_object(surface)
     groom = blender.io.groom_library.read(path_of(path), name)
-    work = blender.groom.library_groom.adding_groom(target, groom, blender.data.scene.present_depsgraph(), method)
+    work = blender.groom.transfer.library_groom.adding_groom(
+        target, groom, blender.data.scene.present_depsgraph(), method
+    )
     applied = run_now(work, heard(progress))
     return applied.made.guides, applied.made.hair

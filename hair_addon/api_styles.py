@@ -81,7 +81,7 @@ def add_style(
     settings = changed(type(settings), settings, changes)
     fit, name = plain_value("fit", fit, False, _SWITCH), plain_value("name", name, "", _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    return blender.groom.hair_styles.add(target, settings, name, is_fitted=fit, kept=kept)
+    return blender.groom.styles.hair_styles.add(target, settings, name, is_fitted=fit, kept=kept)
 
 
 def styles_of(hair: Curves) -> tuple[StyleSettings, ...]:
@@ -101,7 +101,7 @@ def set_styles(hair: Curves, styles: Sequence[StyleSettings]) -> None:
     3
     """
     styles, _names = require_styles(styles)
-    blender.groom.hair_styles.assign(blender.data.arguments.curves_of(hair, "HAIR"), styles)
+    blender.groom.styles.hair_styles.assign(blender.data.arguments.curves_of(hair, "HAIR"), styles)
 
 
 def apply_style_preset(hair: Curves, preset: str, *, fit: bool = True, keep_styles: bool = False) -> None:
@@ -117,7 +117,7 @@ def apply_style_preset(hair: Curves, preset: str, *, fit: bool = True, keep_styl
     found = style_presets.read(choice(preset, "style preset", style_presets.PRESETS))
     fit, keep = plain_value("fit", fit, False, _SWITCH), plain_value("keep_styles", keep_styles, False, _SWITCH)
     target = blender.data.arguments.curves_of(hair, "HAIR")
-    blender.groom.hair_styles.apply_preset(target, found, is_fitted=fit, keeps_styles=keep)
+    blender.groom.styles.hair_styles.apply_preset(target, found, is_fitted=fit, keeps_styles=keep)
 
 
 def styled_strands(

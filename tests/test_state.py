@@ -7,7 +7,7 @@ from tests.test_conventions import MODULES, name_of, nodes, syntax
 
 # What is no cache, each with who ends it.
 STATE = {
-    "blender/groom/brushes.py: _fitted": "nobody: Blender's brushes outlive a file, and so does what was set in them",
+    "blender/groom/guides/brushes.py: _fitted": "nobody: Blender's brushes and what was set in them outlive a file",
     "blender/groom/dynamics/guide_baking.py: _baking": "the end of baking, on every way out",
     "blender/host/cli_command.py: _command": "unregister",
     "blender/host/running.py: _job": "end",

@@ -20,7 +20,7 @@ import hair_addon
 from blend_samples.pictures import styles
 from blend_samples.sheets import picture_files
 from hair_addon import api
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "clump_beside_blender.png"
 ASSETS = "/assets/nodes/procedural_hair_node_assets.blend"

@@ -8,7 +8,7 @@ import numpy as np
 from mathutils import Vector
 from mathutils.bvhtree import BVHTree
 
-from hair_addon.blender.data import guide_poses
+from hair_addon.blender.data.simulation import guide_poses
 from hair_addon.blender.groom.dynamics import frame_folders
 
 _ROOTS = 4  # points of a guide that may be nearer to the skin than hair keeps

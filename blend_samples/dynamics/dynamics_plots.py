@@ -11,8 +11,8 @@ from blend_samples.sheets import line_plot
 from blend_samples.sheets.line_plot import COLORS, REFERENCE, Plot
 from tests.core.dynamics.collision import test_contact
 from tests.core.dynamics.rod import test_equilibria, test_motion
-from tests.support.rod_references import heavy_elastica, kirchhoff
-from tests.support.rods import BENDING, TWISTING, Simulation, arc, line
+from tests.support.dynamics.rod_references import heavy_elastica, kirchhoff
+from tests.support.dynamics.rods import BENDING, TWISTING, Simulation, arc, line
 
 LENGTHS = (0.05, 0.1, 0.15, 0.2)  # [m]
 VERTEX_COUNTS = (7, 13, 25)

@@ -12,7 +12,7 @@ import numpy as np
 from blend_samples.heads import head
 from blend_samples.sheets import picture_files
 from hair_addon import api
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 
 RATE = 24  # frames per second
 FIRST = 1  # frame

@@ -17,7 +17,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import hair_addon
 from blend_samples.heads import head
 from blend_samples.sheets import picture_files
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "manual" / "guide_tools.png"
 WIDTH, HEIGHT = 160, 180  # pixels of a picture

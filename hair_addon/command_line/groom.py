@@ -91,7 +91,7 @@ def _styled(given, settings, surface):
     """`GroomSettings` with the styles that options give, for a mesh object."""
 
     def fit():
-        return blender.groom.hair_styles.fit_of(surface, settings.guides, settings.hair)
+        return blender.groom.styles.hair_styles.fit_of(surface, settings.guides, settings.hair)
 
     if given.no_style_fit and not (given.style_preset or given.styles):
         raise HairError("--no-style-fit needs --style or --style-preset.")
@@ -110,7 +110,7 @@ def _from_library(given, surface, console):
         return _styled(given, settings, surface)
 
     depsgraph = blender.data.scene.present_depsgraph()
-    work = blender.groom.library_groom.adding_groom(surface, groom, depsgraph, changed=changed)
+    work = blender.groom.transfer.library_groom.adding_groom(surface, groom, depsgraph, changed=changed)
     applied = run_now(work, console.progress)
     for sentence, values in applied.notes():
         console.warn(sentence.format(**values))
@@ -124,7 +124,7 @@ def _follow_curves(given, surface, settings, file_axes, console):
     if useless:
         console.warn(f"Guides come from {given.guides_from}: {', '.join(sorted(useless))} have no effect.")
     with _curves_of(given.guides_from, given, file_axes) as curves_object:
-        work = blender.groom.groom_settings.using_as_guides(
+        work = blender.groom.transfer.groom_settings.using_as_guides(
             curves_object, surface, settings, blender.data.scene.present_depsgraph()
         )
         made = run_now(work, console.progress)
@@ -136,7 +136,7 @@ def _follow_curves(given, surface, settings, file_axes, console):
 def _keep_curves(given, surface, settings, file_axes, console):
     """Return (guides, hair): the curves in another file, or in the open one, as hair, and guides derived from them."""
     with _curves_of(given.hair_from, given, file_axes) as curves_object:
-        work = blender.groom.kept_hair.using_as_hair(
+        work = blender.groom.foreign.kept_hair.using_as_hair(
             curves_object,
             surface,
             blender.data.scene.present_depsgraph(),
@@ -147,7 +147,7 @@ def _keep_curves(given, surface, settings, file_axes, console):
         console.warn(sentence.format(**values))
     error, high = 100.0 * made.mean_error, 100.0 * made.high_error
     console.warn(f"The guides reproduce the strands to {error:.1f}% (95%: {high:.1f}%) of their length.")
-    blender.groom.groom_settings.assign_look(made.hair, settings.appearance)
+    blender.groom.transfer.groom_settings.assign_look(made.hair, settings.appearance)
     return made.guides, made.hair
 
 

@@ -20,7 +20,7 @@ from hair_addon.core.imaging.pixel_sampling import DRAWING_FIELDS, FRAME_FIELDS,
 from hair_addon.core.params import declared
 from hair_addon.core.shading.tables import lookup_tables
 from hair_addon.core.styling.kinds import KINDS, OFFERS
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.reading import everything, points
 
 FOREIGN = "Foreign"  # curves not created by Vellus

@@ -26,7 +26,7 @@ from hair_addon import (
     api_tables,
 )
 from hair_addon.core.placement import cvt
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.reading import evaluated_points, points, snapshot
 
 ROOT = Path(__file__).resolve().parents[2]

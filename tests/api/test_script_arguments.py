@@ -12,7 +12,7 @@ from mathutils import Color
 from hair_addon import api
 from hair_addon.core.geometry.mesh import SurfacePoints, TriMesh
 from hair_addon.core.geometry.strands import Strands
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.reading import everything
 
 TRIANGLE = [[0, 1, 2]]

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.data import curves
-from hair_addon.blender.groom import groom_settings
+from hair_addon.blender.data.strands import curves
+from hair_addon.blender.groom.transfer import groom_settings
 from hair_addon.core.files import settings_file
 from hair_addon.core.long_work import run_now
 from tests.support.counting import counts_of
-from tests.support.following import update
-from tests.support.imported import curves_object
+from tests.support.dynamics.following import update
+from tests.support.exchange.imported import curves_object
 from tests.support.reading import points, snapshot
 
 STYLES = (

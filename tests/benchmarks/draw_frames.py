@@ -20,7 +20,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import hair_addon
 from blend_samples.heads import head
-from hair_addon.blender.data import curves, scene
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, drawing, hair_shading, strand_textures, visibility_buffer
 from hair_addon.blender.render import drawn_scene, scene_drawing
 from hair_addon.core.grooming import following, groom

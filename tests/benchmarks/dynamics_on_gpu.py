@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from hair_addon.core.dynamics import root_motion, simulation
 from hair_addon.core.dynamics.rod import rotations
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
-from tests.support import rods
+from tests.support.dynamics import rods
 
 POINTS, LENGTH, SUBSTEPS = 32, 0.15, 8
 RADIUS = 0.1  # [m] of the ball

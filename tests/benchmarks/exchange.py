@@ -21,8 +21,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import hair_addon
 from hair_addon import api
 from tests.benchmarks.hair_peers import head_with_guides
-from tests.support import alembic_reader
-from tests.support.exported import shape
+from tests.support.exchange import alembic_reader
+from tests.support.exchange.exported import shape
 
 # Blender takes Alembic files as Y up and in meters: ours for Unreal are Z up, in centimeters.
 _IMPORTERS = {".abc": {"as_background_job": False, "scale": 0.01}, ".usdc": {}}

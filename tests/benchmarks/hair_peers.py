@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import pipeline, writing
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.core.grooming import groom

@@ -27,10 +27,10 @@ from tests.benchmarks.rods_in_warp import NewtonStep
 from tests.benchmarks.test_hair_speed import Time, best_times, report
 from tests.benchmarks.test_live_editing import View, on_gpu
 from tests.support.devices import DEVICE
+from tests.support.dynamics.rod_contact import Ball, advance_touching, planes_of
+from tests.support.dynamics.rods import FRAME, Simulation, in_lanes, line
+from tests.support.dynamics.shaken_head import grown, shake
 from tests.support.meshes import HEAD, read_obj
-from tests.support.rod_contact import Ball, advance_touching, planes_of
-from tests.support.rods import FRAME, Simulation, in_lanes, line
-from tests.support.shaken_head import grown, shake
 
 ASSETS = "/geometry_nodes_dynamics_assets.blend"
 POINTS, LENGTH = 25, 0.15

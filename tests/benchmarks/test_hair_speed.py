@@ -21,7 +21,7 @@ import warp as wp
 from scipy.spatial import cKDTree
 
 import hair_addon
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.core.geometry import hash_grid

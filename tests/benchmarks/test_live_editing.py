@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import hair_addon
-from hair_addon.blender.data import curves, scene
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.host import running
 from hair_addon.blender.live import events, invalidation, live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture

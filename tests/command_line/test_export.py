@@ -4,8 +4,8 @@
 import bpy
 import pytest
 
-from tests.support import alembic_reader
 from tests.support.commands import run_here
+from tests.support.exchange import alembic_reader
 
 
 @pytest.fixture

@@ -13,7 +13,7 @@ from hair_addon.command_line import options
 from hair_addon.core.errors import HairError
 from tests.blender.io.test_sequence import turning  # noqa: F401 (a fixture)
 from tests.support.commands import run_here
-from tests.support.flamenco import compiled
+from tests.support.farms.flamenco import compiled
 
 pytestmark = pytest.mark.skipif(shutil.which("node") is None, reason="needs node, which runs the job type")
 

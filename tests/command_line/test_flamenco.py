@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import pytest
 
-from tests.support import farm, flamenco
+from tests.support.farms import farm, flamenco
 
 pytestmark = [
     pytest.mark.farm,

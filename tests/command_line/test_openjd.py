@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.support import farm
+from tests.support.farms import farm
 
 pytestmark = pytest.mark.farm
 

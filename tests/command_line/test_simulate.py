@@ -11,8 +11,8 @@ import pytest
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.host import memory
 from tests.support.commands import ROOT, command, run, run_here
+from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import evaluated_points, read_picture
-from tests.support.swung import simulate, swing
 
 
 @pytest.fixture

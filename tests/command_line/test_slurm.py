@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from tests.support import farm, slurm
+from tests.support.farms import farm, slurm
 
 pytestmark = [
     pytest.mark.farm,

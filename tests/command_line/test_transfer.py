@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.commands import run_here
-from tests.support.imported import curves_object, lines_on
+from tests.support.exchange.imported import curves_object, lines_on
 
 
 @pytest.fixture

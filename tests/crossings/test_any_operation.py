@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[2]
 def test_random_operations_raise_no_exception(seed):
     """200 operations a run; the seed fixes the way."""
     walked = subprocess.run(
-        [sys.executable, "-u", "-m", "tests.support.walk_operations", "5", "200", str(seed)],
+        [sys.executable, "-u", "-m", "tests.support.walk.walk_operations", "5", "200", str(seed)],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -12,7 +12,7 @@ from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
-from tests.support.following import assert_follows
+from tests.support.dynamics.following import assert_follows
 from tests.support.reading import points, write_points
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.live import invalidation
-from tests.support.following import drawn_points, surface_points, update
+from tests.support.dynamics.following import drawn_points, surface_points, update
 from tests.support.reading import points
 
 ROOTS = {

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.reading import attribute
 
 GUIDE_COUNT, STRAND_COUNT = 20, 60

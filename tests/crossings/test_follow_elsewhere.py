@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.mesh import TriMesh, positions
-from tests.support.following import assert_follows, grow, surface_points, update
+from tests.support.dynamics.following import assert_follows, grow, surface_points, update
 from tests.support.reading import evaluated_points, points
 
 

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.groom import brushes
+from hair_addon.blender.groom.guides import brushes
 from tests.support.commands import TETRAHEDRON, load, run_here, write_obj
-from tests.support.imported import curves_object, lines_on, select, stored, world
+from tests.support.exchange.imported import curves_object, lines_on, select, stored, world
 
 ESSENTIALS = "brushes/essentials_brushes-curve_sculpt.blend/Brush/"
 

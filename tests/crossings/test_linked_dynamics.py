@@ -9,8 +9,8 @@ import pytest
 
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.core.long_work import run_now
+from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import evaluated_points, points
-from tests.support.swung import simulate, swing
 
 FRAME = 7
 HOW_MANY = '"Hair" keeps the {} strands of its file: change them there.'

@@ -9,7 +9,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.host import notices
-from tests.support.following import update
+from tests.support.dynamics.following import update
 
 SMALL = {"width": 24, "height": 18}
 NAN, INF = math.nan, math.inf

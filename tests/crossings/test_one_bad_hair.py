@@ -12,7 +12,7 @@ from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import drawn_scene
 from hair_addon.core.errors import HairError
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.reading import points, write_points
 
 SMALL = {"width": 24, "height": 18}

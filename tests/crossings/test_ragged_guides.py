@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.ui import panels
-from tests.support.following import update
-from tests.support.imported import curves_object, lines_on, select, stored, use, world
+from tests.support.dynamics.following import update
+from tests.support.exchange.imported import curves_object, lines_on, select, stored, use, world
 from tests.support.layout import draw_all
 from tests.support.reading import write_points
 

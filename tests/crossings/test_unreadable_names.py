@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_hair_of_unreadable_names_is_drawn_edited_and_saved(tmp_path):
-    program = [sys.executable, "-m", "tests.support.walk_unreadable_names", str(tmp_path)]
+    program = [sys.executable, "-m", "tests.support.walk.walk_unreadable_names", str(tmp_path)]
     done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, errors="replace", timeout=120)
     assert done.returncode == 0 and "all was used" in done.stdout, done.stderr[-3000:]
     assert "Traceback" not in done.stderr + done.stdout

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from tests.support.following import update
-from tests.support.imported import curves_object, lines_on, select, stored, world
+from tests.support.dynamics.following import update
+from tests.support.exchange.imported import curves_object, lines_on, select, stored, world
 from tests.support.reading import snapshot
 
 

@@ -7,7 +7,7 @@ import sys
 import bpy
 import numpy as np
 
-from hair_addon.blender.data import curves as curves_door
+from hair_addon.blender.data.strands import curves as curves_door
 from hair_addon.blender.host import running
 from hair_addon.blender.live import events, handlers
 from hair_addon.blender.render import hair_cache, viewport

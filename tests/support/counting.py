@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How often hair is searched, uploaded and written: counted where it happens."""
 
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import strand_textures
 from hair_addon.core.geometry import hash_grid
 

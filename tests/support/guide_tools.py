@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.groom import pipeline
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.reading import points, write_points
 
 # Tools that move points and add none, each with values that change every guide.

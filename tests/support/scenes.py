@@ -11,11 +11,11 @@ import pytest
 
 import hair_addon
 import tests.support.examples  # noqa: F401 (for what it sets)
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, scene_lights
 from hair_addon.blender.host import running
+from tests.support.exchange.imported import curves_object, lines_on
 from tests.support.guide_tools import wave
-from tests.support.imported import curves_object, lines_on
 from tests.support.reading import vertex_positions
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from mathutils import Euler, Matrix
 
 from ...core.imaging import lamps
-from ..data import light_linking
+from ..data.pictures import light_linking
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn

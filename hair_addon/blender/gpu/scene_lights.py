@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core.imaging import lamps
-from ..data.light_linking import ALL
+from ..data.pictures.light_linking import ALL
 from . import uniforms, world_texture
 from .shadows import ShadowMaps
 

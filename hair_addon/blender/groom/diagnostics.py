@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Curves, Object
 
-from ..data import follow_nodes
-from ..data.curves import followers
+from ..data.strands import follow_nodes
+from ..data.strands.curves import followers
 from ..host.notices import name_of, text_of
 from ..settings.translations import interface_text
 

@@ -6,7 +6,8 @@ from bpy.types import Curves, Depsgraph
 
 from ...core import geometry
 from ...core.geometry.mesh import require_finite
-from ..data import curves, kept_shapes, posed_strands, scene
+from ..data import scene
+from ..data.strands import curves, kept_shapes, posed_strands
 from . import bindings
 
 

@@ -5,7 +5,7 @@ import numpy as np
 from bpy.types import Curves, Depsgraph
 
 from ...core.errors import HairError
-from ..data import curves, exported_curves
+from ..data.strands import curves, exported_curves
 from . import bindings, pipeline
 
 

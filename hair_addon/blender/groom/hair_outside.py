@@ -7,7 +7,9 @@ from bpy.types import Curves
 
 from ...core import dynamics
 from ...core.errors import HairError
-from ..data import guide_poses, scene, simulated_guides, simulated_world
+from ..data import scene
+from ..data.simulation import guide_poses, simulated_world
+from ..data.strands import simulated_guides
 from ..host import notices, scene_time
 from ..settings import preferences, properties
 from .bindings import BoundHair

@@ -16,8 +16,9 @@ from ...core.grooming.groom import GuideSettings, HairSettings
 from ...core.interpolation import hair_binding
 from ...core.long_work import Work, part_of, run_now
 from ...core.styling.base import StyleSettings
-from ..data import curves, curves_objects, drawn_lines, masks, partings, scene
+from ..data import masks, scene
 from ..data.scene import Surface
+from ..data.strands import curves, curves_objects, drawn_lines, partings
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import preferences, setting_properties, style_items

@@ -7,7 +7,7 @@ from collections.abc import Generator, Sequence
 import bpy
 from bpy.types import Curves, Object, Scene
 
-from ..data import simulated_world
+from ..data.simulation import simulated_world
 from ..settings import properties
 
 

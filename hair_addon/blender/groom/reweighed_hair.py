@@ -7,7 +7,7 @@ from bpy.types import Curves, Depsgraph
 
 from ...core.grooming import following
 from ...core.interpolation import hair_binding
-from ..data import curves
+from ..data.strands import curves
 from ..settings import style_items
 from . import bindings, pipeline, styled_hair
 from .bindings import BoundHair

@@ -6,7 +6,7 @@ from itertools import repeat
 import bpy
 from bpy.types import Context, Curves, Object, SpaceView3D, ViewLayer
 
-from ..data.curves import followers
+from ..data.strands.curves import followers
 from ..host.notices import text_of
 from ..settings import style_items
 

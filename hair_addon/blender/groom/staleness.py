@@ -9,7 +9,8 @@ from bpy.types import Curves, Depsgraph
 from ...core import geometry
 from ...core.grooming import groom
 from ...core.params import Settings
-from ..data import curves, drawn_lines, masks, partings, scene
+from ..data import masks, scene
+from ..data.strands import curves, drawn_lines, partings
 from ..host.notices import text_of
 from ..settings import setting_properties
 

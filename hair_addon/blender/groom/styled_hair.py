@@ -17,8 +17,8 @@ from ...core.styling import program
 from ...core.styling.base import StyleSettings, has_effect
 from ...core.styling.clump_trees import ClumpTrees
 from ...core.styling.style_inputs import Inputs
-from ..data import style_inputs
 from ..data.scene import Surface
+from ..data.strands import style_inputs
 from ..settings import setting_properties
 
 if TYPE_CHECKING:

@@ -9,7 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError, cause_of
-from ..data import attributes
+from ..data.strands import attributes
 from ..host import paths
 from . import mesh_checks, strand_arrays
 

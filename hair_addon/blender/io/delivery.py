@@ -11,7 +11,8 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.files.whole_file import require_place, whole_file
 from ...core.long_work import Stage
-from ..data import curves, delivered_hair, scene, simulated_guides
+from ..data import scene
+from ..data.strands import curves, delivered_hair, simulated_guides
 from ..groom import selection
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time

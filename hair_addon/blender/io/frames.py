@@ -13,7 +13,8 @@ from ...core.imaging import picture_checks
 from ...core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME, PassSettings
 from ...core.long_work import no_progress
 from ...core.params import declared
-from ..data import curves, scene
+from ..data import scene
+from ..data.strands import curves
 from ..groom.dynamics import frame_folders
 from ..host import scene_time
 from ..live import live_hair

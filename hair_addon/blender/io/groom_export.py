@@ -10,8 +10,8 @@ from ...core.errors import HairError, cause_of
 from ...core.files import export_settings, settings_file, unreal_groom
 from ...core.files.whole_file import require_place, whole_file
 from ...core.long_work import Stage
-from ..groom import groom_settings
 from ..groom.dynamics import frame_folders
+from ..groom.transfer import groom_settings
 from ..host import paths, scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of

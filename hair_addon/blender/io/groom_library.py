@@ -18,9 +18,12 @@ from ...core.files import settings_file
 from ...core.files.whole_file import require_place, whole_file
 from ...core.geometry.mesh import SurfacePoints, check_mesh
 from ...core.long_work import Stage, Work
-from ..data import attributes, curves, groom_assets, scene
-from ..groom import library_groom, selection
-from ..groom.library_groom import LibraryGroom
+from ..data import scene
+from ..data.made import groom_assets
+from ..data.strands import attributes, curves
+from ..groom import selection
+from ..groom.transfer import library_groom
+from ..groom.transfer.library_groom import LibraryGroom
 from ..host.notices import name_of, say
 from ..render import library_picture
 from . import asset_catalogs, strand_arrays

@@ -10,7 +10,7 @@ from ...core.errors import HairError
 from ...core.files import groom_curves
 from ...core.files.groom_curves import GroomCurves
 from ...core.shading import strand_colors
-from ..data import attributes, curves, exported_curves, simulated_guides
+from ..data.strands import attributes, curves, exported_curves, simulated_guides
 from ..groom import guide_maps, hair_systems, selection
 from ..groom.dynamics import frame_folders
 from ..host.datablocks import Remembered

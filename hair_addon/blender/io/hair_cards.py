@@ -11,7 +11,7 @@ from ...core.cards.polygon_mesh import PolygonMesh
 from ...core.files.whole_file import require_place
 from ...core.geometry import clusters
 from ...core.long_work import Stage, part_of
-from ..data import armature_weights, card_images, made_meshes
+from ..data.made import armature_weights, card_images, made_meshes
 from ..materials import card_material
 from ..render import card_pictures
 from . import hair_meshes

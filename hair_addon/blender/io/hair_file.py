@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ..data.delivered_hair import ROOT
+from ..data.strands.delivered_hair import ROOT
 from ..host import paths
 
 _CREATOR = "creator"  # entry of the file that says who wrote it

@@ -12,7 +12,9 @@ from ...core.geometry.mesh import TriMesh
 from ...core.long_work import Stage
 from ...core.shading import strand_colors
 from ...core.shading.appearance import Appearance
-from ..data import armature_weights, curves, exported_curves, made_meshes, scene
+from ..data import scene
+from ..data.made import armature_weights, made_meshes
+from ..data.strands import curves, exported_curves
 from ..host import scene_time
 from ..host.datablocks import Remembered
 from ..host.notices import name_of

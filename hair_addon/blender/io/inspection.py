@@ -8,8 +8,9 @@ import bpy
 from ...core.errors import HairError
 from ...core.grooming import cost
 from ...core.grooming.groom import GuideSettings, HairSettings
-from ..data import curves, delivered_hair, scene
-from ..data.curves import followers
+from ..data import scene
+from ..data.strands import curves, delivered_hair
+from ..data.strands.curves import followers
 from ..groom import diagnostics
 from ..groom.dynamics import frame_folders, guide_baking
 from ..host import scene_time

@@ -5,7 +5,7 @@ import bpy
 
 from ...core.errors import HairError
 from ...core.files.whole_file import require_place, whole_file
-from ..data import armature_weights
+from ..data.made import armature_weights
 from ..host import paths
 
 

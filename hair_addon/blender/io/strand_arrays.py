@@ -8,7 +8,7 @@ from ...core import geometry
 from ...core.errors import HairError
 from ...core.files.groom_curves import Rows, slices
 from ...core.grooming import groom
-from ..data import attributes, curves, posed_strands
+from ..data.strands import attributes, curves, posed_strands
 from ..groom import selection
 from ..host.notices import name_of
 from ..live import live_hair

@@ -5,9 +5,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...core.errors import HairError
-from ..data import frame_animation
-from ..groom import guide_regions, staleness
+from ..data.simulation import frame_animation
+from ..groom import staleness
 from ..groom.dynamics import frame_folders, guide_baking
+from ..groom.guides import guide_regions
 from ..host import notices, running, scene_time
 from ..host.caches import Cache
 from ..settings import properties, shared_wetness

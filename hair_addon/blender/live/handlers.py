@@ -4,7 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
-from ..data import curves_objects
+from ..data.strands import curves_objects
 from ..groom import bindings, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time

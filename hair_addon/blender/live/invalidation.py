@@ -5,7 +5,8 @@ What makes single ones stale is in `events`. Functions of their arguments alone,
 stale.
 """
 
-from ..data import guide_map_readers, simulated_guides, subdivided_surfaces
+from ..data import guide_map_readers, subdivided_surfaces
+from ..data.strands import simulated_guides
 from ..gpu import lights, shaders, surface_shading, world_texture
 from ..groom import bindings
 from ..groom.dynamics import frame_folders, guide_simulation

@@ -2,7 +2,8 @@
 """Kept hair that follows its guides while these are combed or simulated; its Curves are written at once."""
 
 from ...core.errors import HairError
-from ..groom import bindings, kept_following
+from ..groom import bindings
+from ..groom.foreign import kept_following
 from . import events
 
 

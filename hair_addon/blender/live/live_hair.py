@@ -10,8 +10,9 @@ import sys
 import bpy
 
 from ...core.errors import HairError
-from ..data import curves, simulated_guides
-from ..groom import bindings, hair_outside, painted_masks, pipeline, reweighed_hair, staleness, writing
+from ..data.strands import curves, simulated_guides
+from ..groom import bindings, hair_outside, pipeline, reweighed_hair, staleness, writing
+from ..groom.styles import painted_masks
 from ..host import running
 from ..host.notices import text_of
 from ..render import hair_cache

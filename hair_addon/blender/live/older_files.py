@@ -11,7 +11,8 @@ import numpy as np
 
 from ...core import geometry
 from ...core.errors import HairError
-from ..data import curves, follow_nodes, posed_strands, scene
+from ..data import scene
+from ..data.strands import curves, follow_nodes, posed_strands
 
 
 def renew():

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from ..data import curves
+from ..data.strands import curves
 from ..host.caches import Cache
 
 # session_uid of guide Curves → their (N, 3) points. Blender reports the geometry of Curves as updated even if only the

@@ -12,7 +12,8 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ..data import curves, scene, simulated_guides
+from ..data import scene
+from ..data.strands import curves, simulated_guides
 from ..groom import bindings, hair_outside
 from ..groom.dynamics import frame_folders, guide_baking, guide_simulation
 from ..groom.dynamics.guide_simulation import GuideSimulation, simulated

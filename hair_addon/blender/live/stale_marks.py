@@ -6,7 +6,8 @@ from contextlib import contextmanager
 import bpy
 
 from ...core.errors import HairError
-from ..data import curves, drawn_lines, masks
+from ..data import masks
+from ..data.strands import curves, drawn_lines
 from ..groom import bindings, edited_surfaces, staleness
 from ..host.notices import text_of
 from ..settings import style_items

@@ -3,7 +3,8 @@
 
 import bpy
 
-from ..data import attributes, curves, guide_map_readers
+from ..data import guide_map_readers
+from ..data.strands import attributes, curves
 from ..groom import bindings, guide_maps
 from ..host.notices import text_of
 from . import live_hair

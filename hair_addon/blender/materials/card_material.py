@@ -16,7 +16,7 @@ each layer scatters more than all of its light, for those that it stands for.
 import bpy
 
 from ...core.shading import appearance
-from ..data.made_meshes import UV_MAP
+from ..data.made.made_meshes import UV_MAP
 
 _ANISOTROPY = 0.8  # highlights run across strands
 # Part of the scattered light that goes on forward. Before a sun, cards in Cycles had 0.1 to 0.17 of the red light of

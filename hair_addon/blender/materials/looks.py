@@ -4,7 +4,7 @@
 from dataclasses import replace
 
 from ...core.errors import HairError
-from ..data import curves, curves_objects
+from ..data.strands import curves, curves_objects
 from ..settings import setting_properties
 from . import materials
 

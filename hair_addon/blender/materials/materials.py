@@ -4,7 +4,7 @@
 import bpy
 
 from ...core.shading import appearance
-from ..data import curves as curves_door
+from ..data.strands import curves as curves_door
 from ..host.notices import name_of
 from ..settings import properties, setting_properties, shared_wetness
 from . import eevee_nodes, strand_nodes, wet_nodes

@@ -10,7 +10,8 @@ import bpy
 
 from ...core.errors import HairError
 from ...core.imaging.pixel_sampling import RenderSettings
-from ..data import composite_nodes, curves_objects
+from ..data.pictures import composite_nodes
+from ..data.strands import curves_objects
 from ..host.caches import Cache
 from ..settings import setting_properties
 from . import viewport

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...core.errors import HairError
-from ..data import drawn_meshes
+from ..data.pictures import drawn_meshes
 from ..gpu import (
     ambient_visibility,
     drawing,

@@ -10,7 +10,8 @@ import numpy as np
 from ...core.errors import HairError
 from ...core.imaging import pixel_sampling
 from ...core.long_work import Stopped, no_progress
-from ..data import camera_lens, panoramic_camera, scene, view_cameras
+from ..data import scene
+from ..data.pictures import camera_lens, panoramic_camera, view_cameras
 from ..gpu import drawing, world_texture
 from ..groom.dynamics import frame_folders
 from ..host import scene_time

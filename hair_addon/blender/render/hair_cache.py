@@ -21,7 +21,7 @@ from ...core.grooming import groom
 from ...core.kernels.checks import require_count, require_indices
 from ...core.shading import appearance
 from ...core.shading.tables import lookup_tables, strand_tables
-from ..data import attributes, curves, posed_strands, simulated_guides
+from ..data.strands import attributes, curves, posed_strands, simulated_guides
 from ..gpu import hair_shading, strand_textures
 from ..groom import bindings
 from ..host import paths

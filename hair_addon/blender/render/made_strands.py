@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...core.errors import HairError
-from ..data.posed_strands import Pose
+from ..data.strands.posed_strands import Pose
 from ..gpu import maker_choice, strand_carrier, strand_maker, strand_textures, style_maker
 from ..groom.bindings import BoundHair
 from ..groom.styled_hair import StyledHair

@@ -10,7 +10,8 @@ from ...core.errors import HairError
 from ...core.files.whole_file import whole_file
 from ...core.imaging.pixel_sampling import MOST_DRAWN
 from ...core.long_work import Stage, run_now
-from ..data import camera_lens, panoramic_camera, scene
+from ..data import scene
+from ..data.pictures import camera_lens, panoramic_camera
 from ..gpu import drawing, world_texture
 from . import drawn_scene, film, light_paths
 

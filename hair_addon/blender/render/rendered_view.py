@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Viewports with Rendered shading: surfaces and hair, refined pass by pass while nothing moves."""
 
-from ..data import camera_lens
+from ..data.pictures import camera_lens
 from ..gpu import drawing
 from . import hair_picture, region_pictures, viewport
 from .view_film import ViewFilm

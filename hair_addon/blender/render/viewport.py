@@ -12,7 +12,8 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
-from ..data import curves_objects, scene
+from ..data import scene
+from ..data.strands import curves_objects
 from ..gpu import drawing, shaders
 from ..gpu.display_transform import DisplayTransform
 from ..groom import bindings

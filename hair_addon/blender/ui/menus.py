@@ -3,8 +3,8 @@
 
 import bpy
 
-from ..groom import particle_hair
-from ..groom.foreign_curves import is_foreign
+from ..groom.foreign import particle_hair
+from ..groom.foreign.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of
 from ..live import unlocked_renders
 from ..render import composite

@@ -5,7 +5,8 @@ Away from corners where other than four faces meet, a Catmull-Clark surface [Cat
 cage, and the cage with its faces is the bilinear one. B-splines are convolutions of boxes, so the first is the second
 blurred by a hat as wide as two faces, whose variance is 1/6 of a face squared along each axis. Means of neighbouring
 vertices, as many times as give this variance, stand for the hat. The normals of the result lie within a degree of the
-surface's own, but within some ten degrees at the corners of a cube. blender/data/follow_nodes.py blurs likewise.
+surface's own, but within some ten degrees at the corners of a cube. follow_nodes.py of blender/data/strands blurs
+likewise.
 """
 
 import math

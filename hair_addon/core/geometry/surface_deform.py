@@ -5,7 +5,7 @@ A face's deformation gradient takes two of its edges and its unit normal to wher
 around a vertex has a nearest rotation, its polar factor U V^T of the singular value decomposition [Higham86]; between
 vertices two of its columns are interpolated and made orthonormal again. So rigid motion is reproduced exactly, shear
 and stretch rotate no more than necessary, and neighbouring roots do not separate, as they do with the frames of single
-triangles or of a UV map. blender/data/follow_nodes.py implements the same in geometry nodes.
+triangles or of a UV map. blender/data/strands/follow_nodes.py implements the same in geometry nodes.
 
 A subdivided surface is smooth where it is now, and flat on the faces of its cage before: from there, neighbouring roots
 would turn apart. Its rotation is that from the cage's smooth surface (smooth_surface.py).

@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.live import invalidation
-from tests.support.following import assert_follows, grow, update
+from tests.support.dynamics.following import assert_follows, grow, update
 from tests.support.reading import points
 
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hair_addon.blender.data import follow_nodes, scene
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.strands import follow_nodes
 from hair_addon.blender.live import older_files
-from tests.support.following import assert_follows, drawn_points, grow, update
+from tests.support.dynamics.following import assert_follows, drawn_points, grow, update
 from tests.support.reading import evaluated_points, points, vertex_positions, write_points
 
 

@@ -5,8 +5,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import curves_objects
 from hair_addon.blender.data import scene as scenes
+from hair_addon.blender.data.strands import curves_objects
 
 SQUARE = [(-1.0, -1.0, 0.0), (1.0, -1.0, 0.0), (1.0, 1.0, 0.0), (-1.0, 1.0, 0.0)]
 

@@ -5,8 +5,8 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.support.following import update
-from tests.support.imported import curves_object, lines_on, select, stored, use, world
+from tests.support.dynamics.following import update
+from tests.support.exchange.imported import curves_object, lines_on, select, stored, use, world
 from tests.support.reading import attribute, snapshot
 
 

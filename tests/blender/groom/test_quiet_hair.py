@@ -7,7 +7,7 @@ import pytest
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import Stopped, run_now
-from tests.support.swung import simulate, swing
+from tests.support.dynamics.swung import simulate, swing
 
 
 @pytest.fixture

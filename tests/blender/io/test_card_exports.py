@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.io import mesh_export
-from tests.support.following import update
+from tests.support.dynamics.following import update
 
 READERS = {".glb": ("import_scene", "gltf"), ".fbx": ("import_scene", "fbx"), ".usdc": ("wm", "usd_import")}
 

@@ -7,19 +7,19 @@ import shutil
 import bpy
 import pytest
 
-from hair_addon.blender.data import follow_nodes
+from hair_addon.blender.data.strands import follow_nodes
 from hair_addon.blender.groom.dynamics import dynamics_notes, frame_folders, guide_baking
 from hair_addon.blender.host import paths, running
 from hair_addon.blender.io import delivery
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import Stopped, run_now
-from tests.support.delivered import without_addon
-from tests.support.following import grow
+from tests.support.dynamics.following import grow
+from tests.support.dynamics.swung import simulate
+from tests.support.exchange.delivered import without_addon
 from tests.support.modal import Operator, drive
 from tests.support.reading import evaluated_points, everything, read_picture
 from tests.support.rendering import light_up
-from tests.support.swung import simulate
 
 LAST = 5
 

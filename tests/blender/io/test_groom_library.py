@@ -7,10 +7,11 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon import api
-from hair_addon.blender.data import attributes, groom_assets
+from hair_addon.blender.data.made import groom_assets
+from hair_addon.blender.data.strands import attributes
 from hair_addon.blender.io import asset_catalogs, groom_library
 from hair_addon.core.errors import HairError
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.reading import vertex_positions
 
 PICTURE = np.linspace(0.0, 1.0, 16 * 16 * 4, dtype=np.float32).reshape(16, 16, 4)

@@ -15,8 +15,8 @@ from hair_addon.core.cards import texels
 from hair_addon.core.cards.card_settings import CardSettings
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
-from tests.support.exported import world
-from tests.support.following import update
+from tests.support.dynamics.following import update
+from tests.support.exchange.exported import world
 from tests.support.reading import attribute
 
 SIZE = 256

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.data import armature_weights
-from tests.support.following import update
+from hair_addon.blender.data.made import armature_weights
+from tests.support.dynamics.following import update
 
 CARDS = 24
 

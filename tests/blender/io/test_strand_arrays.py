@@ -4,9 +4,9 @@
 import bpy
 import numpy as np
 
-from hair_addon.blender.data import exported_curves
+from hair_addon.blender.data.strands import exported_curves
 from hair_addon.blender.io import strand_arrays
-from tests.support.imported import curves_object, select
+from tests.support.exchange.imported import curves_object, select
 
 CONTROLS = 6
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from mathutils import Matrix
 
-from hair_addon.blender.data import curves
-from tests.support import alembic_reader
-from tests.support.exported import LAST, bake, export, shape, twist, widths, world
-from tests.support.following import update
+from hair_addon.blender.data.strands import curves
+from tests.support.dynamics.following import update
+from tests.support.exchange import alembic_reader
+from tests.support.exchange.exported import LAST, bake, export, shape, twist, widths, world
 from tests.support.reading import evaluated_points
 
 PLACES = {"Hair": "/groom/Hair/strands", "Hair_guides": "/groom/Hair/guides"}  # in Alembic → in USD

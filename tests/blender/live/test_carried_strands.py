@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from hair_addon.blender.data import posed_strands
+from hair_addon.blender.data.strands import posed_strands
 from hair_addon.blender.gpu import ambient_visibility, maker_choice
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import live_hair

@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import strand_textures
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.host import running

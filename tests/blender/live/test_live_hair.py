@@ -8,7 +8,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.settings import properties, setting_properties
 from hair_addon.core.grooming import groom

@@ -9,7 +9,7 @@ import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import curves
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, drawing, maker_choice, shaders, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time

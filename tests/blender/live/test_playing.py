@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import simulated_guides
+from hair_addon.blender.data.strands import simulated_guides
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.host import running
 from hair_addon.blender.live import (
@@ -17,10 +17,10 @@ from hair_addon.blender.live import (
     unlocked_renders,
 )
 from hair_addon.core.long_work import run_now
-from tests.blender.data.test_partings import draw_line
+from tests.blender.data.strands.test_partings import draw_line
+from tests.support.dynamics.swung import simulate, swing
 from tests.support.layout import draw
 from tests.support.reading import points, write_points
-from tests.support.swung import simulate, swing
 
 
 @pytest.fixture

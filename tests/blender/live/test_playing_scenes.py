@@ -5,14 +5,15 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import guide_poses, simulated_guides
+from hair_addon.blender.data.simulation import guide_poses
+from hair_addon.blender.data.strands import simulated_guides
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.host import running
 from hair_addon.blender.live import dynamics_state, invalidation, live_hair
 from hair_addon.core.files.frame_cache import FrameCache
 from hair_addon.core.long_work import run_now
+from tests.support.dynamics.swung import SWINGS, simulate, swing
 from tests.support.reading import evaluated_points, points, write_points
-from tests.support.swung import SWINGS, simulate, swing
 
 
 @pytest.fixture

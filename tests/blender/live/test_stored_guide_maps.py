@@ -8,7 +8,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.groom import bindings
 from hair_addon.core.grooming import following
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.reading import guide_map, points, write_points
 
 

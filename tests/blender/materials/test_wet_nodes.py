@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import attributes, curves
+from hair_addon.blender.data.strands import attributes, curves
 from hair_addon.blender.materials import materials, wet_nodes
 from hair_addon.blender.settings import style_items
 from hair_addon.core.shading import appearance

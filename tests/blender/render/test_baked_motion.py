@@ -9,9 +9,9 @@ from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.render import motion_vectors
 from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import run_now
+from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import points
 from tests.support.rendering import rendered
-from tests.support.swung import simulate, swing
 
 FRAME = 8
 FRAME_RATE = 24

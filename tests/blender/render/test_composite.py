@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import curves_objects
+from hair_addon.blender.data.strands import curves_objects
 from hair_addon.blender.render import composite
 from tests.support.rendering import configure, light_up, rendered
 

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import drawn_meshes
+from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.gpu import ambient_visibility
 from hair_addon.blender.render import drawn_scene, viewport
 from tests.support.reading import points, write_points

@@ -7,7 +7,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import drawn_meshes, scene
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.gpu import (
     ambient_visibility,
     drawing,

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import surface_materials
+from hair_addon.blender.data.pictures import surface_materials
 from hair_addon.blender.data.scene import read_camera
 from hair_addon.blender.gpu import drawing, visibility_buffer
 from hair_addon.blender.host import notices

@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 from scipy.ndimage import map_coordinates
 
-from hair_addon.blender.data import curves_objects, drawn_meshes, scene
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.pictures import drawn_meshes
+from hair_addon.blender.data.strands import curves_objects
 from hair_addon.blender.gpu import display_transform, shaders
 from hair_addon.blender.host import notices
 from hair_addon.blender.host.caches import Cache

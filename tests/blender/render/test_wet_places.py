@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import attributes, curves
+from hair_addon.blender.data.strands import attributes, curves
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.render import film, hair_cache, offscreen
 from hair_addon.blender.settings import style_items

@@ -10,7 +10,8 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import groom_settings, pipeline
+from hair_addon.blender.groom import pipeline
+from hair_addon.blender.groom.transfer import groom_settings
 from hair_addon.blender.settings import properties, setting_properties
 from hair_addon.core.dynamics.collision.collider_settings import ColliderSettings
 from hair_addon.core.dynamics.rod import presets

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.groom import groom_settings
+from hair_addon.blender.groom.transfer import groom_settings
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.files import settings_file
 from hair_addon.core.files.settings_file import GroomSettings

@@ -7,8 +7,10 @@ from types import SimpleNamespace
 import bpy
 import pytest
 
-from hair_addon.blender.data import curves
-from hair_addon.blender.groom import bindings, groom_settings, hair_styles, style_notes
+from hair_addon.blender.data.strands import curves
+from hair_addon.blender.groom import bindings
+from hair_addon.blender.groom.styles import hair_styles, style_notes
+from hair_addon.blender.groom.transfer import groom_settings
 from hair_addon.blender.settings import saved_styles, setting_properties, style_items
 from hair_addon.blender.ui import look_previews, panels
 from hair_addon.core.files import style_presets

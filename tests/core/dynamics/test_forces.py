@@ -14,7 +14,7 @@ from hair_addon.core.dynamics.rod.rods import Rods, combed_shape
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.errors import HairError
 from tests.support.devices import DEVICE
-from tests.support.rods import FIBRE, GRAVITY, Simulation, curl, in_lanes, line
+from tests.support.dynamics.rods import FIBRE, GRAVITY, Simulation, curl, in_lanes, line
 
 WEIGHTLESS = (0.0, 0.0, 0.0)
 

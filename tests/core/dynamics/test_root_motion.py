@@ -8,7 +8,7 @@ from hair_addon.core.dynamics import root_motion
 from hair_addon.core.dynamics.rod import rotations
 from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
 from hair_addon.core.errors import HairError
-from tests.support.rods import Simulation, line
+from tests.support.dynamics.rods import Simulation, line
 
 
 def random_pose(rng, count=20):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.files.alembic import TYPES, AlembicWriter, Property
-from tests.support import alembic_reader
+from tests.support.exchange import alembic_reader
 
 KINDS = sorted(set(TYPES) - {"string"})
 

@@ -10,7 +10,7 @@ import pytest
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import groom_curves, unreal_groom
 from hair_addon.core.files.groom_curves import GroomCurves
-from tests.support import alembic_reader
+from tests.support.exchange import alembic_reader
 
 # Alembic for Grooms, version 1.5: name → (type, extent, scope).
 SPECIFICATION = {

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import bend
-from tests.support.stepped import UP, stepped, straight_strands
+from tests.support.dynamics.stepped import UP, stepped, straight_strands
 
 ALL = {"root": 1.0, "tip": 1.0}
 

@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon.core.geometry.strands import segment_lengths
 from hair_addon.core.styling import braid, clump, curl
-from tests.support.stepped import curved_strands, stepped
+from tests.support.dynamics.stepped import curved_strands, stepped
 
 RADIUS, PITCH = 0.006, 0.036
 EVEN = {"radius": RADIUS, "pitch": PITCH, "thickness": 0.0, "root": 1.0, "tip": 1.0, "start": 0.0, "flatness": 0.0}

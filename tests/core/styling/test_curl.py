@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import clump, curl, frizz
-from tests.support.slid import steepest_moves
-from tests.support.stepped import UP, stepped, straight_strands
+from tests.support.dynamics.slid import steepest_moves
+from tests.support.dynamics.stepped import UP, stepped, straight_strands
 
 ALL = {"root": 1.0, "tip": 1.0, "start": 0.0}
 

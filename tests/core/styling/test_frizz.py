@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import frizz
-from tests.support.stepped import stepped, straight_strands
+from tests.support.dynamics.stepped import stepped, straight_strands
 
 LENGTH, POINTS = 0.3, 129
 

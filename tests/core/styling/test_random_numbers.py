@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon.core.styling import trim
 from hair_addon.core.styling.random_numbers import LENGTH, PURPOSES, random_numbers
-from tests.support.stepped import stepped, straight_strands
+from tests.support.dynamics.stepped import stepped, straight_strands
 
 
 @pytest.fixture

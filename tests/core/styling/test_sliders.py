@@ -16,7 +16,7 @@ import pytest
 
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
 from tests.support import styled
-from tests.support.slid import Slid, steepest_moves
+from tests.support.dynamics.slid import Slid, steepest_moves
 
 PLACES = 32  # along the slider, at first
 FEWEST_HALVINGS, MOST_HALVINGS = 5, 14

@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon.core.geometry.strands import segment_lengths
 from hair_addon.core.styling import smooth
-from tests.support.stepped import curved_strands, stepped, straight_strands
+from tests.support.dynamics.stepped import curved_strands, stepped, straight_strands
 
 
 def wave(wavelength, size=2e-4, length=1.0, point_count=241):

@@ -14,8 +14,8 @@ from bpy.types import Curves, Scene
 
 from ....core.files.frame_cache import FrameCache, Writer
 from ....core.long_work import Stage, Work
-from ...data import frame_animation
 from ...data import scene as scenes
+from ...data.simulation import frame_animation
 from ...host import scene_time
 from ...host.datablocks import Remembered
 from ...settings import properties

@@ -11,8 +11,8 @@ from bpy.types import Curves, Scene
 
 from ....core.dynamics.rod.stiffness_advice import bend_under_weight
 from ....core.errors import HairError
-from ...data import simulated_world
-from ...data.curves import is_hand_made
+from ...data.simulation import simulated_world
+from ...data.strands.curves import is_hand_made
 from ...settings import properties
 from ...settings.translations import error_text, interface_text
 from . import frame_folders, guide_simulation

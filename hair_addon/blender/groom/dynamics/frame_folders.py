@@ -11,8 +11,8 @@ from bpy.types import Curves
 from ....core.errors import HairError
 from ....core.files import frame_cache, frame_manifest
 from ....core.files.frame_cache import FrameCache
-from ...data import attributes, delivered_hair
-from ...data.curves import followers
+from ...data.strands import attributes, delivered_hair
+from ...data.strands.curves import followers
 from ...host import paths, scene_time
 from ...host.caches import Cache
 from ...host.notices import name_of

@@ -18,12 +18,13 @@ from ....core.files.frame_manifest import Manifest
 from ....core.grooming import cost
 from ....core.long_work import Stage, Work
 from ...data import scene as scenes
-from ...data import wet_guides
+from ...data.simulation import wet_guides
 from ...host import memory, scene_time
 from ...host.datablocks import Remembered
 from ...host.notices import name_of
 from ...settings import properties
-from .. import guide_regions, quiet_hair
+from .. import quiet_hair
+from ..guides import guide_regions
 from . import bake_resuming, frame_folders, guide_simulation
 from .bake_resuming import Task
 

@@ -11,10 +11,10 @@ from ....core.geometry.mesh import TriMesh
 from ....core.grooming import cost
 from ....core.grooming.guide_tool_settings import DrapeSettings
 from ....core.long_work import Work, part_of, run_now
-from ...data import simulated_world, wet_guides
+from ...data.simulation import simulated_world, wet_guides
 from ...host.datablocks import Remembered
 from ...settings import preferences, properties
-from .. import guide_tools
+from ..guides import guide_tools
 from . import guide_simulation
 
 LEAST_STIFFNESS = 1e-3  # of dynamics' settings

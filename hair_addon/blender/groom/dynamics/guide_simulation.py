@@ -15,12 +15,14 @@ from ....core import dynamics
 from ....core.dynamics.rod.settings import DynamicsSettings
 from ....core.errors import HairError
 from ....core.params import given
-from ...data import attributes, curves, guide_poses, simulated_world, wet_guides
-from ...data.guide_poses import GuidePose
+from ...data.simulation import guide_poses, simulated_world, wet_guides
+from ...data.simulation.guide_poses import GuidePose
+from ...data.strands import attributes, curves
 from ...host import scene_time
 from ...host.caches import Cache
 from ...settings import preferences, properties
-from .. import guide_regions, staleness
+from .. import staleness
+from ..guides import guide_regions
 
 # session_uid of guides → ((G,) bend stiffness that each needs to hold its shape, `_load` of the settings then)
 stiffness_cache = Cache()

@@ -4,8 +4,8 @@
 import bpy
 
 from ....core.errors import HairError, cause_of
-from ...data.curves import require_editable
-from ...groom import brushes
+from ...data.strands.curves import require_editable
+from ...groom.guides import brushes
 from ...groom.selection import guides_of, make_active, object_of, reveal
 from .base import HairOperator
 

@@ -7,7 +7,7 @@ from ....core.grooming.derived_guides import DerivationSettings
 from ....core.grooming.groom import HairSettings
 from ....core.long_work import run_now
 from ...data import scene
-from ...groom import hand_made_guides, kept_hair, particle_hair
+from ...groom.foreign import hand_made_guides, kept_hair, particle_hair
 from ...groom.selection import make_active, object_of
 from ...settings import properties, setting_properties
 from ...settings.translations import report_text

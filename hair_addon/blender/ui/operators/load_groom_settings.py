@@ -5,8 +5,8 @@ import bpy
 
 from ....core.files import settings_file
 from ....core.long_work import Stage
-from ...groom import groom_settings
 from ...groom.selection import hair_of, make_active, object_of
+from ...groom.transfer import groom_settings
 from ...host import paths
 from ...settings import properties
 from .file_browser import BrowsedOperator

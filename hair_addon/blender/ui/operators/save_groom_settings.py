@@ -6,8 +6,8 @@ import bpy
 from ....core.errors import HairError
 from ....core.files import settings_file
 from ....core.long_work import Stage
-from ...groom import groom_settings
 from ...groom.selection import hair_of
+from ...groom.transfer import groom_settings
 from ...host import paths
 from ...settings import properties
 from .file_browser import BrowsedOperator

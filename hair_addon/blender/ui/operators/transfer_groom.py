@@ -7,8 +7,8 @@ from ....core.errors import HairError
 from ....core.grooming import cost
 from ....core.grooming.transfer_settings import TransferSettings
 from ...data import scene
-from ...groom import groom_transfers
 from ...groom.selection import guides_of, hair_of, make_active, object_of
+from ...groom.transfer import groom_transfers
 from ...settings import properties, setting_properties
 from ...settings.translations import report_text
 from .. import setting_rows

@@ -7,8 +7,8 @@ from ....core.errors import HairError
 from ....core.grooming import cost
 from ....core.grooming.groom import HairSettings
 from ...data import scene
-from ...groom import hand_made_guides
-from ...groom.foreign_curves import is_foreign, require_foreign
+from ...groom.foreign import hand_made_guides
+from ...groom.foreign.foreign_curves import is_foreign, require_foreign
 from ...settings import properties, setting_properties
 from ...settings.translations import report_text
 from .. import setting_rows

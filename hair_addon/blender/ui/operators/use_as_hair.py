@@ -4,8 +4,8 @@
 import bpy
 
 from ....core.grooming.derived_guides import DerivationSettings
-from ...groom import hand_made_guides, kept_hair
-from ...groom.foreign_curves import is_foreign, require_foreign
+from ...groom.foreign import hand_made_guides, kept_hair
+from ...groom.foreign.foreign_curves import is_foreign, require_foreign
 from ...groom.selection import make_active, object_of
 from ...settings import properties, setting_properties
 from ...settings.translations import report_text

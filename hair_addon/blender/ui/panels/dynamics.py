@@ -3,7 +3,7 @@
 
 import bpy
 
-from ...data import delivered_hair
+from ...data.strands import delivered_hair
 from ...groom.dynamics import dynamics_notes, frame_folders
 from ...groom.selection import guides_of, hair_of, object_of
 from ...live import dynamics_state, simulated_hair, unlocked_renders

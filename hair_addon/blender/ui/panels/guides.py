@@ -5,9 +5,9 @@ import bpy
 
 from ....core.grooming import cost
 from ....core.grooming.groom import GuideSettings
-from ...data.curves import is_hand_made
 from ...data.scene import triangle_count
-from ...groom.foreign_curves import is_foreign
+from ...data.strands.curves import is_hand_made
+from ...groom.foreign.foreign_curves import is_foreign
 from ...groom.selection import guides_again, guides_of, surface_of
 from ...settings.translations import interface_text
 from .. import menus, setting_rows

@@ -4,8 +4,8 @@
 import bpy
 
 from ....core.grooming import cost
-from ...data.curves import is_hand_made
 from ...data.scene import triangle_count
+from ...data.strands.curves import is_hand_made
 from ...groom.diagnostics import parting_warnings
 from ...groom.selection import active_of_kind, guides_of, hair_of
 from ...settings.translations import interface_text

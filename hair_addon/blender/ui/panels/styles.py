@@ -7,10 +7,10 @@ from ....core.errors import HairError
 from ....core.files import style_presets
 from ....core.styling.base import ProfiledSettings
 from ....core.styling.kinds import KINDS
-from ...groom import painted_masks
-from ...groom.hair_styles import points_wanted
 from ...groom.selection import hair_of
-from ...groom.style_notes import notes_of
+from ...groom.styles import painted_masks
+from ...groom.styles.hair_styles import points_wanted
+from ...groom.styles.style_notes import notes_of
 from ...settings import saved_styles, style_items
 from ...settings.translations import interface_text
 from .. import look_previews, setting_rows

@@ -3,9 +3,9 @@
 
 import bpy
 
-from ...groom import particle_hair
 from ...groom.diagnostics import warnings_of
-from ...groom.foreign_curves import is_foreign
+from ...groom.foreign import particle_hair
+from ...groom.foreign.foreign_curves import is_foreign
 from ...groom.selection import active_of_kind, guides_of, hair_of, parts_of, surface_of
 from ...host.notices import name_of, text_of
 from ...settings.translations import interface_text

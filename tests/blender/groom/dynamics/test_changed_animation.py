@@ -9,7 +9,7 @@ from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.live import dynamics_state
 from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import Stopped, run_now
-from tests.support.swung import simulate, swing
+from tests.support.dynamics.swung import simulate, swing
 
 LAST = 52
 

@@ -11,9 +11,9 @@ from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.host import running
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
+from tests.support.dynamics.swung import simulate, swing
 from tests.support.modal import TIMER, Operator
 from tests.support.reading import points
-from tests.support.swung import simulate, swing
 
 LAST, PRESENT = 8, 3
 

@@ -7,16 +7,17 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import guide_poses, simulated_guides
-from hair_addon.blender.groom import guide_regions
+from hair_addon.blender.data.simulation import guide_poses
+from hair_addon.blender.data.strands import simulated_guides
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
+from hair_addon.blender.groom.guides import guide_regions
 from hair_addon.blender.live import dynamics_state
 from hair_addon.core.errors import HairError
 from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import Stopped, run_now
-from tests.blender.data.test_partings import draw_line
+from tests.blender.data.strands.test_partings import draw_line
+from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import evaluated_points, points
-from tests.support.swung import simulate, swing
 
 LAST = 28
 

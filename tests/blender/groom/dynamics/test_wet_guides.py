@@ -9,8 +9,8 @@ from hair_addon import api
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking, guide_draping
 from hair_addon.core.grooming.guide_tool_settings import DrapeSettings
 from hair_addon.core.long_work import run_now
+from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import points, write_points
-from tests.support.swung import simulate, swing
 
 LAST = 6
 

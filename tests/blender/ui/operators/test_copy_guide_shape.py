@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.support.following import update
+from tests.support.dynamics.following import update
 from tests.support.guide_tools import grown_from_nothing, lengths_of, select_guides
 from tests.support.reading import points, vertex_positions, write_points
 

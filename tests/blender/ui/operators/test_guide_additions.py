@@ -5,9 +5,10 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import curves, scene
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.strands import curves
 from hair_addon.core.geometry import mesh
-from tests.support.following import surface_points, update
+from tests.support.dynamics.following import surface_points, update
 from tests.support.guide_tools import grown_from_nothing, select_guides, wave
 from tests.support.reading import attribute, points
 

@@ -5,9 +5,9 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data import curves
-from hair_addon.blender.groom import guide_tools
-from tests.support.following import assert_follows, update
+from hair_addon.blender.data.strands import curves
+from hair_addon.blender.groom.guides import guide_tools
+from tests.support.dynamics.following import assert_follows, update
 from tests.support.guide_tools import (
     CHOSEN,
     SHAPING,

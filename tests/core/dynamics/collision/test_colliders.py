@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from hair_addon.core.dynamics.collision.colliders import Collider, Colliders
 from hair_addon.core.dynamics.collision.contact import WIDTH, Contacts
 from hair_addon.core.geometry.mesh import TriMesh
-from tests.support.contacts import bumpy
+from tests.support.dynamics.contacts import bumpy
 from tests.support.meshes import flat_grid, subdivided_sphere
 
 BALL = subdivided_sphere(1, 0.1)

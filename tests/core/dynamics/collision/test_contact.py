@@ -8,8 +8,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hair_addon.core.dynamics.rod.rod_solver import EMPTY, FINISH, PREDICT, SOLVE, Surroundings
-from tests.support.rod_contact import Ball, Plane, advance_touching, planes_of
-from tests.support.rods import FIBRE, GRAVITY, Simulation, curl, in_lanes, line
+from tests.support.dynamics.rod_contact import Ball, Plane, advance_touching, planes_of
+from tests.support.dynamics.rods import FIBRE, GRAVITY, Simulation, curl, in_lanes, line
 
 KEEP = 5e-4  # [m]
 

@@ -10,7 +10,7 @@ from hair_addon.core.dynamics.collision.contact import PLANE, RISE, Contacts
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.support.brute_force import distances, is_inside
-from tests.support.contacts import (
+from tests.support.dynamics.contacts import (
     FAR,
     LANES,
     STEP,

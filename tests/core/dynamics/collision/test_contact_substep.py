@@ -14,8 +14,8 @@ from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.dynamics.root_motion import RigidMotion, RootPose
 from hair_addon.core.dynamics.simulation import Obstacle, Simulation, World
 from hair_addon.core.kernels import replays
-from tests.support.contacts import bumpy
 from tests.support.devices import DEVICE
+from tests.support.dynamics.contacts import bumpy
 
 COUNT, FRAME = 300, 1.0 / 24.0  # more than one share of two threads; [s]
 

@@ -12,7 +12,7 @@ from hair_addon.core.dynamics.collision.distance_grid import (
     least_distance,
 )
 from tests.support.brute_force import distances
-from tests.support.contacts import bumpy, sheet
+from tests.support.dynamics.contacts import bumpy, sheet
 from tests.support.meshes import flat_grid
 
 

@@ -11,8 +11,8 @@ from hair_addon.core.dynamics.simulation import Obstacle, Simulation, World
 from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.support.devices import DEVICE
+from tests.support.dynamics.shaken_head import FRAME, grown, shake
 from tests.support.meshes import HEAD, read_obj, split_in_four
-from tests.support.shaken_head import FRAME, grown, shake
 
 KEEP = 1e-3  # [m]
 

@@ -12,7 +12,18 @@ from hair_addon.core.dynamics.collision.contact import Contacts
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.mesh import TriMesh
 from tests.support.brute_force import distances, is_inside
-from tests.support.contacts import STEP, Asked, around, bumpy, gaps_of, groom_of, is_plane, lanes_of, sheet, slab
+from tests.support.dynamics.contacts import (
+    STEP,
+    Asked,
+    around,
+    bumpy,
+    gaps_of,
+    groom_of,
+    is_plane,
+    lanes_of,
+    sheet,
+    slab,
+)
 from tests.support.meshes import flat_grid, subdivided_sphere
 
 

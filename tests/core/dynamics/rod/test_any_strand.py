@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from hair_addon.core.dynamics.rod.material import Material, material_of
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
-from tests.support.rods import FRAME, Simulation
+from tests.support.dynamics.rods import FRAME, Simulation
 
 STRANDS = 24  # of an example
 

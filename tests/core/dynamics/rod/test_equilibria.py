@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.support.rod_references import heavy_elastica, kirchhoff
-from tests.support.rods import BENDING, FIBRE, LINE_MASS, TWISTING, Simulation, arc, curl, line
+from tests.support.dynamics.rod_references import heavy_elastica, kirchhoff
+from tests.support.dynamics.rods import BENDING, FIBRE, LINE_MASS, TWISTING, Simulation, arc, curl, line
 
 WEIGHT = LINE_MASS * 9.81  # [N/m]
 IN_THICK_AIR = replace(FIBRE, air_drag=10.0, damping=0.05)

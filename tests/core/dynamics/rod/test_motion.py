@@ -8,7 +8,7 @@ import pytest
 from scipy.special import j0
 
 from hair_addon.core.dynamics.rod.rotations import IDENTITY, inverse, product
-from tests.support.rods import BENDING, FIBRE, FRAME, GRAVITY, LINE_MASS, Simulation, curl, line
+from tests.support.dynamics.rods import BENDING, FIBRE, FRAME, GRAVITY, LINE_MASS, Simulation, curl, line
 
 FREE = replace(FIBRE, air_drag=0.0, damping=0.0)  # nothing brakes it
 LIMP = replace(FREE, bend_stiffness=1e-3, youngs_modulus=4e-2, stretch_stiffness=1.0)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from hair_addon.core.dynamics.rod import rod_solver
 from tests.support.devices import DEVICE
-from tests.support.rods import Simulation, curl, in_lanes, line
+from tests.support.dynamics.rods import Simulation, curl, in_lanes, line
 
 COUNT, VERTICES = 150, 12  # more than one share of two threads
 FRAMES = 4

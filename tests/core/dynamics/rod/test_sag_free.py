@@ -10,7 +10,7 @@ from hair_addon.core.dynamics.rod.material import material_of
 from hair_addon.core.dynamics.rod.rods import combed_shape
 from hair_addon.core.dynamics.rod.sag_free import least_stiffness, sag_free
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
-from tests.support.rods import FRAME, GRAVITY, Simulation, curl, line
+from tests.support.dynamics.rods import FRAME, GRAVITY, Simulation, curl, line
 
 NATURAL = DynamicsSettings()
 

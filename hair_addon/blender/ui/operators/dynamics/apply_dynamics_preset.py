@@ -4,8 +4,8 @@
 import bpy
 
 from .....core.dynamics.rod.presets import PRESETS, applied
-from ....groom import groom_settings
 from ....groom.selection import guides_of
+from ....groom.transfer import groom_settings
 from ....settings import properties
 from ..base import HairOperator
 

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ....data import curves, delivered_hair
+from ....data.strands import curves, delivered_hair
 from ....groom.selection import guides_of
 from ....io import delivery
 from ..base import HairOperator

@@ -6,7 +6,7 @@ import bpy
 from .....core.dynamics.rod.settings import DynamicsSettings
 from .....core.errors import HairError
 from .....core.params import declared
-from ....data import curves
+from ....data.strands import curves
 from ....groom.dynamics import dynamics_notes, guide_simulation
 from ....groom.selection import guides_of
 from ..base import HairOperator

@@ -4,7 +4,7 @@
 import bpy
 
 from .....core.grooming.guide_tool_settings import LengthSettings
-from ....groom import guide_tools
+from ....groom.guides import guide_tools
 from ....settings import setting_properties
 from ... import setting_rows
 from .base import GuideTool

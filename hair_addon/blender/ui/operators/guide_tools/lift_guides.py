@@ -4,7 +4,7 @@
 import bpy
 
 from .....core.grooming.guide_tool_settings import LiftSettings
-from ....groom import guide_tools
+from ....groom.guides import guide_tools
 from ....settings import setting_properties
 from .base import GuideTool
 

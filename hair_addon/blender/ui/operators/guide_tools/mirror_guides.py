@@ -4,7 +4,7 @@
 import bpy
 
 from .....core.grooming.guide_tool_settings import MirrorSettings
-from ....groom import guide_additions
+from ....groom.guides import guide_additions
 from ....settings import setting_properties
 from .base import GuideTool
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import bpy
 
 from .....core.errors import HairError
-from ....groom import library_groom
 from ....groom.selection import make_active, object_of, surface_of
+from ....groom.transfer import library_groom
 from ....host import paths
 from ....io import groom_library
 from ....settings import asset_libraries, properties

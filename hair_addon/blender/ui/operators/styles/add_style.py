@@ -4,8 +4,8 @@
 import bpy
 
 from .....core.styling.kinds import DESCRIPTIONS, OFFERS
-from ....groom import hair_styles
 from ....groom.selection import hair_of
+from ....groom.styles import hair_styles
 from ....settings import properties
 from ..base import HairOperator
 from .base import fit_switch

@@ -3,8 +3,8 @@
 
 import bpy
 
-from ....groom import hair_styles
 from ....groom.selection import hair_of
+from ....groom.styles import hair_styles
 from ....settings import properties, saved_styles
 from ..base import HairOperator
 from .base import keep_switch

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ....data.curves import require_editable
+from ....data.strands.curves import require_editable
 from ....groom.selection import hair_of
 from ....settings import properties, style_items
 from ..base import HairOperator

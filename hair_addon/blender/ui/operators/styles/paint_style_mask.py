@@ -3,8 +3,8 @@
 
 import bpy
 
-from ....groom import painted_masks
 from ....groom.selection import hair_of
+from ....groom.styles import painted_masks
 from ..base import HairOperator
 from .base import active_style_of
 

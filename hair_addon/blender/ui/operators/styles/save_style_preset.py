@@ -3,8 +3,8 @@
 
 import bpy
 
-from ....groom import groom_settings
 from ....groom.selection import hair_of
+from ....groom.transfer import groom_settings
 from ....settings import properties, saved_styles
 from ..base import HairOperator
 

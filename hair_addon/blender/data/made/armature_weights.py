@@ -1,0 +1,86 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes of hair that follow the armature of their surface: each piece with the weights of the surface at its root."""
+
+import bpy
+import numpy as np
+
+from ....core import geometry
+from ....core.geometry.mesh import interpolate
+from .. import scene, vertex_groups
+
+_LEAST = 1e-4  # weights below it are left out
+
+
+def armatures_of(mesh_object):
+    """The Armature modifiers of a mesh object that deform it by vertex groups."""
+    return [m for m in mesh_object.modifiers if m.type == "ARMATURE" and m.object and m.use_vertex_groups]
+
+
+def bind(mesh_object, surface_object, piece_size):
+    """Give a mesh object on a surface the surface's armatures, and each of its pieces one place's weights.
+
+    piece_size: vertices of each piece, which lie one after the other from the root; the mesh is where the hair is now.
+    Its vertices move to where the armature's pose takes them from, so that it stays there.
+    """
+    modifiers = armatures_of(surface_object)
+    bones = {bone.name for modifier in modifiers for bone in modifier.object.data.bones if bone.use_deform}
+    names = [group.name for group in surface_object.vertex_groups if group.name in bones]
+    if not names:
+        return
+    mesh = mesh_object.data
+    vertices = np.empty((len(mesh.vertices), 3), np.float32)
+    mesh.vertices.foreach_get("co", vertices.ravel())
+    pieces = vertices.reshape(-1, piece_size, 3)
+    weights = _weights_at(pieces[:, :2].mean(axis=1), surface_object, names)
+    _add(mesh_object, names, weights, piece_size, modifiers)
+    maps = _poses(pieces[:, 0], weights, names, mesh_object, surface_object)
+    offsets = pieces.astype(np.float64) - maps[:, None, 3]
+    unposed = np.einsum("pvi,pij->pvj", offsets, np.linalg.inv(maps[:, :3]))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(unposed, np.float32).ravel())
+    mesh.update()
+
+
+def _weights_at(places, surface_object, names):
+    """(N, K) weights, that sum to one or are zero, of the surface nearest to local places (N, 3)."""
+    depsgraph = scene.present_depsgraph()
+    surface = scene.read_surface(surface_object, depsgraph)
+    weights = np.stack([scene.read_vertex_group(surface_object, depsgraph, name) for name in names], axis=1)
+    nearest = geometry.closest_point.SurfaceQuery(surface.posed_mesh).nearest(surface.from_local(places))
+    found = interpolate(weights, surface.posed_mesh, nearest)
+    found[found < _LEAST] = 0.0
+    return found / np.maximum(found.sum(axis=1, keepdims=True), _LEAST)
+
+
+def _add(mesh_object, names, weights, piece_size, modifiers):
+    """Vertex groups with weights of pieces (N, K), and modifiers like others."""
+    for name, of_pieces in zip(names, weights.T, strict=True):
+        if of_pieces.any():
+            vertex_groups.paint(mesh_object.vertex_groups.new(name=name), np.repeat(of_pieces, piece_size))
+    for modifier in modifiers:
+        made = mesh_object.modifiers.new(modifier.name, "ARMATURE")
+        made.object, made.use_bone_envelopes = modifier.object, False
+        made.use_deform_preserve_volume = modifier.use_deform_preserve_volume
+        made.show_viewport, made.show_render = modifier.show_viewport, modifier.show_render
+
+
+def _poses(places, weights, names, mesh_object, surface_object):
+    """(N, 4, 3) rows x, y, z and origin of the affine map by which the pose takes each piece: seen on four points."""
+    span = max(float(np.ptp(places, axis=0).max()), *surface_object.dimensions, 1e-6)
+    corners = np.concatenate([span * np.eye(3), np.zeros((1, 3))]).astype(np.float32)
+    probe = bpy.data.meshes.new("Probe")
+    probe.from_pydata((corners[None] + np.zeros((len(places), 1, 1), np.float32)).reshape(-1, 3), [], [])
+    probe_object = bpy.data.objects.new("Probe", probe)
+    try:
+        probe_object.parent = surface_object
+        mesh_object.users_collection[0].objects.link(probe_object)
+        _add(probe_object, names, weights, 4, [m for m in mesh_object.modifiers if m.type == "ARMATURE"])
+        bpy.context.view_layer.update()
+        evaluated = probe_object.evaluated_get(scene.present_depsgraph())
+        posed = np.empty((4 * len(places), 3), np.float32)
+        evaluated.data.vertices.foreach_get("co", posed.ravel())
+    finally:
+        bpy.data.objects.remove(probe_object)
+        bpy.data.meshes.remove(probe)
+    maps = posed.reshape(-1, 4, 3).astype(np.float64)
+    maps[:, :3] = (maps[:, :3] - maps[:, 3:]) / span
+    return maps

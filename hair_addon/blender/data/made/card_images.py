@@ -1,0 +1,55 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Textures of cards: arrays → images, in files or packed into the .blend."""
+
+import bpy
+import numpy as np
+
+from ....core.cards import texels
+from ....core.files.whole_file import whole_files
+
+
+def new_images(name, maps, folder, stem):
+    """{map: image} of `texels.maps`; "color" has alpha too.
+
+    name: that images begin with; folder: that .png files are written to, whole or not at all, named after `stem` and
+    the map; None packs images into the .blend. Raises `HairError`.
+    """
+    pixels = {"color": np.dstack([texels.srgb(maps["color"]), maps["alpha"]])}
+    pixels |= {kind: maps[kind] for kind in texels.MAPS if kind != "color"}
+    made = {kind: _new_image(f"{name} {kind}", kind, values) for kind, values in pixels.items()}
+    try:
+        if folder is None:
+            for image in made.values():
+                image.pack()
+        else:
+            _save(made, [folder / f"{stem}_{kind}.png" for kind in made])
+    except BaseException:
+        for image in made.values():
+            bpy.data.images.remove(image)
+        raise
+    return made
+
+
+def _new_image(name, kind, values):
+    """A new image with 8 bits a channel of (n, n), (n, n, 3) or (n, n, 4) values from 0 to 1."""
+    size = len(values)
+    image = bpy.data.images.new(name, size, size, alpha=kind == "color")
+    image.file_format = "PNG"
+    image.alpha_mode = "CHANNEL_PACKED"  # colors go on beyond the edges of strands
+    if kind != "color":
+        image.colorspace_settings.name = "Non-Color"
+    rgba = np.ones((size, size, 4), np.float32)
+    rgba[..., : values.shape[2] if values.ndim == 3 else 3] = values if values.ndim == 3 else values[..., None]
+    image.pixels.foreach_set(rgba.ravel())
+    return image
+
+
+def _save(made, paths):
+    with whole_files(paths) as partials:
+        for image, partial in zip(made.values(), partials, strict=True):
+            image.filepath_raw = str(partial)
+            image.save()
+    for image, path in zip(made.values(), paths, strict=True):
+        image.filepath_raw = str(path)
+        image.source = "FILE"
+        image.alpha_mode = "CHANNEL_PACKED"

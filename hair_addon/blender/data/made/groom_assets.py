@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a groom in an asset library stands on: arrays ↔ a mesh object of its own; and its picture."""
+
+import bpy
+import numpy as np
+
+from ....core.geometry.mesh import TriMesh
+from ...host.notices import name_of
+from .. import scene, vertex_groups
+
+_UV_MAP = "UVMap"
+
+
+def surface_object(name, mesh, corner_uvs, masks):
+    """A new mesh object, in no scene, of a `TriMesh`.
+
+    corner_uvs: (F, 3, 2), None for no UV map; masks: {name: (V,) weights}, which become vertex groups.
+    """
+    made = bpy.data.meshes.new(name)
+    made.from_pydata(mesh.vertices.astype(np.float64), [], mesh.triangles)
+    if corner_uvs is not None:
+        layer = made.uv_layers.new(name=_UV_MAP)
+        layer.uv.foreach_set("vector", np.ascontiguousarray(corner_uvs, np.float32).ravel())
+    owner = bpy.data.objects.new(name, made)
+    for mask, weights in masks.items():
+        vertex_groups.paint(owner.vertex_groups.new(name=mask), weights)
+    return owner
+
+
+def read_surface(owner):
+    """(`TriMesh`, (F, 3, 2) UV coordinates of its corners or None) of a mesh object as it is stored."""
+    mesh = owner.data
+    faces = scene.faces_of(mesh)
+    corners = scene.triangle_corners(mesh, faces, name_of(owner))
+    found = TriMesh(scene.vertex_positions(mesh), faces.corner_vertices[corners])
+    if mesh.uv_layers.active is None:
+        return found, None
+    uvs = np.empty((len(mesh.loops), 2), np.float32)
+    mesh.uv_layers.active.uv.foreach_get("vector", uvs.ravel())
+    return found, uvs[corners]
+
+
+def set_picture(datablock, pixels):
+    """Make pixels (height, width, 4), sRGB, the first row at the bottom, the preview of a datablock."""
+    preview = datablock.preview_ensure()
+    preview.image_size = pixels.shape[1], pixels.shape[0]
+    preview.image_pixels_float.foreach_set(np.ascontiguousarray(pixels, np.float32).ravel())
+
+
+def read_picture(datablock):
+    """(height, width, 4) float32 of a datablock's preview; None without one."""
+    preview = datablock.preview
+    if preview is None or not all(preview.image_size):
+        return None
+    width, height = preview.image_size
+    pixels = np.empty((height, width, 4), np.float32)
+    preview.image_pixels_float.foreach_get(pixels.ravel())
+    return pixels
+
+
+def read_pixels(image):
+    """(height, width, 4) float32 of an image with an alpha channel, the first row at the bottom."""
+    width, height = image.size
+    pixels = np.empty((height, width, image.channels), np.float32)
+    image.pixels.foreach_get(pixels.ravel())
+    return pixels

@@ -1,0 +1,44 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Meshes that are made of hair: arrays → objects in a collection of their own."""
+
+import bpy
+import numpy as np
+
+from .. import surface_collections
+
+UV_MAP = "UVMap"
+
+
+def new_collection(name, surface_object):
+    """A new collection beside a surface."""
+    made = bpy.data.collections.new(name)
+    surface_collections.collection_of(surface_object).children.link(made)
+    return made
+
+
+def new_object(name, made, surface_object, collection, material):
+    """A mesh object of a `PolygonMesh` in a surface's local coordinates, a child of the surface."""
+    mesh = bpy.data.meshes.new(name)
+    faces = made.faces
+    mesh.vertices.add(len(made.vertices))
+    mesh.vertices.foreach_set("co", np.ascontiguousarray(made.vertices, np.float32).ravel())
+    mesh.loops.add(len(faces.corner_vertices))
+    mesh.loops.foreach_set("vertex_index", faces.corner_vertices)
+    mesh.polygons.add(len(faces.starts) - 1)
+    mesh.polygons.foreach_set("loop_start", faces.starts[:-1])
+    uv_map = mesh.uv_layers.new(name=UV_MAP)
+    uv_map.uv.foreach_set("vector", np.ascontiguousarray(made.uvs, np.float32).ravel())
+    mesh.update(calc_edges=True)
+    mesh.shade_smooth()
+    mesh.materials.append(material)
+    mesh_object = bpy.data.objects.new(name, mesh)
+    mesh_object.parent = surface_object
+    collection.objects.link(mesh_object)
+    return mesh_object
+
+
+def hide(mesh_object):
+    """Hide an object in the viewport and in renders."""
+    if bpy.context.view_layer.objects.get(mesh_object.name) == mesh_object:  # as its surface is
+        mesh_object.hide_set(True)
+    mesh_object.hide_render = True

@@ -1,0 +1,67 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Force fields of a scene → those that hair is simulated in; Blender's Python does not evaluate its own."""
+
+import numpy as np
+
+from ....core import dynamics
+from ....core.errors import HairError
+from ...host.notices import name_of
+
+# Kinds that move other things than hair: they are left out without a word.
+_OF_OTHERS = {"NONE", "BOID", "GUIDE", "FLUID_FLOW"}
+
+
+def read(depsgraph, metres):
+    """(`ForceField`s of the objects that a depsgraph was evaluated with, errors of those that cannot act).
+
+    metres: in a unit of the world.
+    """
+    fields, errors = [], []
+    for evaluated in depsgraph.objects:
+        settings = evaluated.field
+        if settings is None or settings.type in _OF_OTHERS:
+            continue
+        if settings.type not in dynamics.air.KINDS or settings.shape not in dynamics.air.SHAPES:
+            sentence = 'The force field "{name}" does not act on hair: its type or shape is not supported.'
+            errors.append(HairError(sentence, name=name_of(evaluated)))
+            continue
+        field = _field_of(evaluated, settings, metres)
+        problem = field.problem()
+        if problem is None:
+            fields.append(field)
+        else:
+            sentence = 'The force field "{name}" does not act on hair: {cause}.'
+            errors.append(HairError(sentence, name=name_of(evaluated), cause=problem))
+    return tuple(fields), errors
+
+
+def _field_of(evaluated, settings, metres):
+    matrix = np.array(evaluated.matrix_world, np.float64)
+    x, y, z = metres * matrix[:3, 3]
+    axis = matrix[:3, 2]
+    is_drag, is_cone = settings.type == "DRAG", settings.falloff_type == "CONE"
+    beside = 1.0 if is_cone else metres  # an angle, or a distance
+
+    def limit(is_used, value, unit):
+        return unit * value if is_used else None
+
+    return dynamics.air.ForceField(
+        settings.type,
+        (x, y, z),
+        (float(axis[0]), float(axis[1]), float(axis[2])),
+        settings.linear_drag if is_drag else settings.strength,
+        settings.flow,
+        settings.shape,
+        settings.falloff_type,
+        settings.z_direction,
+        settings.falloff_power,
+        limit(settings.use_min_distance, settings.distance_min, metres),
+        limit(settings.use_max_distance, settings.distance_max, metres),
+        settings.radial_falloff,
+        limit(settings.use_radial_min, settings.radial_min, beside),
+        limit(settings.use_radial_max, settings.radial_max, beside),
+        settings.use_gravity_falloff,
+        metres * settings.size,
+        settings.use_global_coords,
+        settings.seed,
+    )

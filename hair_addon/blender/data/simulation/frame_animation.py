@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The animation that guides are simulated in, frame by frame, as a digest: baked frames tell by it whether it changed.
+
+Only vertices are read, as this is asked in every frame that plays.
+"""
+
+from dataclasses import asdict
+
+import numpy as np
+
+from ....core.dynamics.collision.collider_settings import ColliderSettings, contact_of
+from ....core.errors import HairError
+from ....core.files import frame_manifest
+from ....core.styling.strand_wetness import mean_amount
+from ...host.notices import name_of
+from ...settings import properties, setting_properties, shared_wetness
+from .. import scene
+from ..strands import curves
+from . import force_fields, simulated_world
+
+_HALF = 16  # digits of a digest, for what carries guides, and for what else acts on them
+
+SURFACE, SURROUNDINGS = "the surface", "colliders, force fields, gravity or keyed settings"
+
+
+def digest_of(guides, blender_scene, depsgraph, settings):
+    """32 hexadecimal digits of what moves guides with these `DynamicsSettings` in a depsgraph's frame.
+
+    Half of them are of the surface at their roots and its size, half of colliders, force fields, gravity and settings
+    that are keyed. Raises `HairError` where the surface cannot be read.
+    """
+    metres = simulated_world.metres_of(blender_scene, settings)
+    surface = guides.surface
+    if surface is None or surface.type != "MESH":
+        raise HairError('"{name}" has no surface: attach the guides to a mesh.', name=name_of(guides))
+    vertices = _vertices(surface, depsgraph, metres)
+    places = curves.read_root_places(guides, len(vertices))
+    if places is None or not len(vertices):
+        sentence = 'The guides "{name}" are not rooted on their surface as it is now: comb or regenerate them.'
+        raise HairError(sentence, name=name_of(guides))
+    roots = np.einsum("nc,ncx->nx", places[1].astype(np.float64), vertices[places[0]])
+    carrying = np.float32(np.concatenate([roots, *_bounds(vertices), _matrix(surface, depsgraph)[:3, :3]]))
+    acting = _acting(guides, blender_scene, depsgraph, settings, metres)
+    return frame_manifest.digest(carrying)[:_HALF] + frame_manifest.digest(acting)[:_HALF]
+
+
+def change(baked, now):
+    """What moves otherwise than in the digest of a baked frame, in a few words; None where nothing does."""
+    if baked == now:
+        return None
+    return SURROUNDINGS if baked[:_HALF] == now[:_HALF] else SURFACE
+
+
+def _acting(guides, blender_scene, depsgraph, settings, metres):
+    """What acts on guides beside their surface, as values of JSON in single precision."""
+    gravity = blender_scene.gravity if blender_scene.use_gravity else simulated_world.NO_GRAVITY
+    colliders = [
+        _collider(collider, depsgraph, settings, metres)
+        for collider in simulated_world.colliders(settings.colliders)
+        if not (settings.collides_with_surface and collider == guides.surface)
+    ]
+    fields, _refused = force_fields.read(depsgraph, metres)
+    keyed = [getattr(settings, name) for name in sorted(properties.keyed_dynamics_of(guides.vellus))]
+    if shared_wetness.is_keyed(guides.vellus):
+        keyed += [style.is_on * mean_amount(style) for style in shared_wetness.masked_styles(guides.vellus)]
+    acting_fields = [[_rounded(value) for value in asdict(one).values()] for one in fields]
+    return [_rounded(gravity), colliders, acting_fields, [_rounded(value) for value in keyed]]
+
+
+def _collider(collider, depsgraph, settings, metres):
+    own = setting_properties.to_settings(collider.vellus, ColliderSettings)
+    vertices = _vertices(collider, depsgraph, metres)
+    bounds = np.concatenate(_bounds(vertices)).ravel() if len(vertices) else ()
+    contact = (*contact_of(own, settings), own.is_double_sided)
+    return [name_of(collider), len(vertices), _rounded(contact), _rounded(bounds)]
+
+
+def _rounded(value):
+    """Numbers of single precision, in tuples too; other values as they are."""
+    if isinstance(value, str) or value is None:
+        return value
+    return np.float32(value).tolist()
+
+
+def _vertices(mesh_object, depsgraph, metres):
+    """(V, 3) float64 [m] in the world, of an evaluated mesh object."""
+    local = scene.evaluated_positions(mesh_object, depsgraph)
+    matrix = metres * _matrix(mesh_object, depsgraph)
+    return local @ matrix[:, :3].T + matrix[:, 3]
+
+
+def _matrix(mesh_object, depsgraph):
+    return np.array(mesh_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]
+
+
+def _bounds(vertices):
+    return vertices.min(axis=0)[None], vertices.max(axis=0)[None]

@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Where a surface carries guides in a frame, in metres and world axes, for their simulation; and back to rest.
+
+A guide moves rigidly with the surface at its root, as hair does (posed_strands.py), and then with the object. Where an
+object is scaled unevenly, its mean scale counts.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ....core import dynamics
+from ....core.errors import HairError
+from ..strands import curves, posed_strands
+from ..strands.posed_strands import Pose
+
+
+@dataclass(frozen=True)
+class GuidePose:
+    """A surface in one frame, and the roots of guides on it.
+
+    places: root vertices and barycentric coordinates; matrix: (3, 4) float64, local coordinates → the world's [m].
+    """
+
+    pose: Pose
+    places: tuple[np.ndarray, np.ndarray]
+    matrix: np.ndarray
+
+    @property
+    def triangles(self) -> np.ndarray:
+        """(F, 3) int32, wound so that normals point out of a closed mesh."""
+        return self.pose.surface.mesh.triangles
+
+    @cached_property
+    def vertices(self) -> np.ndarray:
+        """(V, 3) float64 [m]: the surface's vertices in the world."""
+        return self._to_world(self.pose.surface.posed)
+
+    @cached_property
+    def _polar(self):
+        return _polar(self.matrix[:, :3])
+
+    @property
+    def scale(self) -> float:
+        """Metres in a unit of local coordinates, the mean."""
+        return float(abs(np.linalg.det(self.matrix[:, :3]))) ** (1.0 / 3.0)
+
+    @cached_property
+    def root_positions(self) -> np.ndarray:
+        """(G, 3) float64 [m]: the guides' roots in the world."""
+        vertices, barycentric = self.places
+        return np.einsum("nc,ncx->nx", barycentric.astype(np.float64), self.vertices[vertices])
+
+    def groom(self, local: np.ndarray) -> np.ndarray:
+        """Points (G, P, 3) of combed guides in local coordinates → (G, P, 3) float64 [m] before any rotation."""
+        return local @ self._polar[1].T
+
+    def root_pose(self, start: "GuidePose") -> "dynamics.root_motion.RootPose":
+        """The `RootPose` now of a groom that `start.groom` gives; roots have to be those of `start`."""
+        vertices, barycentric = self.places
+        roots = np.einsum("nc,ncx->nx", barycentric.astype(np.float64), self._rest[vertices])
+        size = max(self.pose.surface.extent, 1e-20)
+        crosses = roots[:, None] + size * np.concatenate([np.zeros((1, 3)), np.eye(3)])
+        posed = self._carried(crosses.astype(np.float32)).astype(np.float64)
+        axes = np.swapaxes(posed[:, 1:] - posed[:, :1], 1, 2) / size  # columns
+        rotation = self._polar[0] @ _nearest_rotations(axes)
+        turns = dynamics.rod.rotations.from_matrices(rotation)
+        return dynamics.root_motion.RootPose(self._to_world(posed[:, 0]), turns, self.scale / start.scale)
+
+    def to_rest(self, points: np.ndarray) -> np.ndarray:
+        """Points (G, P, 3) [m] in the world → (G, P, 3) float32, local coordinates at rest."""
+        local = (points - self.matrix[:, 3]) @ np.linalg.inv(self.matrix[:, :3]).T
+        return self._carried(local.astype(np.float32), is_back=True)
+
+    def to_world(self, points: np.ndarray) -> np.ndarray:
+        """The inverse of `to_rest`, float64 [m]."""
+        return self._to_world(self._carried(np.ascontiguousarray(points, np.float32)))
+
+    @property
+    def _rest(self):
+        return self.pose.surface.rest.astype(np.float64)
+
+    def _carried(self, points, is_back=False):
+        if self.pose.motion is None:
+            return points
+        return posed_strands.carried(points, self.pose.motion, self.places, is_back=is_back)
+
+    def _to_world(self, points):
+        return points @ self.matrix[:, :3].T + self.matrix[:, 3]
+
+
+def read(guides, depsgraph, metres):
+    """The `GuidePose` of guide Curves as a depsgraph has evaluated their surface; metres: in a unit of the world.
+
+    Raises `HairError` where there is no surface, or guides are not rooted on it.
+    """
+    surface_object = guides.surface
+    if surface_object is None:
+        raise HairError('"{name}" has no surface: attach the guides to a mesh.', name=guides.name)
+    pose = posed_strands.read_pose(surface_object, depsgraph)
+    if pose.surface is None:
+        raise HairError('"{name}" is not a mesh: attach the guides to a mesh.', name=surface_object.name)
+    places = curves.read_root_places(guides, len(pose.surface.rest))
+    if places is None or guides.vellus.topology != pose.surface.topology or not places[1].any(axis=1).all():
+        raise HairError(
+            'The guides "{name}" are not rooted on their surface as it is now: comb or regenerate them.',
+            name=guides.name,
+        )
+    matrix = np.array(surface_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]
+    if not np.isfinite(matrix).all() or abs(np.linalg.det(matrix[:, :3])) < 1e-30:
+        raise HairError('"{name}" has a scale of zero: change its scale.', name=surface_object.name)
+    return GuidePose(pose, places, metres * matrix)
+
+
+def _polar(matrix):
+    """(rotation R, P) with R P = matrix; R proper, so P mirrors where the matrix does."""
+    left, sizes, right = np.linalg.svd(matrix)
+    sign = np.sign(np.linalg.det(left @ right))
+    return sign * (left @ right), sign * (right.T * sizes) @ right
+
+
+def _nearest_rotations(matrices):
+    left, _sizes, right = np.linalg.svd(matrices)
+    return left @ right

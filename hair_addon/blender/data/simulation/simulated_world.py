@@ -1,0 +1,66 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What acts on simulated guides in a scene: gravity, and the meshes that they collide with, in metres."""
+
+import bpy
+import numpy as np
+
+from ....core import dynamics
+from ....core.dynamics.collision.collider_settings import ColliderSettings, contact_of
+from ....core.errors import HairError
+from ...host import scene_time
+from ...host.notices import name_of
+from ...settings import setting_properties
+from .. import scene
+from . import force_fields
+
+NO_GRAVITY = (0.0, 0.0, 0.0)
+
+
+def metres_of(blender_scene, settings):
+    """Metres in a unit of the scene's world, for guides with these `DynamicsSettings`."""
+    return blender_scene.unit_settings.scale_length * settings.size
+
+
+def read(blender_scene, depsgraph, settings, guide_pose, surface_object):
+    """The `World` of guides in the frame that a depsgraph was evaluated for, and errors of colliders left out.
+
+    guide_pose: their `GuidePose` in that frame; surface_object: which they grow on.
+    """
+    gravity = tuple(blender_scene.gravity) if blender_scene.use_gravity else NO_GRAVITY
+    metres = metres_of(blender_scene, settings)
+    obstacles, errors = [], []
+    if settings.collides_with_surface:
+        vertices, triangles = guide_pose.vertices, guide_pose.triangles
+        obstacles.append(_obstacle(surface_object, vertices, triangles, settings, metres))
+    for collider in colliders(settings.colliders):
+        if settings.collides_with_surface and collider == surface_object:
+            continue
+        try:
+            vertices, triangles = _read_mesh(collider, depsgraph, metres)
+        except HairError as error:
+            errors.append(error)
+            continue
+        obstacles.append(_obstacle(collider, vertices, triangles, settings, metres))
+    fields, refused = force_fields.read(depsgraph, metres)
+    time = scene_time.time_of(blender_scene) / scene_time.animation_rate(blender_scene)
+    return dynamics.simulation.World(gravity, tuple(obstacles), fields, time), errors + refused
+
+
+def _obstacle(mesh_object, vertices, triangles, settings, metres):
+    own = setting_properties.to_settings(mesh_object.vellus, ColliderSettings)
+    friction, distance = contact_of(own, settings)
+    name = f"{name_of(mesh_object)} {mesh_object.session_uid}"
+    return dynamics.simulation.Obstacle(name, vertices, triangles, friction, metres * distance, own.is_double_sided)
+
+
+def colliders(collection_name):
+    """The mesh objects of a collection, by name."""
+    collection = bpy.data.collections.get(collection_name) if collection_name else None
+    return [] if collection is None else [o for o in collection.all_objects if o.type == "MESH"]
+
+
+def _read_mesh(mesh_object, depsgraph, metres):
+    """((V, 3) float64 [m] in the world, (F, 3) int32) of an evaluated mesh object. Raises `HairError`."""
+    surface = scene.read_surface(mesh_object, depsgraph)
+    matrix = metres * np.array(mesh_object.evaluated_get(depsgraph).matrix_world, np.float64)[:3]
+    return surface.posed @ matrix[:, :3].T + matrix[:, 3], surface.mesh.triangles

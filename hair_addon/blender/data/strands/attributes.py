@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Attributes of Curves ↔ arrays."""
+
+import numpy as np
+
+from ....core import kernels
+
+# Data types that can be read as arrays: (name of the value property, components, dtype).
+LAYOUTS = {
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "INT8": ("value", 1, np.int8),
+    "BOOLEAN": ("value", 1, bool),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.float32),
+    "QUATERNION": ("value", 4, np.float32),
+    "INT16_2D": ("value", 2, np.int16),
+    "INT32_2D": ("value", 2, np.int32),
+    "FLOAT4X4": ("value", 16, np.float32),
+}
+
+RADIUS = 0.005  # of Curves without one, as Blender has it
+
+CATMULL_ROM, POLY = 0, 1  # of Blender's types of curves; the others are above
+
+
+def write(curves, name, data_type, domain, values):
+    """Write a value for every point or curve, unless it is unchanged: writing copies, and triggers updates."""
+    attribute = curves.attributes.get(name)
+    if attribute is not None and (attribute.data_type, attribute.domain) != (data_type, domain):
+        curves.attributes.remove(attribute)
+        attribute = None
+    value_name, _width, scalar = LAYOUTS[data_type]
+    values = np.ascontiguousarray(values, scalar).ravel()
+    if attribute is None:
+        attribute = curves.attributes.new(name, data_type, domain)
+    elif _holds(attribute, value_name, values):
+        return
+    attribute.data.foreach_set(value_name, values)
+
+
+def write_positions(curves, points, name="position"):
+    """Write float32 points (..., 3) of all curves, those of linked and overridden Curves too, which no file keeps.
+
+    name: of the attribute, which is there.
+    """
+    data, points = curves.attributes[name].data, np.ascontiguousarray(points, np.float32)
+    if not is_from_library(curves):
+        data.foreach_set("vector", points.ravel())
+        return
+    # Where Blender's interface lets nobody edit, `foreach_set` does nothing without a word. Single elements may be
+    # written, by the first of which Blender unshares the array from its evaluated copies.
+    if points.size != 3 * len(data):
+        raise ValueError("points are not as many as those of the curves")
+    if len(data):
+        kernels.foreign_memory.write(data[0].as_pointer(), points)
+
+
+def is_from_library(curves):
+    """Whether another file holds what Curves are: they are linked, or a library override."""
+    return curves.library is not None or curves.override_library is not None
+
+
+def _holds(attribute, value_name, values):
+    count = len(attribute.data)
+    if not count:
+        return True
+    # Changed values usually differ everywhere: compare three of them before reading all.
+    rows = values.reshape(count, -1)
+    for place in {0, count // 2, count - 1}:
+        if not np.array_equal(getattr(attribute.data[place], value_name), rows[place].squeeze()):
+            return False
+    present = np.empty_like(values)
+    attribute.data.foreach_get(value_name, present)
+    return np.array_equal(present, values)
+
+
+def has(curves, name, data_type, domain):
+    """Whether there is an attribute of this name, type and domain."""
+    attribute = curves.attributes.get(name)
+    return attribute is not None and (attribute.data_type, attribute.domain) == (data_type, domain)
+
+
+def read(curves, name, data_type, domain):
+    """Read (N,) or (N, width) values; None if there is no attribute of this name, type and domain.
+
+    Users or nodes may have stored any data under our names.
+    """
+    if not has(curves, name, data_type, domain):
+        return None
+    attribute = curves.attributes[name]
+    value_name, width, scalar = LAYOUTS[data_type]
+    values = np.empty((len(attribute.data), width), scalar)
+    attribute.data.foreach_get(value_name, values.ravel())
+    return values[:, 0] if width == 1 else values
+
+
+def valid_radii(radii):
+    """Radii as they are, Blender's own default in place of negative and non-finite ones."""
+    return np.where((radii >= 0.0) & (radii < np.inf), radii, np.float32(RADIUS))
+
+
+def curve_types(curves):
+    """(S,) int8: Blender's type of each curve."""
+    types = read(curves, "curve_type", "INT8", "CURVE")
+    return np.full(len(curves.curves), CATMULL_ROM, np.int8) if types is None else types
+
+
+def are_smooth(curves):
+    """(S,) bool: which curves are Catmull-Rom splines, as brushes create them."""
+    return curve_types(curves) == CATMULL_ROM
+
+
+def reorder_points(curves, order):
+    """Reorder all point attributes: point i gets the value of point order[i]; order: (N,) indices."""
+    for attribute in curves.attributes:
+        layout = LAYOUTS.get(attribute.data_type)
+        if attribute.domain != "POINT" or layout is None:
+            continue
+        name, width, kind = layout
+        values = np.empty((len(order), width), kind)
+        attribute.data.foreach_get(name, values.ravel())
+        attribute.data.foreach_set(name, np.ascontiguousarray(values[order]).ravel())

@@ -1,0 +1,395 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands: arrays ↔ Blender's Curves, with the attributes that sculpt mode, hair nodes and renderers expect.
+
+Curves are poly lines: 41 points are smooth enough, every hair node group supports them, and Blender's
+evaluation of Catmull-Rom curves would cost more than generating the strands.
+"""
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+from ....core import geometry
+from ....core.errors import HairError
+from ....core.geometry import mesh as mesh_math
+from ....core.geometry import strands
+from ....core.geometry.mesh import SurfacePoints
+from ....core.grooming import groom
+from ...host.notices import name_of
+from . import attributes, follow_nodes, simulated_guides
+
+_GUIDE_MAP = ("guide_index", "guide_weight")
+
+_WETNESS = "wetness"  # a strand's, where a mask or a variation of the style Wet makes strands differ
+
+# A stored root further than this part of the surface's size from the curve's first point is out of date.
+_ROOT_TOLERANCE = 1e-4
+
+
+def _write_positions(curves, points):
+    """Write points (..., 3) float32 of all curves, and their fingerprint for `is_combed`."""
+
+    attributes.write_positions(curves, points)
+    curves.vellus.written = geometry.fingerprint.fingerprint(points)
+
+
+def _write_radii(curves, radii):
+    """Write the same radii (P,) along every strand, unless they are unchanged."""
+    radii, present = np.asarray(radii, np.float32), attributes.read(curves, "radius", "FLOAT", "POINT")
+    if present is not None and _repeats(present, radii):
+        return
+    attributes.write(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
+
+
+def _repeats(values, row):
+    """Whether values (N,) repeat a row; compared in blocks that fit the CPU caches."""
+    some = np.tile(row, 4096)
+    parts = (values[first : first + len(some)] for first in range(0, len(values), len(some)))
+    return all(np.array_equal(part, some[: len(part)]) for part in parts)
+
+
+def make_strands(curves, surface, roots, radii, identities, *, leaders=None, normals=None, written_radii=None):
+    """Resize the curves for strands, and write everything except their points.
+
+    roots: `SurfacePoints` (S,); radii: (P,) in local coordinates; identities: as `Surface.identities` gives them;
+    leaders: (S,) int32, the strand that stands for the guide of each, or None where strands are guides themselves;
+    normals: (S, 3) float32 of the surface at the roots, if they are known; written_radii: (P,) that the curves have, if
+    they are known.
+    """
+    if len(roots) == 0:
+        raise ValueError("no strands: an empty list of curves would crash Blender")
+    is_new = _resize(curves, len(roots), len(radii))
+    if is_new or "radius" not in curves.attributes or not np.array_equal(radii, written_radii):
+        _write_radii(curves, radii)
+    if leaders is not None:
+        # Blender's hair nodes look up this curve among the strands, and clump, curl and braid around it.
+        attributes.write(curves, "guide_curve_index", "INT", "CURVE", leaders)
+    for name, data_type, values in zip(("id", "strand_random"), ("INT", "FLOAT"), identities, strict=True):
+        attributes.write(curves, name, data_type, "CURVE", values)
+    write_roots(curves, surface, roots, normals)
+
+
+def write_guide_map(curves, guide_map):
+    """Store (S, k) int32 guides of strands and (S, k) float32 weights, a pair of attributes for each k; None: remove.
+
+    guide_index_0 and guide_weight_0 are the nearest's.
+    """
+    slot_count = 0 if guide_map is None else guide_map[0].shape[1]
+    for attribute in list(curves.attributes):
+        kind, _, slot = name_of(attribute).rpartition("_")
+        if kind in _GUIDE_MAP and slot.isdecimal() and int(slot) >= slot_count:
+            curves.attributes.remove(attribute)
+    for slot in range(slot_count):
+        for name, data_type, values in zip(_GUIDE_MAP, ("INT", "FLOAT"), guide_map, strict=True):
+            attributes.write(curves, f"{name}_{slot}", data_type, "CURVE", values[:, slot])
+
+
+def write_clumps(curves, clumps):
+    """Store (S,) int32 clumps of strands and (S,) float32 random numbers of these, for shaders; None: remove them."""
+    for name, data_type, place in (("clump_index", "INT", 0), ("clump_random", "FLOAT", 1)):
+        _write_or_remove(curves, name, data_type, None if clumps is None else clumps[place])
+
+
+def write_wetness(curves, wetness):
+    """Store (S,) float32 wetness of strands, for shaders; None: remove it. Returns whether it came or went."""
+    had_wetness = has_wetness(curves)
+    _write_or_remove(curves, _WETNESS, "FLOAT", wetness)
+    return had_wetness != (wetness is not None)
+
+
+def _write_or_remove(curves, name, data_type, values):
+    if values is not None:
+        attributes.write(curves, name, data_type, "CURVE", values)
+    elif attributes.has(curves, name, data_type, "CURVE"):
+        curves.attributes.remove(curves.attributes[name])
+
+
+def write_roots(curves, surface, roots, normals=None):
+    """Store the roots of strands: for Vellus, for the nodes that deform them, and for Blender's tools."""
+    stored = surface.swap_winding(roots)
+    normals = surface.to_local_normals(mesh_math.normals(surface.mesh, roots) if normals is None else normals)
+    attributes.write(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
+    attributes.write(curves, "surface_normal", "FLOAT_VECTOR", "CURVE", normals)
+    attributes.write(curves, "root_triangle", "INT", "CURVE", stored.triangle)
+    attributes.write(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE", stored.barycentric)
+    for name, vertices in zip(follow_nodes.ROOT_VERTICES, surface.root_vertices(roots).T, strict=True):
+        attributes.write(curves, name, "INT", "CURVE", vertices)
+    curves.surface_uv_map = surface.uv_map
+    curves.vellus.topology = surface.topology
+    for user in bpy.data.objects:
+        if user.data == curves and user.library is None:
+            is_combed = curves.vellus.kind == "GUIDES" and surface.corner_uvs is not None
+            follow_nodes.set_surface(user, curves.surface, len(surface.rest), is_combed, surface.cage_corners)
+    curves.update_tag()
+
+
+def write_uvs(curves, surface):
+    """Write only the UV coordinates of the roots."""
+    if not len(curves.curves):
+        return
+    roots = read_roots(curves, surface, surface.from_local(first_points(curves)))
+    attributes.write(curves, "surface_uv_coordinate", "FLOAT2", "CURVE", surface.uvs(roots))
+    curves.surface_uv_map = surface.uv_map
+    curves.update_tag()
+
+
+def write_points(curves, growing):
+    """Write the points of strands that `make_strands` created; growing: a future of local (S, P, 3) float32."""
+    # The first access to points makes Blender copy the array shared with its last evaluation, half of the writing time:
+    # do it while strands are computed.
+    _ = curves.attributes["position"].data[0]
+    _write_positions(curves, growing.result())
+    curves.update_tag()
+
+
+# The property with the surface's positions when guides were rooted on it. In a group, because Blender's USD exporter
+# warns about bare arrays.
+_STOOD_ON = "vellus_stood_on"
+
+
+def keep_surface(curves, surface):
+    """Store the rest positions of the surface's vertices: guides are transformed from these after an edit."""
+    if _STOOD_ON in curves:
+        # Blender 5.2 writes an array over a shorter one, past its end.
+        del curves[_STOOD_ON]
+    curves[_STOOD_ON] = {"rest": surface.rest.ravel()}
+
+
+def stood_on(curves):
+    """(V, 3) float32 that `keep_surface` remembered, or None."""
+    kept = curves.get(_STOOD_ON)
+    return None if kept is None else np.array(kept["rest"], np.float32).reshape(-1, 3)
+
+
+def write_moved(curves, points):
+    """Write positions of strands that moved with their surface: combed ones remain combed."""
+    if not len(curves.points):
+        return
+    before, was_combed = curves.vellus.written, is_combed(curves)
+    _write_positions(curves, points)
+    if was_combed:
+        curves.vellus.written = before
+
+
+def clear_parent_inverse(curves):
+    """Remove the parent inverse that Blender set to keep children in place when their surface's transform was applied.
+
+    For Curves whose points were transformed for that.
+    """
+    for user in bpy.data.objects:
+        if user.data == curves and user.parent == curves.surface:
+            user.matrix_local = Matrix()
+
+
+def read_root_places(curves, vertex_count):
+    """Stored (S, 3) int32 root vertices and (S, 3) float32 barycentric coordinates in Blender's order; or None.
+
+    Rows that are invalid for a mesh with so many vertices are zero.
+    """
+    barycentric = attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
+    corners = [attributes.read(curves, name, "INT", "CURVE") for name in follow_nodes.ROOT_VERTICES]
+    if barycentric is None or any(corner is None for corner in corners):
+        return None
+    vertices = np.stack(corners, axis=1)
+    is_lost = ~_are_barycentric(barycentric) | (vertices < 0).any(axis=1) | (vertices >= vertex_count).any(axis=1)
+    vertices[is_lost], barycentric[is_lost] = 0, 0.0
+    return vertices, barycentric
+
+
+def _are_barycentric(coordinates):
+    """(S,) bool: whether rows of (S, 3) are places inside a triangle, to rounding. NaN is not."""
+    is_inside = ((coordinates >= -1e-3) & (coordinates <= 1.0 + 1e-3)).all(axis=1)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return is_inside & (abs(coordinates.sum(axis=1) - 1.0) < 1e-3)
+
+
+def _resize(curves, strand_count, point_count):
+    """Resize for strands; returns whether all strands are new."""
+    if len(curves.curves) == strand_count and len(curves.points) == strand_count * point_count:
+        sizes = point_counts(curves)
+        if (sizes == point_count).all():
+            return False
+    if len(curves.curves):
+        curves.remove_curves()
+    # Plain integers only.
+    curves.add_curves([int(point_count)] * int(strand_count))
+    curves.set_types(type="POLY")
+    return True
+
+
+def curve_offsets(curves):
+    """(S+1,) int32: where each curve's points begin, and where the last one's end."""
+    offsets = np.zeros(len(curves.curves) + 1, np.int32)
+    if len(curves.curves):
+        curves.curve_offset_data.foreach_get("value", offsets)
+    return offsets
+
+
+def point_counts(curves):
+    """(S,) int32: how many points each curve has."""
+    return np.diff(curve_offsets(curves))
+
+
+def first_points(curves):
+    """(S, 3) float32: the first point of each curve, in local coordinates."""
+    return read_points(curves)[curve_offsets(curves)[:-1]]
+
+
+def read_points(curves):
+    """(all points, 3) float32 in local coordinates, curve after curve."""
+    positions = np.empty((len(curves.points), 3), np.float32)
+    if len(positions):
+        curves.attributes["position"].data.foreach_get("vector", positions.ravel())
+    return positions
+
+
+def read_radii(curves):
+    """(all points,) float32 in local units, at least zero; Blender's own default where curves carry no radius."""
+    radii = attributes.read(curves, "radius", "FLOAT", "POINT")
+    if radii is None:
+        return np.full(len(curves.points), attributes.RADIUS, np.float32)
+    return attributes.valid_radii(radii)
+
+
+def read_randoms(curves):
+    """(S,) random numbers, float32 in [0, 1], of strands; by index for curves without them."""
+    randoms = attributes.read(curves, "strand_random", "FLOAT", "CURVE")
+    if randoms is None:
+        return strands.random_numbers(len(curves.curves))
+    return np.where((randoms >= 0.0) & (randoms <= 1.0), randoms, np.float32(0.5))
+
+
+def has_wetness(curves):
+    """Whether strands store a wetness each."""
+    return attributes.has(curves, _WETNESS, "FLOAT", "CURVE")
+
+
+def read_wetness(curves):
+    """(S,) wetness, float32 in [0, 1], of strands; None for curves without it."""
+    wetness = attributes.read(curves, _WETNESS, "FLOAT", "CURVE")
+    return None if wetness is None else np.clip(np.where(np.isfinite(wetness), wetness, np.float32(0.0)), 0.0, 1.0)
+
+
+def write_randoms(curves):
+    """Write random numbers for strands that have none."""
+    if len(curves.curves) and attributes.read(curves, "strand_random", "FLOAT", "CURVE") is None:
+        attributes.write(curves, "strand_random", "FLOAT", "CURVE", read_randoms(curves))
+
+
+# The value of `written` for guides not created by Vellus: no fingerprint equals it, so they always count as combed.
+BY_HAND = "made by hand"
+
+
+def is_hand_made(curves):
+    """Whether these are guides not created by Vellus."""
+    return curves.vellus.written == BY_HAND
+
+
+def is_combed(curves):
+    """Whether points were moved, added or removed since `write_points`, or were not written by it."""
+
+    written = curves.vellus.written
+    return written != "" and written != geometry.fingerprint.fingerprint(read_points(curves))
+
+
+def read_roots(curves, surface, first_points):
+    """Find the roots of (S, 3) first points: as stored, or the nearest point if that is missing or outdated.
+
+    Roots of curves that were added or slid in sculpt mode are outdated, and all roots if the triangles changed.
+    """
+    mesh_math.check_mesh(surface.mesh)
+    stored = stored_roots(curves, surface)
+    if stored is None or curves.vellus.topology != surface.topology:
+        return nearest_roots(surface, first_points)
+    distance = np.linalg.norm(mesh_math.positions(surface.mesh, stored) - first_points, axis=1)
+    apart = attributes.read(curves, "root_distance", "FLOAT", "CURVE")
+    if apart is not None:
+        distance = abs(distance - apart * surface.scale)
+    stale = np.flatnonzero(~(distance <= _ROOT_TOLERANCE * surface.extent * surface.scale))
+    if len(stale):
+        found = nearest_roots(surface, first_points[stale])
+        stored.triangle[stale] = found.triangle
+        stored.barycentric[stale] = found.barycentric
+    return stored
+
+
+def nearest_roots(surface, places):
+    """`SurfacePoints` on a `Surface` at rest, each nearest to one of (S, 3) places [m]."""
+    mesh_math.check_mesh(surface.mesh)
+    return geometry.closest_point.SurfaceQuery(surface.mesh).nearest(places)
+
+
+def read_guides(curves, surface, device, known=None, local=None):
+    """Guides as they are combed now: `Strands` on a device, of one point count, however many each curve has.
+
+    known: `Strands` of the same guides on the same surface as they were read before: those that are where they were
+    rooted then, all of them, keep their roots. local: what `read_points` gives now, if that is known.
+    """
+    counts = point_counts(curves)
+    if not len(counts):
+        raise HairError(f'"{name_of(curves)}" has no guides: generate guides first.')
+    local = read_points(curves) if local is None else local
+    if not np.isfinite(local).all():
+        sentence = '"{name}" has non-finite coordinates: undo, or delete those guides.'
+        raise HairError(sentence, name=name_of(curves))
+    points = surface.from_local(local)
+    offsets = np.concatenate([[0], np.cumsum(counts)])
+    firsts = points[offsets[:-1]]
+    has_known_roots = (
+        known is not None and curves.vellus.topology == surface.topology and np.array_equal(firsts, known.numpy()[:, 0])
+    )
+    roots = None if has_known_roots else read_roots(curves, surface, firsts)
+    points = even_points(points, offsets, lambda: attributes.are_smooth(curves))
+    return known.moved(points) if has_known_roots else strands.from_numpy(points, roots, device)
+
+
+def read_shown_guides(curves, surface, device, known=None, local=None):
+    """Guides as hair follows them in this frame: where dynamics has moved them, else as `read_guides` reads them."""
+    guides = read_guides(curves, surface, device, known, local)
+    shown = simulated_guides.point_cache.get(curves.session_uid)
+    return guides if shown is None or len(shown) != len(guides) else guides.moved(surface.from_local(shown))
+
+
+def even_points(points, offsets, are_smooth):
+    """(G, POINT_COUNT, 3) float32 of guides of any point counts; points (N, 3), offsets (G+1,).
+
+    are_smooth: called for which of them are smooth, (G,) bool. Guides that all have as many points are taken as they
+    are.
+    """
+    if (np.diff(offsets) == groom.POINT_COUNT).all():
+        return points.reshape(-1, groom.POINT_COUNT, 3)
+    return geometry.resampling.resample(points, offsets, groom.POINT_COUNT, are_smooth())
+
+
+def stored_roots(curves, surface, is_complete=False):
+    """`SurfacePoints` from the curves' attributes; impossible ones become a corner of triangle 0. None if absent.
+
+    is_complete: None if any of them is impossible, too.
+    """
+    barycentric = attributes.read(curves, "root_barycentric", "FLOAT_VECTOR", "CURVE")
+    triangle = attributes.read(curves, "root_triangle", "INT", "CURVE")
+    if barycentric is None or triangle is None:
+        return None
+    # Curves that sculpt mode adds carry zeros; a surface that lost faces leaves indices out of range.
+    known = _are_barycentric(barycentric) & (triangle >= 0) & (triangle < len(surface.mesh.triangles))
+    if is_complete and not known.all():
+        return None
+    triangle[~known] = 0
+    barycentric[~known] = (1.0, 0.0, 0.0)
+    return surface.swap_winding(SurfacePoints(triangle, barycentric))
+
+
+def followers(guide_curves):
+    """Return the hair Curves that follow some guides."""
+    return [c for c in bpy.data.hair_curves if c.vellus.kind == "HAIR" and c.vellus.guide_curves == guide_curves]
+
+
+def follows_library(hair):
+    """Whether hair Curves or their guides are linked, or library overrides."""
+    return any(attributes.is_from_library(c) for c in (hair, hair.vellus.guide_curves) if c is not None)
+
+
+def require_editable(datablock):
+    """Raise `HairError` for linked data: Blender would accept the change and lose it on reload."""
+    if datablock.library is not None:
+        raise HairError(f'"{name_of(datablock)}" is linked from another file: make a library override of it first.')

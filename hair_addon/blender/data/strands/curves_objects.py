@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Objects of Curves in the scene: made, and shown or not in renders and by Blender's own drawing."""
+
+import bpy
+import numpy as np
+
+from .. import surface_collections
+from . import follow_nodes
+
+_RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
+
+
+def new_object(name, surface_object, is_rendered=True):
+    """An empty Curves object on a surface, in the surface's collection."""
+    curves = bpy.data.hair_curves.new(name)
+    curves.surface = surface_object
+    return link_object(name, curves, surface_object, is_rendered)
+
+
+def link_object(name, curves, surface_object, is_rendered=True):
+    """A new object for Curves, a child of their surface and in its collection.
+
+    is_rendered: whether Cycles and EEVEE show it.
+    """
+    curves_object = bpy.data.objects.new(name, curves)
+    curves_object.parent = surface_object
+    render(curves_object, is_rendered)
+    if is_rendered:
+        show_thin(bpy.context.scene)
+    surface_collections.collection_of(surface_object).objects.link(curves_object)
+    follow_nodes.add_modifier(curves_object)
+    return curves_object
+
+
+def show_thin(blender_scene):
+    """Let EEVEE draw strands as thin as they are: by Blender's default it draws lines a pixel wide or wider."""
+    if blender_scene.render.hair_type == "STRAND":
+        blender_scene.render.hair_type = "STRIP"
+
+
+def render(curves_object, is_rendered):
+    """Show or hide an object in Cycles and EEVEE by ray visibility: objects disabled in renders are not exported."""
+    for ray in _RAYS:
+        setattr(curves_object, f"visible_{ray}", is_rendered)
+
+
+_RAYS_BEFORE = "vellus_rays"  # custom property: which kinds of rays saw an object before it was hidden
+
+
+def hide_from_engines(curves_object, is_seen_by_rays):
+    """Hide an object from the cameras of Cycles and EEVEE, and from all their rays unless `is_seen_by_rays`."""
+    if _RAYS_BEFORE not in curves_object:
+        curves_object[_RAYS_BEFORE] = [int(getattr(curves_object, f"visible_{ray}")) for ray in _RAYS]
+    for ray, was_seen in zip(_RAYS, curves_object[_RAYS_BEFORE], strict=True):
+        is_seen = bool(was_seen) and is_seen_by_rays and ray != "camera"
+        if getattr(curves_object, f"visible_{ray}") != is_seen:
+            setattr(curves_object, f"visible_{ray}", is_seen)
+
+
+def show_again(curves_object):
+    """Undo `hide_from_engines`."""
+    if _RAYS_BEFORE in curves_object:
+        for ray, was_seen in zip(_RAYS, curves_object[_RAYS_BEFORE], strict=True):
+            setattr(curves_object, f"visible_{ray}", bool(was_seen))
+        del curves_object[_RAYS_BEFORE]
+
+
+def keep_rest(surface_object):
+    """Let Blender store the rest positions of a surface's vertices, on which strands are rooted."""
+    if not surface_object.add_rest_position_attribute:
+        surface_object.add_rest_position_attribute = True
+        # Blender reports this as a change of the mesh: update before there is hair that would react to it.
+        bpy.context.view_layer.update()
+
+
+# Blender draws the bounds of objects that are displayed as bounds in one of five shapes, and draws nothing for a number
+# that stands for none of these. Of Curves that are displayed in any other way it draws the outline of each strand while
+# they are selected, for which it uploads all strands.
+_BOX, _NO_SHAPE = 0, 4
+
+
+def draw_natively(curves, is_shown):
+    """Let Blender draw Curves in viewports, or hide them there. Renders are not affected."""
+    users = {index: user for index, user in enumerate(bpy.data.objects) if user.data == curves}
+    display, shape = ("TEXTURED", _BOX) if is_shown else ("BOUNDS", _NO_SHAPE)
+    shapes = np.empty(len(bpy.data.objects), np.int32)
+    bpy.data.objects.foreach_get("display_bounds_type", shapes)
+    changed = [i for i, user in users.items() if (user.display_type, shapes[i]) != (display, shape)]
+    if changed:
+        shapes[changed] = shape
+        # Only foreach_set accepts a number outside the enumeration.
+        bpy.data.objects.foreach_set("display_bounds_type", shapes)
+    for index in changed:
+        users[index].display_type = display  # which has Blender evaluate the shape too

@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lines that are drawn on a surface, part lines and flow lines: curve objects → segments."""
+
+import hashlib
+
+import bpy
+import numpy as np
+
+from ....core import interpolation
+from ....core.errors import HairError
+from .curves import curve_offsets
+
+_POINT_LIMIT = 10_000  # each strand reads all
+
+
+def read(surface_object, surface, name, depsgraph):
+    """(L, 2, 3) float64 segments [m] of a curve object, or of a mesh's loose edges, as a `Surface` is.
+
+    Lines run from the start of their curves to the end. None for the empty name. Raises `HairError`.
+    """
+    if not name:
+        return None
+    drawn = bpy.data.objects.get(name)
+    if drawn is None:
+        raise HairError('There is no object "{name}": pick a curve for the lines, or clear the field.', name=name)
+    if drawn.type not in {"CURVE", "CURVES", "MESH"} or (drawn.type == "CURVES" and drawn.data.vellus.kind != "NONE"):
+        raise HairError('"{name}" cannot be used as lines: pick a curve, or clear the field.', name=name)
+    points, edges = _read_curves(drawn.data) if drawn.type == "CURVES" else _read_edges(drawn, depsgraph)
+    if not len(edges):
+        raise HairError('"{name}" has no lines: draw a line of at least two points, without bevel.', name=name)
+    if len(edges) > _POINT_LIMIT:
+        sentence = '"{name}" has {count} points, too many for lines on a surface: lower its resolution.'
+        raise HairError(sentence, name=name, count=len(edges))
+    to_local = np.array(surface_object.matrix_world.inverted_safe() @ drawn.matrix_world, np.float64)
+
+    local = points @ to_local[:3, :3].T + to_local[:3, 3]
+    return (local @ surface.to_world_axes.T)[interpolation.part_lines.in_order(edges)]
+
+
+def key(lines):
+    """A key that changes with lines; empty for None."""
+    return "" if lines is None else hashlib.blake2b(lines.tobytes(), digest_size=16).hexdigest()
+
+
+def is_among(name, changed):
+    """Whether the object of a name, or its data, is among changed datablocks."""
+    drawn = bpy.data.objects.get(name) if name else None
+    return drawn is not None and (drawn in changed or drawn.data in changed)
+
+
+def _read_edges(drawn, depsgraph):
+    """(N, 3) float64 points and (L, 2) loose edges of an evaluated object."""
+    evaluated = drawn.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    if mesh is None:  # a curve without a point
+        return np.empty((0, 3)), np.empty((0, 2), np.int32)
+    try:
+        points = np.empty((len(mesh.vertices), 3), np.float32)
+        mesh.vertices.foreach_get("co", points.ravel())
+        edges = np.empty((len(mesh.edges), 2), np.int32)
+        mesh.edges.foreach_get("vertices", edges.ravel())
+        is_loose = np.empty(len(mesh.edges), bool)
+        mesh.edges.foreach_get("is_loose", is_loose)
+    finally:
+        evaluated.to_mesh_clear()
+    return points.astype(np.float64), edges[is_loose]
+
+
+def _read_curves(curves):
+    """The same for a Curves datablock: segments between its control points."""
+    points = np.empty((len(curves.points), 3), np.float32)
+    if len(points):
+        curves.attributes["position"].data.foreach_get("vector", points.ravel())
+    offsets = curve_offsets(curves)
+    is_cyclic = np.zeros(len(curves.curves), bool)
+    if (attribute := curves.attributes.get("cyclic")) is not None:
+        attribute.data.foreach_get("value", is_cyclic)
+    follows = np.ones(len(points), bool)
+    follows[offsets[1:] - 1] = False
+    starts = np.flatnonzero(follows)
+    closing = is_cyclic & (np.diff(offsets) > 2)
+    ends = np.stack([offsets[1:] - 1, offsets[:-1]], axis=1)[closing]
+    return points.astype(np.float64), np.concatenate([np.stack([starts, starts + 1], axis=1), ends])

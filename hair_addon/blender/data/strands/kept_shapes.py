@@ -1,0 +1,60 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Shapes that Curves had when their hair came from elsewhere: of guides derived from it, and of strands they moved.
+
+Stored as points in an attribute, so files, undo and brushes that remove curves keep them with their curves.
+"""
+
+import numpy as np
+
+from ....core import geometry
+from . import attributes, curves
+
+_SHAPE = "kept_position"
+
+
+def read(datablock):
+    """(N, 3) float32 points that were kept, in local coordinates; None for none."""
+    return attributes.read(datablock, _SHAPE, "FLOAT_VECTOR", "POINT")
+
+
+def keep(datablock, points):
+    """Keep (N, 3) points as the shape of Curves; of linked and overridden ones until their file is read again."""
+    if not attributes.is_from_library(datablock):
+        attributes.write(datablock, _SHAPE, "FLOAT_VECTOR", "POINT", points)
+        return
+    if not attributes.has(datablock, _SHAPE, "FLOAT_VECTOR", "POINT"):
+        datablock.attributes.new(_SHAPE, "FLOAT_VECTOR", "POINT")
+    if not np.array_equal(read(datablock), points):
+        attributes.write_positions(datablock, points, _SHAPE)
+
+
+def forget(datablock):
+    """Remove what was kept."""
+    if attributes.has(datablock, _SHAPE, "FLOAT_VECTOR", "POINT"):
+        datablock.attributes.remove(datablock.attributes[_SHAPE])
+    datablock.vellus.kept_written = ""
+
+
+def write_strands(hair, points):
+    """Write (N, 3) points of kept strands where guides have moved them."""
+    attributes.write_positions(hair, points)
+    hair.vellus.kept_written = geometry.fingerprint.fingerprint(points)
+    hair.update_tag()
+
+
+def is_edited(hair, present):
+    """Whether an artist has moved strands since `write_strands`; present: (N, 3) points where they are."""
+    written = hair.vellus.kept_written
+    return written != "" and written != geometry.fingerprint.fingerprint(present)
+
+
+def move(datablock, function):
+    """Move points of Curves and the shape that was kept of them; function: (N, 3) float32 → (N, 3) float32."""
+    present, shape = curves.read_points(datablock), read(datablock)
+    was_written = datablock.vellus.kept_written != "" and not is_edited(datablock, present)
+    moved = np.ascontiguousarray(function(present), np.float32)
+    curves.write_moved(datablock, moved)
+    if shape is not None:
+        keep(datablock, function(shape))
+    if was_written:
+        datablock.vellus.kept_written = geometry.fingerprint.fingerprint(moved)

@@ -1,0 +1,88 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Partings: vertex groups, integer attributes and curves → regions and line segments."""
+
+import hashlib
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....core.errors import HairError
+from ....core.interpolation.regions import Regions
+from ...host.notices import name_of, text_of
+from .. import scene
+from . import drawn_lines
+
+_WHOLE = {"INT", "INT8", "BOOLEAN"}
+
+
+@dataclass(frozen=True)
+class Partings:
+    """regions: tuple of `Regions`; lines: (L, 2, 3) float64 [m] as a `Surface` is, or None."""
+
+    regions: tuple
+    lines: np.ndarray | None
+
+    @property
+    def key(self):
+        """A key that changes with them; empty for none."""
+        if not self.regions and self.lines is None:
+            return ""
+        digest = hashlib.blake2b(digest_size=16)
+        for array in (*(part for r in self.regions for part in (r.corners, r.guides)), self.lines):
+            digest.update(b"-" if array is None else array.tobytes())
+        return digest.hexdigest()
+
+
+def is_wanted(settings):
+    """Whether `HairSettings` (or their properties) name anything that parts hair."""
+    return any(text_of(settings, name) for name in ("region_group", "region_attribute", "part_lines"))
+
+
+def read(surface_object, surface, guide_curves, settings, depsgraph):
+    """The `Partings` that `HairSettings` name, on a `Surface`; guide_curves: None if there are none yet."""
+    regions = []
+    weights = scene.read_vertex_group(surface_object, depsgraph, settings.region_group)
+    if weights is not None:
+        regions.append(Regions((weights > 0.5).astype(np.int32)[surface.mesh.triangles]))
+    if settings.region_attribute:
+        regions.append(_read_numbers(surface_object, surface, guide_curves, settings.region_attribute, depsgraph))
+    lines = drawn_lines.read(surface_object, surface, settings.part_lines, depsgraph)
+    return Partings(tuple(regions), lines)
+
+
+def _read_numbers(surface_object, surface, guide_curves, name, depsgraph):
+    corners = guides = None
+    evaluated = surface_object.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        attribute = mesh.attributes.get(name)
+        if attribute is not None:
+            numbers = _whole_numbers(attribute, name_of(surface_object), ("POINT", "FACE"))
+            if attribute.domain == "POINT":
+                corners = numbers[surface.mesh.triangles]
+            else:
+                mesh.calc_loop_triangles()
+                faces = np.empty(len(mesh.loop_triangles), np.int32)
+                mesh.loop_triangles.foreach_get("polygon_index", faces)
+                corners = np.repeat(numbers[faces][:, None], 3, axis=1)
+    finally:
+        evaluated.to_mesh_clear()
+    attribute = None if guide_curves is None else guide_curves.attributes.get(name)
+    if attribute is not None:
+        guides = _whole_numbers(attribute, name_of(guide_curves), ("CURVE",))
+    if corners is None and guides is None:
+        sentence = 'Neither "{name}" nor its guides have an attribute "{attribute}": pick another, or clear the field.'
+        raise HairError(sentence, name=name_of(surface_object), attribute=name)
+    return Regions(corners, guides)
+
+
+def _whole_numbers(attribute, owner, domains):
+    """(N,) int32. Raises `HairError` for other types and domains."""
+    if attribute.data_type not in _WHOLE or attribute.domain not in domains:
+        sentence = 'The attribute "{attribute}" of "{name}" cannot separate hair: use integers on faces or vertices.'
+        if "CURVE" in domains:
+            sentence = 'The attribute "{attribute}" of "{name}" cannot separate hair: use integers on curves.'
+        raise HairError(sentence, attribute=name_of(attribute), name=owner)
+    numbers = np.empty(len(attribute.data), bool if attribute.data_type == "BOOLEAN" else np.int32)
+    attribute.data.foreach_get("value", numbers)
+    return numbers.astype(np.int32)

@@ -1,0 +1,89 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Posed strands: strands moved from the rest shape of their surface to its deformed shape, and back.
+
+Used by viewports, exports, guides on edited surfaces and curves that become guides. Renders read evaluated Curves,
+which the geometry nodes of follow_nodes.py move in the same way.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....core import geometry
+from .. import scene
+from ..scene import Surface
+from . import curves
+
+
+@dataclass(frozen=True)
+class Pose:
+    """A surface at one time, and its `SurfaceMotion` from the rest shape: None if it is not deformed."""
+
+    surface: Surface | None  # None of strands that grow on no mesh
+    motion: "surface_deform.SurfaceMotion | None"  # noqa: F821 (Warp is imported late)
+
+    def carry(self, points, topology, places, chosen=slice(None)):
+        """Return (M, P, 3) float32: the chosen strands on the deformed surface; unchanged if it is not deformed.
+
+        points: (S, P, 3) float32 of all strands at rest, in local coordinates; topology: of the surface that they were
+        rooted on; places: their roots there, as `Surface.places` or `curves.read_root_places` returns them, or None.
+        Strands are rooted at the nearest place where the surface has other triangles now, or what is stored is damaged.
+        """
+        if self.motion is None:
+            return points[chosen]
+        return self.carry_rooted(points, self.rooted(topology, places, points[:, 0]), chosen)
+
+    def carry_rooted(self, points, places, chosen):
+        """The same of strands whose places `rooted` gave: for parts of many strands."""
+        if self.motion is None:
+            return points[chosen]
+        return carried(points[chosen], self.motion, (places[0][chosen], places[1][chosen]))
+
+    def rooted(self, topology, places, firsts):
+        """Root places on this surface, as `carry` takes them; firsts: (S, 3) local first points."""
+        surface = self.surface
+        if self.motion is None:
+            return places
+        if places is None or topology != surface.topology or len(places[0]) != len(firsts):
+            places = np.zeros((len(firsts), 3), np.int32), np.zeros((len(firsts), 3), np.float32)
+        vertices, barycentric = places
+        lost = np.flatnonzero(~barycentric.any(axis=1) | (vertices >= len(surface.rest)).any(axis=1))
+        if not len(lost):
+            return places
+        vertices, barycentric = vertices.copy(), barycentric.copy()
+        nearest = curves.nearest_roots(surface, surface.from_local(firsts[lost]))
+        vertices[lost], barycentric[lost] = surface.places(nearest)
+        return vertices, barycentric
+
+
+def read_pose(surface_object, depsgraph):
+    """The `Pose` of what strands grow on, as a depsgraph has evaluated it; at rest of what is no mesh."""
+    if surface_object is None or surface_object.type != "MESH":
+        return Pose(None, None)
+    return pose_of(scene.read_surface(surface_object, depsgraph))
+
+
+def pose_of(surface):
+    """The `Pose` of a `Surface` as it was read."""
+    if not surface.is_deformed:
+        return Pose(surface, None)
+    motion = geometry.surface_deform.motion(
+        surface.rest, surface.posed, surface.faces, smooth_before=surface.smooth_rest
+    )
+    return Pose(surface, motion)
+
+
+def carried(points, motion, places, counts=None, is_back=False):
+    """float32 points of strands, each carried rigidly as a `SurfaceMotion` goes at its root.
+
+    points: (S, P, 3), or (N, 3) of strands that have `counts` (S,) points; places: (S, 3) root vertices and barycentric
+    coordinates; is_back: the inverse, from where the surface went to where it was.
+    """
+    carry = geometry.surface_deform.carry
+    if counts is None:
+        return carry(points, motion, *places, is_back=is_back)
+    if len(counts) and (counts == counts[0]).all():
+        strands = points.reshape(len(counts), -1, 3)
+        return carry(strands, motion, *places, is_back=is_back).reshape(-1, 3)
+    of_points = (np.repeat(part, counts, axis=0) for part in places)  # each point as a strand of its own
+    return carry(points[:, None], motion, *of_points, is_back=is_back)[:, 0]

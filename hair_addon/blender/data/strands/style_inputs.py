@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What styles name, read from Blender: masks, cutting planes and directions of objects."""
+
+from collections.abc import Sequence
+
+import bpy
+import numpy as np
+
+from ....core.errors import HairError
+from ....core.styling import lean, trim
+from ....core.styling.base import StyleSettings, has_effect
+from ....core.styling.masks import Mask
+from ....core.styling.program import Cutter, mask_keys
+from ....core.styling.style_inputs import Inputs
+from ...host.notices import name_of
+from .. import scene
+from . import attributes
+
+# Luminance of linear colours, Rec. 709.
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)
+_NUMBERS = {"FLOAT": ("value", 1), "FLOAT_COLOR": ("color", 4), "BYTE_COLOR": ("color", 4), "BOOLEAN": ("value", 1)}
+
+
+def read(surface_object, surface, guide_curves, styles: Sequence[StyleSettings], depsgraph) -> Inputs:
+    """The `Inputs` of styles on a `Surface`; guide_curves: None if there are none yet. Raises `HairError`."""
+    active = [settings for settings in styles if has_effect(settings)]
+    masks = {key: read_mask(surface_object, surface, guide_curves, key, depsgraph) for key in mask_keys(active)}
+    origin = np.array(surface_object.matrix_world.translation, np.float64)
+    cutters, targets = {}, {}
+    for settings in active:
+        if isinstance(settings, trim.Settings) and settings.cutter:
+            matrix = _matrix_of(settings.cutter, "Trim")
+            cutters[settings.cutter] = Cutter(matrix[:3, 3] - origin, _z_axis(matrix, settings.cutter))
+        if isinstance(settings, lean.Settings) and settings.direction == "OBJECT" and settings.target:
+            matrix = _matrix_of(settings.target, "Lean")
+            targets[settings.target] = _z_axis(matrix, settings.target)
+    return Inputs(masks, cutters, targets)
+
+
+def _matrix_of(name, label):
+    """(4, 4) float64: an object's place in the world. Raises `HairError`."""
+    found = bpy.data.objects.get(name)
+    if found is None:
+        raise HairError(f'There is no object "{name}" for the style {label}: pick another object, or clear the field.')
+    return np.array(found.matrix_world, np.float64)
+
+
+def _z_axis(matrix, name):
+    axis = matrix[:3, 2]
+    size = np.linalg.norm(axis)
+    if not (np.isfinite(matrix).all() and size > 1e-12):
+        raise HairError(f'"{name}" has a scale of zero or a non-finite transform: change its scale.')
+    return axis / size
+
+
+def read_mask(surface_object, surface, guide_curves, key, depsgraph):
+    """The `Mask` of a `mask_key` on the `Surface` of an object; guide_curves: None if there are none yet.
+
+    Raises `HairError`.
+    """
+    name, image, is_inverted = key
+    texture = scene.read_texture(surface, image, may_be_black=True)
+    if not name:
+        return Mask(None, texture, None, is_inverted)
+    if surface_object.vertex_groups.get(name) is not None:
+        weights = scene.read_vertex_group(surface_object, depsgraph, name)
+        _require_same(len(weights) == len(surface.rest), surface_object)
+        return Mask(weights[surface.mesh.triangles], texture, None, is_inverted)
+    corners = _read_surface_attribute(surface_object, surface, name, depsgraph)
+    guides = None if corners is not None or guide_curves is None else _read_guide_attribute(guide_curves, name)
+    if corners is None and guides is None:
+        sentence = 'Neither "{name}" nor its guides have a vertex group or attribute "{mask}": pick another mask.'
+        raise HairError(sentence, name=name_of(surface_object), mask=name)
+    return Mask(corners, texture, guides, is_inverted)
+
+
+def _read_surface_attribute(surface_object, surface, name, depsgraph):
+    """(F, 3) float32 at the corners of triangles; None without such an attribute."""
+    evaluated = surface_object.evaluated_get(depsgraph)
+    mesh = evaluated.to_mesh()
+    try:
+        attribute = mesh.attributes.get(name)
+        if attribute is None:
+            return None
+        _require_same(len(mesh.vertices) == len(surface.rest), surface_object)
+        values = _numbers(attribute, name_of(surface_object))
+        if attribute.domain == "POINT":
+            return values[surface.mesh.triangles]
+        mesh.calc_loop_triangles()
+        kind, shape = ("loops", 3) if attribute.domain == "CORNER" else ("polygon_index", 1)
+        places = np.empty((len(mesh.loop_triangles), shape), np.int32)
+        mesh.loop_triangles.foreach_get(kind, places.ravel())
+        _require_same(len(places) == len(surface.mesh.triangles), surface_object)
+    finally:
+        evaluated.to_mesh_clear()
+    if surface.is_mirrored and shape == 3:
+        places = places[:, [0, 2, 1]]
+    return np.broadcast_to(values[places], (len(places), 3)).copy()
+
+
+def _require_same(is_same, surface_object):
+    """Raise `HairError` unless a mesh has as many vertices and faces as its `Surface`, which was read before."""
+    if not is_same:
+        sentence = 'The mesh of "{name}" has changed: the hair updates when you leave its paint mode.'
+        raise HairError(sentence, name=name_of(surface_object))
+
+
+def _numbers(attribute, owner):
+    """(N,) float32 of an attribute: numbers, or the luminance of colours. Raises `HairError`."""
+    if attribute.data_type not in _NUMBERS or attribute.domain not in ("POINT", "CORNER", "FACE"):
+        sentence = 'The attribute "{attribute}" of "{name}" cannot mask hair: use numbers or colors.'
+        raise HairError(sentence, attribute=name_of(attribute), name=owner)
+    field, width = _NUMBERS[attribute.data_type]
+    values = np.empty(len(attribute.data) * width, bool if attribute.data_type == "BOOLEAN" else np.float32)
+    attribute.data.foreach_get(field, values)
+    if width == 1:
+        return values.astype(np.float32)
+    return values.reshape(-1, 4)[:, :3] @ _LUMINANCE
+
+
+def _read_guide_attribute(guide_curves, name):
+    """(G,) float32; None without such an attribute. Raises `HairError` for other types."""
+    if guide_curves.attributes.get(name) is None:
+        return None
+    values = attributes.read(guide_curves, name, "FLOAT", "CURVE")
+    if values is None:
+        sentence = 'The attribute "{attribute}" of "{name}" cannot mask hair: use numbers on curves.'
+        raise HairError(sentence, attribute=name, name=name_of(guide_curves))
+    return values

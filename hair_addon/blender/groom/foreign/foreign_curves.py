@@ -1,0 +1,197 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Evaluated curves not created by Vellus, as polylines or Catmull-Rom splines."""
+
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+from bpy.types import Curves, Object
+
+from ....core.errors import HairError
+from ...data.strands import attributes, curves
+from ...host.notices import name_of
+
+_NAME = "Vellus Curves to Polylines"  # of nodes and their modifier that are there while curves are read
+
+# Settings that make a tube, a ribbon or a face of a legacy curve object, and their neutral values.
+_THIN = {"bevel_depth": 0.0, "extrude": 0.0, "bevel_object": None, "dimensions": "3D"}
+
+
+@dataclass(frozen=True)
+class SeenCurves:
+    """points (N, 3) float32 in the object's own coordinates, starts (C+1,) of each curve, is_smooth (C,) bool: which
+    are Catmull-Rom splines.
+    """
+
+    points: np.ndarray
+    starts: np.ndarray
+    is_smooth: np.ndarray
+
+
+def is_foreign(curves_object: Object) -> bool:
+    """Whether an object holds curves that could become guides: a Curves object that is not ours, or a curve object."""
+    if curves_object is None:
+        return False
+    return curves_object.type == "CURVE" or (
+        curves_object.type == "CURVES" and curves_object.data.vellus.kind == "NONE"
+    )
+
+
+def require_foreign(curves_object: Object) -> None:
+    """Raise `HairError` for guides and hair, which the redo panel's operator would take a second time."""
+    if not is_foreign(curves_object):
+        raise HairError('"{name}" is already guides or hair.', name=name_of(curves_object))
+
+
+def require_editable(curves_object: Object) -> None:
+    """Raise `HairError` unless the object and its curves may be changed without a change to any other object."""
+    for datablock in (curves_object, curves_object.data):
+        curves.require_editable(datablock)
+    if sum(user.data == curves_object.data for user in bpy.data.objects) > 1:
+        raise HairError(
+            '"{name}" shares its curves with another object: make it single-user.', name=name_of(curves_object)
+        )
+    animation = curves_object.animation_data
+    if animation is not None and (animation.action or animation.drivers or animation.nla_tracks):
+        raise HairError(
+            '"{name}" is animated: clear its animation, as guides move with their surface.', name=name_of(curves_object)
+        )
+
+
+def read(curves_object: Object, applies_modifiers: bool) -> SeenCurves:
+    """The `SeenCurves` of an object. Raises `HairError`.
+
+    applies_modifiers: as modifiers leave them in viewports; else as they are stored.
+    """
+    if not _is_evaluated(curves_object, applies_modifiers):
+        return _read(curves_object.data)
+    with _as_polylines(curves_object, applies_modifiers):
+        geometry = _evaluated(curves_object)  # whose curves are gone when it is
+        return _read(geometry.curves)
+
+
+def take(curves_object: Object, applies_modifiers: bool) -> Curves:
+    """Make an object's own curves those that `read` gave, without modifiers that change them; returns its Curves data.
+
+    Modifiers that were applied are gone, the others are switched off.
+    """
+    if _is_evaluated(curves_object, applies_modifiers):
+        bevel = curves_object.data.bevel_depth if curves_object.type == "CURVE" else None
+        with _as_polylines(curves_object, applies_modifiers):
+            if bevel is not None:
+                _convert(curves_object)
+                _write_radii(curves_object.data, bevel)
+            else:
+                geometry = _evaluated(curves_object)
+                _replace_data(curves_object, geometry.curves.copy())
+    for modifier in list(curves_object.modifiers):
+        if applies_modifiers and modifier.show_viewport:
+            curves_object.modifiers.remove(modifier)
+        else:
+            modifier.show_viewport = modifier.show_render = False
+    return curves_object.data
+
+
+def _is_evaluated(curves_object, applies_modifiers):
+    """Whether the evaluated curves may differ from the stored ones."""
+    if curves_object.type == "CURVE" or attributes.curve_types(curves_object.data).max(initial=0) > attributes.POLY:
+        return True
+    return applies_modifiers and any(modifier.show_viewport for modifier in curves_object.modifiers)
+
+
+def _read(datablock):
+    starts = curves.curve_offsets(datablock)
+    return SeenCurves(curves.read_points(datablock), starts, attributes.are_smooth(datablock))
+
+
+def _evaluated(curves_object):
+    """The `GeometrySet` of an object after its modifiers, which has curves."""
+    geometry = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).evaluated_geometry()
+    if geometry.curves is None and curves_object.type == "CURVE" and not curves_object.data.splines:
+        raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
+    if geometry.curves is None:
+        sentence = '"{name}" has no curves after its modifiers: turn off the modifiers that convert them.'
+        raise HairError(sentence, name=name_of(curves_object))
+    return geometry
+
+
+@contextmanager
+def _as_polylines(curves_object, applies_modifiers):
+    """Have Blender evaluate an object to polylines and Catmull-Rom splines; everything is as before afterwards."""
+    layer, data = bpy.context.view_layer, curves_object.data
+    if not curves_object.visible_get(view_layer=layer):
+        raise HairError('"{name}" is hidden: show it first.', name=name_of(curves_object))
+    switched_off = [] if applies_modifiers else [m for m in curves_object.modifiers if m.show_viewport]
+    was = {name: getattr(data, name) for name in _THIN} if curves_object.type == "CURVE" else {}
+    nodes = modifier = None
+    for shown in switched_off:
+        shown.show_viewport = False
+    for name in was:
+        setattr(data, name, _THIN[name])
+    if curves_object.type == "CURVE" or attributes.curve_types(data).max(initial=0) > attributes.POLY:
+        nodes = _resampling_nodes()
+        modifier = curves_object.modifiers.new(_NAME, "NODES")
+        modifier.node_group = nodes
+    try:
+        layer.update()
+        yield
+    finally:
+        if modifier is not None and modifier.name in curves_object.modifiers:
+            curves_object.modifiers.remove(modifier)
+        if nodes is not None:
+            bpy.data.node_groups.remove(nodes)
+        if curves_object.data == data:
+            for name, value in was.items():
+                setattr(data, name, value)
+        for shown in switched_off:
+            shown.show_viewport = True
+        layer.update()
+
+
+def _resampling_nodes():
+    """Nodes that make polylines of curves as finely as Blender draws them."""
+    nodes = bpy.data.node_groups.new(_NAME, "GeometryNodeTree")
+    nodes.is_modifier = True
+    for direction in ("INPUT", "OUTPUT"):
+        nodes.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    given, made = nodes.nodes.new("NodeGroupInput"), nodes.nodes.new("NodeGroupOutput")
+    resample = nodes.nodes.new("GeometryNodeResampleCurve")
+    resample.inputs["Mode"].default_value = "Evaluated"
+    nodes.links.new(given.outputs[0], resample.inputs["Curve"])
+    nodes.links.new(resample.outputs["Curve"], made.inputs[0])
+    return nodes
+
+
+def _convert(curves_object):
+    """Make a Curves object of a curve object, in place."""
+    layer = bpy.context.view_layer
+    with bpy.context.temp_override(
+        active_object=curves_object,
+        object=curves_object,
+        selected_objects=[curves_object],
+        selected_editable_objects=[curves_object],
+    ):
+        bpy.ops.object.convert(target="CURVES")
+    layer.update()
+    if curves_object.type != "CURVES":
+        raise HairError('"{name}" cannot be converted to a Curves object.', name=name_of(curves_object))
+
+
+def _write_radii(datablock, bevel):
+    """Curve objects have factors of their bevel in place of radii: make radii of them, none where there is no bevel."""
+    radii = attributes.read(datablock, "radius", "FLOAT", "POINT")
+    if radii is None:
+        return
+    if bevel > 0.0:
+        attributes.write(datablock, "radius", "FLOAT", "POINT", radii * np.float32(bevel))
+    else:
+        datablock.attributes.remove(datablock.attributes["radius"])
+
+
+def _replace_data(curves_object, replacement):
+    """Give an object other Curves under the same name; the old ones are removed."""
+    before, name = curves_object.data, curves_object.data.name
+    before.user_remap(replacement)
+    bpy.data.hair_curves.remove(before)
+    replacement.name = name

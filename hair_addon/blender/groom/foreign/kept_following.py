@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Kept hair that follows its guides: each strand keeps its offset from the strand that guides interpolate at its root.
+
+The shapes that guides and strands had when the hair came are kept with them (`kept_shapes`), so strands depend on where
+guides are now and not on where they were in between, and are the original ones, to the last bit, where guides are.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ....core import interpolation
+from ....core.errors import HairError
+from ....core.geometry import strands
+from ....core.geometry.strands import Strands
+from ....core.grooming import following, groom
+from ....core.interpolation.hair_binding import HairBinding
+from ...data import scene
+from ...data.scene import Surface
+from ...data.strands import attributes, curves, kept_shapes, partings, simulated_guides
+from ...host.notices import name_of
+from ...settings import setting_properties
+from .. import bindings, staleness
+
+
+@dataclass
+class KeptBinding:
+    """Kept strands bound to guides.
+
+    shape: `Strands` of the guides as the hair came, on the roots that they have now; rest: (N, 3) float32 local points
+    of the strands then; starts: (S+1,); followed: the guides that the strands have followed last. Another `rest` takes
+    another `KeptBinding`: what follows from it is computed once.
+    """
+
+    surface: Surface
+    binding: HairBinding
+    shape: Strands
+    rest: np.ndarray
+    starts: np.ndarray
+    followed: Strands
+
+    @cached_property
+    def _reach(self):
+        return interpolation.guide_weights.reach(self.binding.guide_weights, len(self.shape))
+
+    @cached_property
+    def _course(self):
+        return self._interpolated(self.shape)
+
+    @cached_property
+    def _places(self):
+        return strands.places_along(self.surface.from_local(self.rest), self.starts)
+
+    def _interpolated(self, guides):
+        weights = following.weights_now(self.binding, guides)
+        return following.strands_now(self.binding, guides, weights).numpy()
+
+    def _some_interpolated(self, guides, chosen):
+        """(M, P, 3) rows of `_interpolated` for (M,) indices; where most are wanted, all are computed."""
+        if len(chosen) > len(self.binding.positions) // 2:
+            return self._interpolated(guides)[chosen]
+        return following.follow_some(self.binding, guides, chosen)[0]
+
+    def points_for(self, guides: Strands, points: np.ndarray | None = None, is_back: bool = False) -> np.ndarray:
+        """(N, 3) float32 local: the strands where guides carry them; points: others to carry than `rest`.
+
+        is_back: the inverse, from where guides carry strands to where they were.
+        """
+        points = self.rest if points is None else points
+        moved = self._reach.of(_combed(guides, self.shape))
+        if not len(moved):
+            return points.copy()
+        counts = np.diff(self.starts)
+        is_moved = np.zeros(len(counts), bool)
+        is_moved[moved] = True
+        rows = np.repeat(is_moved, counts)
+        made = interpolation.carried_strands.carried(
+            self.surface.from_local(points[rows]),
+            strands.curve_offsets(counts[moved]),
+            self._places[rows],
+            self._course[moved],
+            self._some_interpolated(guides, moved),
+            self.binding.normals.numpy()[moved],
+            is_back=is_back,
+        )
+        out = points.copy()
+        out[rows] = self.surface.to_local(made[:, None])[:, 0]
+        return out
+
+
+def follow(hair: Curves, depsgraph: Depsgraph, local: np.ndarray | None = None) -> bool:
+    """Move kept strands to where their guides are now; whether these are others than they have followed.
+
+    local: (N, 3) points of the guides, if they have been read. Raises `HairError`.
+    """
+    state = hair.vellus
+    guide_curves = state.guide_curves
+    if guide_curves is None or not len(hair.curves):
+        return False
+    digest, bound = staleness.guides_digest(guide_curves), bindings.kept_cache.get(hair.session_uid)
+    is_simulated = simulated_guides.is_shown(guide_curves)
+    if bound is None and state.followed == digest and not is_simulated:
+        return False
+    present = curves.read_points(hair)
+    bound, guides = _up_to_date(bound, hair, present, depsgraph, local)
+    # Strands that follow a simulation are to come back after it, though guides are as they were.
+    digest = "" if is_simulated else digest
+    is_other = state.followed != digest or len(_combed(guides, bound.followed)) > 0
+    points = bound.points_for(guides)
+    if not np.array_equal(points, present):
+        if kept_shapes.read(hair) is None:
+            kept_shapes.keep(hair, bound.rest)
+        kept_shapes.write_strands(hair, points)
+    bound.followed, state.followed, state.status = guides, digest, ""
+    state.is_stale = False
+    return is_other
+
+
+def _combed(guides, before):
+    """(M,) indices of guides that differ; all of them where they are rooted elsewhere."""
+    combed = following.combed(guides, before)
+    return np.arange(len(guides)) if combed is None else combed
+
+
+def _up_to_date(bound, hair, present, depsgraph, local):
+    """(`KeptBinding`, its guides now): bound again where guides came, went or slid, or strands were edited."""
+    guide_curves, known = hair.vellus.guide_curves, bound
+    if bound is None or kept_shapes.is_edited(hair, present) or len(bound.rest) != len(present):
+        bound = None
+    else:
+        guides = curves.read_shown_guides(guide_curves, bound.surface, "cpu", bound.shape, local)
+        if following.combed(guides, bound.shape) is not None:
+            return bound, guides
+    bound = _bind(hair, present, depsgraph, None if known is None else known.followed)
+    bindings.kept_cache.keep(hair.session_uid, bound)
+    return bound, curves.read_shown_guides(guide_curves, bound.surface, "cpu", bound.shape, local)
+
+
+def _bind(hair, present, depsgraph, followed):
+    """A new `KeptBinding`; followed: guides that strands were last written for, None where these are unknown."""
+    guide_curves = hair.vellus.guide_curves
+    if not np.isfinite(present).all():
+        raise HairError('"{name}" has non-finite coordinates: undo, or delete those strands.', name=name_of(hair))
+    surface = scene.read_surface(hair.surface, depsgraph)
+    guides = curves.read_guides(guide_curves, surface, "cpu")
+    shape = guides.moved(_shape_of(guide_curves, surface))
+    settings = setting_properties.to_settings(hair.vellus.hair, groom.HairSettings)
+    parting = partings.read(hair.surface, surface, guide_curves, settings, depsgraph)
+    starts = curves.curve_offsets(hair)
+    roots = curves.read_roots(hair, surface, surface.from_local(present[starts[:-1]]))
+    binding = groom.bind_hair(
+        surface.mesh,
+        shape,
+        settings,
+        regions=parting.regions,
+        lines=parting.lines,
+        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
+        roots=roots,
+        is_mirrored=surface.is_mirrored,
+    )
+    rest = kept_shapes.read(hair)
+    bound = KeptBinding(surface, binding, shape, present if rest is None else rest, starts, guides)
+    if rest is not None and kept_shapes.is_edited(hair, present):
+        if followed is None or following.combed(followed, shape) is None:
+            followed = guides
+        bound = replace(bound, rest=_rest_of_edited(bound, followed, present))
+        kept_shapes.keep(hair, bound.rest)
+    return bound
+
+
+def _rest_of_edited(bound, followed, present):
+    """Where strands that an artist has moved were, had guides not carried them; others stay as they are."""
+    is_other = (bound.points_for(followed) != present).any(axis=1)
+    rest = bound.rest.copy()
+    rest[is_other] = bound.points_for(followed, present, is_back=True)[is_other]
+    return rest
+
+
+def _shape_of(guide_curves, surface):
+    """(G, POINT_COUNT, 3) float32 [m]: guides as the hair came, at the roots that they have now.
+
+    New guides have been so since they were added, which is kept.
+    """
+    present, shape = curves.read_points(guide_curves), kept_shapes.read(guide_curves)
+    starts = curves.curve_offsets(guide_curves)
+    counts = np.diff(starts)
+    own = np.repeat(np.arange(len(counts)), counts)
+    shape = np.zeros_like(present) if shape is None else shape
+    arms = shape - shape[starts[:-1]][own]
+    is_new = np.bincount(own, np.abs(arms).sum(axis=1), len(counts)) == 0.0
+    shape = np.where(is_new[own][:, None], present, shape)
+    kept_shapes.keep(guide_curves, shape)
+    slid = present[starts[:-1]] - shape[starts[:-1]]
+    at_roots = np.where(slid[own].any(axis=1)[:, None], shape + slid[own], shape)
+    at_roots[starts[:-1]] = present[starts[:-1]]
+    return curves.even_points(surface.from_local(at_roots), starts, lambda: attributes.are_smooth(guide_curves))

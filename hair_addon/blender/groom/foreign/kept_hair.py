@@ -1,0 +1,137 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that came as curves: its strands are kept as they are, and guides that reproduce it are derived from them.
+
+Points, their numbers and all attributes stay, to the last bit, until guides are moved, which strands follow
+(kept_following.py). Vellus regenerates such hair only where an artist asks for it; it then has as many strands, on the
+same roots.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.types import Curves, Depsgraph, Object
+
+from ....core import geometry, grooming
+from ....core.errors import HairError
+from ....core.geometry import strands
+from ....core.grooming import groom, groom_defaults
+from ....core.grooming.derived_guides import DerivationSettings, DerivedGuides
+from ....core.grooming.groom import HairSettings
+from ....core.grooming.rooted_curves import RootedCurves
+from ....core.long_work import Work, part_of
+from ....core.params import Param, declared, plain_value
+from ...data import scene
+from ...data.scene import Surface
+from ...data.strands import attributes, curves, curves_objects, kept_shapes
+from ...host.datablocks import Remembered
+from ...host.notices import name_of
+from ...materials import looks
+from ...settings import setting_properties
+from .. import pipeline, staleness, writing
+from . import foreign_curves, hand_made_guides
+from .hand_made_guides import HandMade, PlacedCurves
+
+_SWITCH = Param("")
+_MOST_RADIUS = next(details.high for name, _default, details in declared(HairSettings) if name == "radius")
+
+
+@dataclass(frozen=True)
+class KeptHair:
+    """Hair Curves, the guide Curves derived from them, statistics of the curves, and how close the guides come."""
+
+    hair: Curves
+    guides: Curves
+    rooted: RootedCurves
+    mean_error: float  # root mean square of strands' distances to their reproduction, as parts of their lengths
+    high_error: float  # that 95 % of the strands stay below
+
+    def notes(self) -> list[tuple[str, dict[str, Any]]]:
+        """[(sentence, values)] to report to the user."""
+        return HandMade(self.guides, self.hair, self.rooted).notes()
+
+
+def using_as_hair(
+    curves_object: Object,
+    surface_object: Object,
+    depsgraph: Depsgraph,
+    settings: DerivationSettings,
+    *,
+    applies_modifiers: bool = True,
+    follows_guides: bool = False,
+) -> Work[KeptHair]:
+    """Make an object's curves hair and derive guides, as work in steps; returns `KeptHair`.
+
+    applies_modifiers: as of `hand_made_guides.using_as_guides`; follows_guides: regenerate the strands, on their roots,
+    by the guides. Raises `HairError` before anything changes.
+    """
+    applies_modifiers = plain_value("Apply Modifiers", applies_modifiers, True, _SWITCH)
+    follows_guides = plain_value("Follow Guides", follows_guides, False, _SWITCH)
+    hand_made_guides.require_usable(curves_object, surface_object)
+    curves_objects.keep_rest(surface_object)
+    surface = scene.read_surface(surface_object, depsgraph)
+    seen = foreign_curves.read(curves_object, applies_modifiers)
+    if len(seen.starts) < 2:
+        raise HairError('"{name}" has no curves yet: draw some with the Add brush.', name=name_of(curves_object))
+    to_surface = np.linalg.inv(np.array(surface_object.matrix_world)) @ np.array(curves_object.matrix_world)
+    place, its_surface = Remembered(curves_object), Remembered(surface_object)
+
+    def compute(progress):
+        progress("Rooting strands", 0.0)
+        placed = hand_made_guides.on_surface(surface, seen, to_surface)
+        count = len(placed.counts)
+        wanted = groom_defaults.complete(
+            HairSettings(strand_count=count), surface.posed_mesh, None, None, min(settings.guide_count, count)
+        )
+        derived = grooming.derived_guides.derive(
+            surface.mesh,
+            placed.even(surface),
+            placed.rooted.roots,
+            wanted,
+            settings.guide_count,
+            is_mirrored=surface.is_mirrored,
+            progress=part_of(progress, 0.1, 1.0),
+        )
+        return placed, wanted, derived
+
+    placed, wanted, derived = yield compute
+    hair = hand_made_guides.write(
+        place.find(), its_surface.find(), surface, placed, seen, applies_modifiers, kind="HAIR"
+    )
+    wanted = replace(wanted, radius=_write_widths(hair, surface, placed, wanted))
+    guides = writing.write_hand_made(hair.surface, surface, derived.guides)
+    _write_hair(hair, guides, surface, placed, wanted, derived)
+    if follows_guides:
+        pipeline.interpolate_hair(guides, wanted, depsgraph, hair)
+    return KeptHair(hair, guides, placed.rooted, derived.mean_error, derived.high_error)
+
+
+def _write_hair(hair, guides, surface, placed, settings, derived: DerivedGuides):
+    state = hair.vellus
+    state.guide_curves = guides
+    setting_properties.assign(state.hair, settings)
+    identities = surface.identities(placed.rooted.roots)
+    for name, data_type, values in zip(("id", "strand_random"), ("INT", "FLOAT"), identities, strict=True):
+        if not attributes.has(hair, name, data_type, "CURVE"):
+            attributes.write(hair, name, data_type, "CURVE", values)
+    curves.write_guide_map(hair, derived.guide_map)
+    kept_shapes.keep(guides, curves.read_points(guides))
+    # So that regenerated strands take these roots, and nothing is regenerated unless asked for.
+    state.root_key = staleness.root_key(settings, None)
+    state.followed = staleness.guides_digest(guides)
+    state.is_stale = False
+    curves_objects.show_thin(bpy.context.scene)
+    looks.evaluate_shading(hair)
+    looks.evaluate_guides(guides)
+
+
+def _write_widths(hair, surface: Surface, placed: PlacedCurves, settings) -> float:
+    """The mean radius at the roots [m]; curves without any radius get that of the settings, which taper."""
+    starts = strands.curve_offsets(placed.counts)
+    if attributes.read(hair, "radius", "FLOAT", "POINT") is None:
+        along = geometry.strands.places_along(placed.points, starts)
+        taper = groom.strand_radii(settings)[[0, -1]] / np.float32(surface.scale)
+        attributes.write(hair, "radius", "FLOAT", "POINT", taper[0] + (taper[1] - taper[0]) * along)
+    found = float(curves.read_radii(hair)[starts[:-1]].mean() * surface.scale)
+    return min(found, _MOST_RADIUS) or groom_defaults.known(settings.radius)

@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair of Blender's particle systems → a Curves object, by Blender's own conversion; the system is switched off."""
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import bpy
+from bpy.types import Object, ParticleSystem
+
+from ....core.errors import HairError
+from ...data.strands import curves
+from ...host.notices import name_of
+
+
+def systems_of(surface: Object | None) -> list[ParticleSystem]:
+    """The particle systems of a mesh object that are hair."""
+    if surface is None or surface.type != "MESH":
+        return []
+    return [system for system in surface.particle_systems if system.settings.type == "HAIR"]
+
+
+def system_to_convert(surface: Object) -> ParticleSystem:
+    """The active particle system of a mesh object if it is hair, else the first that is. Raises `HairError`."""
+    found = systems_of(surface)
+    if not found:
+        raise HairError('"{name}" has no particle system of hair.', name=name_of(surface))
+    active = surface.particle_systems.active
+    return next((system for system in found if system == active), found[0])
+
+
+@contextmanager
+def as_curves(surface: Object) -> Iterator[Object]:
+    """A context with a new Curves object of a mesh object's particle hair. Raises `HairError`.
+
+    If it ends well the system is switched off, else the object is gone again.
+    """
+    system = system_to_convert(surface)
+    curves.require_editable(surface)
+    surface.particle_systems.active_index = list(surface.particle_systems).index(system)
+    name, before = system.name, set(bpy.data.objects)
+    modifier = next(m for m in surface.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system == system)
+    if not (modifier.show_viewport and surface.visible_get()):
+        raise HairError('"{name}" or its particle system is hidden: show it first.', name=name_of(surface))
+    _convert(surface)
+    made = next((o for o in bpy.data.objects if o not in before and o.type == "CURVES"), None)
+    try:
+        if made is None or not len(made.data.curves):
+            raise HairError('The particle system "{system}" has no hair yet.', system=name)
+        made.name = made.data.name = name
+        made.data.surface = surface
+        yield made
+    except BaseException:
+        if made is not None:
+            data = made.data
+            bpy.data.objects.remove(made)
+            bpy.data.hair_curves.remove(data)
+        raise
+    modifier = surface.modifiers[modifier.name]
+    modifier.show_viewport = modifier.show_render = False
+
+
+def _convert(surface):
+    layer = bpy.context.view_layer
+    for other in layer.objects:
+        if other is not None:
+            other.select_set(other == surface)
+    layer.objects.active = surface
+    layer.update()
+    bpy.ops.curves.convert_from_particle_system()
+    layer.update()

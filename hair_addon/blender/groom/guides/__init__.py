@@ -1,0 +1,16 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tools that change, add and remove guides."""
+
+from typing import TYPE_CHECKING
+
+from ....core.lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        brushes,
+        guide_additions,
+        guide_regions,
+        guide_tools,
+    )
+else:
+    __getattr__ = submodules(__name__)

@@ -1,0 +1,77 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Blender's brushes that add curves: new guides are as long as those around them, and have as many points."""
+
+import bpy
+import numpy as np
+from bpy.types import Curves, CurvesSculpt
+
+from ...data.strands import curves
+
+_FILE = "brushes/essentials_brushes-curve_sculpt.blend/Brush/"
+_ADDING = ("Add", "Density")
+
+# Blender's defaults of these brushes.
+_SHIPPED = {
+    "curve_length": 0.3,
+    "points_per_curve": 8,
+    "use_length_interpolate": False,
+    "use_point_count_interpolate": False,
+}
+
+_fitted = {}  # name of a brush → its settings as they were left here
+
+
+def fit(guides: Curves, sculpt: CurvesSculpt) -> None:
+    """Fit Blender's Add and Density brushes to guide Curves, unless an artist has set them; sculpt mode is on.
+
+    They take length and number of points from the guides around, and the median of all where there are none. sculpt:
+    the `CurvesSculpt` settings of the scene, whose active brush stays active.
+    """
+    if not len(guides.curves):
+        return
+    active = sculpt.brush_asset_reference
+    library, identifier = active.asset_library_type, active.relative_asset_identifier
+    custom = active.asset_library_identifier
+    lengths = _lengths(guides)
+    settings = {
+        "curve_length": float(np.median(lengths)),
+        "points_per_curve": int(np.median(curves.point_counts(guides))),
+        "use_length_interpolate": True,
+        "use_point_count_interpolate": True,
+    }
+    for name in _ADDING:
+        if "FINISHED" in bpy.ops.brush.asset_activate(
+            asset_library_type="ESSENTIALS", relative_asset_identifier=_FILE + name
+        ):
+            _fit(sculpt.brush, settings)
+    if identifier:
+        bpy.ops.brush.asset_activate(
+            asset_library_type=library, asset_library_identifier=custom, relative_asset_identifier=identifier
+        )
+
+
+def _fit(brush, settings):
+    group = brush.curves_sculpt_settings
+    present = _settings_of(group)
+    if present not in (_rounded(_SHIPPED), _fitted.get(brush.name)):
+        return  # an artist's choice
+    for name, value in settings.items():
+        setattr(group, name, value)
+    _fitted[brush.name] = _settings_of(group)
+
+
+def _settings_of(group):
+    return _rounded({name: getattr(group, name) for name in _SHIPPED})
+
+
+def _rounded(settings):
+    """Settings as they can be compared: Blender's numbers have single precision."""
+    return settings | {"curve_length": float(np.float32(settings["curve_length"]))}
+
+
+def _lengths(guides):
+    """(G,) lengths in local units."""
+    offsets, points = curves.curve_offsets(guides), curves.read_points(guides)
+    steps = np.linalg.norm(np.diff(points, axis=0, append=points[-1:]), axis=1)
+    steps[offsets[1:] - 1] = 0.0  # from a curve to the next
+    return np.add.reduceat(steps, offsets[:-1])

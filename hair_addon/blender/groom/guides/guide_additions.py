@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tools that add and remove guides: all others keep their bits, their order and their attributes."""
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ....core import geometry, grooming, placement
+from ....core.errors import HairError
+from ....core.geometry import mesh as mesh_math
+from ....core.geometry import strands
+from ....core.geometry.mesh import SurfacePoints
+from ....core.grooming.groom import POINT_COUNT, HairSettings
+from ....core.grooming.guide_tool_settings import CountSettings, MirrorSettings
+from ...data import masks
+from ...data.strands import curves, guide_curves, partings
+from ...settings import preferences
+from .. import pipeline
+from . import guide_tools
+from .guide_tools import CombedGuides
+
+# Points (M, P, 3) [m], the guides (M,) whose attributes they take, and their roots.
+Additions = tuple[np.ndarray, np.ndarray, SurfacePoints]
+
+
+def change_count(datablock: Curves, settings: CountSettings, depsgraph: Depsgraph) -> int:
+    """Add guides between those that are there, or remove crowded ones; returns how many there are then.
+
+    Raises `HairError` before anything changes.
+    """
+    guides = guide_tools.read(datablock, settings, depsgraph)
+    difference = grooming.guide_count.difference(settings, guides.weights)
+    if difference > 0:
+        write(guides, [_between(guides, difference, settings.mask, depsgraph)], np.zeros(0, np.int64))
+    elif difference < 0:
+        removed = _crowded(guides, -difference, depsgraph)
+        write(guides, [], removed)
+    return len(datablock.curves)
+
+
+def mirror(datablock: Curves, settings: MirrorSettings, depsgraph: Depsgraph) -> int:
+    """Replace the guides of one side of the object with images of the other's; returns the number of images.
+
+    Raises `HairError` before anything changes.
+    """
+    guides = guide_tools.read(datablock, settings, depsgraph)
+    mesh, sign = guides.surface.mesh, 1.0 if settings.direction == "FROM_POSITIVE" else -1.0
+    plane = placement.domain.Mirror(sign * guides.surface.mirror_normal)
+    places = mesh_math.positions(mesh, guides.roots)
+    found = grooming.guide_mirror.mirroring(mesh, places, plane, guides.weights >= 0.5)
+    additions = []
+    for count in np.unique(guides.counts[found.sources]):
+        chosen = np.flatnonzero(guides.counts[found.sources] == count)
+        sources, image_roots = found.sources[chosen], found.roots[chosen]
+        points = guides.points[guides.of_count(int(count), sources)]
+        made = grooming.guide_mirror.images(mesh, points, guides.roots[sources], image_roots, plane)
+        additions.append((made, sources, image_roots))
+    write(guides, additions, found.removed)
+    return len(found.sources)
+
+
+def write(guides: CombedGuides, additions: list[Additions], removed: np.ndarray) -> None:
+    """Add guides and remove others, (R,) indices of those that were there. One at least has to be left."""
+    datablock, surface, roots = guides.datablock, guides.surface, guides.roots
+    for points, sources, new_roots in additions:
+        if len(points):
+            starts = curves.curve_offsets(datablock).astype(np.int64)
+            guide_curves.append(datablock, surface.to_local(points), sources, starts)
+            roots = roots.joined(new_roots)
+            identities, randoms = surface.identities(new_roots)
+            # Those made of curves may be rooted off the surface, and so their images.
+            apart = np.linalg.norm(points[:, 0] - mesh_math.positions(surface.mesh, new_roots), axis=1)
+            guide_curves.write_tail(datablock, "id", "INT", identities)
+            guide_curves.write_tail(datablock, "strand_random", "FLOAT", randoms)
+            guide_curves.write_tail(datablock, "root_distance", "FLOAT", apart / surface.scale)
+    guide_curves.remove(datablock, removed)
+    curves.write_roots(datablock, surface, roots[np.setdiff1d(np.arange(len(roots)), removed)])
+    datablock.update_tag()
+
+
+def _between(guides, count, mask, depsgraph):
+    """`Additions` of new guides that take their shape from those around them, as hair does."""
+    datablock, surface, device = guides.datablock, guides.surface, preferences.device()
+    density, texture = _density(guides, mask, depsgraph)
+    roots = grooming.guide_count.new_roots(
+        surface.mesh,
+        guides.roots,
+        count,
+        guides.weights > 0.0,
+        density=density,
+        texture=texture,
+        device=device,
+    )
+    if not len(roots):
+        raise HairError("There is no room for more guides here: change the selection or the mask.")
+    settings = _hair_settings(datablock)
+    parting = partings.read(datablock.surface, surface, datablock, settings, depsgraph)
+    points, nearest = grooming.guide_count.grown_between(
+        surface.mesh,
+        strands.from_numpy(guides.even(POINT_COUNT), guides.roots, device),
+        roots,
+        settings,
+        regions=parting.regions,
+        lines=parting.lines,
+        drawn_on=surface.from_local(surface.posed) if surface.is_deformed else None,
+        is_mirrored=surface.is_mirrored,
+        device=device,
+    )
+    point_count = max(int(np.bincount(guides.counts).argmax()), 2)
+    if point_count != POINT_COUNT:
+        starts = np.arange(len(points) + 1) * POINT_COUNT
+        points = geometry.resampling.resample(points.reshape(-1, 3), starts, point_count)
+    return points, nearest, roots
+
+
+def _density(guides, mask, depsgraph):
+    """Where new guides may stand: (V,) weights or None, and `Texture` or None.
+
+    Inside the mask that guides were placed by, and inside the tool's own mask.
+    """
+    datablock, surface = guides.datablock, guides.surface
+    density = texture = None
+    if not curves.is_hand_made(datablock):
+        density, texture = masks.own(datablock.vellus.guides).read(datablock.surface, surface, depsgraph)
+    if mask:
+        weights, _texture = masks.Mask(mask).read(datablock.surface, surface, depsgraph)
+        density = weights if density is None else density * weights
+    return density, texture
+
+
+def _crowded(guides, count, depsgraph):
+    """Indices of the guides to remove: at least half selected and half inside the mask; one of all stays."""
+    may_go = guides.weights >= 0.5
+    count = min(count, np.count_nonzero(may_go), len(may_go) - 1)
+    if count <= 0:
+        raise HairError("No more guides can be removed here: change the selection or the mask.")
+    spread = None
+    if not curves.is_hand_made(guides.datablock):
+        density, _texture = masks.own(guides.datablock.vellus.guides).read(
+            guides.datablock.surface, guides.surface, depsgraph
+        )
+        if density is not None:
+            spread = np.maximum(mesh_math.interpolate(density, guides.surface.mesh, guides.roots), 0.01)
+    places = mesh_math.positions(guides.surface.mesh, guides.roots)
+    return grooming.guide_count.most_crowded(places, guides.normals, int(count), may_go, spread)
+
+
+def _hair_settings(datablock):
+    """The `HairSettings` of the first hair that follows guides; the defaults where none does."""
+    following = curves.followers(datablock)
+    return pipeline.inputs_of(following[0])[1] if following else HairSettings()

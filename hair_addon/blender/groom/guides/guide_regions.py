@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Regions of guides, as the hair between them is parted: hair of two of them does not rub or press on each other."""
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ....core import interpolation
+from ....core.grooming import groom
+from ...data import scene
+from ...data.strands import curves, partings
+from ...settings import preferences, setting_properties
+from .. import bindings
+
+
+def regions_of(guides: Curves, depsgraph: Depsgraph) -> np.ndarray | None:
+    """(G,) int32 from 0: alike where no hair between the guides is parted; None where none is. Raises `HairError`."""
+    parted = _parted_hair(guides)
+    if not parted or guides.surface is None:
+        return None
+    device = preferences.device()
+    surface = scene.read_surface(guides.surface, depsgraph)
+    roots = curves.read_guides(guides, surface, device).roots
+    drawn_on = surface.from_local(surface.posed) if surface.is_deformed else None
+    labels = []
+    for hair in parted:
+        settings = setting_properties.to_settings(hair.vellus.hair, groom.HairSettings)
+        parting = partings.read(guides.surface, surface, guides, settings, depsgraph)
+        lines = groom.laid_lines(surface.mesh, parting.lines, drawn_on, device)
+        labels.append(interpolation.guide_regions.guide_regions(surface.mesh, roots, parting.regions, lines, device))
+    regions = interpolation.guide_regions.combined(labels)
+    return regions if regions.any() else None
+
+
+def is_parted(guides: Curves) -> bool:
+    """Whether `regions_of` has anything to read."""
+    return bool(_parted_hair(guides))
+
+
+def _parted_hair(guides):
+    return [hair for hair in curves.followers(guides) if partings.is_wanted(hair.vellus.hair)]
+
+
+def parting_keys(guides: Curves) -> tuple[str, ...]:
+    """What parted the hair between guides when it was grown: changes where `regions_of` may."""
+    followers = curves.followers(guides)
+    bound = [bindings.of(hair) for hair in followers]  # newer than what is written
+    keys = [
+        hair.vellus.parting_key if own is None else own.parting_key for hair, own in zip(followers, bound, strict=True)
+    ]
+    return tuple(sorted(keys))

@@ -1,0 +1,280 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Tools that change combed guides in place: read guides, compute, write back what has changed.
+
+Guides keep their roots, and those that a tool does not change all their bits. As after combing, settings no longer
+apply to them, and hair follows at Blender's next update.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from bpy.types import Curves, Depsgraph
+
+from ....core import geometry, grooming
+from ....core.errors import HairError
+from ....core.geometry import mesh as mesh_math
+from ....core.geometry.mesh import SurfacePoints
+from ....core.grooming.guide_tool_settings import (
+    AttractSettings,
+    CopySettings,
+    LengthSettings,
+    LiftSettings,
+    SmoothSettings,
+    ToolSettings,
+    TrimSettings,
+)
+from ...data import scene
+from ...data.scene import Surface
+from ...data.strands import attributes, curves, cutters, guide_curves, posed_strands
+from ...host.notices import name_of
+
+_FARTHEST = 1e14  # [m] from the surface's origin: squares of such lengths are still floats
+
+
+@dataclass(frozen=True)
+class CombedGuides:
+    """Guides as they are, G of them, of any point counts.
+
+    local (N, 3) float32 in local coordinates, points (N, 3) float32 [m] as their `Surface` is, starts (G+1,); weights
+    (G,) float64 in [0, 1]: how much of a change each gets.
+    """
+
+    datablock: Curves
+    surface: Surface
+    local: np.ndarray
+    points: np.ndarray
+    starts: np.ndarray
+    weights: np.ndarray
+    roots: SurfacePoints
+
+    @property
+    def counts(self) -> np.ndarray:
+        """(G,) how many points each guide has."""
+        return np.diff(self.starts)
+
+    @cached_property
+    def normals(self) -> np.ndarray:
+        """(G, 3) float32: unit, of the surface at the roots."""
+        return mesh_math.normals(self.surface.mesh, self.roots)
+
+    @property
+    def first_points(self) -> np.ndarray:
+        """(G, 3) float32 [m]."""
+        return self.points[self.starts[:-1]]
+
+    def of_count(self, count: int, chosen: np.ndarray) -> np.ndarray:
+        """(M, count) indices of the points of chosen guides (M,), which have `count` points each."""
+        return self.starts[chosen][:, None] + np.arange(count)
+
+    def even(self, point_count: int) -> np.ndarray:
+        """(G, point_count, 3) float32 [m]: the guides as they are if all have as many points, else evenly resampled."""
+        if (self.counts == point_count).all():
+            return self.points.reshape(-1, point_count, 3)
+        return geometry.resampling.resample(
+            self.points, self.starts, point_count, attributes.are_smooth(self.datablock)
+        )
+
+    def carried_back(self, posed: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Points (M, P, 3) float32 [m] of chosen guides on the deformed surface → the same on the surface at rest."""
+        pose = posed_strands.pose_of(self.surface)
+        if pose.motion is None:
+            return posed
+        places = tuple(part[chosen] for part in self.surface.places(self.roots))
+        local = self.surface.to_local(posed)
+        return self.surface.from_local(posed_strands.carried(local, pose.motion, places, is_back=True))
+
+    def posed(self) -> np.ndarray:
+        """(N, 3) float32 [m]: the points on the surface as shape keys and modifiers deform it now."""
+        pose = posed_strands.pose_of(self.surface)
+        if pose.motion is None:
+            return self.points
+        places = self.surface.places(self.roots)
+        return self.surface.from_local(posed_strands.carried(self.local, pose.motion, places, self.counts))
+
+
+def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
+    """The `CombedGuides` of guide Curves, all of weight one. Raises `HairError` where they cannot be changed."""
+    curves.require_editable(datablock)
+    if datablock.surface is None:
+        raise HairError("The surface is missing: pick a mesh.")
+    surface = scene.read_surface(datablock.surface, depsgraph)
+    mesh_math.check_mesh(surface.mesh)
+    starts = curves.curve_offsets(datablock).astype(np.int64)
+    if len(starts) < 2:
+        raise HairError('"{name}" has no guides: generate guides first.', name=name_of(datablock))
+    local = curves.read_points(datablock)
+    if not np.isfinite(local).all():
+        sentence = '"{name}" has non-finite coordinates: undo, or delete those guides.'
+        raise HairError(sentence, name=name_of(datablock))
+    points = surface.from_local(local)
+    roots = curves.read_roots(datablock, surface, points[starts[:-1]])
+    return CombedGuides(datablock, surface, local, points, starts, np.ones(len(starts) - 1), roots)
+
+
+def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> CombedGuides:
+    """The `CombedGuides` of guide Curves, weighted by selection and mask. Raises `HairError`."""
+    guides = open_guides(datablock, depsgraph)
+    weights = guides.weights.copy()
+    selected = guide_curves.selection(datablock, guides.starts) if settings.selected_only else None
+    if selected is not None:
+        weights *= selected
+    if settings.mask:
+        weights *= weights_in_group(guides, settings.mask, depsgraph)
+    if not weights.any():
+        raise HairError("No guide is both selected and inside the mask: change the selection or the mask.")
+    return replace(guides, weights=weights)
+
+
+def weights_in_group(guides: CombedGuides, name: str, depsgraph: Depsgraph) -> np.ndarray:
+    """(G,) in [0, 1]: weights of a vertex group at the roots; the guides' own for no name. Raises `HairError`."""
+    weights = scene.read_vertex_group(guides.datablock.surface, depsgraph, name)
+    if weights is None:
+        return guides.weights
+    return np.clip(mesh_math.interpolate(weights, guides.surface.mesh, guides.roots), 0.0, 1.0)
+
+
+Shaping = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def reshape(guides: CombedGuides, shaped: Shaping) -> int:
+    """Give guides other points; returns how many have changed.
+
+    shaped: a function of points (M, P, 3) [m] and the indices (M,) of these guides, all of P points, that returns such
+    points. Guides of no weight, and of a single point, are not given to it.
+    """
+    after = guides.points.copy()
+    for chosen, places in to_shape(guides):
+        after[places] = shaped(guides.points[places], chosen)
+    return write_shapes(guides, after)
+
+
+def to_shape(guides: CombedGuides) -> list[tuple[np.ndarray, np.ndarray]]:
+    """[((M,) indices of guides, (M, P) of their points)] of those with weight and several points, by their number."""
+    found = []
+    for count in np.unique(guides.counts[(guides.counts > 1) & (guides.weights > 0.0)]):
+        chosen = np.flatnonzero((guides.counts == count) & (guides.weights > 0.0))
+        found.append((chosen, guides.of_count(int(count), chosen)))
+    return found
+
+
+def write_shapes(guides: CombedGuides, after: np.ndarray) -> int:
+    """Write points (N, 3) [m] of guides; returns how many have changed. Raises `HairError`."""
+    if not np.abs(after).max() < _FARTHEST:  # also refuses NaN
+        raise HairError("The guides would extend too far from their surface: use smaller values.")
+    is_moved = (after != guides.points).any(axis=1)
+    local = guides.local.copy()
+    local[is_moved] = guides.surface.to_local(after[is_moved][:, None])[:, 0]
+    if is_moved.any():
+        attributes.write(guides.datablock, "position", "FLOAT_VECTOR", "POINT", local)
+        guides.datablock.update_tag()
+    return int(np.count_nonzero(np.add.reduceat(is_moved, guides.starts[:-1])))
+
+
+def change_lengths(datablock: Curves, settings: LengthSettings, depsgraph: Depsgraph) -> int:
+    """Give guides other lengths; returns how many have changed. Raises `HairError` before anything changes."""
+    guides = read(datablock, settings, depsgraph)
+    resized = grooming.guide_lengths.resized
+    return reshape(guides, lambda points, chosen: resized(points, settings, guides.weights[chosen]))
+
+
+def trim(datablock: Curves, settings: TrimSettings, depsgraph: Depsgraph) -> int:
+    """Cut guides where an object crosses them, on the surface as it is deformed now; returns and raises as above."""
+    guides = read(datablock, settings, depsgraph)
+    cutter = cutters.read_cutter(settings.cutter, datablock.surface, depsgraph)
+    posed = guides.posed()
+
+    def shaped(points, chosen):
+        there = posed[guides.of_count(points.shape[1], chosen)]
+        if cutter.mesh is not None:
+            crossings = grooming.guide_trim.mesh_crossings(there, cutter.mesh)
+        else:
+            crossings = grooming.guide_trim.plane_crossings(there, cutter.origin, cutter.normal)
+        return grooming.guide_trim.trimmed(points, crossings, guides.weights[chosen])
+
+    return reshape(guides, shaped)
+
+
+def smooth(datablock: Curves, settings: SmoothSettings, depsgraph: Depsgraph) -> int:
+    """Smooth guides along their length; returns and raises as above."""
+    guides = read(datablock, settings, depsgraph)
+    smoothed = grooming.guide_smoothing.smoothed
+    return reshape(guides, lambda points, chosen: smoothed(points, settings, guides.weights[chosen]))
+
+
+def lift(datablock: Curves, settings: LiftSettings, depsgraph: Depsgraph) -> int:
+    """Turn guides toward the surface normal; returns and raises as above."""
+    guides = read(datablock, settings, depsgraph)
+    lifted = grooming.guide_lift.lifted
+    return reshape(
+        guides, lambda points, chosen: lifted(points, guides.normals[chosen], settings, guides.weights[chosen])
+    )
+
+
+def attract(datablock: Curves, settings: AttractSettings, depsgraph: Depsgraph) -> int:
+    """Turn guides toward the surface; returns and raises as above."""
+    guides = read(datablock, settings, depsgraph)
+    mesh, attracted = guides.surface.mesh, grooming.guide_attraction.attracted
+    return reshape(
+        guides, lambda points, chosen: attracted(mesh, points, guides.normals[chosen], settings, guides.weights[chosen])
+    )
+
+
+def copy_shape(datablock: Curves, settings: CopySettings, depsgraph: Depsgraph) -> int:
+    """Give guides of one region the shape of those of another; returns and raises as above."""
+    guides = open_guides(datablock, depsgraph)
+    is_source, weights = _regions(guides, settings, depsgraph)
+    guides = replace(guides, weights=weights)
+    sources, targets = np.flatnonzero(is_source), np.flatnonzero(weights > 0.0)
+    copies = grooming.guide_copies
+    its, own = (copies.Places(guides.first_points[rows], guides.normals[rows]) for rows in (sources, targets))
+    matches = copies.matched(its, own, settings.mapping, guides.surface.mirror_normal)
+
+    def shaped(points, chosen):
+        rows = np.searchsorted(targets, chosen)
+        shapes = guides.even(points.shape[1])[sources[matches.sources[rows]]]
+        return copies.copied(points, shapes, matches.matrices[rows], settings, weights[chosen])
+
+    return reshape(guides, shaped)
+
+
+def _regions(guides, settings, depsgraph):
+    """(G,) bool, the guides to copy from, and (G,) float64, how much of a copy each of the others gets."""
+    selected = guide_curves.selection(guides.datablock, guides.starts)
+    if settings.source:
+        is_source = weights_in_group(guides, settings.source, depsgraph) >= 0.5
+        if not is_source.any():
+            raise HairError(
+                'No guide is rooted in the vertex group "{name}": pick another group.', name=settings.source
+            )
+    elif selected is not None:
+        is_source = selected > 0.0
+    else:
+        raise HairError("Select the guides to copy from, or pick the vertex group that they are rooted in.")
+    if settings.target:
+        weights = weights_in_group(guides, settings.target, depsgraph).astype(np.float64)
+    elif settings.source and selected is not None:
+        weights = selected.astype(np.float64)
+    else:
+        weights = np.ones(len(is_source))
+    weights[is_source] = 0.0
+    if not weights.any():
+        raise HairError("There are no guides to copy to: pick another vertex group, or select fewer guides.")
+    return is_source, weights
+
+
+def is_any_selected(datablock: Curves) -> bool:
+    """Whether guides are selected in Sculpt Mode or Edit Mode, and others are not."""
+    return guide_curves.selection(datablock, curves.curve_offsets(datablock)) is not None
+
+
+def median_length(datablock: Curves) -> float:
+    """The median length [m] of guides; 0 for none."""
+    starts, points = curves.curve_offsets(datablock), curves.read_points(datablock)
+    if datablock.surface is not None:
+        points = points @ np.array(datablock.surface.matrix_world.to_3x3(), np.float32).T
+    steps = np.linalg.norm(np.diff(points, axis=0, append=points[-1:]), axis=1)
+    lengths = [steps[start : end - 1].sum() for start, end in pairwise(starts) if end > start]
+    return float(np.median(lengths)) if lengths else 0.0

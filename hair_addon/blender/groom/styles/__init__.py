@@ -1,0 +1,15 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Styles of a hair: added, fitted, painted, and why one does nothing."""
+
+from typing import TYPE_CHECKING
+
+from ....core.lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        hair_styles,
+        painted_masks,
+        style_notes,
+    )
+else:
+    __getattr__ = submodules(__name__)

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Styles of a hair: add, replace, and fit to the size of its surface."""
+
+import math
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+from bpy.types import Curves, Object
+
+from ....core.errors import HairError
+from ....core.files import style_presets
+from ....core.files.settings_file import PartialSettings
+from ....core.geometry import strands
+from ....core.grooming import groom_defaults
+from ....core.grooming.groom import GuideSettings, HairSettings
+from ....core.params import declared
+from ....core.styling import curl, fitting
+from ....core.styling.base import StyleSettings, has_effect
+from ...data import scene
+from ...data.strands import curves
+from ...settings import setting_properties, style_items
+from .. import pipeline
+from ..transfer import groom_settings
+
+_HEAD_LENGTH = next(length for name, length, _details in declared(GuideSettings) if name == "length")  # [m]
+
+
+def add(
+    hair: Curves, settings: StyleSettings, name: str = "", is_fitted: bool = False, kept: Collection[str] = ()
+) -> StyleSettings:
+    """Add a style to a hair Curves datablock, after its other styles; returns its settings.
+
+    is_fitted: whether lengths are for a human head, and fitted to the surface; kept: names of settings that are not
+    fitted. A seed that is none of them becomes one that no other style of the hair has. Raises `HairError` before any
+    change.
+    """
+    curves.require_editable(hair)
+    style_items.require_room(len(hair.vellus.styles) + 1)
+    if is_fitted:
+        settings = fitting.fitted(settings, *surface_fit(hair), kept)
+    if "seed" not in kept:
+        settings = replace(settings, seed=style_items.new_seed(hair.vellus))
+    style_items.add(hair.vellus, settings, name)
+    return style_items.settings_of(style_items.active_of(hair.vellus))
+
+
+def assign(hair: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> None:
+    """Replace the styles of a hair Curves datablock; styles that stay keep their keys. Raises `HairError`."""
+    curves.require_editable(hair)
+    style_items.assign(hair.vellus, styles, names)
+
+
+def apply_preset(hair: Curves, preset: PartialSettings, is_fitted: bool = True, keeps_styles: bool = False) -> None:
+    """Apply a style preset to a hair Curves datablock; what it leaves out stays. Raises `HairError` before any change.
+
+    is_fitted: as in `add`; keeps_styles: whether the preset's styles come after the present ones, which stay.
+    """
+    if is_fitted:
+        preset = style_presets.fit(preset, *surface_fit(hair))
+    present = groom_settings.settings_of(hair)
+    wanted = preset.changed(present)
+    if keeps_styles and preset.styles is not None:
+        added = _with_new_seeds(preset.styles, present.styles)
+        names = [*present.style_names, *(preset.style_names or [""] * len(added))]
+        wanted = replace(wanted, styles=(*present.styles, *added), style_names=tuple(names))
+    groom_settings.apply_settings(hair, wanted)
+
+
+def surface_fit(hair: Curves) -> tuple[float, float]:
+    """(factor of lengths, mean distance of strands [m]) for a hair's surface; the factor is 1 on a human scalp.
+
+    Raises `HairError`.
+    """
+    guides, settings = pipeline.inputs_of(hair)
+    return fit_of(guides.surface, setting_properties.to_settings(guides.vellus.guides, GuideSettings), settings)
+
+
+def fit_of(surface_object: Object, guide_settings: GuideSettings, hair_settings: HairSettings) -> tuple[float, float]:
+    """The same for hair of these settings on a mesh object."""
+    open_guides, open_hair = replace(guide_settings, length=None), replace(hair_settings, influence_distance=None)
+    known_guides, known_hair = pipeline.complete(surface_object, open_guides, open_hair, scene.present_depsgraph())
+    # Found by `complete`, which leaves none open.
+    length, influence = known_guides.length or _HEAD_LENGTH, known_hair.influence_distance or 0.0
+    spacing = influence / groom_defaults.INFLUENCE * math.sqrt(guide_settings.guide_count / hair_settings.strand_count)
+    return length / _HEAD_LENGTH, spacing
+
+
+def points_wanted(hair: Curves, length: float | None = None) -> int:
+    """Points per strand that the curls of a hair want, within the setting's range; 0 without curls.
+
+    length [m]: of strands, None for what the guides are set to; of hand-made guides it must be given. Raises
+    `HairError`.
+    """
+    guides = hair.vellus.guide_curves
+    if guides is None or (length is None and curves.is_hand_made(guides)):
+        return 0
+    length = guides.vellus.guides.length if length is None else length
+    styles = style_items.styles_of(hair.vellus)
+    curls = [style for style in styles if isinstance(style, curl.Settings) and has_effect(style)]
+    most = hair.vellus.hair.bl_rna.properties["point_count"].hard_max
+    return min(max((curl.points_wanted(style, length) for style in curls), default=0), most)
+
+
+def use_points(hair: Curves) -> int:
+    """Give hair the points per strand that its curls want, or those it has if these are more; returns their number.
+
+    Raises `HairError`.
+    """
+    curves.require_editable(hair)
+    guides, _settings = pipeline.inputs_of(hair)
+    wanted = points_wanted(hair, _mean_length(guides) if curves.is_hand_made(guides) else None)
+    if not wanted:
+        raise HairError("No style needs more points: add Curl or Wave.")
+    hair.vellus.hair.point_count = max(wanted, hair.vellus.hair.point_count)
+    return hair.vellus.hair.point_count
+
+
+def _mean_length(guides):
+    """[m] in the world; 0 where all guides were deleted."""
+    if not len(guides.curves):
+        return 0.0
+    scale = 1.0 if guides.surface is None else guides.surface.matrix_world.median_scale
+    return float(strands.ragged_lengths(curves.read_points(guides), curves.curve_offsets(guides)).mean()) * scale
+
+
+def _with_new_seeds(added, present):
+    """Styles with seeds that none before them has."""
+    taken = {style.seed for style in present}
+    renewed = []
+    for style in added:
+        seed = style.seed if style.seed not in taken else next(n for n in range(len(taken) + 1) if n not in taken)
+        taken.add(seed)
+        renewed.append(replace(style, seed=seed))
+    return tuple(renewed)

@@ -1,0 +1,98 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Why a style does nothing, or not what its place in the list suggests.
+
+Panels ask with every redraw, so geometry is not read.
+"""
+
+from collections.abc import Iterator
+
+import bpy
+from bpy.types import Curves, PropertyGroup
+
+from ....core.styling import clump_trees, program
+from ....core.styling.base import ProfiledSettings
+from ....core.styling.kinds import KINDS
+from ...host.notices import text_of
+from ...settings import style_items
+from ...settings.translations import interface_text
+from .. import bindings
+
+# Settings that are all zero, or empty, where a style of a kind does nothing.
+_WITHOUT = {
+    "CURL": ("radius",),
+    "FRIZZ": ("amplitude",),
+    "BEND": ("angle",),
+    "TRIM": ("random", "to_length", "undercoat", "cutter"),
+}
+
+_OBJECTS = {"TRIM": "cutter", "LEAN": "target"}
+
+
+def notes_of(hair: Curves, item: PropertyGroup) -> list[str]:
+    """Translated sentences about a style of a hair Curves datablock; item: the style's properties."""
+    return [*_without_effect(item), *_missing_data(hair, item), *_too_small(hair, item), *_order(hair, item)]
+
+
+def _without_effect(item: PropertyGroup) -> Iterator[str]:
+    group = style_items.group_of(item)
+    if not group.is_on:
+        yield interface_text("The style is disabled.")
+    elif group.amount == 0.0:
+        yield interface_text("No effect: the amount is zero.")
+    elif issubclass(KINDS[item.kind], ProfiledSettings) and group.root == group.tip == 0.0:
+        yield interface_text("No effect: the amount is zero at root and tip.")
+    elif _is_neutral(item, group):
+        yield interface_text("No effect with these settings.")
+
+
+def _is_neutral(item, group):
+    if item.kind == "TRIM" and group.factor != 1.0:
+        return False
+    return item.kind in _WITHOUT and not any(text_of(group, name) for name in _WITHOUT[item.kind])
+
+
+def _missing_data(hair: Curves, item: PropertyGroup) -> Iterator[str]:
+    group = style_items.group_of(item)
+    name = text_of(group, _OBJECTS[item.kind]) if item.kind in _OBJECTS else ""
+    mask, image = style_items.masks_of(item)
+    is_used = item.kind != "LEAN" or group.direction == "OBJECT"
+    if is_used and name and name not in bpy.data.objects:
+        yield interface_text('No object "{name}": pick another.', name=name)
+    if is_used and item.kind == "LEAN" and not name:
+        yield interface_text("Pick an object to lean along.")
+    if mask and not _has_mask(hair, mask):
+        yield interface_text('No vertex group or attribute "{name}".', name=mask)
+    if image and image not in bpy.data.images:
+        yield interface_text('No image "{name}": pick another.', name=image)
+
+
+def _has_mask(hair, name):
+    """Whether surface or guides have it; modifiers of the surface may make any attribute."""
+    surface, guides = hair.surface, hair.vellus.guide_curves
+    if surface is not None and (surface.modifiers or name in surface.vertex_groups or name in surface.data.attributes):
+        return True
+    return surface is None or (guides is not None and name in guides.attributes)
+
+
+def _too_small(hair: Curves, item: PropertyGroup) -> Iterator[str]:
+    """Known of hair whose strands were styled since the file was opened."""
+    bound = bindings.of(hair)
+    if bound is None or bound.styles.styling is None:
+        return
+    tree = program.tree_settings(style_items.settings_of(item))
+    if tree is None:
+        return
+    factor = clump_trees.size_factor(bound.styles.styling.trees.area, tree)
+    if factor > 1.0:
+        units = bpy.context.scene.unit_settings.system
+        size = bpy.utils.units.to_string(units, "LENGTH", factor * tree.sizes[0], precision=3)
+        yield interface_text("The locks are too small for this surface: a size of {size} is used.", size=size)
+
+
+def _order(hair: Curves, item: PropertyGroup) -> Iterator[str]:
+    items = list(hair.vellus.styles)
+    place = items.index(item)
+    if item.kind == "WET" and any(style_items.group_of(below).is_on for below in items[place + 1 :]):
+        yield interface_text("Wet belongs last: move it down.")
+    if item.kind == "LEAN" and any(above.kind != "LEAN" for above in items[:place]):
+        yield interface_text("Lean acts on guides, before all other styles.")

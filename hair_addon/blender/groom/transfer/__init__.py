@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Grooms taken from a hair and put on another mesh; all settings of a hair."""
+
+from typing import TYPE_CHECKING
+
+from ....core.lazy import submodules
+
+if TYPE_CHECKING:
+    from . import (
+        carried_masks,
+        groom_settings,
+        groom_transfers,
+        library_groom,
+        transferred_names,
+    )
+else:
+    __getattr__ = submodules(__name__)

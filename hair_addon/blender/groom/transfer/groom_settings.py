@@ -1,0 +1,94 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair ↔ all of its settings, as `settings_file.GroomSettings`."""
+
+from dataclasses import replace
+
+from bpy.types import Curves, Depsgraph, Object
+
+from ....core.dynamics.rod.settings import DynamicsSettings
+from ....core.files.settings_file import GroomSettings
+from ....core.grooming.groom import GuideSettings
+from ....core.long_work import Work
+from ....core.shading.appearance import TABLE_FIELDS, Appearance
+from ...data import scene
+from ...data.strands import curves
+from ...materials import looks
+from ...settings import properties, setting_properties, style_items
+from .. import pipeline, writing
+from ..foreign import hand_made_guides
+
+
+def settings_of(hair: Curves) -> GroomSettings:
+    """The `GroomSettings` of a hair Curves datablock and its guides. Raises `HairError`."""
+    guides, hair_settings = pipeline.inputs_of(hair)
+    guide_settings = setting_properties.to_settings(guides.vellus.guides, GuideSettings)
+    look, tables = properties.own_look_of(hair.vellus), properties.own_table_settings_of(hair.vellus)
+    styles, names = style_items.styles_of(hair.vellus), style_items.names_of(hair.vellus)
+    dynamics = properties.own_dynamics_of(guides.vellus)
+    return GroomSettings(guide_settings, hair_settings, look, tables, styles, names, dynamics)
+
+
+def apply_settings(hair: Curves, settings: GroomSettings) -> None:
+    """Apply settings to a hair Curves datablock and its guides; Blender's next update regenerates them.
+
+    Combed guides or hair are not changed, as with any change of settings. Open
+    settings are computed from the surface. Raises `HairError` before anything changes.
+    """
+    guides, _settings = pipeline.inputs_of(hair)
+    for target in (guides, hair):
+        curves.require_editable(target)
+    depsgraph = scene.present_depsgraph()
+    of_guides, of_hair = pipeline.complete(guides.surface, settings.guides, settings.hair, depsgraph)
+    settings = replace(settings, guides=of_guides, hair=of_hair)
+    for group, wanted in ((guides.vellus.guides, settings.guides), (hair.vellus.hair, settings.hair)):
+        # Otherwise everything would be regenerated without need.
+        if setting_properties.to_settings(group, type(wanted)) != wanted:
+            setting_properties.assign(group, wanted)
+    assign_dynamics(guides, settings.dynamics)
+    style_items.assign(hair.vellus, settings.styles, settings.style_names)
+    _assign_shading(hair, settings)
+
+
+def assign_look(hair: Curves, look: Appearance) -> None:
+    """Assign an `Appearance` including its mode, which a look does not change. Raises `HairError`."""
+    curves.require_editable(hair)
+    hair.vellus.appearance.mode = look.mode
+    looks.apply_look(hair, look)
+
+
+def assign_dynamics(guides: Curves, settings: DynamicsSettings) -> None:
+    """Assign settings of the simulation to guide Curves; the same settings again mark nothing. Raises `HairError`."""
+    curves.require_editable(guides)
+    if properties.own_dynamics_of(guides.vellus) != setting_properties.as_stored(settings):
+        setting_properties.assign(guides.vellus.dynamics, settings)
+
+
+def adding_hair(surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph) -> Work[tuple[Curves, Curves]]:
+    """Guides and hair of some `GroomSettings` on a mesh object, as work in steps; returns the Curves of both."""
+    growing = pipeline.adding_hair(surface_object, settings.guides, settings.hair, depsgraph, settings.styles)
+    guides, hair = yield from growing
+    writing.keep_styles(hair, settings.styles, settings.style_names)
+    assign_dynamics(guides, settings.dynamics)
+    _assign_shading(hair, settings)
+    return guides, hair
+
+
+def using_as_guides(
+    curves_object: Object, surface_object: Object, settings: GroomSettings, depsgraph: Depsgraph
+) -> Work[hand_made_guides.HandMade]:
+    """Guides of an object's curves and hair of some `GroomSettings` between them, as work in steps; a `HandMade`."""
+    made = yield from hand_made_guides.using_as_guides(
+        curves_object, surface_object, depsgraph, hair_settings=settings.hair
+    )
+    assign_dynamics(made.guides, settings.dynamics)
+    if made.hair is not None:
+        style_items.assign(made.hair.vellus, settings.styles, settings.style_names)
+        _assign_shading(made.hair, settings)
+        # Styled now that there are guides, whose attributes may be masks.
+        pipeline.evaluate(made.hair, scene.present_depsgraph())
+    return made
+
+
+def _assign_shading(hair, settings):
+    setting_properties.assign(hair.vellus.marschner, settings.tables, skip=TABLE_FIELDS)
+    assign_look(hair, settings.appearance)

@@ -1,0 +1,228 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A hair system on another mesh: a copy of its guides there, and of its hair, with all settings, styles and the look.
+
+Guides are carried as core/grooming/groom_transfer.py says. The copies keep their attributes, and as guides made by
+hand they are not regenerated. Hair grows between them anew.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import bpy
+import numpy as np
+from bpy.types import Curves, Depsgraph, Object
+
+from ....core import geometry, grooming
+from ....core.errors import HairError
+from ....core.geometry.landmark_warp import Warp
+from ....core.geometry.mesh import check_mesh, positions
+from ....core.grooming.groom import HairSettings
+from ....core.grooming.groom_transfer import Ground, Places
+from ....core.grooming.transfer_settings import TransferSettings
+from ....core.long_work import Work
+from ...data import landmarks, scene, usable_surfaces
+from ...data.scene import Surface
+from ...data.strands import attributes, curves, curves_objects, guide_curves, kept_shapes
+from ...host.datablocks import Remembered
+from ...host.notices import name_of
+from ...materials import looks
+from ...settings import setting_properties
+from .. import pipeline
+from ..foreign import hand_made_guides
+from ..guides import guide_tools
+from . import carried_masks, transferred_names
+
+_OVERLAPPING = 0.01  # of a surface's area: UVs that lead elsewhere are said
+
+
+@dataclass(frozen=True)
+class TransferredGroom:
+    """New guide Curves and hair Curves, None of guides without hair; and what to say about it.
+
+    guide_count: of the source; places: `Places` of its guides; painted: vertex groups that the mesh has got from the
+    source; cleared: names of what it does not have.
+    """
+
+    guides: Curves
+    hair: Curves | None
+    guide_count: int
+    places: Places
+    painted: tuple[str, ...]
+    cleared: tuple[str, ...]
+    has_overlap: bool
+
+    def notes(self) -> list[tuple[str, dict[str, Any]]]:
+        """[(sentence, values)] to report to the user."""
+        places, surface = self.places, name_of(self.guides.surface)
+        said: list[tuple[str, dict[str, Any]]] = []
+        if places.lost_count:
+            sentence = (
+                "{count} of {all} guides found no place: {far} too far from the surface, {other} where it faces away."
+            )
+            values = {"all": self.guide_count, "far": places.far_count, "other": places.other_side_count}
+            said.append((sentence, {"count": places.lost_count, **values}))
+        if self.painted:
+            said.append(
+                ('"{name}" has new vertex groups: {names}.', {"name": surface, "names": ", ".join(self.painted)})
+            )
+        if self.cleared:
+            sentence = '"{name}" does not have these, which were cleared: {names}.'
+            said.append((sentence, {"name": surface, "names": ", ".join(self.cleared)}))
+        if self.has_overlap:
+            said.append(('The UVs of "{name}" overlap: guides may be on another part of it.', {"name": surface}))
+        return said
+
+
+def transferring(
+    guides: Curves, hair: Curves | None, target: Object, settings: TransferSettings, depsgraph: Depsgraph
+) -> Work[TransferredGroom]:
+    """Copy guides, and hair that follows them or None, to another mesh object, as work in steps.
+
+    Raises `HairError` before anything changes.
+    """
+    if target.type != "MESH" or target == guides.surface:
+        raise HairError("Pick another mesh to transfer the groom to.")
+    curves.require_editable(target)
+    usable_surfaces.require_evaluated(target)
+    usable_surfaces.require_object_mode(target)
+    if hair is not None:
+        pipeline.inputs_of(hair)
+    source = guide_tools.open_guides(guides, depsgraph)
+    curves_objects.keep_rest(target)
+    surface = scene.read_surface(target, bpy.context.evaluated_depsgraph_get())
+    check_mesh(surface.mesh)
+    warp = _warp(guides.surface, source.surface, target, surface, settings, depsgraph)
+    own_ground, ground = (Ground(one.mesh, one.corner_uvs) for one in (source.surface, surface))
+    masks = carried_masks.read(guides, hair, target, depsgraph)
+    remembered = tuple(map(Remembered, (guides, hair, target)))
+
+    def compute(progress):
+        progress("Finding places", 0.0)
+        places = _places(own_ground, ground, source.roots, warp, settings)
+        meshes = source.surface.mesh, surface.mesh
+        points = grooming.groom_transfer.carried(*meshes, source.roots, source.points, source.counts, places)
+        painted = carried_masks.carried(masks, own_ground, ground, warp, settings.reach)
+        return places, points, painted, warp is None and _has_overlap(surface)
+
+    places, points, painted, has_overlap = yield compute
+    guides, hair, target = (one.find() for one in remembered)
+    made = []
+    try:
+        names = carried_masks.paint(target, surface, painted)
+        made += [(target, name) for name in names]
+        new_guides = _copy(guides, target, made, is_rendered=False)
+        _write_guides(new_guides, surface, places, points, source.surface.scale * places.scale)
+        cleared = transferred_names.clear(new_guides, hair=None, target=target)
+        new_hair = None
+        if hair is not None:
+            new_hair = _copy(hair, target, made, is_rendered=True)
+            new_hair.vellus.guide_curves = new_guides
+            cleared += transferred_names.clear(new_guides, new_hair, target)
+        new_guides.vellus.is_stale = False  # settings changed with what they describe
+        if new_hair is not None:
+            yield from _growing(new_guides, new_hair, surface, places, made)
+    except BaseException:  # canceled, too: all is left as it was
+        _remove(made)
+        raise
+    looks.evaluate_guides(new_guides)
+    cleared = tuple(dict.fromkeys(cleared))
+    return TransferredGroom(new_guides, new_hair, len(source.roots), places, tuple(names), cleared, has_overlap)
+
+
+def _warp(its_object, its_surface: Surface, target, surface: Surface, settings, depsgraph):
+    """The `Warp` of space by which the nearest surface is found; None by UV. Raises `HairError`."""
+    if settings.method == "UV":
+        return None
+    if settings.method == "LANDMARKS":
+        return _through_landmarks(
+            landmarks.read(its_object, its_surface, depsgraph),
+            landmarks.read(target, surface, bpy.context.evaluated_depsgraph_get()),
+        )
+    if settings.alignment == "BOXES":
+        return geometry.landmark_warp.between_boxes(its_surface.mesh.vertices, surface.mesh.vertices)
+    if settings.alignment == "LOCAL":
+        return Warp(surface.to_world_axes @ its_surface.to_local_axes, np.zeros(3))
+    apart = np.array(its_object.matrix_world.translation) - np.array(target.matrix_world.translation)
+    return Warp(np.eye(3), apart)
+
+
+def _places(source: Ground, target: Ground, roots, warp, settings):
+    """The `Places` of guides. Raises `HairError`."""
+    transfer, scales = grooming.groom_transfer, settings.scale_lengths
+    if warp is None:
+        return transfer.places_by_uv(source, target, roots, scales)
+    return transfer.places_by_warp(source.mesh, target.mesh, roots, warp, settings.reach, scales)
+
+
+def _has_overlap(surface):
+    return geometry.uv_check.misleading_fraction(surface.mesh, surface.corner_uvs) > _OVERLAPPING
+
+
+def _through_landmarks(own, others):
+    names = sorted(own.keys() & others.keys())
+    if not names:
+        raise HairError(
+            'The meshes have no landmarks: give both vertex groups or empty children of the same names, "Landmark …".'
+        )
+    return geometry.landmark_warp.through_landmarks([own[name] for name in names], [others[name] for name in names])
+
+
+def _copy(datablock, target, made, is_rendered):
+    """A copy of Curves in a new object on a mesh; both are noted in a list."""
+    copy = datablock.copy()
+    made.append(copy)
+    copy.surface = target
+    kept_shapes.forget(copy)
+    state = copy.vellus
+    state.root_key = state.parting_key = state.flow_key = state.followed = ""
+    state.cache_identity = state.delivered_key = state.status = ""
+    made.append(curves_objects.link_object(name_of(datablock), copy, target, is_rendered))
+    state.is_stale = False
+    return copy
+
+
+def _remove(made):
+    for one in reversed(made):
+        if isinstance(one, tuple):
+            owner, name = one
+            owner.vertex_groups.remove(owner.vertex_groups[name])
+        else:
+            (bpy.data.objects if isinstance(one, Object) else bpy.data.hair_curves).remove(one)
+
+
+def _write_guides(guides, surface: Surface, places: Places, points, scale):
+    """Give copied guides their places; scale: of the lengths in their coordinates before [m]."""
+    lost = np.setdiff1d(np.arange(len(guides.curves)), places.kept)
+    guide_curves.remove(guides, lost)
+    starts = curves.curve_offsets(guides)
+    apart = np.linalg.norm(points[starts[:-1]] - positions(surface.mesh, places.roots), axis=1)
+    attributes.write_positions(guides, surface.to_local(points[:, None])[:, 0])
+    attributes.write(guides, "radius", "FLOAT", "POINT", curves.read_radii(guides) * (scale / surface.scale))
+    for name, data_type, values in zip(
+        ("id", "strand_random"), ("INT", "FLOAT"), surface.identities(places.roots), strict=True
+    ):
+        attributes.write(guides, name, data_type, "CURVE", values)
+    guides.vellus.written = curves.BY_HAND
+    curves.write_roots(guides, surface, places.roots)
+    attributes.write(guides, "root_distance", "FLOAT", "CURVE", apart / surface.scale)
+    curves.keep_surface(guides, surface)
+    transferred_names.scale_lengths(guides.vellus.guides, places.scale)
+    transferred_names.scale_lengths(guides.vellus.dynamics, places.scale)
+
+
+def _growing(guides, hair, surface, places, made):
+    """Grow copied hair between copied guides, as work in steps."""
+    state = hair.vellus
+    transferred_names.scale_lengths(state.hair, places.scale)
+    for item in state.styles:
+        transferred_names.scale_style(item, places.scale)
+    if not (state.hair.density_group or state.hair.density_image or guides.vellus.guides.density_group):
+        name = hand_made_guides.paint_area(guides.surface, surface, places.roots)
+        if name:
+            made.append((guides.surface, name))
+            state.hair.density_group = name
+    was_live, state.is_live = state.is_live, False  # or the update would grow it, before this does
+    bpy.context.view_layer.update()
+    state.is_live, state.is_stale = was_live, False
+    settings = setting_properties.to_settings(state.hair, HairSettings)
+    yield from pipeline.interpolating_hair(guides, settings, scene.present_depsgraph(), hair)
