@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Exports of grooms that are refused or stopped, which leave the file that was there; and notes on what importers do."""
+"""Exports of grooms that are refused or stopped leave the file that was there; what importers do is said."""
 
 import resource
 
