@@ -12,7 +12,7 @@ const float LARGEST_DISTANCE = 0.25;
 // Of surfaces that face away from the light more than this, hair sends it to none.
 const float LEAST_COSINE = -0.3;
 
-// Noise from 0 to 1 that is even in any few samples next to each other: interleaved gradient noise, by Jimenez, 2014.
+// Noise from 0 to 1 that is even in any few samples next to each other: interleaved gradient noise [Jimenez14].
 float gradient_noise(vec2 place)
 {
   return fract(52.9829189 * fract(dot(place, vec2(0.06711056, 0.00583715))));

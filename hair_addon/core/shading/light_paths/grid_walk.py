@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's way through the grid to the next strand or surface, cell by cell (Amanatides and Woo 1987).
+"""A path's way through the grid to the next strand or surface, cell by cell [Amanatides87].
 
 In a cell strands stand anywhere, with equal chance. A path meets their pieces as if all lay across it, and each of them
-with a chance of the sine between its tangent and the path (Woodcock et al. 1965).
+with a chance of the sine between its tangent and the path [Woodcock65].
 """
 
 import warp as wp

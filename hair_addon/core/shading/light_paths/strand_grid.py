@@ -3,7 +3,7 @@
 
 Light meets a strand in proportion to its length, its width and the sine between its tangent and the light. So strands
 are cut into pieces of equal length × width; how many are in a cell says how dense it is, and a piece drawn from them
-has the tangents, colors and roughness that are there. Moon et al. (2008) store a mean direction and a spread instead.
+has the tangents, colors and roughness that are there. [Moon08] stores a mean direction and a spread instead.
 """
 
 from collections.abc import Callable, Sequence
