@@ -45,7 +45,7 @@ PARTS = {
     "pose": (hair_cache, "_pose_of"),
     "shadows": (ShadowMaps, "draw"),
     "visibility": (drawn_scene, "_renewed"),
-    "all of it": (drawn_scene, "_visibility"),
+    "all of it": (drawn_scene, "visibility"),
     "drawing": (Frame, "draw"),
 }
 _WITHIN = {"guides' upload": "strands", "pose": "strands"}
