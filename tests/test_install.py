@@ -21,7 +21,7 @@ from hair_addon.blender.ui import operators
 from hair_addon.blender.ui.operators import dynamics, guide_tools, library, looks, styles, surface
 from tools import build_extension, compile_kernels, manual_pages
 
-WALK = Path(__file__).with_name("support") / "walk_installed.py"
+WALK = Path(__file__).with_name("support") / "walk" / "walk_installed.py"
 ROOT = build_extension.ROOT
 
 

@@ -18,15 +18,20 @@ reading_cache = Cache()
 def are_read(hair):
     """Whether any nodes read the guide weights of hair Curves, or an input of a modifier of theirs names them."""
     users = [user for user in bpy.data.objects if user.data == hair]
-    modifiers = [modifier for user in users for modifier in user.modifiers if modifier.type == "NODES"]
+    modifiers = [
+        modifier
+        for user in users
+        for modifier in user.modifiers
+        if modifier.type == "NODES" and modifier.node_group is not None  # else it has no inputs
+    ]
     if any(map(_has_input, modifiers)):
         return True
     return reading_cache.get(_key(modifiers), lambda: "read" if _are_in_nodes() else "unread") == "read"
 
 
 def _key(modifiers):
-    groups = [modifier.node_group for modifier in modifiers if modifier.node_group is not None]
-    return len(bpy.data.node_groups), len(bpy.data.materials), *(group.session_uid for group in groups)
+    groups = (modifier.node_group.session_uid for modifier in modifiers)
+    return len(bpy.data.node_groups), len(bpy.data.materials), *groups
 
 
 def _has_input(modifier):

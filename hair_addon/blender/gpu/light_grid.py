@@ -8,7 +8,7 @@ from ..host.caches import Cache
 
 _GREATEST = 60000.0  # of half floats
 
-_none_cache = Cache(capacity=1)
+none_cache = Cache(capacity=1)
 
 
 def upload(means):
@@ -24,4 +24,4 @@ def upload(means):
 
 def none():
     """A texture for pictures without a grid."""
-    return _none_cache.get("none", lambda: upload(np.zeros((1, 1, 1, 3))))
+    return none_cache.get("none", lambda: upload(np.zeros((1, 1, 1, 3))))

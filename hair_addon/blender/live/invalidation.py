@@ -7,7 +7,7 @@ stale.
 
 from ..data import guide_map_readers, subdivided_surfaces
 from ..data.strands import simulated_guides
-from ..gpu import lights, shaders, surface_shading, world_texture
+from ..gpu import light_grid, lights, shaders, surface_shading, world_texture
 from ..groom import bindings
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
@@ -52,8 +52,8 @@ OTHERS = (
 )
 
 # If a bound program is freed and a new one gets its address, the GPU module takes the new one for bound, so programs
-# stay until Python ends. Blender must not free them after its graphics either.
-PROGRAMS = (shaders.program_cache,)
+# stay until Python ends. Blender must not free them after its graphics either. A texture of no file stays too.
+PROGRAMS = (shaders.program_cache, light_grid.none_cache)
 
 CACHES = COPIES + OTHERS + PROGRAMS
 
