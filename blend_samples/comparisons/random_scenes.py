@@ -3,8 +3,8 @@
 
 Prints each scene with the ratio of its hair's mean colour (Vellus / Cycles, channel by channel) and the structural
 similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and
-distribution.png, the part of the scenes up to each deviation, beside that of an earlier scenes.json with --before.
-Cycles' pictures are kept by the scene and the points of its hair: another run renders only what has changed.
+distribution.png, the part of the scenes up to each deviation, with --dual beside that of a scenes.json by dual
+scattering. Cycles' pictures are kept by the scene and the points of its hair: another run renders only what changed.
 """
 
 import argparse
@@ -34,16 +34,17 @@ def main():
     """Render, draw, measure."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/random_scenes"))
-    parser.add_argument("--seeds", type=int, nargs=2, default=(0, 30), metavar=("FIRST", "END"))
+    parser.add_argument("--seeds", type=int, nargs="+", default=(0, 30), help="FIRST END, and any number of such pairs")
     parser.add_argument("--size", type=int, default=144, help="pixels along a side")
     parser.add_argument("--samples", type=int, default=48, help="samples a pixel, of Cycles")
     parser.add_argument("--scattering", default="GRID", choices=("GRID", "DUAL"), help="of the scene's render settings")
-    parser.add_argument("--before", type=Path, help="scenes.json of an earlier run, for the plot")
+    parser.add_argument("--dual", type=Path, help="scenes.json of a run with --scattering DUAL, for the plot")
     options = parser.parse_args()
     (options.out / "cycles").mkdir(parents=True, exist_ok=True)
     prepare()
     rows, pairs = [], []
-    for seed in range(*options.seeds):
+    ranges = zip(options.seeds[::2], options.seeds[1::2], strict=True)
+    for seed in (seed for first, end in ranges for seed in range(first, end)):
         values = random_scene.recipe(seed)
         curves = random_scene.build(values)
         bpy.context.scene.vellus.multiple_scattering = options.scattering
@@ -64,8 +65,9 @@ def main():
         pairs.append((f"{seed}: " + " ".join(f"{value:.2f}" for value in row["ratio"]), reference, picture))
     (options.out / "scenes.json").write_text(json.dumps(rows, indent=1))
     print(summary(rows))
-    before = [] if options.before is None else json.loads(options.before.read_text())
-    write_distribution({"now": rows, "before": before}, options.out / "distribution.png")
+    dual = [] if options.dual is None else json.loads(options.dual.read_text())
+    own = "light grid" if options.scattering == "GRID" else "now"
+    write_distribution({own: rows, "dual scattering": dual}, options.out / "distribution.png")
     worst = sorted(zip(rows, pairs, strict=True), key=lambda both: -both[0]["deviation"])[:10]
     picture_pairs.write_sheet([pair for _row, pair in worst], options.out / "worst.png")
 
