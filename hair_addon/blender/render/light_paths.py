@@ -26,8 +26,8 @@ def path_count(blender_scene, size):
 def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
     """A `DrawnScene` whose hair is lit by `count` paths through a grid, as a view of these (4, 4) sees it.
 
-    The same scene for no paths, without hair in view, where lights are linked, and unless all hair is shaded by the
-    energy-conserving model: dual scattering lights all of it then.
+    The same scene for no paths, without hair of any area in view, where lights are linked, and unless all hair is
+    shaded by the energy-conserving model: dual scattering lights all of it then.
     """
     if not count or not drawn.hair:
         return drawn
@@ -39,6 +39,8 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
     fibres = [layer.fibre[0] for layer in looks]
     firsts = np.cumsum([0, *(len(shading.layers) for _strands, shading, *_ in drawn.hair)])
     systems = [_strands_of(*hair[:3], first) for hair, first in zip(drawn.hair, firsts[:-1], strict=True)]
+    if not light_paths.strand_grid.has_area(systems):
+        return drawn
     grid = light_paths.strand_grid.build(systems, fibres)
     sums = light_paths.gather.gather(grid, _surroundings(drawn), rays, count, len(systems), seed, preferences.device())
     seen = [

@@ -116,10 +116,11 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
             leave[axis] = (medium.corner[axis] + far_side * medium.cell[axis] - position[axis]) / direction[axis]
 
     left = random_way(wp.randf(state))
-    going = int(1)
+    going = medium.shape[0] + medium.shape[1] + medium.shape[2]  # more cells are on no ray, whatever its numbers are
     if here >= last:
         going = 0
     while going > 0:
+        going -= 1
         to = wp.min(wp.min(leave[0], leave[1]), wp.min(leave[2], last))
         index = (cell[2] * medium.shape[1] + cell[1]) * medium.shape[0] + cell[0]
         first = medium.starts[index]

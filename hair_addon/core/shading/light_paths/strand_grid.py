@@ -109,6 +109,11 @@ def build(
     )
 
 
+def has_area(systems: Sequence[Strands]) -> bool:
+    """Whether any strand has a length and a width, which light could meet."""
+    return any(_segment_areas(strands).any() for strands in systems)
+
+
 def _segment_areas(strands):
     """(S, P - 1) length × width of segments [m²]."""
     lengths = np.linalg.norm(np.diff(strands.points, axis=1), axis=-1)
