@@ -89,6 +89,6 @@ def test_other_models_take_dual_scattering(scene, rng, shading):
 
 
 def test_hair_without_any_area_takes_dual_scattering(scene, rng):
-    hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN, length=0.0)
+    hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN, radius=0.0)
     light(scene, world=0.3, sun=2.0)
     np.testing.assert_array_equal(picture(scene, "GRID"), picture(scene, "DUAL"))
