@@ -12,20 +12,14 @@ from . import live_hair
 
 def follow(depsgraph):
     """Store the guide weights of hair that nodes read them of, and that has none."""
-    changed = [update.id for update in depsgraph.updates]
-    if any(_may_have_nodes(datablock) for datablock in changed):
+    changed = [update.id.original for update in depsgraph.updates]
+    have_nodes_changed = any(isinstance(i, bpy.types.NodeTree | bpy.types.Material) for i in changed)
+    if have_nodes_changed:
         guide_map_readers.reading_cache.clear()
-    if not any(isinstance(i, bpy.types.Object | bpy.types.NodeTree | bpy.types.Material) for i in changed):
-        return
-    for hair in bpy.data.hair_curves:
+    with_modifiers = {i.data for i in changed if isinstance(i, bpy.types.Object) and i.type == "CURVES"}
+    for hair in bpy.data.hair_curves if have_nodes_changed else with_modifiers:
         if _lacks_map(hair) and guide_map_readers.are_read(hair):
             _store(hair, depsgraph)
-
-
-def _may_have_nodes(datablock):
-    if isinstance(datablock, bpy.types.Object):
-        return datablock.type != "CURVES"  # whose modifiers are looked at each time
-    return isinstance(datablock, bpy.types.NodeTree | bpy.types.Material)
 
 
 def _lacks_map(hair):

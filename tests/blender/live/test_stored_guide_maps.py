@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
+from hair_addon.blender.data import guide_map_readers
 from hair_addon.blender.groom import bindings
 from hair_addon.core.grooming import following
 from tests.support.dynamics.following import update
@@ -115,3 +116,21 @@ def test_new_hair_has_them_where_nodes_read_them(modified):
     named_attribute(tree, "guide_weight_")  # the slot's number is joined to it
     made = api.interpolate_hair(bpy.data.objects["Guides"], strand_count=100)
     assert guide_map(made.data if hasattr(made, "data") else made) is not None
+
+
+def test_nodes_are_not_looked_through_when_objects_move(modified, monkeypatch):
+    hair, tree = modified
+    looks, real = [], guide_map_readers._are_in_nodes
+    monkeypatch.setattr(guide_map_readers, "_are_in_nodes", lambda: looks.append(1) or real())
+    lamp = bpy.data.objects.new("Lamp", bpy.data.lights.new("Lamp", "POINT"))
+    bpy.context.scene.collection.objects.link(lamp)
+    update()
+    looks.clear()
+    for x in range(3):
+        lamp.location.x = x
+        update()
+    assert not looks
+    named_attribute(tree, "guide_weight_0")
+    update()
+    assert looks
+    assert_stored(hair.data)
