@@ -11,7 +11,7 @@
 // vec3 returned_from_behind(float sin_theta_o, float behind)
 //     what `behind` strands beyond add to the first
 
-#include "include/arrival.glsl"
+#include "include/arrival_on_strand.glsl"
 #include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
 #include "include/light_grid.glsl"
@@ -20,54 +20,53 @@
 
 const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not visible
 
-vec3 towards_viewer()
-{
-  return view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
-}
-
-// Radiance towards the viewer of the place that `find_place` found, where paths through a grid have found all light but
-// that which comes straight from lamps.
-vec3 strand_light_on_grid()
-{
-  vec3 T = strand_tangent;
-  vec3 V = towards_viewer();
-  vec3 R = root_direction(strand_index);
-  vec3 returned;
+struct SeenStrand {
+  vec3 T;
+  vec3 V;
+  vec3 root;  // `root_direction`
+  vec3 returned;  // these four of `hair_return`
   vec3 towards;
   vec3 zonal_1;
   vec3 zonal_2;
-  hair_return(dot(T, V), returned, towards, zonal_1, zonal_2);
-  vec3 radiance = drawn_lobes.w * light_among_strands(drawn_position) * returned;
+};
+
+// The strand at the place that `find_place` found.
+SeenStrand seen_strand()
+{
+  SeenStrand strand;
+  strand.T = strand_tangent;
+  strand.V = view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
+  strand.root = root_direction(strand_index);
+  hair_return(dot(strand.T, strand.V), strand.returned, strand.towards, strand.zonal_1, strand.zonal_2);
+  return strand;
+}
+
+bool is_visible(vec3 irradiance)
+{
+  return max(irradiance.r, max(irradiance.g, irradiance.b)) > LEAST_IRRADIANCE;
+}
+
+// Radiance towards the viewer where paths through a grid have found all light but that which comes straight from lamps.
+vec3 strand_light_on_grid(SeenStrand strand)
+{
+  vec3 radiance = drawn_lobes.w * light_among_strands(drawn_position) * strand.returned;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
-    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
-    vec3 irradiance = irradiance_of(light, drawn_position);
-    vec3 at;
-    float depth;
-    if (shadow_place(light, drawn_position, at, depth)) {
-      float behind;
-      float front = crossed_strands(at, depth, own_count(light, drawn_position, drawn_radius), behind);
-      irradiance *= lit_part(at, depth, strand_bias(R, L)) * exp(-front);
-    }
-    if (max(irradiance.r, max(irradiance.g, irradiance.b)) > LEAST_IRRADIANCE) {
+    LampLight lamp = lamp_on_strand(light, strand.root);
+    vec3 arriving = lamp.irradiance * lamp.open * exp(-lamp.front);
+    if (is_visible(arriving)) {
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
-      radiance += irradiance * hair_bsdf(T, L, V, blur);
+      radiance += arriving * hair_bsdf(strand.T, lamp.L, strand.V, blur);
     }
   }
   return radiance;
 }
 
 // The same by dual scattering.
-vec3 strand_light()
+vec3 strand_light(SeenStrand strand)
 {
-  vec3 T = strand_tangent;
-  vec3 V = towards_viewer();
-  vec3 R = root_direction(strand_index);
-  vec3 returned;
-  vec3 towards;
-  vec3 zonal_1;
-  vec3 zonal_2;
-  hair_return(dot(T, V), returned, towards, zonal_1, zonal_2);
+  vec3 T = strand.T;
+  vec3 V = strand.V;
   vec2 seen_at = seen_texel(strand_index, strand_position, view.point_count, view.seen_points, view.row_strands) /
                  vec2(textureSize(visibility_x_y, 0));
   vec4 seen_x_y = textureLod(visibility_x_y, seen_at, 0.0);
@@ -78,45 +77,35 @@ vec3 strand_light()
   mat3 minus;
   vec4 seen_channels = textureLod(visibility_channels, seen_at, 0.0);
   strand_sides(seen_x_y, seen_z.xy, view.seen_opacity, view.hair_forward.rgb, seen_channels.rgb, plus, minus);
-  vec3 world = strand_radiance(plus, minus, T, V, returned + back, with_back(towards, back));
-  vec3 all = max(returned, vec3(1e-6));
-  world *= cone_visibility(seen_x_y, seen_z, seen_channels.rgb, T, zonal_1 / all, zonal_2 / all);
+  vec3 world = strand_radiance(plus, minus, T, V, strand.returned + back, with_back(strand.towards, back));
+  vec3 all = max(strand.returned, vec3(1e-6));
+  world *= cone_visibility(seen_x_y, seen_z, seen_channels.rgb, T, strand.zonal_1 / all, strand.zonal_2 / all);
   vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
   vec3 N = surface_normal_of(hidden.xyz);
   float surface_part = seen_channels.a / 6.0;
   vec3 from_surfaces = surface_light(plus, minus, N, surface_part, hidden.w, view.seen_opacity, view.hair_forward.rgb);
   from_surfaces *= view.surface_color.rgb * between_hair_and_surface(strands_behind);
   vec2 below = light_from_below(T, V, N);
-  vec3 of_surfaces = max(below.x * returned + below.y * towards, vec3(0.0));
+  vec3 of_surfaces = max(below.x * strand.returned + below.y * strand.towards, vec3(0.0));
   world += from_surfaces * of_surfaces;
   vec3 radiance = drawn_world * world;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
-    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
-    vec3 irradiance = irradiance_of(light, drawn_position);
-    vec3 at;
-    float depth;
-    float front = 0.0;
-    float behind = 0.0;
-    bool is_in_map = shadow_place(light, drawn_position, at, depth);
-    if (is_in_map) {
-      irradiance *= lit_part(at, depth, strand_bias(R, L));
-      front = crossed_strands(at, depth, own_count(light, drawn_position, drawn_radius), behind);
-    }
+    LampLight lamp = lamp_on_strand(light, strand.root);
+    vec3 irradiance = lamp.irradiance * lamp.open;
     // Most strands are in the shadow of the others, with no light to scatter.
-    vec3 arriving = irradiance * transmitted(front, view.hair_forward.rgb);
-    if (max(arriving.r, max(arriving.g, arriving.b)) > LEAST_IRRADIANCE) {
+    if (is_visible(irradiance * transmitted(lamp.front, view.hair_forward.rgb))) {
       // Where the light passes beside the surface, that which the strand sees.
       vec3 lit_normal = N;
-      if (is_in_map) {
+      if (lamp.is_in_map) {
         vec3 normal;
-        float found = surface_beyond(light, at, depth, L, normal);
-        lit_normal = normalize(mix(N, normal, found) + 1e-4 * L);
+        float found = surface_beyond(light, lamp.at, lamp.depth, lamp.L, normal);
+        lit_normal = normalize(mix(N, normal, found) + 1e-4 * lamp.L);
       }
-      vec3 bounce = surface_bounce(lit_normal, surface_part, L, T, front, behind);
+      vec3 bounce = surface_bounce(lit_normal, surface_part, lamp.L, T, lamp.front, lamp.behind);
       radiance += drawn_lobes.w * irradiance * bounce * of_surfaces;
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
-      radiance += irradiance * hair_radiance(T, L, V, front, behind, blur);
+      radiance += irradiance * hair_radiance(T, lamp.L, V, lamp.front, lamp.behind, blur);
     }
   }
   return radiance;
@@ -124,5 +113,6 @@ vec3 strand_light()
 
 vec4 sample_value()
 {
-  return vec4(has_light_grid() ? strand_light_on_grid() : strand_light(), 1.0);
+  SeenStrand strand = seen_strand();
+  return vec4(has_light_grid() ? strand_light_on_grid(strand) : strand_light(strand), 1.0);
 }

@@ -14,6 +14,7 @@ _COMPONENTS = {"float": 1, "vec2": 2, "vec3": 3, "vec4": 4}
 _MAIN = (
     "include/shade_strand.glsl",
     "include/arrival.glsl",
+    "include/arrival_on_strand.glsl",
     "include/light_grid.glsl",
     "include/shadow.glsl",
     "include/strand_samples.glsl",
