@@ -9,8 +9,6 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from tests.support.each_file import ROOT, each_file
 
 ADDON = ROOT / "hair_addon"
@@ -208,19 +206,14 @@ def test_native_code_fits_the_columns_of_python(path):
     assert max(map(len, path.read_text(encoding="utf-8").splitlines())) <= 120
 
 
-# Files of these folders that others are made of stand beside the others.
-BASES = {
-    "blender/ui/operators": {"asked", "base", "modal", "file_browser"},
-    "blender/ui/operators/guide_tools": {"base"},
-    "blender/ui/operators/styles": {"base"},
-}
+OPERATORS = ADDON / "blender" / "ui" / "operators"
 
 
-@pytest.mark.parametrize("folder", BASES)
-def test_folder_tuple_names_every_file(folder):
-    """What grows without end is found by its folder's tuple, one line each."""
-    files = {path.stem for path in (ADDON / folder).glob("*.py")} - {"__init__"} - BASES[folder]
-    tree = syntax(ADDON / folder / "__init__.py")
+@each_file(path for path in OPERATORS.rglob("__init__.py") if path.parent.name != "base")
+def test_folder_tuple_names_every_file(path):
+    """What grows without end is found by its folder's tuple, one line each; `base` is what the others are made of."""
+    files = {entry.stem for entry in path.parent.iterdir() if re.fullmatch(r"[a-z]\w*(\.py)?", entry.name)} - {"base"}
+    tree = syntax(path)
     imported = [node for node in nodes(tree) if isinstance(node, ast.ImportFrom)]
     file_of = {alias.asname or alias.name: node.module or alias.name for node in imported for alias in node.names}
     tuples = [node for node in nodes(tree) if isinstance(node, ast.Tuple)]

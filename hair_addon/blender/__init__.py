@@ -12,7 +12,6 @@ from .live import first_setup, handlers, invalidation
 from .render import engine, viewport
 from .settings import preferences, properties, translations
 from .ui import asset_shelf, engine_panels, keymap, look_previews, menus, operators, panels
-from .ui.operators import dynamics, guide_tools, library, looks, styles, surface
 
 CLASSES = (
     preferences.VellusPreferences,
@@ -20,12 +19,6 @@ CLASSES = (
     *hair_systems.CLASSES,
     engine.VellusRenderEngine,
     *operators.CLASSES,
-    *surface.CLASSES,
-    *looks.CLASSES,
-    *styles.CLASSES,
-    *guide_tools.CLASSES,
-    *dynamics.CLASSES,
-    *library.CLASSES,
     *panels.LISTS,
     *panels.CLASSES,
     *menus.CLASSES,

@@ -12,7 +12,6 @@ import bpy
 from .groom import hair_systems
 from .settings import preferences, properties, style_items
 from .ui import operators
-from .ui.operators import dynamics, guide_tools, library, looks, styles, surface
 
 # Page → the classes whose properties it explains, unless a property has its own entry below.
 _CLASSES = {
@@ -97,9 +96,7 @@ def _properties():
 
 def _operators():
     """Of an operator's properties too, which Blender looks up by their operator."""
-    folders = (operators, surface, looks, guide_tools, styles, dynamics, library)
-    every = [cls for folder in folders for cls in folder.CLASSES]
-    labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in every}
+    labels = {cls.bl_idname.removeprefix("vellus."): cls.bl_label for cls in operators.CLASSES}
     for page, names in _OPERATORS.items():
         for name in names:
             yield f"bpy.ops.vellus.{name}", page, labels[name]

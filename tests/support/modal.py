@@ -4,7 +4,7 @@
 from types import SimpleNamespace
 
 from hair_addon.blender.host import running
-from hair_addon.blender.ui.operators.modal import LongOperator
+from hair_addon.blender.ui.operators.base.modal import LongOperator
 
 TIMER = SimpleNamespace(type="TIMER", value="NOTHING")
 ESC = SimpleNamespace(type="ESC", value="PRESS")

@@ -5,8 +5,8 @@ import bpy
 import pytest
 
 from hair_addon.blender.host import running
-from hair_addon.blender.ui.operators.asked import AskedOperator
-from hair_addon.blender.ui.operators.modal import LongOperator
+from hair_addon.blender.ui.operators.base.asked import AskedOperator
+from hair_addon.blender.ui.operators.base.modal import LongOperator
 from tests.support.layout import redo_panel
 
 

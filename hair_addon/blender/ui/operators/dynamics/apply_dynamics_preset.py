@@ -7,7 +7,7 @@ from .....core.dynamics.rod.presets import PRESETS, applied
 from ....groom.selection import guides_of
 from ....groom.transfer import groom_settings
 from ....settings import properties
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_apply_dynamics_preset(HairOperator, bpy.types.Operator):

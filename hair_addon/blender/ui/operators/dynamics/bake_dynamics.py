@@ -10,7 +10,7 @@ from ....groom.selection import guides_of
 from ....host import memory, scene_time
 from ....settings import properties
 from ....settings.translations import report_text
-from ..modal import LongOperator
+from ..base.modal import LongOperator
 
 
 class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):

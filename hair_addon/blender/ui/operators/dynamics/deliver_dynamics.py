@@ -6,7 +6,7 @@ import bpy
 from ....groom.selection import guides_of
 from ....io import delivery
 from ....settings.translations import report_text
-from ..modal import LongOperator
+from ..base.modal import LongOperator
 
 
 class VELLUS_OT_deliver_dynamics(LongOperator, bpy.types.Operator):

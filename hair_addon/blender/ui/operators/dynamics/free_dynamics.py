@@ -6,7 +6,7 @@ import bpy
 from .....core.files import frame_cache
 from ....groom.dynamics import frame_folders
 from ....groom.selection import guides_of
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_free_dynamics(HairOperator, bpy.types.Operator):

@@ -7,7 +7,7 @@ from ....groom.selection import guides_of
 from ....host import scene_time
 from ....live import every_frame
 from ....settings import properties
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_play_dynamics(HairOperator, bpy.types.Operator):

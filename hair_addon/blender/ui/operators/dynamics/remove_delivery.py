@@ -6,7 +6,7 @@ import bpy
 from ....data.strands import curves, delivered_hair
 from ....groom.selection import guides_of
 from ....io import delivery
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_remove_delivery(HairOperator, bpy.types.Operator):

@@ -9,7 +9,7 @@ from .....core.params import declared
 from ....data.strands import curves
 from ....groom.dynamics import dynamics_notes, guide_simulation
 from ....groom.selection import guides_of
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 _MOST = next(details.high for name, _default, details in declared(DynamicsSettings) if name == "bend_stiffness")
 

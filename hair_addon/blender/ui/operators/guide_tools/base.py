@@ -6,7 +6,7 @@ from .....core.params import declared
 from ....groom.selection import guides_of, surface_of
 from ....settings import setting_properties
 from ... import setting_rows
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 _MODES = {"OBJECT", "SCULPT_CURVES", "EDIT_CURVES"}
 _COMMON = setting_properties.names_of(ToolSettings)

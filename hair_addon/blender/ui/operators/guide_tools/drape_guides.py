@@ -8,7 +8,7 @@ from ....data import scene
 from ....groom.dynamics import guide_draping
 from ....groom.selection import guides_of, surface_of
 from ....settings import setting_properties
-from ..modal import LongOperator
+from ..base.modal import LongOperator
 from .base import GuideTool
 
 

@@ -12,7 +12,7 @@ from ....host import paths
 from ....io import groom_library
 from ....settings import asset_libraries, properties
 from ....settings.translations import report_text
-from ..file_browser import BrowsedOperator
+from ..base.file_browser import BrowsedOperator
 
 _METHODS = {"AUTO": "Automatic", "UV": "UV Map", "NEAREST": "Nearest Surface"}
 _TOOLTIPS = {

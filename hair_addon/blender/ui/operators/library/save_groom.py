@@ -8,7 +8,7 @@ from ....groom.selection import hair_of
 from ....host.notices import name_of
 from ....io import groom_library
 from ....settings import asset_libraries, properties
-from ..modal import LongOperator
+from ..base.modal import LongOperator
 
 
 class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):

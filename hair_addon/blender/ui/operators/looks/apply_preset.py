@@ -7,7 +7,7 @@ from .....core.shading.presets import PRESETS
 from ....groom.selection import hair_of
 from ....materials import looks
 from ....settings import properties
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_apply_preset(HairOperator, bpy.types.Operator):

@@ -6,7 +6,7 @@ import bpy
 from ....groom.selection import hair_of
 from ....materials import looks
 from ....settings import properties, saved_looks
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_apply_saved_look(HairOperator, bpy.types.Operator):

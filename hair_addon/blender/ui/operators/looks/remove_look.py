@@ -4,7 +4,7 @@
 import bpy
 
 from ....settings import properties, saved_looks
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_remove_look(HairOperator, bpy.types.Operator):

@@ -5,7 +5,7 @@ import bpy
 
 from ....groom.selection import hair_of
 from ....settings import properties, saved_looks
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_save_look(HairOperator, bpy.types.Operator):

@@ -7,7 +7,7 @@ from .....core.styling.kinds import DESCRIPTIONS, OFFERS
 from ....groom.selection import hair_of
 from ....groom.styles import hair_styles
 from ....settings import properties
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 from .base import fit_switch
 
 

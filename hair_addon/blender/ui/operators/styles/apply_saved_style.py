@@ -6,7 +6,7 @@ import bpy
 from ....groom.selection import hair_of
 from ....groom.styles import hair_styles
 from ....settings import properties, saved_styles
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 from .base import keep_switch
 
 

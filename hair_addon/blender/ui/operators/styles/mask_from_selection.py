@@ -5,7 +5,7 @@ import bpy
 
 from ....groom.selection import hair_of
 from ....groom.styles import painted_masks
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 from .base import active_style_of
 
 

@@ -6,7 +6,7 @@ import bpy
 from ....data.strands.curves import require_editable
 from ....groom.selection import hair_of
 from ....settings import properties, style_items
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 from .base import has_styles
 
 

@@ -4,7 +4,7 @@
 import bpy
 
 from ....settings import properties, saved_styles
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_remove_style_preset(HairOperator, bpy.types.Operator):

@@ -6,7 +6,7 @@ import bpy
 from ....groom.selection import hair_of
 from ....groom.transfer import groom_settings
 from ....settings import properties, saved_styles
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_save_style_preset(HairOperator, bpy.types.Operator):

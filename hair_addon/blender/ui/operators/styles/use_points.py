@@ -5,7 +5,7 @@ import bpy
 
 from ....groom.selection import hair_of
 from ....groom.styles import hair_styles
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_use_points(HairOperator, bpy.types.Operator):

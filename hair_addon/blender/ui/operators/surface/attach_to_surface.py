@@ -5,7 +5,7 @@ import bpy
 
 from ....groom import edits
 from ....groom.selection import mesh_to_attach_to, parts_of
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_attach_to_surface(HairOperator, bpy.types.Operator):

@@ -5,7 +5,7 @@ import bpy
 
 from ....groom import edits
 from ....groom.selection import surface_of
-from ..base import HairOperator
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_use_uv_map(HairOperator, bpy.types.Operator):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Base of long operators that write a file: file browser first, then the computation."""
 
-from ....core.errors import HairError
+from .....core.errors import HairError
 from .modal import LongOperator
 
 

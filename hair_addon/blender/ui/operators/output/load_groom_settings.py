@@ -3,13 +3,13 @@
 
 import bpy
 
-from ....core.files import settings_file
-from ....core.long_work import Stage
-from ...groom.selection import hair_of, make_active, object_of
-from ...groom.transfer import groom_settings
-from ...host import paths
-from ...settings import properties
-from .file_browser import BrowsedOperator
+from .....core.files import settings_file
+from .....core.long_work import Stage
+from ....groom.selection import hair_of, make_active, object_of
+from ....groom.transfer import groom_settings
+from ....host import paths
+from ....settings import properties
+from ..base.file_browser import BrowsedOperator
 
 
 class VELLUS_OT_load_groom_settings(BrowsedOperator, bpy.types.Operator):

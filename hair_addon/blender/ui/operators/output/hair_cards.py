@@ -3,15 +3,15 @@
 
 import bpy
 
-from ....core.cards.card_settings import CardSettings
-from ...groom.selection import hair_of
-from ...host import paths
-from ...host.notices import text_of
-from ...io import hair_cards, hair_meshes
-from ...settings import properties, setting_properties
-from ...settings.translations import interface_text
-from .. import setting_rows
-from .asked import AskedOperator
+from .....core.cards.card_settings import CardSettings
+from ....groom.selection import hair_of
+from ....host import paths
+from ....host.notices import text_of
+from ....io import hair_cards, hair_meshes
+from ....settings import properties, setting_properties
+from ....settings.translations import interface_text
+from ... import setting_rows
+from ..base.asked import AskedOperator
 
 
 class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):

@@ -3,16 +3,16 @@
 
 import bpy
 
-from ....core.errors import HairError
-from ....core.grooming import cost
-from ....core.grooming.transfer_settings import TransferSettings
-from ...data import scene
-from ...groom.selection import guides_of, hair_of, make_active, object_of
-from ...groom.transfer import groom_transfers
-from ...settings import properties, setting_properties
-from ...settings.translations import report_text
-from .. import setting_rows
-from .modal import LongOperator
+from .....core.errors import HairError
+from .....core.grooming import cost
+from .....core.grooming.transfer_settings import TransferSettings
+from ....data import scene
+from ....groom.selection import guides_of, hair_of, make_active, object_of
+from ....groom.transfer import groom_transfers
+from ....settings import properties, setting_properties
+from ....settings.translations import report_text
+from ... import setting_rows
+from ..base.modal import LongOperator
 
 
 class VELLUS_OT_transfer_groom(LongOperator, bpy.types.Operator):

@@ -7,11 +7,11 @@ which may compile kernels, run in a thread, with a progress bar and Esc to cance
 
 import bpy
 
-from ....core.errors import HairError
-from ....core.long_work import Job, Stopped, run_now
-from ...host import running
-from ...settings.translations import interface_text, report_text
-from .base import HairOperator
+from .....core.errors import HairError
+from .....core.long_work import Job, Stopped, run_now
+from ....host import running
+from ....settings.translations import interface_text, report_text
+from .hair_operator import HairOperator
 
 PATIENCE = 0.4  # [s]: what takes longer gets a progress bar
 

@@ -3,13 +3,13 @@
 
 import bpy
 
-from ....core.cards.card_settings import TubeSettings
-from ...groom.selection import hair_of
-from ...io import hair_meshes
-from ...settings import setting_properties
-from ...settings.translations import interface_text
-from .. import setting_rows
-from .asked import AskedOperator
+from .....core.cards.card_settings import TubeSettings
+from ....groom.selection import hair_of
+from ....io import hair_meshes
+from ....settings import setting_properties
+from ....settings.translations import interface_text
+from ... import setting_rows
+from ..base.asked import AskedOperator
 
 
 class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):

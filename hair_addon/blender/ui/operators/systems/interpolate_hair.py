@@ -3,14 +3,14 @@
 
 import bpy
 
-from ....core.grooming import cost
-from ....core.grooming.groom import HairSettings
-from ...data import scene
-from ...groom import pipeline
-from ...groom.selection import active_of_kind, guides_of, surface_of
-from ...settings import setting_properties
-from .. import setting_rows
-from .modal import LongOperator
+from .....core.grooming import cost
+from .....core.grooming.groom import HairSettings
+from ....data import scene
+from ....groom import pipeline
+from ....groom.selection import active_of_kind, guides_of, surface_of
+from ....settings import setting_properties
+from ... import setting_rows
+from ..base.modal import LongOperator
 
 
 class VELLUS_OT_interpolate_hair(LongOperator, bpy.types.Operator):

@@ -3,9 +3,9 @@
 
 import bpy
 
-from ...groom import edits
-from ...groom.selection import make_active, parts_of, surface_of
-from .base import HairOperator
+from ....groom import edits
+from ....groom.selection import make_active, parts_of, surface_of
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_delete_hair(HairOperator, bpy.types.Operator):

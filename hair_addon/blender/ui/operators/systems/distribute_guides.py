@@ -3,14 +3,14 @@
 
 import bpy
 
-from ....core.grooming import cost
-from ....core.grooming.groom import GuideSettings
-from ...data import scene
-from ...groom import pipeline
-from ...groom.selection import guides_again, surface_of
-from ...settings import setting_properties
-from .. import setting_rows
-from .modal import LongOperator
+from .....core.grooming import cost
+from .....core.grooming.groom import GuideSettings
+from ....data import scene
+from ....groom import pipeline
+from ....groom.selection import guides_again, surface_of
+from ....settings import setting_properties
+from ... import setting_rows
+from ..base.modal import LongOperator
 
 
 class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):

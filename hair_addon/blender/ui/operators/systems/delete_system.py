@@ -3,10 +3,10 @@
 
 import bpy
 
-from ...groom import edits
-from ...groom.hair_systems import edited_system, parts_of_system
-from ...groom.selection import make_active, surface_of
-from .base import HairOperator
+from ....groom import edits
+from ....groom.hair_systems import edited_system, parts_of_system
+from ....groom.selection import make_active, surface_of
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_delete_system(HairOperator, bpy.types.Operator):

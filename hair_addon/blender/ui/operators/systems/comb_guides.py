@@ -3,11 +3,11 @@
 
 import bpy
 
-from ....core.errors import HairError, cause_of
-from ...data.strands.curves import require_editable
-from ...groom.guides import brushes
-from ...groom.selection import guides_of, make_active, object_of, reveal
-from .base import HairOperator
+from .....core.errors import HairError, cause_of
+from ....data.strands.curves import require_editable
+from ....groom.guides import brushes
+from ....groom.selection import guides_of, make_active, object_of, reveal
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_comb_guides(HairOperator, bpy.types.Operator):

@@ -3,14 +3,14 @@
 
 import bpy
 
-from ....core.grooming import cost
-from ....core.grooming.groom import GuideSettings, HairSettings
-from ...data import scene
-from ...groom import pipeline
-from ...groom.selection import make_active, object_of, surface_of
-from ...settings import setting_properties
-from .. import setting_rows
-from .modal import LongOperator
+from .....core.grooming import cost
+from .....core.grooming.groom import GuideSettings, HairSettings
+from ....data import scene
+from ....groom import pipeline
+from ....groom.selection import make_active, object_of, surface_of
+from ....settings import setting_properties
+from ... import setting_rows
+from ..base.modal import LongOperator
 
 _OWN = tuple(
     name for name in setting_properties.names_of(HairSettings) if name in setting_properties.names_of(GuideSettings)

@@ -3,9 +3,9 @@
 
 import bpy
 
-from ...groom.selection import drawn_with
-from ...materials import looks
-from .base import HairOperator
+from ....groom.selection import drawn_with
+from ....materials import looks
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_toggle_drawing(HairOperator, bpy.types.Operator):

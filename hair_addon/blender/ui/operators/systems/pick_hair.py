@@ -3,8 +3,8 @@
 
 import bpy
 
-from ...render import viewport
-from ...settings.translations import CONTEXT
+from ....render import viewport
+from ....settings.translations import CONTEXT
 
 
 class VELLUS_OT_pick_hair(bpy.types.Operator):

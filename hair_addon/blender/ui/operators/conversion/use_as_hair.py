@@ -3,14 +3,14 @@
 
 import bpy
 
-from ....core.grooming.derived_guides import DerivationSettings
-from ...groom.foreign import hand_made_guides, kept_hair
-from ...groom.foreign.foreign_curves import is_foreign, require_foreign
-from ...groom.selection import make_active, object_of
-from ...settings import properties, setting_properties
-from ...settings.translations import report_text
-from .. import setting_rows
-from .modal import LongOperator
+from .....core.grooming.derived_guides import DerivationSettings
+from ....groom.foreign import hand_made_guides, kept_hair
+from ....groom.foreign.foreign_curves import is_foreign, require_foreign
+from ....groom.selection import make_active, object_of
+from ....settings import properties, setting_properties
+from ....settings.translations import report_text
+from ... import setting_rows
+from ..base.modal import LongOperator
 
 
 class VELLUS_OT_use_as_hair(LongOperator, bpy.types.Operator):

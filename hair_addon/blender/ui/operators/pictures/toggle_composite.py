@@ -3,8 +3,8 @@
 
 import bpy
 
-from ...render import composite
-from .base import HairOperator
+from ....render import composite
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_toggle_composite(HairOperator, bpy.types.Operator):

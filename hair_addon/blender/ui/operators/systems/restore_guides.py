@@ -3,9 +3,9 @@
 
 import bpy
 
-from ...groom import edits
-from ...groom.selection import guides_of, object_of
-from .base import HairOperator
+from ....groom import edits
+from ....groom.selection import guides_of, object_of
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_restore_guides(HairOperator, bpy.types.Operator):

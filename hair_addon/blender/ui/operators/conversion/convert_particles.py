@@ -3,16 +3,16 @@
 
 import bpy
 
-from ....core.grooming.derived_guides import DerivationSettings
-from ....core.grooming.groom import HairSettings
-from ....core.long_work import run_now
-from ...data import scene
-from ...groom.foreign import hand_made_guides, kept_hair, particle_hair
-from ...groom.selection import make_active, object_of
-from ...settings import properties, setting_properties
-from ...settings.translations import report_text
-from .. import setting_rows
-from .base import HairOperator
+from .....core.grooming.derived_guides import DerivationSettings
+from .....core.grooming.groom import HairSettings
+from .....core.long_work import run_now
+from ....data import scene
+from ....groom.foreign import hand_made_guides, kept_hair, particle_hair
+from ....groom.selection import make_active, object_of
+from ....settings import properties, setting_properties
+from ....settings.translations import report_text
+from ... import setting_rows
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_convert_particles(HairOperator, bpy.types.Operator):

@@ -3,16 +3,16 @@
 
 import bpy
 
-from ....core.errors import HairError
-from ....core.grooming import cost
-from ....core.grooming.groom import HairSettings
-from ...data import scene
-from ...groom.foreign import hand_made_guides
-from ...groom.foreign.foreign_curves import is_foreign, require_foreign
-from ...settings import properties, setting_properties
-from ...settings.translations import report_text
-from .. import setting_rows
-from .modal import LongOperator
+from .....core.errors import HairError
+from .....core.grooming import cost
+from .....core.grooming.groom import HairSettings
+from ....data import scene
+from ....groom.foreign import hand_made_guides
+from ....groom.foreign.foreign_curves import is_foreign, require_foreign
+from ....settings import properties, setting_properties
+from ....settings.translations import report_text
+from ... import setting_rows
+from ..base.modal import LongOperator
 
 
 class VELLUS_OT_use_as_guides(LongOperator, bpy.types.Operator):

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Base of all operators: when they can run; `HairError` is reported without changes."""
 
-from ....core.errors import HairError
-from ...settings.translations import CONTEXT, error_text, report_text
+from .....core.errors import HairError
+from ....settings.translations import CONTEXT, error_text, report_text
 
 
 class HairOperator:

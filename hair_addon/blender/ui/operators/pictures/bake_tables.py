@@ -3,14 +3,14 @@
 
 import bpy
 
-from ....core.grooming import cost
-from ....core.shading.tables import lookup_tables
-from ...groom.selection import hair_of
-from ...host import paths
-from ...host.datablocks import Remembered
-from ...io import table_files
-from ...settings import properties, setting_properties
-from .file_browser import BrowsedOperator
+from .....core.grooming import cost
+from .....core.shading.tables import lookup_tables
+from ....groom.selection import hair_of
+from ....host import paths
+from ....host.datablocks import Remembered
+from ....io import table_files
+from ....settings import properties, setting_properties
+from ..base.file_browser import BrowsedOperator
 
 
 class VELLUS_OT_bake_tables(BrowsedOperator, bpy.types.Operator):

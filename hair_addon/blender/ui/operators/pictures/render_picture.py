@@ -3,12 +3,12 @@
 
 import bpy
 
-from ....core.imaging.pixel_sampling import FRAME_FIELDS, MOST_DRAWN, PictureSettings
-from ....core.long_work import Stage
-from ...host import paths
-from ...render import offscreen
-from ...settings import properties, setting_properties
-from .file_browser import BrowsedOperator
+from .....core.imaging.pixel_sampling import FRAME_FIELDS, MOST_DRAWN, PictureSettings
+from .....core.long_work import Stage
+from ....host import paths
+from ....render import offscreen
+from ....settings import properties, setting_properties
+from ..base.file_browser import BrowsedOperator
 
 
 class VELLUS_OT_render_picture(BrowsedOperator, bpy.types.Operator):

@@ -3,13 +3,13 @@
 
 import bpy
 
-from ....core.files.export_settings import ExportSettings
-from ...groom.selection import hair_of
-from ...host import paths
-from ...io import groom_export, groom_sources
-from ...settings import properties, setting_properties
-from ...settings.translations import error_text
-from .file_browser import BrowsedOperator
+from .....core.files.export_settings import ExportSettings
+from ....groom.selection import hair_of
+from ....host import paths
+from ....io import groom_export, groom_sources
+from ....settings import properties, setting_properties
+from ....settings.translations import error_text
+from ..base.file_browser import BrowsedOperator
 
 
 class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):

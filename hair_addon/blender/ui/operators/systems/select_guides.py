@@ -3,9 +3,9 @@
 
 import bpy
 
-from ....core.errors import HairError
-from ...groom.selection import guides_of, make_active, object_of
-from .base import HairOperator
+from .....core.errors import HairError
+from ....groom.selection import guides_of, make_active, object_of
+from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_select_guides(HairOperator, bpy.types.Operator):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Base of long operators that show their settings, and what they will make, before they begin."""
 
-from ...host import running
+from ....host import running
 from .modal import LongOperator
 
 _WIDTH = 360  # of the dialog [pixels]
