@@ -1,9 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Commands as users call them: in a process of their own, or in this one, which is quicker."""
 
+import contextlib
 import io
 import json
 import os
+import resource
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -60,6 +62,17 @@ def run_here(*arguments):
     with Interruption() as interruption:
         status = command_line.run(given, Console(out, errors, interruption, given.quiet, given.json))
     return Ended(status, out.getvalue(), errors.getvalue())
+
+
+@contextlib.contextmanager
+def largest_file(size):
+    """No file that this process writes may become larger [bytes], as on a full disk: a write fails in the middle."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 def write_obj(path, vertices, triangles, name="Tetrahedron"):
