@@ -14,7 +14,7 @@ import pytest
 from hair_addon import api
 from hair_addon.command_line.interruption import Interruption
 from hair_addon.core.long_work import Stopped
-from tests.support.commands import HEAD, ROOT, command
+from tests.support.commands import HEAD, ROOT, command, run_here
 
 LONG = ("groom", HEAD, "--guides", 4000, "--relax-iterations", 1000, "--strands", 100)
 ENVIRONMENT = os.environ | {"PYTHONPATH": str(ROOT)}
@@ -67,12 +67,13 @@ def test_long_work_ends_at_its_next_step(tmp_path, asked, status):
 
 
 def test_progress_is_for_terminals_only(tmp_path):
-    words = command("groom", HEAD, "--guides", 50, "--strands", 100, "--out", tmp_path / "out.npz")
-    piped = subprocess.run(words, capture_output=True, env=ENVIRONMENT, timeout=120)
-    assert piped.stderr == b""
+    words = ("groom", HEAD, "--guides", 50, "--strands", 100, "--out", tmp_path / "out.npz")
+    ended = run_here(*words)
+    assert (ended.status, ended.errors) == (0, "")
     for quiet, expected in (((), True), (("--quiet",), False)):
         terminal = Terminal()
-        subprocess.run([*words, *quiet], stdout=subprocess.PIPE, stderr=terminal.writing, env=ENVIRONMENT, timeout=120)
+        with open(terminal.writing, "w", closefd=False) as writing:
+            assert run_here(*words, *quiet, terminal=writing).status == 0
         said = terminal.rest()
         assert ("Spreading guides" in said) is expected
         assert said.rpartition("\r\x1b[K")[2] == ""

@@ -52,15 +52,15 @@ def run(*arguments, **details):
     return Ended(done.returncode, done.stdout, done.stderr)
 
 
-def run_here(*arguments):
-    """Run a command in this process, where Blender is there already."""
+def run_here(*arguments, terminal=None):
+    """Run a command in this process, where Blender is there already; terminal: takes errors and progress."""
     out, errors = io.StringIO(), io.StringIO()
     try:
         given = command_line.parser("vellus").parse_args(list(map(str, arguments)))
     except SystemExit as end:
         return Ended(end.code, "", "")
     with Interruption() as interruption:
-        status = command_line.run(given, Console(out, errors, interruption, given.quiet, given.json))
+        status = command_line.run(given, Console(out, terminal or errors, interruption, given.quiet, given.json))
     return Ended(status, out.getvalue(), errors.getvalue())
 
 
