@@ -2,7 +2,6 @@
 """Files that are not what they seem, and places that cannot be written: one sentence, status 1, nothing lost."""
 
 import os
-import resource
 import shutil
 import subprocess
 from functools import partial
@@ -11,7 +10,7 @@ import bpy
 import numpy as np
 import pytest
 
-from tests.support.commands import HEAD, TETRAHEDRON, command, run, run_here, write_obj
+from tests.support.commands import HEAD, TETRAHEDRON, command, largest_file, run_here, write_obj
 
 SMALL = ("--guides", 5, "--strands", 20)
 
@@ -192,15 +191,12 @@ SLOW = pytest.mark.long  # of formats that go the way of another one
 @pytest.mark.parametrize(
     "kind", [pytest.param(kind, marks=SLOW if kind in {".usda", ".usdz"} else ()) for kind in OUTPUTS]
 )
-def test_a_full_disk_leaves_nothing_half_written(words, tmp_path, kind):
+def test_a_full_disk_leaves_nothing_half_written(words, tmp_path, monkeypatch, kind):
     """A limit on the size of files stands for it: both end a write in the middle."""
-    limit = LIMITS.get(kind, 60_000)
-
-    def limited():
-        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
-
-    environment = os.environ | {"PYTHONPATH": str(HEAD.parents[1])}
-    ended = run(*words(kind), cwd=tmp_path, env=environment, preexec_fn=limited)
+    monkeypatch.chdir(tmp_path)
+    options = words(kind)
+    with largest_file(LIMITS.get(kind, 60_000)):
+        ended = run_here(*options)
     refused(ended, tmp_path)
     assert any(words in ended.errors for words in ("File too large", "cannot be written", "disk may be full"))
 
