@@ -119,8 +119,13 @@ def arm(scene):
 @pytest.fixture
 def coarse_shadows(monkeypatch):
     """Shadow maps as small as the pictures of tests, which take as long to draw as all else."""
-    monkeypatch.setattr(ambient_visibility, "_SIZE", 64)
-    monkeypatch.setattr(scene_lights, "_MAP_SIZE", 128)
+    shrink_shadows(monkeypatch)
+
+
+def shrink_shadows(patch):
+    """The same for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
+    patch.setattr(ambient_visibility, "_SIZE", 64)
+    patch.setattr(scene_lights, "_MAP_SIZE", 128)
 
 
 @pytest.fixture

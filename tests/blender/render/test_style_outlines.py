@@ -8,6 +8,7 @@ from blend_samples.pictures import styles
 from hair_addon import api
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from tests.support.scenes import shrink_shadows
 
 STYLES = ("STRAIGHT", "CURLY", "COILY", "FRIZZY", "WET")
 WIDTH, HEIGHT = 96, 112
@@ -18,7 +19,9 @@ def pictures():
     """{preset: (HEIGHT, WIDTH, 4) linear pixels} of the hair alone, with the light and camera of the gallery."""
     hair = styles.build(strand_count=4000)
     bpy.data.objects["Head"].hide_render = True
-    return {name: drawn(hair, name) for name in STYLES}
+    with pytest.MonkeyPatch.context() as patch:
+        shrink_shadows(patch)
+        return {name: drawn(hair, name) for name in STYLES}
 
 
 def drawn(hair, preset):
