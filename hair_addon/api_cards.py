@@ -30,7 +30,8 @@ def make_hair_cards(
     hair: hair Curves; settings: `CardSettings`; folder: of the textures' .png files, None packs them into the .blend;
     changes: fields of `CardSettings` by name.
 
-    >>> cards, fewer = api.make_hair_cards(bpy.data.objects["Hair"], card_count=60, segment_count=4, level_count=2)
+    >>> settings = {"card_count": 60, "segment_count": 4, "level_count": 2, "texture_size": 256}
+    >>> cards, fewer = api.make_hair_cards(bpy.data.objects["Hair"], **settings)
     >>> len(cards.data.polygons), len(fewer.data.polygons)
     (240, 60)
     """
