@@ -21,6 +21,8 @@ from tests.support.modal import Operator, drive
 from tests.support.reading import evaluated_points, everything, read_picture
 from tests.support.rendering import light_up
 
+pytestmark = pytest.mark.usefixtures("coarse_shadows")
+
 LAST = 5
 
 

@@ -11,6 +11,8 @@ from hair_addon.blender.render import drawn_scene, hair_cache, hair_places
 from tests.support.counting import counts_of
 from tests.support.reading import points
 
+pytestmark = pytest.mark.usefixtures("coarse_shadows")
+
 
 def view3d():
     return next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
