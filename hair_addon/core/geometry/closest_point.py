@@ -62,6 +62,20 @@ class SurfaceQuery:
         return SurfacePoints(self._triangles[faces.numpy()], barycentric.numpy())
 
 
+@wp.func
+def normal_and_offset(
+    surface: wp.uint64, vertex_normals: wp.array[wp.vec3], face: int, u: float, v: float, place: wp.vec3
+):
+    """(unit normal at a point of a face, vector from there to a place [m]), in a kernel; vertex_normals: (V,) unit."""
+    indices = wp.mesh_get(surface).indices
+    normal = wp.normalize(
+        u * vertex_normals[indices[3 * face]]
+        + v * vertex_normals[indices[3 * face + 1]]
+        + (1.0 - u - v) * vertex_normals[indices[3 * face + 2]]
+    )
+    return normal, place - wp.mesh_eval_position(surface, face, u, v)
+
+
 @wp.kernel
 def _nearest(
     surface: wp.uint64,

@@ -4,7 +4,7 @@
 import numpy as np
 import warp as wp
 
-from ..geometry.closest_point import SurfaceQuery
+from ..geometry.closest_point import SurfaceQuery, normal_and_offset
 from ..geometry.mesh import TriMesh
 from ..kernels import parallel
 from ..kernels.checks import require_count
@@ -97,7 +97,6 @@ def _follow(
 ):
     guide = wp.tid()
     last = points.shape[1] - 1
-    indices = wp.mesh_get(surface).indices
     root_normal = normals[guide]
     position = points[guide, 0]
     out_path[guide, 0] = position
@@ -127,15 +126,7 @@ def _follow(
                 place = position + length * direction
                 query = wp.mesh_query_point_no_sign(surface, place, gap + wanted + 2.0 * length)
                 if query.result:
-                    face = query.face
-                    u = query.u
-                    v = query.v
-                    normal = wp.normalize(
-                        u * vertex_normals[indices[3 * face]]
-                        + v * vertex_normals[indices[3 * face + 1]]
-                        + (1.0 - u - v) * vertex_normals[indices[3 * face + 2]]
-                    )
-                    away = place - wp.mesh_eval_position(surface, face, u, v)
+                    normal, away = normal_and_offset(surface, vertex_normals, query.face, query.u, query.v, place)
                     height = wp.dot(away, normal)
                     # Past the border of an open surface the nearest point lies sideways: there guides are left alone.
                     sideways = wp.length(away - height * normal)

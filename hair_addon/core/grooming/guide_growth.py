@@ -7,7 +7,7 @@ import numpy as np
 import warp as wp
 
 from ..geometry.bspline import basis, greville_abscissae
-from ..geometry.closest_point import SurfaceQuery
+from ..geometry.closest_point import SurfaceQuery, normal_and_offset
 from ..geometry.mesh import SurfacePoints, TriMesh, normals, positions
 from ..kernels import kernel_cache
 from ..placement.domain import Mirror
@@ -123,7 +123,6 @@ def _march(
     steps = out_path.shape[1] - 1
     step = lengths[guide] / float(steps)
     clearance = CLEARANCE * lengths[guide]
-    indices = wp.mesh_get(surface).indices
     position = roots[guide]
     direction = directions[guide]
     out_path[guide, 0] = position
@@ -136,16 +135,7 @@ def _march(
         wanted = wp.min(clearance, float(i + 1) * step * rises[guide])
         query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * clearance + step)
         if query.result:
-            face = query.face
-            u = query.u
-            v = query.v
-            w = 1.0 - u - v
-            normal = wp.normalize(
-                u * vertex_normals[indices[3 * face]]
-                + v * vertex_normals[indices[3 * face + 1]]
-                + w * vertex_normals[indices[3 * face + 2]]
-            )
-            away = ahead - wp.mesh_eval_position(surface, face, u, v)
+            normal, away = normal_and_offset(surface, vertex_normals, query.face, query.u, query.v, ahead)
             height = wp.dot(away, normal)
             # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
             if height < wanted and wp.length(away - height * normal) < 0.5 * wanted:

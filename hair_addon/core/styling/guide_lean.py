@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 
 from ..errors import HairError
-from ..geometry.closest_point import SurfaceQuery
+from ..geometry.closest_point import SurfaceQuery, normal_and_offset
 from ..kernels import parallel
 from ..kernels.checks import require_count
 
@@ -64,16 +64,7 @@ def _lean(
             query = wp.mesh_query_point_no_sign(surface, ahead, 4.0 * (clearance + size))
             lift = float(0.0)
             if query.result:
-                face = query.face
-                u = query.u
-                v = query.v
-                w = 1.0 - u - v
-                normal = wp.normalize(
-                    u * vertex_normals[indices[3 * face]]
-                    + v * vertex_normals[indices[3 * face + 1]]
-                    + w * vertex_normals[indices[3 * face + 2]]
-                )
-                away = ahead - wp.mesh_eval_position(surface, face, u, v)
+                normal, away = normal_and_offset(surface, vertex_normals, query.face, query.u, query.v, ahead)
                 height = wp.dot(away, normal)
                 # Past the border of an open surface the nearest point lies sideways: from there a guide hangs.
                 sideways = wp.length(away - height * normal)
@@ -87,7 +78,7 @@ def _lean(
                     along = forward - rise * normal
                     if wp.length(along) < 1.0e-3:
                         # Straight at the surface every direction along it is as good: that of an edge.
-                        edge = corners[indices[3 * face + 1]] - corners[indices[3 * face]]
+                        edge = corners[indices[3 * query.face + 1]] - corners[indices[3 * query.face]]
                         along = edge - wp.dot(edge, normal) * normal
                     rise = wp.max(rise, wp.min(rise + lift / size, _STEEPEST))
                     forward = rise * normal + wp.sqrt(1.0 - rise * rise) * wp.normalize(along)
