@@ -70,7 +70,7 @@ def _declared(settings_class):
     return [(name, details.typical if default is None else default, details) for name, default, details in described]
 
 
-def normal_and_offset(settings_class: type["Settings"]) -> tuple[str, ...]:
+def from_surface(settings_class: type["Settings"]) -> tuple[str, ...]:
     """Names of the settings of a class that are computed from the surface unless given."""
     return tuple(name for name, _default, details in declared(settings_class) if details.typical is not None)
 
