@@ -54,11 +54,12 @@ void walk_run(ivec2 size)
   int strand = drawn_strand(run);
   int piece = (index - run * runs) * RUN_LENGTH;
   int last = min(piece + RUN_LENGTH, pieces);
-  ivec2 root = strand_texel(strand, 0, view.point_count, view.row_strands);
-  vec4 first = texelFetch(strands, root + ivec2(piece_start(piece), 0), 0);
+  ivec2 texel = strand_first(strand);
+  vec4 head = packed_head(strands, texel);
+  vec4 first = strand_point(strand, texel, head, piece_start(piece));
   vec4 start = to_clip(first);
   for (; piece < last; piece++) {
-    vec4 second = texelFetch(strands, root + ivec2(piece_start(piece + 1), 0), 0);
+    vec4 second = strand_point(strand, texel, head, piece_start(piece + 1));
     vec4 end = to_clip(second);
     Segment segment;
     if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), segment)) {

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.kernels.checks import require_count, require_indices
 from . import shaders
-from .strand_changes import StrandChanges, new_changes, rows_texture
+from .strand_changes import StrandChanges, declare_put, new_changes, rows_texture
 from .strand_textures import MOST_GROUPS, StrandsOnGPU
 
 if TYPE_CHECKING:
@@ -94,9 +94,7 @@ def _carry_program():
     info.local_group_size(_GROUP_SIZE)
     for slot, name in enumerate(("rest", "roots", "vertices")):
         info.sampler(slot, "FLOAT_2D", name)
-    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}, "boxes": {"WRITE"}}
-    for slot, (name, qualifiers) in enumerate(images.items()):
-        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=qualifiers)
+    declare_put(info, first_slot=0)
     for name in ("strand_count", "point_count", "row_strands", "row_moved"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "carry_strands.comp")

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands on the GPU: points, radii and random numbers in textures.
 
+Points take eight bytes each: core/geometry/packed_strands.py.
+
 A change costs one upload, or only that of the moved strands; a redraw costs none.
 """
 
@@ -10,6 +12,7 @@ from functools import cached_property
 import gpu
 import numpy as np
 
+from ...core.geometry import packed_strands
 from . import shaders
 
 # Widest row of the strand texture; every driver takes 16384 texels.
@@ -22,14 +25,14 @@ _SAMPLED = 500  # strands whose lengths are compared
 
 _AT_ONCE = 400  # strands that are brought into the order of texels
 
-_MOVE_GROUP_SIZE = 64  # points that one work group of `_move_program` brings to their places
+_MOVE_GROUP_SIZE = 64  # texels that one work group of `_move_program` brings to their places
 
 
 @dataclass(frozen=True)
 class Moved:
     """What the last `move_strands` did: where the strands that it moved were before."""
 
-    points: gpu.types.GPUTexture  # of each moved strand a texel that means nothing, and its points
+    points: gpu.types.GPUTexture  # of each moved strand a texel that means nothing, and its texels
     row_strands: int  # of that texture
     rows: gpu.types.GPUTexture  # of each of all strands: which of the moved it is, counted from one; 0: none
     turn: int  # how many such changes there were
@@ -37,9 +40,12 @@ class Moved:
 
 @dataclass(frozen=True)
 class StrandsOnGPU:
-    """Points and radii of strands in a texture, with the strip that draws them."""
+    """Points and radii of strands in textures, with the strip that draws them."""
 
-    texture: gpu.types.GPUTexture
+    texture: gpu.types.GPUTexture  # of points, as core/geometry/packed_strands.py has them
+    radii_texture: gpu.types.GPUTexture  # of one strand, where all have the same
+    radius_strands: int  # whose radii are in it
+    radius_unit: float  # that they are in it by
     batch: gpu.types.GPUBatch
     strand_count: int
     point_count: int
@@ -87,8 +93,8 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     None where strands do not differ in it.
     """
     strand_count, point_count, _xyz = points.shape
-    row_strands = TEXTURE_WIDTH // point_count
-    texture = places_texture(points, radii, row_strands)
+    row_strands = row_strands_of(point_count)
+    texture = packed_texture(points, row_strands)
     random_texture = numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
     wetness_texture = None if wetness is None else numbers_texture(wetness, row_strands)
     strip = bare_vertices(vertex_count(strand_count, point_count))
@@ -100,6 +106,7 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     mean_length = float(np.linalg.norm(np.diff(points[some], axis=1), axis=2).sum(axis=1).mean())
     return StrandsOnGPU(
         texture,
+        *_radii_texture(radii, row_strands),
         strip,
         strand_count,
         point_count,
@@ -141,21 +148,53 @@ def numbers_texture(values, row_strands):
     return texture
 
 
-def places_texture(points, radii, row_strands):
-    """(S, P, 3) places and (S, P) radii in a texture, each row of it `row_strands` whole strands."""
+def row_strands_of(point_count, others=0):
+    """Whole strands in a row of a texture of packed strands, with so many other texels before each."""
+    return TEXTURE_WIDTH // (others + packed_strands.texel_count(point_count))
+
+
+def packed_texture(points, row_strands):
+    """(S, P, 3) places in a texture, each row of it `row_strands` whole strands."""
     strand_count, point_count, _xyz = points.shape
-    row_count = -(-strand_count // row_strands)
-    texels = np.empty((row_count * row_strands, point_count, 4), np.float32)
+    texel_count, row_count = packed_strands.texel_count(point_count), -(-strand_count // row_strands)
+    texels = np.empty((row_count * row_strands, texel_count, 2), np.float32)
     texels[strand_count:] = 0.0
-    # Number by number, of as many strands as the processor's caches hold: half the time of all at once.
-    for first in range(0, strand_count, _AT_ONCE):
-        some = slice(first, min(first + _AT_ONCE, strand_count))
-        for axis in range(3):
-            texels[some, :, axis] = points[some, :, axis]
-        texels[some, :, 3] = radii[some]
+    packed_strands.pack(points, texels[:strand_count])
+    return _texture("RG32F", row_strands * texel_count, texels)
+
+
+def with_radii(strands, radii):
+    """`StrandsOnGPU` with other radii (S, P) float32, all else as it is."""
+    texture, strand_count, unit = _radii_texture(radii, strands.row_strands)
+    some = radii[:: -(-len(radii) // 1000)]
+    return replace(
+        strands,
+        radii_texture=texture,
+        radius_strands=strand_count,
+        radius_unit=unit,
+        radii=radii,
+        mean_radius=float(some.mean()),
+        greatest_radius=float(radii.max()),
+    )
+
+
+def _radii_texture(radii, row_strands):
+    """(texture, strands in it, unit): radii (S, P) in two bytes each where strands differ, else of one for all."""
+    strand_count, point_count = radii.shape
+    if (radii == radii[:1]).all():
+        return _texture("R32F", point_count, np.ascontiguousarray(radii[:1], np.float32)), 1, 1.0
+    row_count, unit = -(-strand_count // row_strands), float(radii.max())
+    is_real = np.isfinite(unit) and unit > 0.0
+    texels = np.zeros((row_count * row_strands, point_count), np.float32)
+    np.divide(radii, unit if is_real else 1.0, out=texels[:strand_count])
+    return _texture("R16" if is_real else "R32F", row_strands * point_count, texels), strand_count, unit if is_real else 1.0
+
+
+def _texture(texture_format, width, texels):
+    channels = 2 if texture_format == "RG32F" else 1
     texture = gpu.types.GPUTexture(
-        (row_strands * point_count, row_count),
-        format="RGBA32F",
+        (width, texels.size // (channels * width)),
+        format=texture_format,
         data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel()),
     )
     texture.filter_mode(False)
@@ -164,7 +203,7 @@ def places_texture(points, radii, row_strands):
 
 def like(texture):
     """A texture of the same size for other strands, with nothing in it."""
-    other = gpu.types.GPUTexture((texture.width, texture.height), format="RGBA32F")
+    other = gpu.types.GPUTexture((texture.width, texture.height), format="RG32F")
     other.filter_mode(False)
     return other
 
@@ -184,12 +223,13 @@ def move_strands(strands, moved, points):
     flat = points.reshape(-1, 3)
     strands.bounds[0] = np.minimum(strands.bounds[0], flat.min(axis=0))
     strands.bounds[1] = np.maximum(strands.bounds[1], flat.max(axis=0))
-    heads = np.zeros((len(moved), 1, 3), np.float32)
-    heads[:, 0, 0] = moved  # exact in single precision up to 16 million
-    row_strands = TEXTURE_WIDTH // (strands.point_count + 1)
-    texture = places_texture(
-        np.concatenate([heads, points], axis=1), np.pad(strands.radii[moved], ((0, 0), (1, 0))), row_strands
-    )
+    texel_count, row_strands = packed_strands.texel_count(strands.point_count), row_strands_of(strands.point_count, 1)
+    packed = np.empty((len(moved), texel_count, 2), np.float32)
+    packed_strands.pack(points, packed)
+    texels = np.zeros((-(-len(moved) // row_strands) * row_strands, 1 + texel_count, 2), np.float32)
+    texels[: len(moved), 0, 0] = moved  # exact in single precision up to 16 million
+    texels[: len(moved), 1:] = packed
+    texture = _texture("RG32F", row_strands * (1 + texel_count), texels)
     turn, rows = (strands.moved.turn, strands.moved.rows) if strands.moved else (0, _no_rows(strands))
     rows.clear(format="FLOAT", value=(0.0,))
     program = _move_program()
@@ -197,10 +237,10 @@ def move_strands(strands, moved, points):
     for name, image in (("strands", strands.texture), ("moved_strands", texture), ("moved_rows", rows)):
         program.image(name, image)
     program.uniform_int("moved_count", len(moved))
-    program.uniform_int("point_count", strands.point_count)
+    program.uniform_int("texel_count", texel_count)
     program.uniform_int("row_strands", strands.row_strands)
     program.uniform_int("moved_row_strands", row_strands)
-    groups = -(-len(moved) * strands.point_count // _MOVE_GROUP_SIZE)
+    groups = -(-len(moved) * texel_count // _MOVE_GROUP_SIZE)
     rows_of_groups = -(-groups // MOST_GROUPS)
     gpu.compute.dispatch(program, -(-groups // rows_of_groups), rows_of_groups, 1)
     return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1), lengthenings={}, is_made=False)
@@ -216,9 +256,9 @@ def _move_program():
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_MOVE_GROUP_SIZE)
     for slot, name in enumerate(("strands", "moved_strands")):
-        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers={"READ", "WRITE"})
+        info.image(slot, "RG32F", "FLOAT_2D", name, qualifiers={"READ", "WRITE"})
     info.image(2, "R32F", "FLOAT_2D", "moved_rows", qualifiers={"WRITE"})
-    for name in ("moved_count", "point_count", "row_strands", "moved_row_strands"):
+    for name in ("moved_count", "texel_count", "row_strands", "moved_row_strands"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "move_strands.comp")
 

@@ -78,6 +78,8 @@ VIEW = Block(
         "seen_points": "int",  # of each strand's points, those of the visibility textures
         "seen_opacity": "float",  # of a strand, for which they hold
         "row_strands": "int",
+        "radius_strands": "int",  # whose radii are stored: one for all, or each
+        "radius_unit": "float",  # that they are stored in
         "object_scale": "float",
         "pixels_per_unit": "float",  # at distance one, in a perspective
         "least_half_width": "float",  # there as well
@@ -147,6 +149,7 @@ MAKING = Block(
     "Making",
     {
         "axes": "mat4",  # from the coordinates of roots and guides to those of the strands
+        "axes_scale": "float",  # the greatest by which they lengthen anything
         "limits": "vec4",  # as `limited_part` of shaders/include/guide_sum.glsl
         "keep_length": "float",
         "strand_count": "int",
@@ -181,15 +184,17 @@ STYLING = Block(
         "axes": "mat4",  # from the coordinates of strands to the surface's own axes
         "to_drawn": "mat4",  # from the coordinates of strands to those that are drawn
         "strand_count": "int",
-        "first_strand": "int",  # of these in the image
+        "first_strand": "int",  # where the first of these is in the image
         "row_strands": "int",  # whole strands in a row of each texture
+        "row_packed": "int",
+        "row_moved": "int",  # 0 where it is not kept where strands were
         "row_known": "int",
         "row_centres": "int",
         "row_locks": "int",
         "known_texels": "int",  # of a strand
         "level_count": "int",  # of clump centres, those of guides among them
         "centre_count": "int",  # of all levels, those of guides left out
-        "are_centres": "int",  # whether centres are styled: arc lengths take the place of radii
+        "are_centres": "int",  # whether centres are styled
         "step_count": "int",
         "steps": (STEP, MOST_STEPS),
     },

@@ -211,7 +211,7 @@ class VisibilityBuffer:
         blocks = {"view": uniforms.uniform_buffer(record), "lights": placed.lights, **blocks}
         grid = light_grid.none()
         textures = {"light_grid": grid, **placed.samplers, **textures}
-        textures |= {"segments": self.segments, "strands": placed.strands.texture}
+        textures |= {"segments": self.segments, **drawing.strand_samplers(placed.strands)}
         with drawing.bound(program, blocks, textures):
             program.image("picture", picture)
             program.uniform_int("first_segment", placed.first)

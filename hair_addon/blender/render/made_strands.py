@@ -77,17 +77,15 @@ class Making:
         bound, binding, known = self.due, self.due.binding, self._binding
         before = self.maker if self.maker is not None and known.positions is binding.positions else None
         axes = bound.surface.to_local_axes
-        self.maker = style_maker.maker_of(binding, bound.styles.styling, bound.radii, axes, before)
+        self.maker = style_maker.maker_of(binding, bound.styles.styling, len(bound.radii), axes, before)
         if known is not binding and self.maker is before:
             if known.guide_weights is not binding.guide_weights:
                 self.maker = self.maker.weighed(strand_maker.bound_strands(binding))
             self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
         self._binding = binding
         if not np.array_equal(kept.radii[0], bound.radii):
-            self.maker = self.maker.of_radii(bound.radii)
             kept.radii = np.broadcast_to(bound.radii, kept.radii.shape)
-            sizes = {"mean_radius": float(bound.radii.mean()), "greatest_radius": float(bound.radii.max())}
-            kept.on_gpu = replace(kept.on_gpu, radii=kept.radii, **sizes)
+            kept.on_gpu = strand_textures.with_radii(kept.on_gpu, kept.radii)
         wetness = bound.styles.wetness
         if not are_equal(kept.wetness, wetness):
             kept.wetness = wetness
@@ -110,7 +108,7 @@ class Making:
         places = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0])
         drawn = kept.on_gpu
         if _is_deformed(kept.pose):
-            rest = strand_textures.places_texture(kept.points, kept.radii, drawn.row_strands)
+            rest = strand_textures.packed_texture(kept.points, drawn.row_strands)
         else:
             rest, kept.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
         self.carrier = strand_carrier.new_carrier(rest, drawn.point_count, places, surface.rest)
