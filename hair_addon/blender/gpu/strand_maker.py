@@ -126,8 +126,9 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
 def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain: bool = False) -> StrandMaker:
     """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
 
-    axes: (3, 3), from the coordinates of roots and guides to those of the strands; is_plain: whether strands are made in
-    single precision, for styles. Raises `HairError` where counts or indices do not match, or the driver lacks something.
+    axes: (3, 3), from the coordinates of roots and guides to those of the strands; is_plain: whether strands are made
+    in single precision, for styles. Raises `HairError` where counts or indices do not match, or the driver lacks
+    something.
     """
     bindings = _binding_rows(bound)
     record = uniforms.MAKING.record()

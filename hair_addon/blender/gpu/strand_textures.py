@@ -183,11 +183,12 @@ def _radii_texture(radii, row_strands):
     strand_count, point_count = radii.shape
     if (radii == radii[:1]).all():
         return _texture("R32F", point_count, np.ascontiguousarray(radii[:1], np.float32)), 1, 1.0
-    row_count, unit = -(-strand_count // row_strands), float(radii.max())
-    is_real = np.isfinite(unit) and unit > 0.0
-    texels = np.zeros((row_count * row_strands, point_count), np.float32)
-    np.divide(radii, unit if is_real else 1.0, out=texels[:strand_count])
-    return _texture("R16" if is_real else "R32F", row_strands * point_count, texels), strand_count, unit if is_real else 1.0
+    greatest = float(radii.max())
+    # Infinite ones are kept as they are.
+    texture_format, unit = ("R16", greatest) if np.isfinite(greatest) and greatest > 0.0 else ("R32F", 1.0)
+    texels = np.zeros((-(-strand_count // row_strands) * row_strands, point_count), np.float32)
+    np.divide(radii, unit, out=texels[:strand_count])
+    return _texture(texture_format, row_strands * point_count, texels), strand_count, unit
 
 
 def _texture(texture_format, width, texels):

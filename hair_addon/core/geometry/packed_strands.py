@@ -2,10 +2,10 @@
 """Strands in eight bytes a point, as they are drawn: offsets from the root in steps of the strand's own range.
 
 A strand of P points is P + 1 texels of two floats: (root x, root y), (root z, range), then its points but for the root.
-An offset has 20 bits along each axis, so that a point is at most 2^-20 of its strand's greatest offset from its place: a
-strand of 30 cm that fills a picture of 2,000 pixels is drawn within 0.002 pixels. The 60 bits are in two floats that are
-normal numbers whatever their values are: textures of floats keep the bits of these alone. Their twin is
-shaders/include/packed_strand.glsl.
+An offset has 20 bits along each axis, so that each coordinate is within 2^-20 of the strand's greatest, beside the
+rounding of places: a strand that fills a picture of 4,000 pixels is drawn within 0.004 of them. The 60 bits are in two
+floats that are normal numbers whatever their values are: textures of floats keep the bits of these alone.
+shaders/include/packed_strand.glsl is the twin.
 """
 
 import numpy as np
@@ -25,7 +25,6 @@ _MIDDLE = MOST + 1
 @wp.func_native(native_code.body(__file__, "packed_strands.cpp", MOST=MOST))
 def _pack_strand(points: wp.array2d[wp.vec3], strand: int, texels: wp.array2d[wp.vec2]):  # type: ignore[empty-body]
     """Write the texels of one strand."""
-    ...
 
 
 @wp.kernel
@@ -42,8 +41,8 @@ def texel_count(point_count: int) -> int:
 def pack(points: np.ndarray, texels: np.ndarray) -> None:
     """Write the texels of strands.
 
-    points: (S, P, 3) float32; texels: (S, P + 1, 2) float32, contiguous. Strands with a coordinate that is not finite are
-    such again. Raises `HairError` where counts do not match.
+    points: (S, P, 3) float32; texels: (S, P + 1, 2) float32, contiguous. Strands with a coordinate that is not finite
+    are such again. Raises `HairError` where counts do not match.
     """
     strand_count, point_count, _xyz = points.shape
     if not strand_count:
