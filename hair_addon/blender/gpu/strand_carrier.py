@@ -31,6 +31,11 @@ class StrandCarrier:
     vertices: np.ndarray  # (V, 3) of the surface at rest
     changes: StrandChanges
 
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        return [self.rest, self.roots, *self.changes.textures]
+
     def carry(self, strands: StrandsOnGPU, motion: "SurfaceMotion | None") -> StrandsOnGPU:
         """Carry all strands from their rest; the `StrandsOnGPU` after it.
 

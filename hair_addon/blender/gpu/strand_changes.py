@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import gpu
 import numpy as np
 
-from ...core.geometry import packed_strands
+from ...core import geometry
 from . import strand_bounds
 from .strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, numbers_texture, row_strands_of
 
@@ -22,6 +22,11 @@ class StrandChanges:
     row_moved: int  # strands in a row of it, 0 where it is not kept
     moved_rows: gpu.types.GPUTexture
     bounds: strand_bounds.StrandBounds
+
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        return [self.moved, self.moved_rows, *(boxes for boxes, _count in self.bounds.levels)]
 
     def bind(self, program: gpu.types.GPUShader) -> None:
         """Bind `moved_strands` and `boxes` of a program that is bound."""
@@ -46,7 +51,7 @@ def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -
     """
     bounds = strand_bounds.new_bounds(strand_count)
     if keeps_moved and strand_count * point_count <= MOST_MOVED:
-        moved, row_moved = empty_rows(strand_count, 1 + packed_strands.texel_count(point_count), "RG32F")
+        moved, row_moved = empty_rows(strand_count, 1 + geometry.packed_strands.texel_count(point_count), "RG32F")
         moved_rows = numbers_texture(np.arange(1, strand_count + 1), row_strands_of(point_count))
         return StrandChanges(moved, row_moved, moved_rows, bounds)
     return StrandChanges(empty_rows(1, 1, "RG32F")[0], 0, empty_rows(1, 1)[0], bounds)

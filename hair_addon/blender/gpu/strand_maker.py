@@ -31,6 +31,12 @@ class StrandMaker:
     block: gpu.types.GPUUniformBuf
     slot_count: int  # guides of a strand
 
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        own = [self.bindings, self.guide_normals, self.segments]
+        return own + ([] if self.changes is None else self.changes.textures)
+
     def make(
         self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
     ) -> StrandsOnGPU:

@@ -12,7 +12,7 @@ from functools import cached_property
 import gpu
 import numpy as np
 
-from ...core.geometry import packed_strands
+from ...core import geometry
 from . import shaders
 
 # Widest row of the strand texture; every driver takes 16384 texels.
@@ -64,6 +64,13 @@ class StrandsOnGPU:
     is_made: bool = False  # whether the GPU has made or carried them
     has_points: bool = True  # whether `points` are where strands are, which they are not while the GPU alone knows it
     lengthenings: dict = field(default_factory=dict)  # {number of points: how much longer strands are with all}
+
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        own = [self.texture, self.radii_texture, self.randoms]
+        own += [] if self.wetness is None else [self.wetness]
+        return own + ([] if self.moved is None else [self.moved.points, self.moved.rows])
 
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
@@ -150,17 +157,32 @@ def numbers_texture(values, row_strands):
 
 def row_strands_of(point_count, others=0):
     """Whole strands in a row of a texture of packed strands, with so many other texels before each."""
-    return TEXTURE_WIDTH // (others + packed_strands.texel_count(point_count))
+    return TEXTURE_WIDTH // (others + geometry.packed_strands.texel_count(point_count))
 
 
 def packed_texture(points, row_strands):
     """(S, P, 3) places in a texture, each row of it `row_strands` whole strands."""
     strand_count, point_count, _xyz = points.shape
-    texel_count, row_count = packed_strands.texel_count(point_count), -(-strand_count // row_strands)
+    texel_count, row_count = geometry.packed_strands.texel_count(point_count), -(-strand_count // row_strands)
     texels = np.empty((row_count * row_strands, texel_count, 2), np.float32)
     texels[strand_count:] = 0.0
-    packed_strands.pack(points, texels[:strand_count])
+    geometry.packed_strands.pack(points, texels[:strand_count])
     return _texture("RG32F", row_strands * texel_count, texels)
+
+
+_TEXEL_BYTES = {"RG32F": 8, "R32F": 4, "R16": 2, "RGBA32F": 16}
+_SEEN_BYTES = 32  # of a point in the visibility textures
+
+
+def bytes_of(textures):
+    """Memory of textures [bytes], each counted once."""
+    by_id = {id(texture): texture for texture in textures}
+    return sum(texture.width * texture.height * _TEXEL_BYTES[texture.format] for texture in by_id.values())
+
+
+def seen_bytes(strands):
+    """Memory of the visibility textures of `StrandsOnGPU` [bytes]."""
+    return strands.texture.height * strands.row_strands * seen_points(strands.point_count) * _SEEN_BYTES
 
 
 def with_radii(strands, radii):
@@ -224,9 +246,12 @@ def move_strands(strands, moved, points):
     flat = points.reshape(-1, 3)
     strands.bounds[0] = np.minimum(strands.bounds[0], flat.min(axis=0))
     strands.bounds[1] = np.maximum(strands.bounds[1], flat.max(axis=0))
-    texel_count, row_strands = packed_strands.texel_count(strands.point_count), row_strands_of(strands.point_count, 1)
+    texel_count, row_strands = (
+        geometry.packed_strands.texel_count(strands.point_count),
+        row_strands_of(strands.point_count, 1),
+    )
     packed = np.empty((len(moved), texel_count, 2), np.float32)
-    packed_strands.pack(points, packed)
+    geometry.packed_strands.pack(points, packed)
     texels = np.zeros((-(-len(moved) // row_strands) * row_strands, 1 + texel_count, 2), np.float32)
     texels[: len(moved), 0, 0] = moved  # exact in single precision up to 16 million
     texels[: len(moved), 1:] = packed

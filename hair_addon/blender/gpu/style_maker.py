@@ -74,6 +74,14 @@ class StyleMaker:
     plain: gpu.types.GPUTexture  # (`MOST_AT_ONCE`, P) points of strands before their styles
     _guide_points: np.ndarray | None = None  # of the last `make`
 
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        own = [self.locks, self.plain, self.hair.known, *(level.known for level in self.levels)]
+        if self.centre_maker is not None:
+            own += [self.centres, *self.centre_maker.textures]
+        return own + self.maker.textures + self.changes.textures
+
     def make(
         self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
     ) -> StrandsOnGPU:

@@ -142,6 +142,15 @@ def _pose_of(surface_object):
     return pose_cache.get(surface_object.session_uid, lambda: posed_strands.read_pose(surface_object, depsgraph()))
 
 
+def drawn_bytes(datablock):
+    """Memory that viewports use on the GPU for a hair Curves datablock [bytes]; None while nothing draws it."""
+    kept = _strands_of(datablock.session_uid)
+    if kept is None or kept.on_gpu is None:
+        return None
+    textures = [*kept.on_gpu.textures, *kept.making.textures]
+    return strand_textures.bytes_of(textures) + strand_textures.seen_bytes(kept.on_gpu)
+
+
 def refuse(datablock, error):
     """Do not draw a datablock again until it changes; report the reason once."""
     strand_cache.keep(datablock.session_uid, _REFUSED)

@@ -43,6 +43,11 @@ class Making:
     _binding: Any = None  # `HairBinding` of the maker
     _triangles: np.ndarray | None = None  # that the carrier's strands are rooted on
 
+    @property
+    def textures(self) -> list:
+        """All that its maker and its carrier hold."""
+        return [texture for one in (self.maker, self.carrier) if one is not None for texture in one.textures]
+
     def choose(self, is_wanted: bool, bound: BoundHair | None) -> None:
         """Choose what it is to do: carry strands, and make those of `BoundHair` with their styles."""
         self.may_carry = is_wanted and not self.is_refused
