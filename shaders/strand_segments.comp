@@ -17,6 +17,24 @@ void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
   this_index = uint(first_segment + strand * (view.drawn_points - 1) + piece);
 }
 
+// Whether all samples of tiles have something nearer. Depths are linear along a segment, but for rounding.
+bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
+{
+  if (are_tiles_known == 0) {
+    return false;
+  }
+  vec2 ends = vec2(mix(end_depths.x, end_depths.y, first_along), mix(end_depths.x, end_depths.y, last_along));
+  uint nearest = floatBitsToUint(max(min(ends.x, ends.y) - 1e-6, 0.0));
+  for (int y = low.y / TILE; y <= high.y / TILE; y++) {
+    for (int x = low.x / TILE; x <= high.x / TILE; x++) {
+      if (nearest <= texelFetch(farthest_depths, ivec2(x, y), 0).r) {
+        return false;
+      }
+    }
+  }
+  return true;
+}
+
 void meet(ivec2 place, float along, float coverage)
 {
   if (!is_covered(dash_offset, place + first_place, coverage)) {

@@ -208,19 +208,31 @@ def strand_samplers(strands):
     return {"strands": strands.texture, "strand_radii": strands.radii_texture}
 
 
-def walk_strands(strands, program, record, lights, samplers, images, constants):
+# Which of the strands are walked along, and how many in how many: WALK_ALL and the like of
+# shaders/include/walk_segment.glsl.
+WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
+_FIRST_SHARE = 8
+
+
+def walk_strands(strands, program, record, lights, samplers, images, constants, part=WALK_ALL):
     """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
 
-    lights: on the GPU; samplers, images: {name: texture} that it reads and writes; constants: {name: int}.
+    lights: on the GPU; samplers, images: {name: texture} that it reads and writes; constants: {name: int}; part: of the
+    strands, all or those of `WALK_FIRST` or `WALK_OTHERS`, which are all together.
     """
     runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
-    groups = -(-int(record["drawn_strands"]) * runs // shaders.RUN_GROUP_SIZE)
+    strand_count = int(record["drawn_strands"])
+    first_count = -(-strand_count // _FIRST_SHARE)
+    walked = (strand_count, first_count, strand_count - first_count)[part]
+    if not walked:
+        return
+    groups = -(-walked * runs // shaders.RUN_GROUP_SIZE)
     rows = -(-groups // MOST_GROUPS)
     blocks = {"view": uniforms.uniform_buffer(record), "lights": lights}
     with bound(program, blocks, {**strand_samplers(strands), **samplers}):
         for name, texture in images.items():
             program.image(name, texture)
-        for name, value in constants.items():
+        for name, value in (constants | {"walked_part": part}).items():
             program.uniform_int(name, value)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
 

@@ -116,24 +116,41 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.
 @kept
 def segments_program():
     """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
-    return _walk("strand_segments.comp", ("depths", "segments"), ("first_segment", "is_depth"))
+    constants = ("first_segment", "is_depth", "are_tiles_known")
+    return _walk("strand_segments.comp", ("depths", "segments"), constants, samplers=(("farthest_depths", "UINT_2D"),))
+
+
+TILE = 8  # samples along each side of a tile: TILE of shaders/include/walk_segment.glsl
+
+
+@kept
+def farthest_depths_program():
+    """The compute program that finds the farthest depth in each tile: see farthest_depths.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
+    info.sampler(0, "UINT_2D", "depths")
+    info.image(0, "R32UI", "UINT_2D", "farthest_depths", qualifiers={"WRITE"})
+    info.define("TILE", str(TILE))
+    return compile_compute(info, "farthest_depths.comp")
 
 
 @kept
 def strand_shadow_program():
     """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
-    return _walk("strand_shadow.comp", ("fronts", "backs", "counts"), ("is_front",), ("hair_front",), ("hidden_depth",))
+    samplers = (("hidden_depth", "FLOAT_2D"),)
+    return _walk("strand_shadow.comp", ("fronts", "backs", "counts"), ("is_front",), ("hair_front",), samplers)
 
 
 def _walk(file, images, constants, shadow_samplers=(), samplers=()):
     info = gpu.types.GPUShaderCreateInfo()
     declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
     info.local_group_size(RUN_GROUP_SIZE)
-    for slot, name in enumerate((*STRAND_SAMPLERS, *samplers), start=len(SHADOW_SAMPLERS)):
-        info.sampler(slot, "FLOAT_2D", name)
+    own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
+    for slot, (name, kind) in enumerate((*own, *samplers), start=len(SHADOW_SAMPLERS)):
+        info.sampler(slot, kind, name)
     for slot, name in enumerate(images):
         info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
-    for name in constants:
+    for name in (*constants, "walked_part"):
         info.push_constant("INT", name)
     return compile_compute(info, file)
 
