@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Carries strands from where they are at rest with their surface: core/geometry/surface_deform.py on any GPU.
-// Where points were before is left for motion vectors, and the box of each strand for what is around all.
+// The box of each strand is left for what is around all.
 
 #include "include/packed_strand.glsl"
 #include "include/surface_turn.glsl"
@@ -27,21 +27,15 @@ void main()
   float change = 0.0;
   int row_vertices = textureSize(vertices, 0).x / VERTEX_TEXELS;
   for (int corner = 0; corner < 3; corner++) {
-    ivec2 vertex = strand_texel(int(corners[corner]), 0, VERTEX_TEXELS, row_vertices);
-    vec4 place = texelFetch(vertices, vertex, 0);
+    ivec2 texel = strand_texel(int(corners[corner]), 0, VERTEX_TEXELS, row_vertices);
+    vec4 place = texelFetch(vertices, texel, 0);
     to += barycentric[corner] * place.xyz;
-    x_axis += barycentric[corner] * texelFetch(vertices, vertex + ivec2(1, 0), 0).xyz;
-    y_axis += barycentric[corner] * texelFetch(vertices, vertex + ivec2(2, 0), 0).xyz;
+    x_axis += barycentric[corner] * texelFetch(vertices, texel + ivec2(1, 0), 0).xyz;
+    y_axis += barycentric[corner] * texelFetch(vertices, texel + ivec2(2, 0), 0).xyz;
     change += place.w;
   }
   mat3 turn = surface_turn(x_axis, y_axis);
   ivec2 here = packed_first(strand, 0, point_count, row_strands);
-  if (row_moved > 0) {
-    ivec2 past = packed_first(strand, 1, point_count, row_moved);
-    for (int texel = 0; texel < HEAD_TEXELS + point_count - 1; texel++) {
-      imageStore(moved_strands, past + ivec2(texel, 0), imageLoad(strands, here + ivec2(texel, 0)));
-    }
-  }
   vec4 head = packed_head(rest, here);
   vec4 carried = head;
   bool is_carried = change > 0.0;  // undeformed parts do not change, bit for bit

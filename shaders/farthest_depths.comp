@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The farthest of the nearest depths in each tile of a picture: what lies beyond it there is hidden [Greene93].
 
+#include "include/tile.glsl"
+
 void main()
 {
   ivec2 tile = ivec2(gl_GlobalInvocationID.xy);

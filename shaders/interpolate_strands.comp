@@ -70,7 +70,7 @@ void main()
   bitangent = (making.axes * vec4(bitangent, 0.0)).xyz;
   normal = (making.axes * vec4(normal, 0.0)).xyz;
   vec3 place = (making.axes * vec4(root, 0.0)).xyz;
-  begin_strand(made, place, range, making.point_count, making.row_strands, making.row_moved);
+  begin_strand(made, place, range, making.point_count, making.row_strands);
   vec3 offset = vec3(0.0);
   for (int point = 1; point < making.point_count; point++) {
     vec3 sum = vec3(0.0);

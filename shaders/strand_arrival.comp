@@ -2,7 +2,7 @@
 // Visibility of the lights from strands: one if unoccluded, zero in full shadow.
 
 #include "include/arrival.glsl"
-#include "include/strand_samples.glsl"
+#include "include/this_place.glsl"
 
 vec4 sample_value()
 {
@@ -26,3 +26,5 @@ vec4 sample_value()
   }
   return vec4(part_of(arriving, sent), 1.0);
 }
+
+#include "include/strand_samples.glsl"

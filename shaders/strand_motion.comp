@@ -2,7 +2,7 @@
 // Motion vectors of strands.
 
 #include "include/motion.glsl"
-#include "include/strand_samples.glsl"
+#include "include/this_place.glsl"
 
 // Which of the combed strands this one is, counted from one; 0: it was not combed.
 int moved_row(int strand)
@@ -40,3 +40,5 @@ vec4 sample_value()
                motion.after_to_clip * vec4(after, 1.0),
                motion.size.xy);
 }
+
+#include "include/strand_samples.glsl"

@@ -2,7 +2,8 @@
 // Visibility buffer of strands: first the depth of the nearest segment, then its index.
 
 #include "include/coverage.glsl"
-#include "include/walk_segment.glsl"
+#include "include/segment.glsl"
+#include "include/tile.glsl"
 
 vec2 end_depths;
 uint this_index;
@@ -53,6 +54,8 @@ void meet(ivec2 place, float along, float coverage)
     imageAtomicMin(segments, place, this_index);  // the same one at each redraw
   }
 }
+
+#include "include/walk_segment.glsl"
 
 void main()
 {

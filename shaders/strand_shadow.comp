@@ -2,7 +2,7 @@
 // Strands in a deep opacity map: first the depths of the nearest and of the last, then the opacity of each layer between.
 
 #include "include/opacity.glsl"
-#include "include/walk_segment.glsl"
+#include "include/segment.glsl"
 
 vec2 end_depths;
 
@@ -49,6 +49,8 @@ void meet(ivec2 place, float along, float coverage)
     imageAtomicAdd(counts, ivec2(place.x * 4 + layer, place.y), uint(coverage * COUNT_UNIT + 0.5));
   }
 }
+
+#include "include/walk_segment.glsl"
 
 void main()
 {

@@ -125,7 +125,7 @@ void write_strand(int strand, ivec2 first, bool is_touched)
     range = max(range, max(extent.x, max(extent.y, extent.z)));
   }
   vec3 root = (styling.to_drawn * vec4(strand_root, 0.0)).xyz;
-  begin_strand(strand, root, range, POINTS, styling.row_packed, styling.row_moved);
+  begin_strand(strand, root, range, POINTS, styling.row_packed);
   from_root = vec3(0.0);
   for (int i = 1; i < POINTS; i++) {
     vec4 along = segment_at(i);

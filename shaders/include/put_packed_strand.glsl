@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// A strand as it is drawn, eight bytes a point, and the box around it: needs the images strands, moved_strands and boxes.
-// Where it was before is left for motion vectors.
+// A strand as it is drawn, eight bytes a point, and the box around it: needs the images strands and boxes.
 
 #include "include/packed_strand.glsl"
 
@@ -10,17 +9,10 @@ float put_range;
 vec3 put_least;
 vec3 put_greatest;
 
-// row_strands, row_moved: whole strands in a row of each texture, 0 where it is not kept where strands were; range: what
-// no coordinate of an offset exceeds.
-void begin_strand(int strand, vec3 root, float range, int point_count, int row_strands, int row_moved)
+// range: what no coordinate of an offset exceeds; row_strands: whole strands in a row of the texture.
+void begin_strand(int strand, vec3 root, float range, int point_count, int row_strands)
 {
   put_first = packed_first(strand, 0, point_count, row_strands);
-  if (row_moved > 0) {
-    ivec2 past = packed_first(strand, 1, point_count, row_moved);
-    for (int texel = 0; texel < HEAD_TEXELS + point_count - 1; texel++) {
-      imageStore(moved_strands, past + ivec2(texel, 0), imageLoad(strands, put_first + ivec2(texel, 0)));
-    }
-  }
   imageStore(strands, put_first, vec4(root.xy, 0.0, 0.0));
   imageStore(strands, put_first + ivec2(1, 0), vec4(root.z, range, 0.0, 0.0));
   put_root = root;

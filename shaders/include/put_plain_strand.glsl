@@ -7,7 +7,7 @@
 ivec2 put_first;
 vec3 put_root;
 
-void begin_strand(int strand, vec3 root, float range, int point_count, int row_strands, int row_moved)
+void begin_strand(int strand, vec3 root, float range, int point_count, int row_strands)
 {
   put_first = strand_texel(strand, 0, point_count, row_strands);
   put_root = root;

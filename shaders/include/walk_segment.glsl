@@ -3,19 +3,19 @@
 // faster than triangles: graphics hardware draws those four samples at a time, software drivers at an even greater cost.
 
 #include "include/segment.glsl"
+#include "include/tile.glsl"
 
 // Consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;
 
-// Samples along each side of the tiles that hidden parts of segments are recognised in.
-const int TILE = 8;
-
-// Functions that a program defines for the start of a segment, for a part of it between two parameters along it, none of
-// whose samples from `low` to `high` it need meet if it is hidden, and for each covered sample: its parameter along the
-// segment, and the coverage of the drawn width by the strand.
-void begin(int strand, int piece, Segment segment, vec4 first, vec4 second);
-bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along);
-void meet(ivec2 place, float along, float coverage);
+// Functions that a program defines before it includes this:
+//
+// void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
+//     the start of a segment
+// bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
+//     whether none of the samples from `low` to `high` need be met, of a part between two parameters along the segment
+// void meet(ivec2 place, float along, float coverage)
+//     a covered sample: its parameter along the segment, and the coverage of the drawn width by the strand
 
 // Samples whose centres lie in the segment, column by column along the axis on which it is longer.
 void walk(Segment segment, ivec2 size)

@@ -120,7 +120,7 @@ def segments_program():
     return _walk("strand_segments.comp", ("depths", "segments"), constants, samplers=(("farthest_depths", "UINT_2D"),))
 
 
-TILE = 8  # samples along each side of a tile: TILE of shaders/include/walk_segment.glsl
+TILE = 8  # samples along each side of a tile: TILE of shaders/include/tile.glsl
 
 
 @kept
@@ -130,7 +130,6 @@ def farthest_depths_program():
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     info.sampler(0, "UINT_2D", "depths")
     info.image(0, "R32UI", "UINT_2D", "farthest_depths", qualifiers={"WRITE"})
-    info.define("TILE", str(TILE))
     return compile_compute(info, "farthest_depths.comp")
 
 

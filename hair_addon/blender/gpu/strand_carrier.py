@@ -51,6 +51,7 @@ class StrandCarrier:
             vertices[:, 0, :3], vertices[:, 1:, :3] = motion.after, motion.axes
             is_moved = (motion.after != self.vertices).any(axis=1)
             vertices[:, 0, 3] = is_moved | (motion.axes != _NOT_TURNED).any(axis=(1, 2))
+        self.changes.keep(strands)
         texture, _row = rows_texture(vertices.reshape(len(vertices), -1), 4)
         program = _carry_program()
         program.bind()
@@ -62,7 +63,6 @@ class StrandCarrier:
             ("strand_count", strands.strand_count),
             ("point_count", strands.point_count),
             ("row_strands", strands.row_strands),
-            ("row_moved", self.changes.row_moved),
         ):
             program.uniform_int(name, value)
         groups = -(-strands.strand_count // _GROUP_SIZE)
@@ -100,6 +100,6 @@ def _carry_program():
     for slot, name in enumerate(("rest", "roots", "vertices")):
         info.sampler(slot, "FLOAT_2D", name)
     declare_put(info, first_slot=0)
-    for name in ("strand_count", "point_count", "row_strands", "row_moved"):
+    for name in ("strand_count", "point_count", "row_strands"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "carry_strands.comp")

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import geometry
 from . import strand_bounds
-from .strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, numbers_texture, row_strands_of
+from .strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, keep_strands, numbers_texture, row_strands_of
 
 # Points of strands up to which it is kept where they were, for motion vectors: 64 MiB.
 MOST_MOVED = 8 << 20
@@ -16,7 +16,7 @@ MOST_MOVED = 8 << 20
 
 @dataclass(frozen=True)
 class StrandChanges:
-    """Textures that a program writes beside the strands; made by `new_changes`."""
+    """Textures of what a program changes beside the strands; made by `new_changes`."""
 
     moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; a texel where that is not kept
     row_moved: int  # strands in a row of it, 0 where it is not kept
@@ -28,9 +28,13 @@ class StrandChanges:
         """All that it holds."""
         return [self.moved, self.moved_rows, *(boxes for boxes, _count in self.bounds.levels)]
 
+    def keep(self, strands: StrandsOnGPU) -> None:
+        """Keep where strands are that a program is about to change."""
+        if self.row_moved:
+            keep_strands(strands, self.moved, strands.strand_count, self.row_moved)
+
     def bind(self, program: gpu.types.GPUShader) -> None:
-        """Bind `moved_strands` and `boxes` of a program that is bound."""
-        program.image("moved_strands", self.moved)
+        """Bind `boxes` of a program that is bound."""
         program.image("boxes", self.bounds.boxes)
 
     def changed(self, strands: StrandsOnGPU) -> StrandsOnGPU:
@@ -59,10 +63,8 @@ def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -
 
 def declare_put(info: gpu.types.GPUShaderCreateInfo, first_slot: int) -> None:
     """Declare what shaders/include/put_packed_strand.glsl writes, from an image slot on."""
-    images = {"strands": ("RG32F", {"READ", "WRITE"}), "moved_strands": ("RG32F", {"WRITE"})}
-    images["boxes"] = "RGBA32F", {"WRITE"}
-    for slot, (name, (texture_format, qualifiers)) in enumerate(images.items(), start=first_slot):
-        info.image(slot, texture_format, "FLOAT_2D", name, qualifiers=qualifiers)
+    for slot, (name, texture_format) in enumerate((("strands", "RG32F"), ("boxes", "RGBA32F")), start=first_slot):
+        info.image(slot, texture_format, "FLOAT_2D", name, qualifiers={"WRITE"})
 
 
 def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTexture, int]:

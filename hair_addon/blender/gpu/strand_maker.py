@@ -47,6 +47,8 @@ class StrandMaker:
         from there. Raises `HairError` where counts do not match.
         """
         self.require_fitting(strands)
+        if rest is None:
+            self.changes.keep(strands)
         self.put_guides(guide_points)
         self.fill(strands.texture if rest is None else rest)
         return self.changes.changed(strands) if rest is None else strands
@@ -152,7 +154,6 @@ def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain:
     normals_texture, record["row_normals"] = rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
     segments, record["row_segments"] = empty_rows(guide_count, point_count + 1)
     changes = None if is_plain else new_changes(strand_count, point_count)
-    record["row_moved"] = 0 if changes is None else changes.row_moved
     block = uniforms.uniform_buffer(record)
     return StrandMaker(bindings_texture, normals_texture, segments, changes, record, block, slot_count)
 

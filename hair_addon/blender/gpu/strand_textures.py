@@ -258,18 +258,40 @@ def move_strands(strands, moved, points):
     texture = _texture("RG32F", row_strands * (1 + texel_count), texels)
     turn, rows = (strands.moved.turn, strands.moved.rows) if strands.moved else (0, _no_rows(strands))
     rows.clear(format="FLOAT", value=(0.0,))
+    before = like(texture)
+    keep_strands(strands, before, len(moved), row_strands, texture)
     program = _move_program()
     program.bind()
-    for name, image in (("strands", strands.texture), ("moved_strands", texture), ("moved_rows", rows)):
+    program.uniform_sampler("moved_strands", texture)
+    for name, image in (("strands", strands.texture), ("moved_rows", rows)):
         program.image(name, image)
-    program.uniform_int("moved_count", len(moved))
-    program.uniform_int("texel_count", texel_count)
-    program.uniform_int("row_strands", strands.row_strands)
-    program.uniform_int("moved_row_strands", row_strands)
-    groups = -(-len(moved) * texel_count // _MOVE_GROUP_SIZE)
-    rows_of_groups = -(-groups // MOST_GROUPS)
-    gpu.compute.dispatch(program, -(-groups // rows_of_groups), rows_of_groups, 1)
-    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1), lengthenings={}, is_made=False)
+    _dispatch(program, {"moved_count": len(moved), "moved_row_strands": row_strands}, strands, len(moved))
+    return replace(strands, moved=Moved(before, row_strands, rows, turn + 1), lengthenings={}, is_made=False)
+
+
+def keep_strands(strands, kept, count, row_kept, listed=None):
+    """Copy the texels of `StrandsOnGPU`, behind another one of each strand, to a texture of `row_kept` strands a row.
+
+    count: of strands; listed: a texture like it, where the other texel is the index of the strand; None: all strands.
+    """
+    program = _keep_program()
+    program.bind()
+    program.uniform_sampler("strands", strands.texture)
+    program.uniform_sampler("listed", strands.texture if listed is None else listed)
+    program.image("kept_strands", kept)
+    numbers = {"kept_count": count, "row_kept": row_kept, "is_list": int(listed is not None)}
+    _dispatch(program, numbers, strands, count)
+
+
+def _dispatch(program, numbers, strands, count):
+    """Run a bound program on each texel of so many strands."""
+    texel_count = geometry.packed_strands.texel_count(strands.point_count)
+    for name, value in (numbers | {"texel_count": texel_count, "row_strands": strands.row_strands}).items():
+        program.uniform_int(name, value)
+    groups = -(-count * texel_count // _MOVE_GROUP_SIZE)
+    rows = -(-groups // MOST_GROUPS)
+    gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+    gpu.shader.unbind()
 
 
 def _no_rows(strands):
@@ -278,15 +300,28 @@ def _no_rows(strands):
 
 @shaders.kept
 def _move_program():
-    """The compute program that exchanges the points of some strands with those in the texture of all."""
+    """The compute program that brings the points of some strands into the texture of all."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_MOVE_GROUP_SIZE)
-    for slot, name in enumerate(("strands", "moved_strands")):
-        info.image(slot, "RG32F", "FLOAT_2D", name, qualifiers={"READ", "WRITE"})
-    info.image(2, "R32F", "FLOAT_2D", "moved_rows", qualifiers={"WRITE"})
-    for name in ("moved_count", "texel_count", "row_strands", "moved_row_strands"):
+    info.sampler(0, "FLOAT_2D", "moved_strands")
+    info.image(0, "RG32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
+    info.image(1, "R32F", "FLOAT_2D", "moved_rows", qualifiers={"WRITE"})
+    for name in ("moved_count", "moved_row_strands", "texel_count", "row_strands"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "move_strands.comp")
+
+
+@shaders.kept
+def _keep_program():
+    """The compute program that keeps where strands are. Metal cannot read images of this format that it writes."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(_MOVE_GROUP_SIZE)
+    for slot, name in enumerate(("strands", "listed")):
+        info.sampler(slot, "FLOAT_2D", name)
+    info.image(0, "RG32F", "FLOAT_2D", "kept_strands", qualifiers={"WRITE"})
+    for name in ("kept_count", "row_kept", "is_list", "texel_count", "row_strands"):
+        info.push_constant("INT", name)
+    return shaders.compile_compute(info, "keep_strands.comp")
 
 
 def vertex_count(strand_count, drawn_points):

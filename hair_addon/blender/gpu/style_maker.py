@@ -90,6 +90,8 @@ class StyleMaker:
         if self._guide_points is None or not np.array_equal(self._guide_points, guide_points):
             self.maker.put_guides(guide_points)
             self._guide_points = guide_points.copy()
+        if rest is None:
+            self.changes.keep(strands)
         texture = strands.texture if rest is None else rest
         program = _styles_program(strands.point_count, _kinds_of(self.styling.program))
         if self.centre_maker is not None:
@@ -199,7 +201,7 @@ def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) 
     changes = strand_changes.new_changes(strand_count, point_count)
     record = uniforms.STYLING.record()
     record["axes"][:3, :3], record["axes"][3, 3] = styling.axes.T, 1.0
-    record["row_packed"], record["row_moved"] = row_strands_of(point_count), changes.row_moved
+    record["row_packed"] = row_strands_of(point_count)
     record["level_count"] = len(styling.data.members)
     record["row_centres"] = TEXTURE_WIDTH // point_count
     locks, record["row_locks"] = _locks(styling.data)

@@ -27,9 +27,10 @@ class Block:
 
     def __init__(self, type_name, members):
         """members: {name: GLSL type}, or {name: (Block, count)} and {name: ("vec4", count)} for arrays."""
-        offsets, formats, lines = [], [], []
+        names, offsets, formats, lines = [], [], [], []
         end = 0
-        for name, kind in members.items():
+        # A float behind a vec3 is in its fourth word in std140, and behind that in the Metal Shading Language.
+        for name, kind in sorted(members.items(), key=lambda member: member[1] == "vec3"):
             if isinstance(kind, tuple):
                 element, count = kind
                 is_block = isinstance(element, Block)
@@ -40,14 +41,13 @@ class Block:
                 form = np.dtype((scalar, shape))
                 lines.append(f"  {kind} {name};")
             end += -end % alignment
+            names.append(name)
             offsets.append(end)
             formats.append(form)
             end += form.itemsize
         self.type_name = type_name
         self.source = f"struct {type_name} {{\n" + "\n".join(lines) + "\n};\n"
-        self.dtype = np.dtype(
-            {"names": list(members), "formats": formats, "offsets": offsets, "itemsize": end + -end % 16}
-        )
+        self.dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": end + -end % 16})
 
     def record(self):
         """A zeroed record to be filled by member name."""
@@ -160,7 +160,6 @@ MAKING = Block(
         "row_segments": "int",
         "row_bindings": "int",
         "row_strands": "int",
-        "row_moved": "int",  # 0 where it is not kept where strands were
     },
 )
 
@@ -187,7 +186,6 @@ STYLING = Block(
         "first_strand": "int",  # where the first of these is in the image
         "row_strands": "int",  # whole strands in a row of each texture
         "row_packed": "int",
-        "row_moved": "int",  # 0 where it is not kept where strands were
         "row_known": "int",
         "row_centres": "int",
         "row_locks": "int",
