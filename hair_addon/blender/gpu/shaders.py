@@ -48,6 +48,20 @@ def expand(name, replaced=None):
 program_cache = Cache()  # (function decorated by `kept`, its arguments) → program
 kept = program_cache.keeping  # decorates what makes a program: it is compiled once, and kept until Python ends
 
+
+def compile_one(makers):
+    """Compile the first program that is not yet compiled; whether there was one. Raises `HairError`.
+
+    makers: functions decorated by `kept`, each with its arguments in a tuple.
+    """
+    for make, arguments in makers:
+        known = len(program_cache)
+        make(*arguments)
+        if len(program_cache) > known:
+            return True
+    return False
+
+
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
 # See shaders/world_visibility.frag.
 VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z", "visibility_surface", "visibility_channels")

@@ -131,6 +131,11 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
 
 
+def programs_of(slot_count: int, is_plain: bool) -> list[tuple]:
+    """Programs of a `StrandMaker`, for `shaders.compile_one`; is_plain: as in `new_maker`."""
+    return [(_segments_program, ()), (_strands_program, (slot_count, is_plain))]
+
+
 def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain: bool = False) -> StrandMaker:
     """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
 

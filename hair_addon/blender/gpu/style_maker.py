@@ -165,6 +165,14 @@ class StyleMaker:
         return True
 
 
+def programs_of(styling: "Styling | None", slot_count: int, point_count: int) -> list[tuple]:
+    """Programs that `maker_of` and the makers need, for `shaders.compile_one`; slot_count: guides of a strand."""
+    if styling is None or not len(styling.program):
+        return strand_maker.programs_of(slot_count, is_plain=False)
+    plain = strand_maker.programs_of(slot_count, is_plain=True)
+    return [*plain, (_styles_program, (point_count, _kinds_of(styling.program)))]
+
+
 def maker_of(
     binding: HairBinding,
     styling: "Styling | None",

@@ -187,6 +187,15 @@ def may_restyle(session_uid, bound, styles):
     return may_make(session_uid) and bound.straight is None and kept.making.can_style(styles)
 
 
+def prepare_makers():
+    """Compile one of the programs that edits of what viewports draw need; whether there was one left."""
+    for datablock in bpy.data.hair_curves:
+        kept, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
+        if kept is not None and bound is not None and kept.making.prepare(bound.shown):
+            return True
+    return False
+
+
 def choose_makers():
     """Find out which of the hair that a viewport draws the GPU may make, and is to."""
     is_wanted = made_strands.are_wanted()

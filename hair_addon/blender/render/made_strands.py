@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ..data.strands.posed_strands import Pose
-from ..gpu import maker_choice, strand_carrier, strand_maker, strand_textures, style_maker
+from ..gpu import maker_choice, shaders, strand_carrier, strand_maker, strand_textures, style_maker
 from ..groom.bindings import BoundHair
 from ..groom.styled_hair import StyledHair
 from ..host import running
@@ -53,6 +53,18 @@ class Making:
         self.may_carry = is_wanted and not self.is_refused
         self.is_chosen = self.may_carry and bound is not None and self.can_style(bound.styles)
 
+    def prepare(self, bound: BoundHair) -> bool:
+        """Compile one program that the next edit of `BoundHair` needs; whether there was one."""
+        if not self.is_chosen:
+            return False
+        slot_count = bound.binding.guide_weights.indices.shape[1]
+        needed = style_maker.programs_of(bound.styles.styling, slot_count, len(bound.radii))
+        try:
+            return shaders.compile_one(needed)
+        except HairError:
+            self._refuse()
+            return False
+
     def can_style(self, styles: StyledHair) -> bool:
         """Whether styles can be applied to strands that are made here: the one place where that is decided."""
         return styles.styling is None or style_maker.can_style(styles.styling)
@@ -73,10 +85,13 @@ class Making:
             if self.carrier is not None:
                 kept.on_gpu = self.carrier.carry(kept.on_gpu, None if pose is None else pose.motion)
         except HairError:
-            self.is_refused, self.is_chosen, self.may_carry, self.carrier = True, False, False, None
+            self._refuse()
             return False
         self.due, kept.pose = None, pose
         return True
+
+    def _refuse(self):
+        self.is_refused, self.is_chosen, self.may_carry, self.carrier = True, False, False, None
 
     def _make(self, kept):
         bound, binding, known = self.due, self.due.binding, self._binding

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import uniforms
+from hair_addon.blender.gpu import shaders, uniforms
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache
@@ -67,6 +67,18 @@ def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, sty
     np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
     np.testing.assert_array_equal(drawn(watched), shown)
     assert np.abs(shown - grown(watched)).max() > 0.01  # without styles
+
+
+def test_programs_are_compiled_before_the_first_edit_one_at_a_time(watched):
+    watched.data.vellus.hair.point_count = 19  # as nowhere else
+    add_styles(watched, clump.Settings(size=0.3, levels=1), bend.Settings())
+    known = [len(shaders.program_cache)]
+    while hair_cache.prepare_makers():
+        known.append(len(shaders.program_cache))
+    assert known[-1] > known[0] and set(np.diff(known)) == {1}
+    comb(5)
+    drawn(watched)
+    assert len(shaders.program_cache) == known[-1]
 
 
 def test_hair_of_another_number_of_points_than_its_guides(watched, monkeypatch):
