@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Carries strands from where they are at rest with their surface: core/geometry/surface_deform.py on any GPU.
-// Where points were before is left for motion vectors, and the box of each strand for what is around all.
+// The box of each strand is left for what is around all.
 
-#include "include/strand.glsl"
+#include "include/packed_strand.glsl"
 #include "include/surface_turn.glsl"
 
 // Texels of a strand in `roots`: the vertices around it, its barycentric coordinates, and its place at rest; of a vertex
@@ -27,30 +27,37 @@ void main()
   float change = 0.0;
   int row_vertices = textureSize(vertices, 0).x / VERTEX_TEXELS;
   for (int corner = 0; corner < 3; corner++) {
-    ivec2 vertex = strand_texel(int(corners[corner]), 0, VERTEX_TEXELS, row_vertices);
-    vec4 place = texelFetch(vertices, vertex, 0);
+    ivec2 texel = strand_texel(int(corners[corner]), 0, VERTEX_TEXELS, row_vertices);
+    vec4 place = texelFetch(vertices, texel, 0);
     to += barycentric[corner] * place.xyz;
-    x_axis += barycentric[corner] * texelFetch(vertices, vertex + ivec2(1, 0), 0).xyz;
-    y_axis += barycentric[corner] * texelFetch(vertices, vertex + ivec2(2, 0), 0).xyz;
+    x_axis += barycentric[corner] * texelFetch(vertices, texel + ivec2(1, 0), 0).xyz;
+    y_axis += barycentric[corner] * texelFetch(vertices, texel + ivec2(2, 0), 0).xyz;
     change += place.w;
   }
   mat3 turn = surface_turn(x_axis, y_axis);
-  ivec2 here = strand_texel(strand, 0, point_count, row_strands);
-  ivec2 past = strand_texel(strand, 1, point_count + 1, row_moved);
-  vec3 least = vec3(1.0e30);
-  vec3 greatest = vec3(-1.0e30);
-  for (int point = 0; point < point_count; point++) {
-    ivec2 texel = here + ivec2(point, 0);
-    vec4 place = texelFetch(rest, texel, 0);
-    if (change > 0.0) {  // undeformed parts do not change, bit for bit
-      place.xyz = to + turn * (place.xyz - from);
+  ivec2 here = packed_first(strand, 0, point_count, row_strands);
+  vec4 head = packed_head(rest, here);
+  vec4 carried = head;
+  bool is_carried = change > 0.0;  // undeformed parts do not change, bit for bit
+  if (is_carried) {
+    // A turn leaves every offset within the diagonal of what it was within.
+    carried = vec4(to + turn * (head.xyz - from), 1.7321 * head.w);
+  }
+  imageStore(strands, here, vec4(carried.xy, 0.0, 0.0));
+  imageStore(strands, here + ivec2(1, 0), vec4(carried.zw, 0.0, 0.0));
+  vec3 least = carried.xyz;
+  vec3 greatest = carried.xyz;
+  for (int point = 1; point < point_count; point++) {
+    ivec2 texel = here + ivec2(HEAD_TEXELS - 1 + point, 0);
+    vec2 bits = texelFetch(rest, texel, 0).xy;
+    vec3 offset = unpacked_offset(bits, head.w);
+    if (is_carried) {
+      offset = turn * offset;
+      bits = packed_offset(offset, carried.w);
     }
-    least = min(least, place.xyz);
-    greatest = max(greatest, place.xyz);
-    if (row_moved > 0) {
-      imageStore(moved_strands, past + ivec2(point, 0), imageLoad(strands, texel));
-    }
-    imageStore(strands, texel, place);
+    least = min(least, carried.xyz + offset);
+    greatest = max(greatest, carried.xyz + offset);
+    imageStore(strands, texel, vec4(bits, 0.0, 0.0));
   }
   ivec2 box = strand_texel(strand, 0, 2, imageSize(boxes).x / 2);
   imageStore(boxes, box, vec4(least, 0.0));

@@ -16,12 +16,20 @@ vec3 fibre_residual(vec2 at)
 
 FibreLobes fibre_lobes(vec2 at)
 {
-  return FibreLobes(textureLod(n_table, at, 0.0), textureLod(n_trt_table, at, 0.0).rgb, fibre_residual(at));
+  FibreLobes lobes;
+  lobes.n = textureLod(n_table, at, 0.0);
+  lobes.n_trt = textureLod(n_trt_table, at, 0.0).rgb;
+  lobes.n_res = fibre_residual(at);
+  return lobes;
 }
 
 FibreLobes forward_lobes(vec2 at)
 {
-  return FibreLobes(textureLod(n_g_table, at, 0.0), textureLod(n_g_trt_table, at, 0.0).rgb, fibre_residual(at));
+  FibreLobes lobes;
+  lobes.n = textureLod(n_g_table, at, 0.0);
+  lobes.n_trt = textureLod(n_g_trt_table, at, 0.0).rgb;
+  lobes.n_res = fibre_residual(at);
+  return lobes;
 }
 
 vec3 dual(float row, float theta_i)

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Makes strands of their guides in the texture that they are drawn from: core/interpolation/interpolation.py on any GPU.
-// Where points were before is left for motion vectors, and the box of each strand for what is around all.
+// Makes strands of their guides in the texture that they are drawn from, or that styles take them from:
+// core/interpolation/interpolation.py on any GPU.
 
 #include "include/guide_sum.glsl"
+#include "include/put_packed_strand.glsl"
 #include "include/strand.glsl"
 
 // Texels of a strand in `bindings`: root, normal, and guides with their weights, two a texel.
@@ -11,10 +12,11 @@ const int BINDING_TEXELS = 2 + (SLOTS + 1) / 2;
 void main()
 {
   int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
-  int strand = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
-  if (strand >= making.strand_count) {
+  int made = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
+  if (made >= some_count) {
     return;
   }
+  int strand = first_strand + made;
   ivec2 bound = strand_texel(strand, 0, BINDING_TEXELS, making.row_bindings);
   vec3 root = texelFetch(bindings, bound, 0).xyz;
   vec3 normal = texelFetch(bindings, bound + ivec2(1, 0), 0).xyz;
@@ -24,6 +26,7 @@ void main()
 
   ivec2 guide[SLOTS];
   float share[SLOTS];
+  float log_length[SLOTS];
   vec2 turn[SLOTS];
   vec3 first_lower = vec3(0.0);
   vec3 first_tip = vec3(0.0);
@@ -41,6 +44,7 @@ void main()
     vec3 lower = turned_by(turn[slot], shape.xyz);
     vec3 tip = turned_by(turn[slot], texelFetch(segments, guide[slot] + ivec2(making.point_count, 0), 0).xyz);
     share[slot] = weighed.y;
+    log_length[slot] = shape.w;
     if (slot == 0) {
       first_lower = lower;
       first_tip = tip;
@@ -52,41 +56,34 @@ void main()
     }
     total += share[slot];
   }
+  // No strand is longer than its guides' mean, but for rounding.
+  float range = 0.0;
   for (int slot = 0; slot < SLOTS; slot++) {
     share[slot] /= total;
     turn[slot] *= share[slot];
+    range += share[slot] * exp(log_length[slot]);
   }
+  range *= 1.001 * making.axes_scale;
 
   // From the surface's frame to the coordinates that are drawn.
   tangent = (making.axes * vec4(tangent, 0.0)).xyz;
   bitangent = (making.axes * vec4(bitangent, 0.0)).xyz;
   normal = (making.axes * vec4(normal, 0.0)).xyz;
   vec3 place = (making.axes * vec4(root, 0.0)).xyz;
-  ivec2 here = strand_texel(strand, 0, making.point_count, making.row_strands);
-  ivec2 past = strand_texel(strand, 1, making.point_count + 1, making.row_moved);
-  vec3 least = place;
-  vec3 greatest = place;
-  for (int point = 0; point < making.point_count; point++) {
-    if (point > 0) {
-      vec3 sum = vec3(0.0);
-      float mean_length = 0.0;
-      for (int slot = 0; slot < SLOTS; slot++) {
-        vec4 segment = texelFetch(segments, guide[slot] + ivec2(point - 1, 0), 0);
-        sum.xy += turn[slot] * segment.x + vec2(-turn[slot].y, turn[slot].x) * segment.y;
-        sum.z += share[slot] * segment.z;
-        mean_length += share[slot] * segment.w;
-      }
-      sum = stretched(sum, mean_length, making.keep_length);
-      place += tangent * sum.x + bitangent * sum.y + normal * sum.z;
-      least = min(least, place);
-      greatest = max(greatest, place);
+  begin_strand(made, place, range, making.point_count, making.row_strands);
+  vec3 offset = vec3(0.0);
+  for (int point = 1; point < making.point_count; point++) {
+    vec3 sum = vec3(0.0);
+    float mean_length = 0.0;
+    for (int slot = 0; slot < SLOTS; slot++) {
+      vec4 segment = texelFetch(segments, guide[slot] + ivec2(point - 1, 0), 0);
+      sum.xy += turn[slot] * segment.x + vec2(-turn[slot].y, turn[slot].x) * segment.y;
+      sum.z += share[slot] * segment.z;
+      mean_length += share[slot] * segment.w;
     }
-    if (making.row_moved > 0) {
-      imageStore(moved_strands, past + ivec2(point, 0), imageLoad(strands, here + ivec2(point, 0)));
-    }
-    imageStore(strands, here + ivec2(point, 0), vec4(place, texelFetch(radii, ivec2(point, 0), 0).r));
+    sum = stretched(sum, mean_length, making.keep_length);
+    offset += tangent * sum.x + bitangent * sum.y + normal * sum.z;
+    put_point(point, offset);
   }
-  ivec2 box = strand_texel(strand, 0, 2, imageSize(boxes).x / 2);
-  imageStore(boxes, box, vec4(least, 0.0));
-  imageStore(boxes, box + ivec2(1, 0), vec4(greatest, 0.0));
+  end_strand(made);
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Exchanges the points of some strands with those in the texture of all: changes by combing. Where they were before is
-// left for motion vectors.
+// Brings the points of some strands into the texture of all: changes by combing.
 
 #include "include/strand.glsl"
 
@@ -8,19 +7,17 @@ void main()
 {
   int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
   int place = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
-  int moved = place / point_count;
+  int moved = place / texel_count;
   if (moved >= moved_count) {
     return;
   }
-  int point = place - moved * point_count;
-  // Each strand has one texel more than points: the first is its index.
-  int strand = int(imageLoad(moved_strands, strand_texel(moved, 0, point_count + 1, moved_row_strands)).x);
-  ivec2 there = strand_texel(moved, point + 1, point_count + 1, moved_row_strands);
-  ivec2 here = strand_texel(strand, point, point_count, row_strands);
-  vec4 after = imageLoad(moved_strands, there);
-  imageStore(moved_strands, there, imageLoad(strands, here));
-  imageStore(strands, here, after);
-  if (point == 0) {
+  int texel = place - moved * texel_count;
+  // Each strand has one texel more: the first is its index.
+  ivec2 there = strand_texel(moved, 0, texel_count + 1, moved_row_strands);
+  int strand = int(texelFetch(moved_strands, there, 0).x);
+  ivec2 here = strand_texel(strand, texel, texel_count, row_strands);
+  imageStore(strands, here, texelFetch(moved_strands, there + ivec2(1 + texel, 0), 0));
+  if (texel == 0) {
     imageStore(moved_rows, ivec2(strand % row_strands, strand / row_strands), vec4(float(moved + 1)));
   }
 }

@@ -10,9 +10,11 @@ void main()
   strip_vertex(gl_VertexID, view.drawn_points, strand, drawn_point, side);
   strand = drawn_strand(strand);
   int point = piece_start(drawn_point);
-  vec4 here = strand_point(strand, point);
-  vec3 along = strand_point(strand, min(point + 1, view.point_count - 1)).xyz -
-               strand_point(strand, max(point - 1, 0)).xyz;
+  ivec2 first = strand_first(strand);
+  vec4 head = packed_head(strands, first);
+  vec4 here = strand_point(strand, first, head, point);
+  vec3 along = packed_place(strands, first, head, min(point + 1, view.point_count - 1)) -
+               packed_place(strands, first, head, max(point - 1, 0));
   // A strand that folds back on itself has no tangent there; any unit vector is valid.
   along = (dot(along, along) > 0.0) ? along : vec3(0.0, 0.0, 1.0);
 

@@ -2,7 +2,6 @@
 // Visibility of the lights from strands: one if unoccluded, zero in full shadow.
 
 #include "include/arrival_on_strand.glsl"
-#include "include/strand_samples.glsl"
 
 vec4 sample_value()
 {
@@ -16,3 +15,5 @@ vec4 sample_value()
   }
   return vec4(part_of(arriving, sent), 1.0);
 }
+
+#include "include/strand_samples.glsl"

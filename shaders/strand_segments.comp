@@ -2,7 +2,8 @@
 // Visibility buffer of strands: first the depth of the nearest segment, then its index.
 
 #include "include/coverage.glsl"
-#include "include/walk_segment.glsl"
+#include "include/segment.glsl"
+#include "include/tile.glsl"
 
 vec2 end_depths;
 uint this_index;
@@ -15,6 +16,24 @@ void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
   dash_offset = strand_offset(strand) + view.coverage_turn;
   first_place = ivec2(view.first_column, view.first_row);
   this_index = uint(first_segment + strand * (view.drawn_points - 1) + piece);
+}
+
+// Whether all samples of tiles have something nearer. Depths are linear along a segment, but for rounding.
+bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
+{
+  if (are_tiles_known == 0) {
+    return false;
+  }
+  vec2 ends = vec2(mix(end_depths.x, end_depths.y, first_along), mix(end_depths.x, end_depths.y, last_along));
+  uint nearest = floatBitsToUint(max(min(ends.x, ends.y) - 1e-6, 0.0));
+  for (int y = low.y / TILE; y <= high.y / TILE; y++) {
+    for (int x = low.x / TILE; x <= high.x / TILE; x++) {
+      if (nearest <= texelFetch(farthest_depths, ivec2(x, y), 0).r) {
+        return false;
+      }
+    }
+  }
+  return true;
 }
 
 void meet(ivec2 place, float along, float coverage)
@@ -35,6 +54,8 @@ void meet(ivec2 place, float along, float coverage)
     imageAtomicMin(segments, place, this_index);  // the same one at each redraw
   }
 }
+
+#include "include/walk_segment.glsl"
 
 void main()
 {

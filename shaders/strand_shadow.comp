@@ -2,7 +2,7 @@
 // Strands in a deep opacity map: first the depths of the nearest and of the last, then the opacity of each layer between.
 
 #include "include/opacity.glsl"
-#include "include/walk_segment.glsl"
+#include "include/segment.glsl"
 
 vec2 end_depths;
 
@@ -16,6 +16,12 @@ float depth_of(vec3 point)
 void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
 {
   end_depths = mix(vec2(depth_of(first.xyz)), vec2(depth_of(second.xyz)), segment.part);
+}
+
+// What is hidden by surfaces alone is not known of a whole part.
+bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
+{
+  return false;
 }
 
 void meet(ivec2 place, float along, float coverage)
@@ -43,6 +49,8 @@ void meet(ivec2 place, float along, float coverage)
     imageAtomicAdd(counts, ivec2(place.x * 4 + layer, place.y), uint(coverage * COUNT_UNIT + 0.5));
   }
 }
+
+#include "include/walk_segment.glsl"
 
 void main()
 {

@@ -7,6 +7,7 @@
 #include "include/clump.glsl"
 #include "include/curl.glsl"
 #include "include/frizz.glsl"
+#include "include/put_packed_strand.glsl"
 #include "include/smooth.glsl"
 #include "include/strand.glsl"
 #include "include/styled_strand.glsl"
@@ -32,10 +33,10 @@ void read_strand(ivec2 first)
   half_now = 0;
   total = 0.0;
   vec3 direction = strand_normal;
-  vec3 before = imageLoad(strands, first).xyz;
+  vec3 before = imageLoad(plain_strands, first).xyz;
   strand_root = before;
   for (int i = 1; i < POINTS; i++) {
-    vec3 here = imageLoad(strands, first + ivec2(i, 0)).xyz;
+    vec3 here = imageLoad(plain_strands, first + ivec2(i, 0)).xyz;
     vec3 along = here - before;
     float size = length(along);
     direction = (size > 1e-12) ? along / size : direction;
@@ -106,45 +107,64 @@ void apply(Step row)
 #endif
 }
 
-// Points in the coordinates that are drawn, with their radii, and the box around them; or points of centres with their
-// arc lengths. A strand that no style has touched keeps its points.
+// A point from the root on, in the coordinates that are drawn. A strand that no style has touched keeps its points.
+vec3 drawn_offset(ivec2 first, int i, vec3 from_root, bool is_touched)
+{
+  vec3 offset = is_touched ? from_root : imageLoad(plain_strands, first + ivec2(i, 0)).xyz - strand_root;
+  return (styling.to_drawn * vec4(offset, 0.0)).xyz;
+}
+
 void write_strand(int strand, ivec2 first, bool is_touched)
 {
   vec3 from_root = vec3(0.0);
+  float range = 0.0;
+  for (int i = 1; i < POINTS; i++) {
+    vec4 along = segment_at(i);
+    from_root += along.xyz * along.w;
+    vec3 extent = abs(drawn_offset(first, i, from_root, is_touched));
+    range = max(range, max(extent.x, max(extent.y, extent.z)));
+  }
+  vec3 root = (styling.to_drawn * vec4(strand_root, 0.0)).xyz;
+  begin_strand(strand, root, range, POINTS, styling.row_packed);
+  from_root = vec3(0.0);
+  for (int i = 1; i < POINTS; i++) {
+    vec4 along = segment_at(i);
+    from_root += along.xyz * along.w;
+    put_point(i, drawn_offset(first, i, from_root, is_touched));
+  }
+  end_strand(strand);
+}
+
+// Points of a centre strand, with their arc lengths.
+void write_centre(ivec2 first, bool is_touched)
+{
+  vec3 from_root = vec3(0.0);
   float arc = 0.0;
-  vec4 least = vec4(3e38);
-  vec4 greatest = vec4(-3e38);
   for (int i = 0; i < POINTS; i++) {
-    vec4 texel = imageLoad(strands, first + ivec2(i, 0));
+    vec4 texel = imageLoad(plain_strands, first + ivec2(i, 0));
     if (i > 0) {
       vec4 along = segment_at(i);
       from_root += along.xyz * along.w;
       arc += along.w;
     }
     vec3 here = is_touched ? strand_root + from_root : texel.xyz;
-    texel.xyz = (styling.to_drawn * vec4(here, 0.0)).xyz;
-    least = min(least, texel);
-    greatest = max(greatest, texel);
-    texel.w = (styling.are_centres != 0) ? arc : texel.w;
-    imageStore(strands, first + ivec2(i, 0), texel);
+    imageStore(plain_strands, first + ivec2(i, 0), vec4(here, arc));
   }
-  ivec2 box = strand_texel(strand, 0, 2, imageSize(boxes).x / 2);
-  imageStore(boxes, box, least);
-  imageStore(boxes, box + ivec2(1, 0), greatest);
 }
 
 void main()
 {
   int group = int(gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x);
-  int strand = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
-  if (strand >= styling.strand_count) {
+  int place = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
+  if (place >= some_count) {
     return;
   }
+  int strand = first_strand + place;
   ivec2 known_first = strand_texel(strand, 0, styling.known_texels, styling.row_known);
   vec4 head = texelFetch(known, known_first, 0);
   strand_normal = head.xyz;
   strand_identity = whole(head.w, known_number(known_first, 4));
-  ivec2 first = strand_texel(styling.first_strand + strand, 0, POINTS, styling.row_strands);
+  ivec2 first = strand_texel(styling.first_strand + place, 0, POINTS, styling.row_strands);
   read_strand(first);
   bool is_touched = false;
   for (int index = 0; index < styling.step_count; index++) {
@@ -162,5 +182,10 @@ void main()
       apply(row);
     }
   }
-  write_strand(strand, first, is_touched);
+  if (styling.are_centres != 0) {
+    write_centre(first, is_touched);
+  }
+  else {
+    write_strand(strand, first, is_touched);
+  }
 }

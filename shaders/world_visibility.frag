@@ -2,12 +2,17 @@
 // Visibility of the world: a texel per point, the sum over the directions of the opacity maps.
 
 #include "include/shadow.glsl"
-#include "include/strand.glsl"
+#include "include/packed_strand.glsl"
 
-vec3 place_of(int strand, int point, int row)
+// A place of a strand whose first texel is given, or of a surface.
+vec3 place_of(ivec2 first, int point)
 {
   point = clamp(point, 0, view.point_count - 1);
-  return (view.object_to_world * vec4(texelFetch(places, ivec2(strand * view.point_count + point, row), 0).xyz, 1.0)).xyz;
+  vec3 place = texelFetch(places, first, 0).xyz;
+  if (view.point_count > 1) {
+    place = packed_place(places, first, packed_head(places, first), point);
+  }
+  return (view.object_to_world * vec4(place, 1.0)).xyz;
 }
 
 void main()
@@ -15,15 +20,17 @@ void main()
   ivec2 cell = ivec2(gl_FragCoord.xy);
   int strand = cell.x / view.seen_points;
   int point = min((cell.x - strand * view.seen_points) * SEEN_STEP, view.point_count - 1);
-  vec3 position = place_of(strand, point, cell.y);
-  vec3 along = place_of(strand, point + 1, cell.y) - place_of(strand, point - 1, cell.y);
   bool is_strand = view.point_count > 1;
+  ivec2 first = is_strand ? ivec2(strand * (HEAD_TEXELS + view.point_count - 1), cell.y) : ivec2(strand, cell.y);
+  vec3 position = place_of(first, point);
+  vec3 along = place_of(first, point + 1) - place_of(first, point - 1);
   vec3 T = along * inversesqrt(max(dot(along, along), 1e-20));
-  vec3 root = place_of(strand, 1, cell.y) - place_of(strand, 0, cell.y);
+  vec3 root = place_of(first, 1) - place_of(first, 0);
   vec3 R = root * inversesqrt(max(dot(root, root), 1e-20));
   // Of surfaces there is something else, or nothing.
-  ivec2 texel = ivec2(strand * view.point_count + point, cell.y);
-  float radius = is_strand ? texelFetch(places, texel, 0).w * view.object_scale : 0.0;
+  bool is_shared = view.radius_strands == 1;
+  ivec2 texel = is_shared ? ivec2(point, 0) : ivec2(strand * view.point_count + point, cell.y);
+  float radius = is_strand ? texelFetch(strand_radii, texel, 0).r * view.radius_unit * view.object_scale : 0.0;
   seen_x_y = vec4(0.0);
   seen_z = vec4(0.0);
   seen_surface = vec4(0.0);

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Segments of strands, each between two neighbouring points, in image space: needs the sampler strands.
+// Segments of strands, each between two neighbouring points, in image space: needs the samplers strands and strand_radii.
 
 #include "include/drawn_strand.glsl"
-#include "include/strand.glsl"
+#include "include/packed_strand.glsl"
 
 // Index of the strand point at which a segment starts.
 int piece_start(int piece)
@@ -10,10 +10,22 @@ int piece_start(int piece)
   return piece * (view.point_count - 1) / (view.drawn_points - 1);
 }
 
-// A point of a strand and, last, its radius.
-vec4 strand_point(int strand, int point)
+ivec2 strand_first(int strand)
 {
-  return texelFetch(strands, strand_texel(strand, point, view.point_count, view.row_strands), 0);
+  return packed_first(strand, 0, view.point_count, view.row_strands);
+}
+
+// Radii of one strand are those of all where all are alike.
+float strand_radius(int strand, int point)
+{
+  ivec2 texel = strand_texel(min(strand, view.radius_strands - 1), point, view.point_count, view.row_strands);
+  return texelFetch(strand_radii, texel, 0).r * view.radius_unit;
+}
+
+// A point and, last, its radius, of the strand with a first texel and its head.
+vec4 strand_point(int strand, ivec2 first, vec4 head, int point)
+{
+  return vec4(packed_place(strands, first, head, point), strand_radius(strand, point));
 }
 
 // The part of a segment in front of the near plane: its two ends.

@@ -15,7 +15,7 @@
 #include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
 #include "include/light_grid.glsl"
-#include "include/strand_samples.glsl"
+#include "include/this_place.glsl"
 #include "include/world.glsl"
 
 const float LEAST_IRRADIANCE = 1e-4;  // [W/m²]; less is not visible
@@ -116,3 +116,5 @@ vec4 sample_value()
   SeenStrand strand = seen_strand();
   return vec4(has_light_grid() ? strand_light_on_grid(strand) : strand_light(strand), 1.0);
 }
+
+#include "include/strand_samples.glsl"

@@ -3,11 +3,11 @@
 
 // Where a vertex of the one long strip lies: strand, point, and side (-1 or +1). Each strand takes two vertices
 // a point and repeats its first and last one, so that the triangles between two strands have no area.
-void strip_vertex(int vertex, int point_count, out int strand, out int point, out float side)
+void strip_vertex(int index, int point_count, out int strand, out int point, out float side)
 {
   int stride = 2 * point_count + 2;
-  strand = vertex / stride;
-  int local = clamp(vertex - strand * stride - 1, 0, 2 * point_count - 1);
+  strand = index / stride;
+  int local = clamp(index - strand * stride - 1, 0, 2 * point_count - 1);
   point = local / 2;
   side = float(2 * (local - 2 * point) - 1);
 }

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The main of programs that fill the samples of a picture in which a strand of this hair is nearest: needs the sampler
-// segments and the image picture. They run over a window of it that holds all of this hair.
+// segments and the image picture. They run over a window of it that holds all of this hair, and end by including this.
+//
+// vec4 sample_value()
+//     what a sample is filled with, at the place that `find_place` found
 
 #include "include/this_place.glsl"
 #include "include/whole_samples.glsl"
-
-// At the place that `find_place` found.
-vec4 sample_value();
 
 void main()
 {

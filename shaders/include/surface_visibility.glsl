@@ -39,8 +39,12 @@ Across across_of(Light light, vec3 position)
   mat4 m = light.world_to_shadow;
   vec3 right = vec3(m[0][0], m[1][0], m[2][0]);
   vec3 up = vec3(m[0][1], m[1][1], m[2][1]);
-  float w = dot(vec4(m[0][3], m[1][3], m[2][3], m[3][3]), vec4(position, 1.0));
-  return Across(normalize(right), normalize(up), 0.5 * length(right), w);
+  Across across;
+  across.right = normalize(right);
+  across.up = normalize(up);
+  across.scale = 0.5 * length(right);
+  across.w = dot(vec4(m[0][3], m[1][3], m[2][3], m[3][3]), vec4(position, 1.0));
+  return across;
 }
 
 // A direction for the samples of a place in the picture, another one in each pass.

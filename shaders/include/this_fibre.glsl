@@ -18,8 +18,11 @@ vec4 channel_lobes(vec2 at, float sigma_a)
 
 FibreLobes side_by_side(vec4 red, vec4 green, vec4 blue)
 {
-  return FibreLobes(
-      vec4(red.x, green.x, blue.x, red.w), vec3(red.y, green.y, blue.y), vec3(red.z, green.z, blue.z));
+  FibreLobes lobes;
+  lobes.n = vec4(red.x, green.x, blue.x, red.w);
+  lobes.n_trt = vec3(red.y, green.y, blue.y);
+  lobes.n_res = vec3(red.z, green.z, blue.z);
+  return lobes;
 }
 
 FibreLobes fibre_lobes(vec2 at)

@@ -19,7 +19,9 @@ vec3 tangent_at(vec3 before, vec3 after)
 // Unit vector from the root of a strand, in the world.
 vec3 root_direction(int strand)
 {
-  vec3 along = strand_point(strand, 1).xyz - strand_point(strand, 0).xyz;
+  ivec2 first = strand_first(strand);
+  vec4 head = packed_head(strands, first);
+  vec3 along = packed_place(strands, first, head, 1) - head.xyz;
   return normalize(mat3(view.object_to_world) * tangent_at(vec3(0.0), along));
 }
 
@@ -31,15 +33,17 @@ void find_place(int index, vec2 at, vec2 size)
   int piece = index % pieces;
   int start = piece_start(piece);
   int end = piece_start(piece + 1);
-  vec4 first = strand_point(strand_index, start);
-  vec4 second = strand_point(strand_index, end);
+  ivec2 texel = strand_first(strand_index);
+  vec4 head = packed_head(strands, texel);
+  vec4 first = strand_point(strand_index, texel, head, start);
+  vec4 second = strand_point(strand_index, texel, head, end);
   Segment segment;
   bool is_in_front = segment_in_front(to_clip(first), to_clip(second), vec2(first.w, second.w), size, segment);
   float t = is_in_front ? place_on_segment(segment, at) : 0.0;
-  vec3 before = strand_point(strand_index, max(start - 1, 0)).xyz;
-  vec3 after = strand_point(strand_index, min(end + 1, view.point_count - 1)).xyz;
-  vec3 near_start = strand_point(strand_index, start + 1).xyz;
-  vec3 near_end = strand_point(strand_index, end - 1).xyz;
+  vec3 before = packed_place(strands, texel, head, max(start - 1, 0));
+  vec3 after = packed_place(strands, texel, head, min(end + 1, view.point_count - 1));
+  vec3 near_start = packed_place(strands, texel, head, start + 1);
+  vec3 near_end = packed_place(strands, texel, head, end - 1);
   vec3 tangent = mix(tangent_at(before, near_start), tangent_at(near_end, after), t);
   strand_position = mix(float(start), float(end), t) / float(view.point_count - 1);
   strand_tangent = normalize(mat3(view.object_to_world) * tangent);

@@ -3,14 +3,19 @@
 // faster than triangles: graphics hardware draws those four samples at a time, software drivers at an even greater cost.
 
 #include "include/segment.glsl"
+#include "include/tile.glsl"
 
 // Consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;
 
-// Functions that a program defines for the start of a segment, and for each covered sample: its parameter along the
-// segment, and the coverage of the drawn width by the strand.
-void begin(int strand, int piece, Segment segment, vec4 first, vec4 second);
-void meet(ivec2 place, float along, float coverage);
+// Functions that a program defines before it includes this:
+//
+// void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
+//     the start of a segment
+// bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
+//     whether none of the samples from `low` to `high` need be met, of a part between two parameters along the segment
+// void meet(ivec2 place, float along, float coverage)
+//     a covered sample: its parameter along the segment, and the coverage of the drawn width by the strand
 
 // Samples whose centres lie in the segment, column by column along the axis on which it is longer.
 void walk(Segment segment, ivec2 size)
@@ -26,18 +31,49 @@ void walk(Segment segment, ivec2 size)
   // Width across the columns, of a strip that is as wide as the strand across its own axis.
   float widening = (way.x == 0.0) ? 1.0 : length(way) / abs(way.x);
   float least_half_width = view.least_half_width * view.pixels_per_unit;
-  for (int column = first_column; column <= last_column; column++) {
-    float along = (float(column) + 0.5 - start.x) / way.x;
-    float true_half_width = mix(segment.half_width.x, segment.half_width.y, along);
-    float half_width = max(true_half_width, least_half_width);
-    float middle = start.y + along * way.y;
-    float reach = half_width * widening;
-    int first_row = max(int(ceil(clamp(middle - reach, -1.0, 1e6) - 0.5)), 0);
-    int last_row = min(int(ceil(clamp(middle + reach, -1.0, 1e6) - 0.5)) - 1, last_place.y);
-    for (int row = first_row; row <= last_row; row++) {
-      meet(is_steep ? ivec2(row, column) : ivec2(column, row), along, true_half_width / half_width);
+  float most_reach = max(max(segment.half_width.x, segment.half_width.y), least_half_width) * widening;
+  int column = first_column;
+  while (column <= last_column) {
+    // As far as the end of the tile.
+    int end_column = min(column / TILE * TILE + TILE - 1, last_column);
+    float first_along = (float(column) + 0.5 - start.x) / way.x;
+    float last_along = (float(end_column) + 0.5 - start.x) / way.x;
+    vec2 rows = start.y + vec2(first_along, last_along) * way.y;
+    int low_row = int(clamp(min(rows.x, rows.y) - most_reach - 1.0, -1.0, 1e6));
+    int high_row = int(clamp(max(rows.x, rows.y) + most_reach + 1.0, -1.0, 1e6));
+    ivec2 low = ivec2(column, max(low_row, 0));
+    ivec2 high = ivec2(end_column, min(high_row, last_place.y));
+    if (high.y < low.y || is_hidden(is_steep ? low.yx : low, is_steep ? high.yx : high, first_along, last_along)) {
+      column = end_column + 1;
+      continue;
+    }
+    for (; column <= end_column; column++) {
+      float along = (float(column) + 0.5 - start.x) / way.x;
+      float true_half_width = mix(segment.half_width.x, segment.half_width.y, along);
+      float half_width = max(true_half_width, least_half_width);
+      float middle = start.y + along * way.y;
+      float reach = half_width * widening;
+      int first_row = max(int(ceil(clamp(middle - reach, -1.0, 1e6) - 0.5)), 0);
+      int last_row = min(int(ceil(clamp(middle + reach, -1.0, 1e6) - 0.5)) - 1, last_place.y);
+      for (int row = first_row; row <= last_row; row++) {
+        meet(is_steep ? ivec2(row, column) : ivec2(column, row), along, true_half_width / half_width);
+      }
     }
   }
+}
+
+// The turn of a run among all strands that are drawn, of which one in FIRST_SHARE comes before the others.
+const int FIRST_SHARE = 8;
+const int WALK_ALL = 0;
+const int WALK_FIRST = 1;
+const int WALK_OTHERS = 2;
+
+int walked_turn(int run)
+{
+  if (walked_part == WALK_FIRST) {
+    return run * FIRST_SHARE;
+  }
+  return (walked_part == WALK_OTHERS) ? run + run / (FIRST_SHARE - 1) + 1 : run;
 }
 
 // The run of segments of this thread, between every how many-th point is drawn.
@@ -47,18 +83,19 @@ void walk_run(ivec2 size)
   int index = group * int(gl_WorkGroupSize.x) + int(gl_LocalInvocationID.x);
   int pieces = view.drawn_points - 1;
   int runs = (pieces + RUN_LENGTH - 1) / RUN_LENGTH;
-  int run = index / runs;
-  if (run >= view.drawn_strands) {
+  int turn = walked_turn(index / runs);
+  if (turn >= view.drawn_strands) {
     return;
   }
-  int strand = drawn_strand(run);
-  int piece = (index - run * runs) * RUN_LENGTH;
+  int strand = drawn_strand(turn);
+  int piece = index % runs * RUN_LENGTH;
   int last = min(piece + RUN_LENGTH, pieces);
-  ivec2 root = strand_texel(strand, 0, view.point_count, view.row_strands);
-  vec4 first = texelFetch(strands, root + ivec2(piece_start(piece), 0), 0);
+  ivec2 texel = strand_first(strand);
+  vec4 head = packed_head(strands, texel);
+  vec4 first = strand_point(strand, texel, head, piece_start(piece));
   vec4 start = to_clip(first);
   for (; piece < last; piece++) {
-    vec4 second = texelFetch(strands, root + ivec2(piece_start(piece + 1), 0), 0);
+    vec4 second = strand_point(strand, texel, head, piece_start(piece + 1));
     vec4 end = to_clip(second);
     Segment segment;
     if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), segment)) {

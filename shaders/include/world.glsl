@@ -26,7 +26,12 @@ void world_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, out ma
 // what surfaces alone leave, the same of all channels, and what strands alone leave.
 void strand_sides(vec4 seen_x_y, vec2 seen_z, float opacity, vec3 forward, vec3 channels, out mat3 plus, out mat3 minus)
 {
-  float sides[6] = float[6](seen_x_y.x, seen_x_y.y, seen_x_y.z, seen_x_y.w, seen_z.x, seen_z.y);
+  float sides[6];
+  for (int side = 0; side < 4; side++) {
+    sides[side] = seen_x_y[side];
+  }
+  sides[4] = seen_z.x;
+  sides[5] = seen_z.y;
   vec3 through[6];
   float behind_surfaces = 0.0;
   vec3 behind_hair = vec3(0.0);

@@ -33,6 +33,7 @@ from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.styling.kinds import KINDS
 from tests.benchmarks.draw_frames import Frame
+from tests.support import drawn_strands
 
 REPETITIONS = 50
 ACTIONS = ("stroke", "slider", "surface", "playback")
@@ -263,13 +264,12 @@ def _print_error(hair):
     if on_gpu.strand_count > 200_000:
         live_hair.write_all()
         return
-    texels = np.array(on_gpu.texture.read(), np.float32).reshape(on_gpu.texture.height, on_gpu.texture.width, 4)
-    texels = texels[:, : on_gpu.row_strands * on_gpu.point_count].reshape(-1, on_gpu.point_count, 4)
+    places = drawn_strands.places(on_gpu)
     started = time.perf_counter()
     live_hair.write_all()
     points = bindings.of(hair.data).points
     written = 1e3 * (time.perf_counter() - started)
-    error = np.linalg.norm(texels[: len(points), :, :3] - points, axis=2).max(axis=1)
+    error = np.linalg.norm(places - points, axis=2).max(axis=1)
     lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
     print(
         f"         drawn and written differ by {np.max(error / lengths):.1e} of a length; written in {written:.0f} ms"

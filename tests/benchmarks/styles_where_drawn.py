@@ -23,6 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from hair_addon.blender.gpu import style_maker
 from hair_addon.blender.gpu.strand_textures import upload_strands
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, smooth, trim, wet
+from tests.support import drawn_strands
 from tests.support.styled import head
 
 STACKS = {
@@ -72,7 +73,7 @@ def measure(hair, styles):
     styling, plain = hair.bound(*styles), hair.plain
     radii = np.full(plain.shape[1], 1e-4, np.float32)
     started = time.perf_counter()
-    maker = style_maker.maker_of(hair.binding, styling, radii, np.eye(3))
+    maker = style_maker.maker_of(hair.binding, styling, len(radii), np.eye(3))
     strands = upload_strands(plain, np.broadcast_to(radii, plain.shape[:2]))
     guides = (hair.guides if styling is None else styling.guides(hair.guides)).numpy().copy()
     strands = maker.make(strands, guides)
@@ -92,8 +93,7 @@ def measure(hair, styles):
             slider = median(slide), of_slider.count // REPETITIONS
     strands = maker.make(strands, guides)
     chosen = np.linspace(0, len(plain) - 1, min(CHECKED, len(plain))).astype(np.int32)
-    rows = np.array(strands.texture.read(), np.float32).reshape(strands.texture.height, -1, 4)
-    points = rows[:, : strands.row_strands * strands.point_count].reshape(-1, strands.point_count, 4)[chosen, :, :3]
+    points = drawn_strands.places(strands)[chosen]
     lengths = np.linalg.norm(np.diff(plain[chosen], axis=1), axis=2).sum(axis=1)
     error = np.linalg.norm(points - hair.styled(*styles)[chosen], axis=2).max(axis=1) / lengths
     return stroke, slider, compiled, error

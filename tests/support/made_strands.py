@@ -10,6 +10,7 @@ from hair_addon.blender.groom import pipeline
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
+from tests.support import drawn_strands
 from tests.support.reading import points, write_points
 
 CLOSE = 1e-5  # [m] of strands of half a metre on a ball of one
@@ -48,8 +49,7 @@ def drawn(hair):
     """(S, P, 3) in the texture that the shader reads, after a viewport has drawn it."""
     on_gpu = hair_cache.strands_on_gpu(hair.data)
     hair_cache.choose_makers()
-    texels = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)
-    return texels[: on_gpu.strand_count, :, :3]
+    return drawn_strands.places(on_gpu)
 
 
 def grown(hair):

@@ -81,13 +81,15 @@ class Renewal:
 
 
 def _places(hair, receivers, through):
-    """[(`uniforms.VIEW` record, texture)] of what receives light: strands, then surfaces."""
+    """[(`uniforms.VIEW` record, {sampler: texture})] of what receives light: strands, then surfaces."""
     views = [_view_of_strands(strands, to_world) for strands, to_world in hair]
     views += [_view_of_surface(surface) for surface in receivers]
     of_surfaces = through[densest([strands for strands, _ in hair])] if hair else (1.0, np.zeros(3))
     for view, (opacity, forward) in zip(views, through + [of_surfaces] * len(receivers), strict=True):
         view["seen_opacity"], view["hair_forward"][:3] = opacity, forward
-    textures = [strands.texture for strands, _ in hair] + [surface.places for surface in receivers]
+    textures = [{"places": strands.texture, "strand_radii": strands.radii_texture} for strands, _ in hair]
+    # Surfaces have no radii: any texture will do.
+    textures += [{"places": surface.places, "strand_radii": surface.places} for surface in receivers]
     return list(zip(views, textures, strict=True))
 
 
@@ -127,6 +129,7 @@ def _view_of_strands(strands, to_world):
     view = uniforms.VIEW.record()
     view["object_to_world"] = to_world.T
     view["point_count"], view["row_strands"] = strands.point_count, strands.row_strands
+    view["radius_strands"], view["radius_unit"] = strands.radius_strands, strands.radius_unit
     view["object_scale"] = drawing.scale_of(to_world)
     view["seen_points"] = seen_points(strands.point_count)
     return view
@@ -158,11 +161,11 @@ class _Target:
     def add(self, lights, maps):
         with self.framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"):
             blocks = {"view": self.view, "lights": lights}
-            drawing.draw_cover(shaders.visibility_program(), blocks, {"places": self.places, **maps})
+            drawing.draw_cover(shaders.visibility_program(), blocks, {**self.places, **maps})
 
 
 def _size_of(view, places):
-    return int(view["row_strands"] * view["seen_points"]), places.height
+    return int(view["row_strands"] * view["seen_points"]), places["places"].height
 
 
 def _texture(size):

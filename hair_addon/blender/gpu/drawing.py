@@ -15,12 +15,12 @@ import numpy as np
 
 from ...core import geometry
 from . import shaders, uniforms
-from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, bare_vertices, places_texture, vertex_count
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, bare_vertices, vertex_count
 
 
 @dataclass(frozen=True)
 class SurfaceOnGPU:
-    """Triangles of a surface: their batch, and their corners' places in a texture as `StrandsOnGPU` has them."""
+    """Triangles of a surface: their batch, and their corners' places in a texture."""
 
     batch: gpu.types.GPUBatch
     places: gpu.types.GPUTexture
@@ -136,6 +136,7 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     record["part_size"], record["part_stride"] = _parts(strands.strand_count)
     record["thickness"] = strands.strand_count / record["drawn_strands"]
     record["row_strands"] = strands.row_strands
+    record["radius_strands"], record["radius_unit"] = strands.radius_strands, strands.radius_unit
     return record
 
 
@@ -199,22 +200,39 @@ def draw_strands(strands, program, view, lights, object_to_world, samplers=None,
 def draw_strip(strands, program, record, lights, samplers=None):
     """The same with a record of `strand_record` and lights on the GPU."""
     count = vertex_count(int(record["drawn_strands"]), int(record["drawn_points"]))
-    _draw(strands.batch, program, record, lights, {"strands": strands.texture, **(samplers or {})}, count)
+    _draw(strands.batch, program, record, lights, {**strand_samplers(strands), **(samplers or {})}, count)
 
 
-def walk_strands(strands, program, record, lights, samplers, images, constants):
+def strand_samplers(strands):
+    """{sampler: texture} of `StrandsOnGPU` in programs that draw them."""
+    return {"strands": strands.texture, "strand_radii": strands.radii_texture}
+
+
+# Which of the strands are walked along, and how many in how many: WALK_ALL and the like of
+# shaders/include/walk_segment.glsl.
+WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
+_FIRST_SHARE = 8
+
+
+def walk_strands(strands, program, record, lights, samplers, images, constants, part=WALK_ALL):
     """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
 
-    lights: on the GPU; samplers, images: {name: texture} that it reads and writes; constants: {name: int}.
+    lights: on the GPU; samplers, images: {name: texture} that it reads and writes; constants: {name: int}; part: of the
+    strands, all or those of `WALK_FIRST` or `WALK_OTHERS`, which are all together.
     """
     runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
-    groups = -(-int(record["drawn_strands"]) * runs // shaders.RUN_GROUP_SIZE)
+    strand_count = int(record["drawn_strands"])
+    first_count = -(-strand_count // _FIRST_SHARE)
+    walked = (strand_count, first_count, strand_count - first_count)[part]
+    if not walked:
+        return
+    groups = -(-walked * runs // shaders.RUN_GROUP_SIZE)
     rows = -(-groups // MOST_GROUPS)
     blocks = {"view": uniforms.uniform_buffer(record), "lights": lights}
-    with bound(program, blocks, {"strands": strands.texture, **samplers}):
+    with bound(program, blocks, {**strand_samplers(strands), **samplers}):
         for name, texture in images.items():
             program.image(name, texture)
-        for name, value in constants.items():
+        for name, value in (constants | {"walked_part": part}).items():
             program.uniform_int(name, value)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
 
@@ -268,9 +286,19 @@ def upload_surface(positions, normals, uvs=None):
     for name, values in (("position", positions), ("normal", normals), ("uv", uvs)):
         vertices.attr_fill(name, np.ascontiguousarray(values, np.float32))
     row_corners = min(len(positions), TEXTURE_WIDTH)
-    places = places_texture(positions[:, None], np.zeros((len(positions), 1), np.float32), row_corners)
     batch, fingerprint = gpu.types.GPUBatch(type="TRIS", buf=vertices), geometry.fingerprint.fingerprint(positions)
-    return SurfaceOnGPU(batch, places, row_corners, len(positions), fingerprint)
+    return SurfaceOnGPU(batch, _places_texture(positions, row_corners), row_corners, len(positions), fingerprint)
+
+
+def _places_texture(positions, row_corners):
+    """(N, 3) places in a texture, `row_corners` a row."""
+    row_count = -(-len(positions) // row_corners)
+    texels = np.zeros((row_count * row_corners, 4), np.float32)
+    texels[: len(positions), :3] = positions
+    data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    texture = gpu.types.GPUTexture((row_corners, row_count), format="RGBA32F", data=data)
+    texture.filter_mode(False)
+    return texture
 
 
 def draw_cover(program, blocks, samplers):

@@ -56,7 +56,7 @@ def _maker():
     bound = strand_maker.BoundStrands(
         np.zeros_like(up), up, up[:_GUIDES], slots, weights, (-3.0, 1.0, 200.0, 0.01), 1.0
     )
-    return strand_maker.new_maker(bound, np.zeros(_POINTS, np.float32), np.eye(3))
+    return strand_maker.new_maker(bound, _POINTS, np.eye(3))
 
 
 def _seconds(work, strands):

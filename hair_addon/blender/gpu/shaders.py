@@ -48,9 +48,24 @@ def expand(name, replaced=None):
 program_cache = Cache()  # (function decorated by `kept`, its arguments) → program
 kept = program_cache.keeping  # decorates what makes a program: it is compiled once, and kept until Python ends
 
+
+def compile_one(makers):
+    """Compile the first program that is not yet compiled; whether there was one. Raises `HairError`.
+
+    makers: functions decorated by `kept`, each with its arguments in a tuple.
+    """
+    for make, arguments in makers:
+        known = len(program_cache)
+        make(*arguments)
+        if len(program_cache) > known:
+            return True
+    return False
+
+
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
 # See shaders/world_visibility.frag.
 VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z", "visibility_surface", "visibility_channels")
+STRAND_SAMPLERS = ("strands", "strand_radii")  # see shaders/include/segment.glsl
 VISIBILITY_TARGETS = ("seen_x_y", "seen_z", "seen_surface", "seen_channels")
 
 
@@ -82,7 +97,7 @@ def strip_program(fragment, shadow_samplers=(), targets=_COLOR, samplers=()):
     """
     info = gpu.types.GPUShaderCreateInfo()
     _strip(info, shadow_samplers)
-    for slot, name in enumerate(samplers, start=len(SHADOW_SAMPLERS) + 1):
+    for slot, name in enumerate(samplers, start=len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
     return compile_drawing(info, "strand.vert", fragment, targets)
 
@@ -98,7 +113,8 @@ def strip_segments_program():
 
 def _strip(info, shadow_samplers):
     declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
-    info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "strands")
+    for slot, name in enumerate(STRAND_SAMPLERS, start=len(SHADOW_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
     varying = gpu.types.GPUStageInterfaceInfo("strand_varying")
     varying.smooth("VEC3", "drawn_position")
     varying.smooth("FLOAT", "strand_coverage")
@@ -114,24 +130,40 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.
 @kept
 def segments_program():
     """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
-    return _walk("strand_segments.comp", ("depths", "segments"), ("first_segment", "is_depth"))
+    constants = ("first_segment", "is_depth", "are_tiles_known")
+    return _walk("strand_segments.comp", ("depths", "segments"), constants, samplers=(("farthest_depths", "UINT_2D"),))
+
+
+TILE = 8  # samples along each side of a tile: TILE of shaders/include/tile.glsl
+
+
+@kept
+def farthest_depths_program():
+    """The compute program that finds the farthest depth in each tile: see farthest_depths.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
+    info.sampler(0, "UINT_2D", "depths")
+    info.image(0, "R32UI", "UINT_2D", "farthest_depths", qualifiers={"WRITE"})
+    return compile_compute(info, "farthest_depths.comp")
 
 
 @kept
 def strand_shadow_program():
     """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
-    return _walk("strand_shadow.comp", ("fronts", "backs", "counts"), ("is_front",), ("hair_front",), ("hidden_depth",))
+    samplers = (("hidden_depth", "FLOAT_2D"),)
+    return _walk("strand_shadow.comp", ("fronts", "backs", "counts"), ("is_front",), ("hair_front",), samplers)
 
 
 def _walk(file, images, constants, shadow_samplers=(), samplers=()):
     info = gpu.types.GPUShaderCreateInfo()
     declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
     info.local_group_size(RUN_GROUP_SIZE)
-    for slot, name in enumerate(("strands", *samplers), start=len(SHADOW_SAMPLERS)):
-        info.sampler(slot, "FLOAT_2D", name)
+    own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
+    for slot, (name, kind) in enumerate((*own, *samplers), start=len(SHADOW_SAMPLERS)):
+        info.sampler(slot, kind, name)
     for slot, name in enumerate(images):
         info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
-    for name in constants:
+    for name in (*constants, "walked_part"):
         info.push_constant("INT", name)
     return compile_compute(info, file)
 
@@ -189,7 +221,8 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, 
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     declare_scene(info, structs)
     first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
-    read = (("segments", "UINT_2D"), ("strands", "FLOAT_2D"), ("light_grid", "FLOAT_3D"), *samplers)
+    own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
+    read = (("segments", "UINT_2D"), *own, ("light_grid", "FLOAT_3D"), *samplers)
     for slot, (name, kind) in enumerate(read, start=first):
         info.sampler(slot, kind, name)
     info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"} if is_mixed else {"WRITE"})
@@ -243,7 +276,8 @@ def visibility_program():
     """The program that adds up how much of the world the texels of `places` see."""
     info = gpu.types.GPUShaderCreateInfo()
     declare_scene(info, is_lit=False)
-    info.sampler(len(SHADOW_SAMPLERS), "FLOAT_2D", "places")
+    for slot, name in enumerate(("places", "strand_radii"), start=len(SHADOW_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
     return compile_drawing(info, "cover.vert", "world_visibility.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
 
 

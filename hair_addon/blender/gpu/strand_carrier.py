@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.kernels.checks import require_count, require_indices
 from . import shaders
-from .strand_changes import StrandChanges, new_changes, rows_texture
+from .strand_changes import StrandChanges, declare_put, new_changes, rows_texture
 from .strand_textures import MOST_GROUPS, StrandsOnGPU
 
 if TYPE_CHECKING:
@@ -31,6 +31,11 @@ class StrandCarrier:
     vertices: np.ndarray  # (V, 3) of the surface at rest
     changes: StrandChanges
 
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        return [self.rest, self.roots, *self.changes.textures]
+
     def carry(self, strands: StrandsOnGPU, motion: "SurfaceMotion | None") -> StrandsOnGPU:
         """Carry all strands from their rest; the `StrandsOnGPU` after it.
 
@@ -46,6 +51,7 @@ class StrandCarrier:
             vertices[:, 0, :3], vertices[:, 1:, :3] = motion.after, motion.axes
             is_moved = (motion.after != self.vertices).any(axis=1)
             vertices[:, 0, 3] = is_moved | (motion.axes != _NOT_TURNED).any(axis=(1, 2))
+        self.changes.keep(strands)
         texture, _row = rows_texture(vertices.reshape(len(vertices), -1), 4)
         program = _carry_program()
         program.bind()
@@ -57,7 +63,6 @@ class StrandCarrier:
             ("strand_count", strands.strand_count),
             ("point_count", strands.point_count),
             ("row_strands", strands.row_strands),
-            ("row_moved", self.changes.row_moved),
         ):
             program.uniform_int(name, value)
         groups = -(-strands.strand_count // _GROUP_SIZE)
@@ -94,9 +99,7 @@ def _carry_program():
     info.local_group_size(_GROUP_SIZE)
     for slot, name in enumerate(("rest", "roots", "vertices")):
         info.sampler(slot, "FLOAT_2D", name)
-    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}, "boxes": {"WRITE"}}
-    for slot, (name, qualifiers) in enumerate(images.items()):
-        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=qualifiers)
-    for name in ("strand_count", "point_count", "row_strands", "row_moved"):
+    declare_put(info, first_slot=0)
+    for name in ("strand_count", "point_count", "row_strands"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "carry_strands.comp")

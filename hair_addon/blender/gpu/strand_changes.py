@@ -6,25 +6,35 @@ from dataclasses import dataclass, replace
 import gpu
 import numpy as np
 
+from ...core import geometry
 from . import strand_bounds
-from .strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, numbers_texture
+from .strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, keep_strands, numbers_texture, row_strands_of
 
-# Points of strands up to which it is kept where they were, for motion vectors: 128 MiB.
+# Points of strands up to which it is kept where they were, for motion vectors: 64 MiB.
 MOST_MOVED = 8 << 20
 
 
 @dataclass(frozen=True)
 class StrandChanges:
-    """Textures that a program writes beside the strands; made by `new_changes`."""
+    """Textures of what a program changes beside the strands; made by `new_changes`."""
 
-    moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; one texel where that is not kept
+    moved: gpu.types.GPUTexture  # where strands were, as `Moved` has it; a texel where that is not kept
     row_moved: int  # strands in a row of it, 0 where it is not kept
     moved_rows: gpu.types.GPUTexture
     bounds: strand_bounds.StrandBounds
 
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        return [self.moved, self.moved_rows, *(boxes for boxes, _count in self.bounds.levels)]
+
+    def keep(self, strands: StrandsOnGPU) -> None:
+        """Keep where strands are that a program is about to change."""
+        if self.row_moved:
+            keep_strands(strands, self.moved, strands.strand_count, self.row_moved)
+
     def bind(self, program: gpu.types.GPUShader) -> None:
-        """Bind `moved_strands` and `boxes` of a program that is bound."""
-        program.image("moved_strands", self.moved)
+        """Bind `boxes` of a program that is bound."""
         program.image("boxes", self.bounds.boxes)
 
     def changed(self, strands: StrandsOnGPU) -> StrandsOnGPU:
@@ -45,10 +55,16 @@ def new_changes(strand_count: int, point_count: int, keeps_moved: bool = True) -
     """
     bounds = strand_bounds.new_bounds(strand_count)
     if keeps_moved and strand_count * point_count <= MOST_MOVED:
-        moved, row_moved = empty_rows(strand_count, point_count + 1)
-        moved_rows = numbers_texture(np.arange(1, strand_count + 1), TEXTURE_WIDTH // point_count)
+        moved, row_moved = empty_rows(strand_count, 1 + geometry.packed_strands.texel_count(point_count), "RG32F")
+        moved_rows = numbers_texture(np.arange(1, strand_count + 1), row_strands_of(point_count))
         return StrandChanges(moved, row_moved, moved_rows, bounds)
-    return StrandChanges(empty_rows(1, 1)[0], 0, empty_rows(1, 1)[0], bounds)
+    return StrandChanges(empty_rows(1, 1, "RG32F")[0], 0, empty_rows(1, 1)[0], bounds)
+
+
+def declare_put(info: gpu.types.GPUShaderCreateInfo, first_slot: int) -> None:
+    """Declare what shaders/include/put_packed_strand.glsl writes, from an image slot on."""
+    for slot, (name, texture_format) in enumerate((("strands", "RG32F"), ("boxes", "RGBA32F")), start=first_slot):
+        info.image(slot, texture_format, "FLOAT_2D", name, qualifiers={"WRITE"})
 
 
 def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTexture, int]:
@@ -65,9 +81,9 @@ def rows_texture(values: np.ndarray, channels: int) -> tuple[gpu.types.GPUTextur
     return texture, in_row
 
 
-def empty_rows(count: int, texels: int) -> tuple[gpu.types.GPUTexture, int]:
-    """The same of RGBA32F without values."""
+def empty_rows(count: int, texels: int, texture_format: str = "RGBA32F") -> tuple[gpu.types.GPUTexture, int]:
+    """The same without values."""
     in_row = min(TEXTURE_WIDTH // texels, count)
-    texture = gpu.types.GPUTexture((in_row * texels, -(-count // in_row)), format="RGBA32F")
+    texture = gpu.types.GPUTexture((in_row * texels, -(-count // in_row)), format=texture_format)
     texture.filter_mode(False)
     return texture, in_row

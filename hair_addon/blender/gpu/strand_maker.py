@@ -13,8 +13,8 @@ import numpy as np
 from ...core.interpolation.hair_binding import HairBinding
 from ...core.kernels.checks import require_count, require_indices
 from . import shaders, uniforms
-from .strand_changes import StrandChanges, empty_rows, new_changes, rows_texture
-from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU
+from .strand_changes import StrandChanges, declare_put, empty_rows, new_changes, rows_texture
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU, row_strands_of
 
 _GROUP_SIZE = 64
 
@@ -26,11 +26,16 @@ class StrandMaker:
     bindings: gpu.types.GPUTexture  # of each strand its root, its normal, and its guides with their weights
     guide_normals: gpu.types.GPUTexture
     segments: gpu.types.GPUTexture  # of guides, in their frames; then what their weights are limited by
-    radii: gpu.types.GPUTexture  # along every strand
-    changes: StrandChanges
+    changes: StrandChanges | None  # None where strands are made for styles
     record: np.ndarray  # uniforms.MAKING
     block: gpu.types.GPUUniformBuf
     slot_count: int  # guides of a strand
+
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        own = [self.bindings, self.guide_normals, self.segments]
+        return own + ([] if self.changes is None else self.changes.textures)
 
     def make(
         self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
@@ -42,6 +47,8 @@ class StrandMaker:
         from there. Raises `HairError` where counts do not match.
         """
         self.require_fitting(strands)
+        if rest is None:
+            self.changes.keep(strands)
         self.put_guides(guide_points)
         self.fill(strands.texture if rest is None else rest)
         return self.changes.changed(strands) if rest is None else strands
@@ -53,14 +60,21 @@ class StrandMaker:
 
     def fill(self, texture: gpu.types.GPUTexture) -> None:
         """Make all strands in a texture like that of `StrandsOnGPU`, for the guides of the last `put_guides`."""
-        program = _strands_program(self.slot_count)
+        self.fill_some(texture, 0, int(self.record["strand_count"]))
+
+    def fill_some(self, texture: gpu.types.GPUTexture, first: int, count: int) -> None:
+        """The same of some strands one after the other, the first at the start of the texture."""
+        program = _strands_program(self.slot_count, self.changes is None)
         program.bind()
         program.uniform_block("making", self.block)
-        for name in ("bindings", "guide_normals", "segments", "radii"):
+        for name in ("bindings", "guide_normals", "segments"):
             program.uniform_sampler(name, getattr(self, name))
         program.image("strands", texture)
-        self.changes.bind(program)
-        groups = -(-int(self.record["strand_count"]) // _GROUP_SIZE)
+        if self.changes is not None:
+            self.changes.bind(program)
+        program.uniform_int("first_strand", first)
+        program.uniform_int("some_count", count)
+        groups = -(-count // _GROUP_SIZE)
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
@@ -76,15 +90,10 @@ class StrandMaker:
         require_count("strands", len(bound.roots), int(self.record["strand_count"]))
         require_count("guides", len(bound.guide_normals), int(self.record["guide_count"]))
         record, slot_count = self.record.copy(), bound.indices.shape[1]
-        _strands_program(slot_count)
+        _strands_program(slot_count, self.changes is None)
         bindings, record["row_bindings"] = rows_texture(_binding_rows(bound), 4)
         block = uniforms.uniform_buffer(record)
         return replace(self, bindings=bindings, record=record, block=block, slot_count=slot_count)
-
-    def of_radii(self, radii: np.ndarray) -> "StrandMaker":
-        """The same of strands with radii (P,) float32."""
-        require_count("radii", len(radii), int(self.record["point_count"]))
-        return replace(self, radii=_profile(radii))
 
     def put_guides(self, guide_points: np.ndarray) -> None:
         """Upload guides, as `make` does."""
@@ -122,36 +131,36 @@ def bound_strands(binding: HairBinding) -> BoundStrands:
     return BoundStrands(*(array.numpy() for array in arrays), binding.limits.fading, binding.keep_length)
 
 
-def new_maker(bound: BoundStrands, radii: np.ndarray, axes: np.ndarray, keeps_moved: bool = True) -> StrandMaker:
+def programs_of(slot_count: int, is_plain: bool) -> list[tuple]:
+    """Programs of a `StrandMaker`, for `shaders.compile_one`; is_plain: as in `new_maker`."""
+    return [(_segments_program, ()), (_strands_program, (slot_count, is_plain))]
+
+
+def new_maker(bound: BoundStrands, point_count: int, axes: np.ndarray, is_plain: bool = False) -> StrandMaker:
     """The `StrandMaker` of `BoundStrands`: guides and strands of as many points, no styles.
 
-    radii: (P,) float32 along every strand; axes: (3, 3), from the coordinates of roots and guides to those of the
-    strands; keeps_moved: as in `new_changes`. Raises `HairError` where counts or indices do not match, or the driver
-    lacks something.
+    axes: (3, 3), from the coordinates of roots and guides to those of the strands; is_plain: whether strands are made
+    in single precision, for styles. Raises `HairError` where counts or indices do not match, or the driver lacks
+    something.
     """
-    point_count = len(radii)
     bindings = _binding_rows(bound)
     record = uniforms.MAKING.record()
     record["axes"][:3, :3], record["axes"][3, 3] = np.asarray(axes).T, 1.0
+    record["axes_scale"] = np.linalg.norm(axes, 2)
     record["limits"], record["keep_length"] = bound.fading, bound.keep_length
     strand_count, guide_count = len(bound.roots), len(bound.guide_normals)
     record["strand_count"], record["guide_count"], record["point_count"] = strand_count, guide_count, point_count
     record["row_guides"] = TEXTURE_WIDTH // (3 * point_count)
-    record["row_strands"] = TEXTURE_WIDTH // point_count
+    record["row_strands"] = TEXTURE_WIDTH // point_count if is_plain else row_strands_of(point_count)
     # Programs first: where there are none, nothing is uploaded.
     slot_count = bound.indices.shape[1]
-    _segments_program(), _strands_program(slot_count)
+    _segments_program(), _strands_program(slot_count, is_plain)
     bindings_texture, record["row_bindings"] = rows_texture(bindings, 4)
     normals_texture, record["row_normals"] = rows_texture(np.pad(bound.guide_normals, ((0, 0), (0, 1))), 4)
     segments, record["row_segments"] = empty_rows(guide_count, point_count + 1)
-    changes = new_changes(strand_count, point_count, keeps_moved)
-    record["row_moved"] = changes.row_moved
-    block, profile = uniforms.uniform_buffer(record), _profile(radii)
-    return StrandMaker(bindings_texture, normals_texture, segments, profile, changes, record, block, slot_count)
-
-
-def _profile(radii):
-    return rows_texture(np.float32(radii)[None], 1)[0]
+    changes = None if is_plain else new_changes(strand_count, point_count)
+    block = uniforms.uniform_buffer(record)
+    return StrandMaker(bindings_texture, normals_texture, segments, changes, record, block, slot_count)
 
 
 def _binding_rows(bound):
@@ -170,29 +179,34 @@ def _binding_rows(bound):
     return rows.reshape(strand_count, -1)
 
 
-def _declared(samplers, images):
+def _declared(samplers):
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_GROUP_SIZE)
     info.typedef_source(uniforms.MAKING.source)
     info.uniform_buf(0, "Making", "making")
     for slot, name in enumerate(samplers):
         info.sampler(slot, "FLOAT_2D", name)
-    for slot, (name, qualifiers) in enumerate(images.items()):
-        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=qualifiers)
     return info
 
 
 @shaders.kept
 def _segments_program():
     """The compute program that brings guides into the frames of their roots."""
-    info = _declared(("guide_points", "guide_normals"), {"segments": {"WRITE"}})
+    info = _declared(("guide_points", "guide_normals"))
+    info.image(0, "RGBA32F", "FLOAT_2D", "segments", qualifiers={"WRITE"})
     return shaders.compile_compute(info, "guide_segments.comp")
 
 
 @shaders.kept
-def _strands_program(slot_count):
-    """The compute program that makes strands of so many guides each."""
-    images = {"strands": {"READ", "WRITE"}, "moved_strands": {"WRITE"}, "boxes": {"WRITE"}}
-    info = _declared(("bindings", "guide_normals", "segments", "radii"), images)
+def _strands_program(slot_count, is_plain):
+    """The compute program that makes strands of so many guides each; is_plain: as in `new_maker`."""
+    info = _declared(("bindings", "guide_normals", "segments"))
     info.define("SLOTS", str(slot_count))
-    return shaders.compile_compute(info, "interpolate_strands.comp")
+    for name in ("first_strand", "some_count"):
+        info.push_constant("INT", name)
+    if not is_plain:
+        declare_put(info, first_slot=0)
+        return shaders.compile_compute(info, "interpolate_strands.comp")
+    info.image(0, "RGBA32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
+    put = "include/put_packed_strand.glsl", "include/put_plain_strand.glsl"
+    return shaders.compile_compute(info, "interpolate_strands.comp", dict([put]))

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands on the GPU: points, radii and random numbers in textures.
 
+Points take eight bytes each: core/geometry/packed_strands.py.
+
 A change costs one upload, or only that of the moved strands; a redraw costs none.
 """
 
@@ -10,6 +12,7 @@ from functools import cached_property
 import gpu
 import numpy as np
 
+from ...core import geometry
 from . import shaders
 
 # Widest row of the strand texture; every driver takes 16384 texels.
@@ -22,14 +25,14 @@ _SAMPLED = 500  # strands whose lengths are compared
 
 _AT_ONCE = 400  # strands that are brought into the order of texels
 
-_MOVE_GROUP_SIZE = 64  # points that one work group of `_move_program` brings to their places
+_MOVE_GROUP_SIZE = 64  # texels that one work group of `_move_program` brings to their places
 
 
 @dataclass(frozen=True)
 class Moved:
     """What the last `move_strands` did: where the strands that it moved were before."""
 
-    points: gpu.types.GPUTexture  # of each moved strand a texel that means nothing, and its points
+    points: gpu.types.GPUTexture  # of each moved strand a texel that means nothing, and its texels
     row_strands: int  # of that texture
     rows: gpu.types.GPUTexture  # of each of all strands: which of the moved it is, counted from one; 0: none
     turn: int  # how many such changes there were
@@ -37,9 +40,12 @@ class Moved:
 
 @dataclass(frozen=True)
 class StrandsOnGPU:
-    """Points and radii of strands in a texture, with the strip that draws them."""
+    """Points and radii of strands in textures, with the strip that draws them."""
 
-    texture: gpu.types.GPUTexture
+    texture: gpu.types.GPUTexture  # of points, as core/geometry/packed_strands.py has them
+    radii_texture: gpu.types.GPUTexture  # of one strand, where all have the same
+    radius_strands: int  # whose radii are in it
+    radius_unit: float  # that they are in it by
     batch: gpu.types.GPUBatch
     strand_count: int
     point_count: int
@@ -58,6 +64,13 @@ class StrandsOnGPU:
     is_made: bool = False  # whether the GPU has made or carried them
     has_points: bool = True  # whether `points` are where strands are, which they are not while the GPU alone knows it
     lengthenings: dict = field(default_factory=dict)  # {number of points: how much longer strands are with all}
+
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        own = [self.texture, self.radii_texture, self.randoms]
+        own += [] if self.wetness is None else [self.wetness]
+        return own + ([] if self.moved is None else [self.moved.points, self.moved.rows])
 
     @cached_property
     def ball(self) -> tuple[np.ndarray, float]:
@@ -87,8 +100,8 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     None where strands do not differ in it.
     """
     strand_count, point_count, _xyz = points.shape
-    row_strands = TEXTURE_WIDTH // point_count
-    texture = places_texture(points, radii, row_strands)
+    row_strands = row_strands_of(point_count)
+    texture = packed_texture(points, row_strands)
     random_texture = numbers_texture(np.full(strand_count, 0.5) if randoms is None else randoms, row_strands)
     wetness_texture = None if wetness is None else numbers_texture(wetness, row_strands)
     strip = bare_vertices(vertex_count(strand_count, point_count))
@@ -100,6 +113,7 @@ def upload_strands(points, radii, randoms=None, wetness=None):
     mean_length = float(np.linalg.norm(np.diff(points[some], axis=1), axis=2).sum(axis=1).mean())
     return StrandsOnGPU(
         texture,
+        *_radii_texture(radii, row_strands),
         strip,
         strand_count,
         point_count,
@@ -141,21 +155,69 @@ def numbers_texture(values, row_strands):
     return texture
 
 
-def places_texture(points, radii, row_strands):
-    """(S, P, 3) places and (S, P) radii in a texture, each row of it `row_strands` whole strands."""
+def row_strands_of(point_count, others=0):
+    """Whole strands in a row of a texture of packed strands, with so many other texels before each."""
+    return TEXTURE_WIDTH // (others + geometry.packed_strands.texel_count(point_count))
+
+
+def packed_texture(points, row_strands):
+    """(S, P, 3) places in a texture, each row of it `row_strands` whole strands."""
     strand_count, point_count, _xyz = points.shape
-    row_count = -(-strand_count // row_strands)
-    texels = np.empty((row_count * row_strands, point_count, 4), np.float32)
+    texel_count, row_count = geometry.packed_strands.texel_count(point_count), -(-strand_count // row_strands)
+    texels = np.empty((row_count * row_strands, texel_count, 2), np.float32)
     texels[strand_count:] = 0.0
-    # Number by number, of as many strands as the processor's caches hold: half the time of all at once.
-    for first in range(0, strand_count, _AT_ONCE):
-        some = slice(first, min(first + _AT_ONCE, strand_count))
-        for axis in range(3):
-            texels[some, :, axis] = points[some, :, axis]
-        texels[some, :, 3] = radii[some]
+    geometry.packed_strands.pack(points, texels[:strand_count])
+    return _texture("RG32F", row_strands * texel_count, texels)
+
+
+_TEXEL_BYTES = {"RG32F": 8, "R32F": 4, "R16": 2, "RGBA32F": 16}
+_SEEN_BYTES = 32  # of a point in the visibility textures
+
+
+def bytes_of(textures):
+    """Memory of textures [bytes], each counted once."""
+    by_id = {id(texture): texture for texture in textures}
+    return sum(texture.width * texture.height * _TEXEL_BYTES[texture.format] for texture in by_id.values())
+
+
+def seen_bytes(strands):
+    """Memory of the visibility textures of `StrandsOnGPU` [bytes]."""
+    return strands.texture.height * strands.row_strands * seen_points(strands.point_count) * _SEEN_BYTES
+
+
+def with_radii(strands, radii):
+    """`StrandsOnGPU` with other radii (S, P) float32, all else as it is."""
+    texture, strand_count, unit = _radii_texture(radii, strands.row_strands)
+    some = radii[:: -(-len(radii) // 1000)]
+    return replace(
+        strands,
+        radii_texture=texture,
+        radius_strands=strand_count,
+        radius_unit=unit,
+        radii=radii,
+        mean_radius=float(some.mean()),
+        greatest_radius=float(radii.max()),
+    )
+
+
+def _radii_texture(radii, row_strands):
+    """(texture, strands in it, unit): radii (S, P) in two bytes each where strands differ, else of one for all."""
+    strand_count, point_count = radii.shape
+    if (radii == radii[:1]).all():
+        return _texture("R32F", point_count, np.ascontiguousarray(radii[:1], np.float32)), 1, 1.0
+    greatest = float(radii.max())
+    # Infinite ones are kept as they are.
+    texture_format, unit = ("R16", greatest) if np.isfinite(greatest) and greatest > 0.0 else ("R32F", 1.0)
+    texels = np.zeros((-(-strand_count // row_strands) * row_strands, point_count), np.float32)
+    np.divide(radii, unit, out=texels[:strand_count])
+    return _texture(texture_format, row_strands * point_count, texels), strand_count, unit
+
+
+def _texture(texture_format, width, texels):
+    channels = 2 if texture_format == "RG32F" else 1
     texture = gpu.types.GPUTexture(
-        (row_strands * point_count, row_count),
-        format="RGBA32F",
+        (width, texels.size // (channels * width)),
+        format=texture_format,
         data=gpu.types.Buffer("FLOAT", texels.size, texels.ravel()),
     )
     texture.filter_mode(False)
@@ -164,7 +226,7 @@ def places_texture(points, radii, row_strands):
 
 def like(texture):
     """A texture of the same size for other strands, with nothing in it."""
-    other = gpu.types.GPUTexture((texture.width, texture.height), format="RGBA32F")
+    other = gpu.types.GPUTexture((texture.width, texture.height), format="RG32F")
     other.filter_mode(False)
     return other
 
@@ -184,26 +246,52 @@ def move_strands(strands, moved, points):
     flat = points.reshape(-1, 3)
     strands.bounds[0] = np.minimum(strands.bounds[0], flat.min(axis=0))
     strands.bounds[1] = np.maximum(strands.bounds[1], flat.max(axis=0))
-    heads = np.zeros((len(moved), 1, 3), np.float32)
-    heads[:, 0, 0] = moved  # exact in single precision up to 16 million
-    row_strands = TEXTURE_WIDTH // (strands.point_count + 1)
-    texture = places_texture(
-        np.concatenate([heads, points], axis=1), np.pad(strands.radii[moved], ((0, 0), (1, 0))), row_strands
+    texel_count, row_strands = (
+        geometry.packed_strands.texel_count(strands.point_count),
+        row_strands_of(strands.point_count, 1),
     )
+    packed = np.empty((len(moved), texel_count, 2), np.float32)
+    geometry.packed_strands.pack(points, packed)
+    texels = np.zeros((-(-len(moved) // row_strands) * row_strands, 1 + texel_count, 2), np.float32)
+    texels[: len(moved), 0, 0] = moved  # exact in single precision up to 16 million
+    texels[: len(moved), 1:] = packed
+    texture = _texture("RG32F", row_strands * (1 + texel_count), texels)
     turn, rows = (strands.moved.turn, strands.moved.rows) if strands.moved else (0, _no_rows(strands))
     rows.clear(format="FLOAT", value=(0.0,))
+    before = like(texture)
+    keep_strands(strands, before, len(moved), row_strands, texture)
     program = _move_program()
     program.bind()
-    for name, image in (("strands", strands.texture), ("moved_strands", texture), ("moved_rows", rows)):
+    program.uniform_sampler("moved_strands", texture)
+    for name, image in (("strands", strands.texture), ("moved_rows", rows)):
         program.image(name, image)
-    program.uniform_int("moved_count", len(moved))
-    program.uniform_int("point_count", strands.point_count)
-    program.uniform_int("row_strands", strands.row_strands)
-    program.uniform_int("moved_row_strands", row_strands)
-    groups = -(-len(moved) * strands.point_count // _MOVE_GROUP_SIZE)
-    rows_of_groups = -(-groups // MOST_GROUPS)
-    gpu.compute.dispatch(program, -(-groups // rows_of_groups), rows_of_groups, 1)
-    return replace(strands, moved=Moved(texture, row_strands, rows, turn + 1), lengthenings={}, is_made=False)
+    _dispatch(program, {"moved_count": len(moved), "moved_row_strands": row_strands}, strands, len(moved))
+    return replace(strands, moved=Moved(before, row_strands, rows, turn + 1), lengthenings={}, is_made=False)
+
+
+def keep_strands(strands, kept, count, row_kept, listed=None):
+    """Copy the texels of `StrandsOnGPU`, behind another one of each strand, to a texture of `row_kept` strands a row.
+
+    count: of strands; listed: a texture like it, where the other texel is the index of the strand; None: all strands.
+    """
+    program = _keep_program()
+    program.bind()
+    program.uniform_sampler("strands", strands.texture)
+    program.uniform_sampler("listed", strands.texture if listed is None else listed)
+    program.image("kept_strands", kept)
+    numbers = {"kept_count": count, "row_kept": row_kept, "is_list": int(listed is not None)}
+    _dispatch(program, numbers, strands, count)
+
+
+def _dispatch(program, numbers, strands, count):
+    """Run a bound program on each texel of so many strands."""
+    texel_count = geometry.packed_strands.texel_count(strands.point_count)
+    for name, value in (numbers | {"texel_count": texel_count, "row_strands": strands.row_strands}).items():
+        program.uniform_int(name, value)
+    groups = -(-count * texel_count // _MOVE_GROUP_SIZE)
+    rows = -(-groups // MOST_GROUPS)
+    gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+    gpu.shader.unbind()
 
 
 def _no_rows(strands):
@@ -212,15 +300,28 @@ def _no_rows(strands):
 
 @shaders.kept
 def _move_program():
-    """The compute program that exchanges the points of some strands with those in the texture of all."""
+    """The compute program that brings the points of some strands into the texture of all."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(_MOVE_GROUP_SIZE)
-    for slot, name in enumerate(("strands", "moved_strands")):
-        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers={"READ", "WRITE"})
-    info.image(2, "R32F", "FLOAT_2D", "moved_rows", qualifiers={"WRITE"})
-    for name in ("moved_count", "point_count", "row_strands", "moved_row_strands"):
+    info.sampler(0, "FLOAT_2D", "moved_strands")
+    info.image(0, "RG32F", "FLOAT_2D", "strands", qualifiers={"WRITE"})
+    info.image(1, "R32F", "FLOAT_2D", "moved_rows", qualifiers={"WRITE"})
+    for name in ("moved_count", "moved_row_strands", "texel_count", "row_strands"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "move_strands.comp")
+
+
+@shaders.kept
+def _keep_program():
+    """The compute program that keeps where strands are. Metal cannot read images of this format that it writes."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(_MOVE_GROUP_SIZE)
+    for slot, name in enumerate(("strands", "listed")):
+        info.sampler(slot, "FLOAT_2D", name)
+    info.image(0, "RG32F", "FLOAT_2D", "kept_strands", qualifiers={"WRITE"})
+    for name in ("kept_count", "row_kept", "is_list", "texel_count", "row_strands"):
+        info.push_constant("INT", name)
+    return shaders.compile_compute(info, "keep_strands.comp")
 
 
 def vertex_count(strand_count, drawn_points):

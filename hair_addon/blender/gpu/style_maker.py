@@ -18,14 +18,18 @@ from ...core.styling import frizz, program_rows
 from ...core.styling.program_rows import Program
 from ...core.styling.random_numbers import PURPOSES
 from . import shaders, strand_changes, strand_maker, uniforms
+from .strand_changes import StrandChanges
 from .strand_maker import StrandMaker
-from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU
+from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU, row_strands_of
 
 if TYPE_CHECKING:
     from ...core.styling.stack import Styling
     from ...core.styling.steps import StrandData
 
 MOST_POINTS = 128  # of a strand: what a thread keeps of it is 32 or 48 bytes a point
+
+# Strands that are made and styled together, as in between they take 16 bytes a point: 43 MB of 41 points.
+MOST_AT_ONCE = 1 << 16
 
 _GROUP_SIZE = 64
 _KINDS = {name: getattr(program_rows, name) for name in ("TRIM", "CLUMP", "CURL", "FRIZZ", "BEND", "SMOOTH", "WEAVE")}
@@ -66,7 +70,17 @@ class StyleMaker:
     locks: gpu.types.GPUTexture  # of each clump centre, and of each guide, its normal and identity
     levels: list[_Pass]
     hair: _Pass
+    changes: StrandChanges
+    plain: gpu.types.GPUTexture  # (`MOST_AT_ONCE`, P) points of strands before their styles
     _guide_points: np.ndarray | None = None  # of the last `make`
+
+    @property
+    def textures(self) -> list[gpu.types.GPUTexture]:
+        """All that it holds."""
+        own = [self.locks, self.plain, self.hair.known, *(level.known for level in self.levels)]
+        if self.centre_maker is not None:
+            own += [self.centres, *self.centre_maker.textures]
+        return own + self.maker.textures + self.changes.textures
 
     def make(
         self, strands: StrandsOnGPU, guide_points: np.ndarray, rest: gpu.types.GPUTexture | None = None
@@ -76,32 +90,36 @@ class StyleMaker:
         if self._guide_points is None or not np.array_equal(self._guide_points, guide_points):
             self.maker.put_guides(guide_points)
             self._guide_points = guide_points.copy()
+        if rest is None:
+            self.changes.keep(strands)
         texture = strands.texture if rest is None else rest
-        self.maker.fill(texture)
         program = _styles_program(strands.point_count, _kinds_of(self.styling.program))
         if self.centre_maker is not None:
             self.centre_maker.fill(self.centres)
             for level in self.levels:
-                self._style(program, level, self.centres, self.centre_maker)
-        self._style(program, self.hair, texture, self.maker)
-        return self.maker.changes.changed(strands) if rest is None else strands
+                self._style(program, level, (self.centres, texture), 0, int(level.record["strand_count"]))
+        for first in range(0, strands.strand_count, MOST_AT_ONCE):
+            count = min(MOST_AT_ONCE, strands.strand_count - first)
+            self.maker.fill_some(self.plain, first, count)
+            self._style(program, self.hair, (self.plain, texture), first, count)
+        return self.changes.changed(strands) if rest is None else strands
 
-    def _style(self, program, strands, image, maker):
+    def _style(self, program, strands, images, first, count):
+        plain, drawn = images
         program.bind()
         program.uniform_block("styling", strands.block)
         program.uniform_sampler("known", strands.known)
         program.uniform_sampler("locks", self.locks)
-        program.image("strands", image)
-        program.image("centres", image if self.centres is None else self.centres)
-        program.image("boxes", maker.changes.bounds.boxes)
-        groups = -(-int(strands.record["strand_count"]) // _GROUP_SIZE)
+        program.image("plain_strands", plain)
+        program.image("centres", plain if self.centres is None else self.centres)
+        program.image("strands", drawn)
+        self.changes.bind(program)
+        program.uniform_int("first_strand", first)
+        program.uniform_int("some_count", count)
+        groups = -(-count // _GROUP_SIZE)
         rows = -(-groups // MOST_GROUPS)
         gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
         gpu.shader.unbind()
-
-    def of_radii(self, radii: np.ndarray) -> "StyleMaker":
-        """The same of strands with radii (P,) float32."""
-        return replace(self, maker=self.maker.of_radii(radii))
 
     def rebound(self, binding: HairBinding, styling: "Styling") -> "StyleMaker | None":
         """The same for other weights or limits of the same strands and clumps; None where these are others.
@@ -147,40 +165,51 @@ class StyleMaker:
         return True
 
 
+def programs_of(styling: "Styling | None", slot_count: int, point_count: int) -> list[tuple]:
+    """Programs that `maker_of` and the makers need, for `shaders.compile_one`; slot_count: guides of a strand."""
+    if styling is None or not len(styling.program):
+        return strand_maker.programs_of(slot_count, is_plain=False)
+    plain = strand_maker.programs_of(slot_count, is_plain=True)
+    return [*plain, (_styles_program, (point_count, _kinds_of(styling.program)))]
+
+
 def maker_of(
     binding: HairBinding,
     styling: "Styling | None",
-    radii: np.ndarray,
+    point_count: int,
     axes: np.ndarray,
     before: StrandMaker | StyleMaker | None = None,
 ) -> StrandMaker | StyleMaker:
     """What makes the strands of bound hair, with styles or without: the one before where that still does.
 
-    before: for strands at the same places. radii and axes: as in `new_maker`. Raises `HairError` as it does.
+    before: for strands at the same places. point_count and axes: as in `new_maker`. Raises `HairError` as it does.
     """
     if styling is None or not len(styling.program):  # styles of guides alone are in these
         if isinstance(before, StrandMaker):
             return before
-        return strand_maker.new_maker(strand_maker.bound_strands(binding), radii, axes)
+        return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
     if isinstance(before, StyleMaker) and before.binding is not binding:
         before = before.rebound(binding, styling)
     if isinstance(before, StyleMaker) and before.restyle(styling):
         return before
-    return new_style_maker(binding, styling, radii, axes)
+    require_count("points of a strand", point_count, styling.point_count)
+    return new_style_maker(binding, styling, axes)
 
 
-def new_style_maker(binding: HairBinding, styling: "Styling", radii: np.ndarray, axes: np.ndarray) -> StyleMaker:
+def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) -> StyleMaker:
     """The `StyleMaker` of bound hair and its styles, of which `can_style` holds.
 
-    radii: (P,) float32; axes: (3, 3), from the coordinates of roots and guides to those that are drawn. Raises
+    axes: (3, 3), from the coordinates of roots and guides to those that are drawn. Raises
     `HairError` as `new_maker`.
     """
-    require_count("radii", len(radii), styling.point_count)
     point_count = styling.point_count
     _styles_program(point_count, _kinds_of(styling.program))  # first: where there is none, nothing is uploaded
-    maker = strand_maker.new_maker(strand_maker.bound_strands(binding), radii, np.eye(3))
+    maker = strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, np.eye(3), is_plain=True)
+    strand_count = len(styling.data.normals)
+    changes = strand_changes.new_changes(strand_count, point_count)
     record = uniforms.STYLING.record()
     record["axes"][:3, :3], record["axes"][3, 3] = styling.axes.T, 1.0
+    record["row_packed"] = row_strands_of(point_count)
     record["level_count"] = len(styling.data.members)
     record["row_centres"] = TEXTURE_WIDTH // point_count
     locks, record["row_locks"] = _locks(styling.data)
@@ -188,7 +217,7 @@ def new_style_maker(binding: HairBinding, styling: "Styling", radii: np.ndarray,
     if styling.levels:
         bound = _centres_of(styling)
         record["centre_count"] = len(bound.roots)
-        centre_maker = strand_maker.new_maker(bound, radii, np.eye(3), keeps_moved=False)
+        centre_maker = strand_maker.new_maker(bound, point_count, np.eye(3), is_plain=True)
         centre_maker = replace(centre_maker, segments=maker.segments)
         centres, _in_row = strand_changes.empty_rows(len(bound.roots), point_count)
         for level in styling.levels:
@@ -196,7 +225,8 @@ def new_style_maker(binding: HairBinding, styling: "Styling", radii: np.ndarray,
             own["first_strand"], own["are_centres"] = level.first, 1
             levels.append(_new_pass(own, level.data, level.steps, np.eye(3), point_count))
     hair = _new_pass(record, styling.data, styling.program, axes, point_count)
-    return StyleMaker(binding, styling, maker, centre_maker, centres, locks, levels, hair)
+    plain, _in_row = strand_changes.empty_rows(min(strand_count, MOST_AT_ONCE), point_count)
+    return StyleMaker(binding, styling, maker, centre_maker, centres, locks, levels, hair, changes, plain)
 
 
 def _new_pass(record, data, program, axes, point_count):
@@ -274,8 +304,11 @@ def _styles_program(point_count, kinds):
     for slot, name in enumerate(("known", "locks")):
         info.sampler(slot, "FLOAT_2D", name)
     both = {"NO_RESTRICT", "READ", "WRITE"}  # centres are read from the image that others are written to
-    for slot, (name, qualifiers) in enumerate({"strands": both, "centres": both, "boxes": {"WRITE"}}.items()):
-        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=qualifiers)
+    for slot, name in enumerate(("plain_strands", "centres")):
+        info.image(slot, "RGBA32F", "FLOAT_2D", name, qualifiers=both)
+    strand_changes.declare_put(info, first_slot=2)
+    for name in ("first_strand", "some_count"):
+        info.push_constant("INT", name)
     numbers = {"POINTS": point_count, "WAVES": frizz.WAVES_AN_OCTAVE, "MOST_OCTAVES": frizz.MOST_OCTAVES}
     numbers |= {f"KIND_{name}": kind for name, kind in _KINDS.items()}
     numbers |= {f"RANDOM_{name}": purpose for name, purpose in PURPOSES.items()}

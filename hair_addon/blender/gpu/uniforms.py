@@ -27,9 +27,10 @@ class Block:
 
     def __init__(self, type_name, members):
         """members: {name: GLSL type}, or {name: (Block, count)} and {name: ("vec4", count)} for arrays."""
-        offsets, formats, lines = [], [], []
+        names, offsets, formats, lines = [], [], [], []
         end = 0
-        for name, kind in members.items():
+        # A float behind a vec3 is in its fourth word in std140, and behind that in the Metal Shading Language.
+        for name, kind in sorted(members.items(), key=lambda member: member[1] == "vec3"):
             if isinstance(kind, tuple):
                 element, count = kind
                 is_block = isinstance(element, Block)
@@ -40,14 +41,13 @@ class Block:
                 form = np.dtype((scalar, shape))
                 lines.append(f"  {kind} {name};")
             end += -end % alignment
+            names.append(name)
             offsets.append(end)
             formats.append(form)
             end += form.itemsize
         self.type_name = type_name
         self.source = f"struct {type_name} {{\n" + "\n".join(lines) + "\n};\n"
-        self.dtype = np.dtype(
-            {"names": list(members), "formats": formats, "offsets": offsets, "itemsize": end + -end % 16}
-        )
+        self.dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": end + -end % 16})
 
     def record(self):
         """A zeroed record to be filled by member name."""
@@ -78,6 +78,8 @@ VIEW = Block(
         "seen_points": "int",  # of each strand's points, those of the visibility textures
         "seen_opacity": "float",  # of a strand, for which they hold
         "row_strands": "int",
+        "radius_strands": "int",  # whose radii are stored: one for all, or each
+        "radius_unit": "float",  # that they are stored in
         "object_scale": "float",
         "pixels_per_unit": "float",  # at distance one, in a perspective
         "least_half_width": "float",  # there as well
@@ -147,6 +149,7 @@ MAKING = Block(
     "Making",
     {
         "axes": "mat4",  # from the coordinates of roots and guides to those of the strands
+        "axes_scale": "float",  # the greatest by which they lengthen anything
         "limits": "vec4",  # as `limited_part` of shaders/include/guide_sum.glsl
         "keep_length": "float",
         "strand_count": "int",
@@ -157,7 +160,6 @@ MAKING = Block(
         "row_segments": "int",
         "row_bindings": "int",
         "row_strands": "int",
-        "row_moved": "int",  # 0 where it is not kept where strands were
     },
 )
 
@@ -181,15 +183,16 @@ STYLING = Block(
         "axes": "mat4",  # from the coordinates of strands to the surface's own axes
         "to_drawn": "mat4",  # from the coordinates of strands to those that are drawn
         "strand_count": "int",
-        "first_strand": "int",  # of these in the image
+        "first_strand": "int",  # where the first of these is in the image
         "row_strands": "int",  # whole strands in a row of each texture
+        "row_packed": "int",
         "row_known": "int",
         "row_centres": "int",
         "row_locks": "int",
         "known_texels": "int",  # of a strand
         "level_count": "int",  # of clump centres, those of guides among them
         "centre_count": "int",  # of all levels, those of guides left out
-        "are_centres": "int",  # whether centres are styled: arc lengths take the place of radii
+        "are_centres": "int",  # whether centres are styled
         "step_count": "int",
         "steps": (STEP, MOST_STEPS),
     },

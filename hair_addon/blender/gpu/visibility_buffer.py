@@ -15,6 +15,7 @@ from . import drawing, light_grid, shaders, uniforms
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
+HAS_TILES = True
 NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
 
 
@@ -50,6 +51,8 @@ class VisibilityBuffer:
         self.color = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
+        tiles = tuple(-(-length // shaders.TILE) for length in self.size)
+        self._farthest = gpu.types.GPUTexture(tiles, format="R32UI")  # of the depths in each
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
         self._has_strips = False  # whether `depths` are of strips alone
@@ -149,12 +152,26 @@ class VisibilityBuffer:
         """Find the nearest segments by a compute program: first depths, then indices."""
         self._copy_depths()
         self._has_strips = False
+        # A few strands hide most of the others, and those behind a head are hidden by it.
+        for part, is_depth in ((drawing.WALK_FIRST, 1), (drawing.WALK_OTHERS, 1), (drawing.WALK_ALL, 0)):
+            self._find_farthest()
+            self._walk(part, is_depth)
+
+    def _find_farthest(self):
+        """Fill the tiles with the farthest of their depths."""
+        program = shaders.farthest_depths_program()
+        with drawing.bound(program, {}, {"depths": self.depths}):
+            program.image("farthest_depths", self._farthest)
+            drawing.dispatch_over(program, (self._farthest.width, self._farthest.height))
+
+    def _walk(self, part, is_depth):
         program = shaders.segments_program()
-        images = {"depths": self.depths, "segments": self.segments}
-        for is_depth in (1, 0):
-            for placed in self._hair:
-                constants = {"first_segment": placed.first, "is_depth": is_depth}
-                drawing.walk_strands(placed.strands, program, placed.record, placed.lights, {}, images, constants)
+        images, samplers = {"depths": self.depths, "segments": self.segments}, {"farthest_depths": self._farthest}
+        for placed in self._hair:
+            constants = {"first_segment": placed.first, "is_depth": is_depth, "are_tiles_known": int(HAS_TILES)}
+            drawing.walk_strands(
+                placed.strands, program, placed.record, placed.lights, samplers, images, constants, part
+            )
 
     def nearest_depths(self):
         """`depths` with those of surfaces where there is no hair."""
@@ -211,7 +228,7 @@ class VisibilityBuffer:
         blocks = {"view": uniforms.uniform_buffer(record), "lights": placed.lights, **blocks}
         grid = light_grid.none()
         textures = {"light_grid": grid, **placed.samplers, **textures}
-        textures |= {"segments": self.segments, "strands": placed.strands.texture}
+        textures |= {"segments": self.segments, **drawing.strand_samplers(placed.strands)}
         with drawing.bound(program, blocks, textures):
             program.image("picture", picture)
             program.uniform_int("first_segment", placed.first)

@@ -142,6 +142,15 @@ def _pose_of(surface_object):
     return pose_cache.get(surface_object.session_uid, lambda: posed_strands.read_pose(surface_object, depsgraph()))
 
 
+def drawn_bytes(datablock):
+    """Memory that viewports use on the GPU for a hair Curves datablock [bytes]; None while nothing draws it."""
+    kept = _strands_of(datablock.session_uid)
+    if kept is None or kept.on_gpu is None:
+        return None
+    textures = [*kept.on_gpu.textures, *kept.making.textures]
+    return strand_textures.bytes_of(textures) + strand_textures.seen_bytes(kept.on_gpu)
+
+
 def refuse(datablock, error):
     """Do not draw a datablock again until it changes; report the reason once."""
     strand_cache.keep(datablock.session_uid, _REFUSED)
@@ -176,6 +185,15 @@ def may_restyle(session_uid, bound, styles):
     """Whether the GPU makes what viewports show of bound hair with other styles."""
     kept = _strands_of(session_uid)
     return may_make(session_uid) and bound.straight is None and kept.making.can_style(styles)
+
+
+def prepare_makers():
+    """Compile one of the programs that edits of what viewports draw need; whether there was one left."""
+    for datablock in bpy.data.hair_curves:
+        kept, bound = _strands_of(datablock.session_uid), bindings.of(datablock)
+        if kept is not None and bound is not None and kept.making.prepare(bound.shown):
+            return True
+    return False
 
 
 def choose_makers():

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.errors import HairError
 from ..data.strands.posed_strands import Pose
-from ..gpu import maker_choice, strand_carrier, strand_maker, strand_textures, style_maker
+from ..gpu import maker_choice, shaders, strand_carrier, strand_maker, strand_textures, style_maker
 from ..groom.bindings import BoundHair
 from ..groom.styled_hair import StyledHair
 from ..host import running
@@ -43,10 +43,27 @@ class Making:
     _binding: Any = None  # `HairBinding` of the maker
     _triangles: np.ndarray | None = None  # that the carrier's strands are rooted on
 
+    @property
+    def textures(self) -> list:
+        """All that its maker and its carrier hold."""
+        return [texture for one in (self.maker, self.carrier) if one is not None for texture in one.textures]
+
     def choose(self, is_wanted: bool, bound: BoundHair | None) -> None:
         """Choose what it is to do: carry strands, and make those of `BoundHair` with their styles."""
         self.may_carry = is_wanted and not self.is_refused
         self.is_chosen = self.may_carry and bound is not None and self.can_style(bound.styles)
+
+    def prepare(self, bound: BoundHair) -> bool:
+        """Compile one program that the next edit of `BoundHair` needs; whether there was one."""
+        if not self.is_chosen:
+            return False
+        slot_count = bound.binding.guide_weights.indices.shape[1]
+        needed = style_maker.programs_of(bound.styles.styling, slot_count, len(bound.radii))
+        try:
+            return shaders.compile_one(needed)
+        except HairError:
+            self._refuse()
+            return False
 
     def can_style(self, styles: StyledHair) -> bool:
         """Whether styles can be applied to strands that are made here: the one place where that is decided."""
@@ -68,26 +85,27 @@ class Making:
             if self.carrier is not None:
                 kept.on_gpu = self.carrier.carry(kept.on_gpu, None if pose is None else pose.motion)
         except HairError:
-            self.is_refused, self.is_chosen, self.may_carry, self.carrier = True, False, False, None
+            self._refuse()
             return False
         self.due, kept.pose = None, pose
         return True
+
+    def _refuse(self):
+        self.is_refused, self.is_chosen, self.may_carry, self.carrier = True, False, False, None
 
     def _make(self, kept):
         bound, binding, known = self.due, self.due.binding, self._binding
         before = self.maker if self.maker is not None and known.positions is binding.positions else None
         axes = bound.surface.to_local_axes
-        self.maker = style_maker.maker_of(binding, bound.styles.styling, bound.radii, axes, before)
+        self.maker = style_maker.maker_of(binding, bound.styles.styling, len(bound.radii), axes, before)
         if known is not binding and self.maker is before:
             if known.guide_weights is not binding.guide_weights:
                 self.maker = self.maker.weighed(strand_maker.bound_strands(binding))
             self.maker = self.maker.limited(binding.limits.fading, binding.keep_length)
         self._binding = binding
         if not np.array_equal(kept.radii[0], bound.radii):
-            self.maker = self.maker.of_radii(bound.radii)
             kept.radii = np.broadcast_to(bound.radii, kept.radii.shape)
-            sizes = {"mean_radius": float(bound.radii.mean()), "greatest_radius": float(bound.radii.max())}
-            kept.on_gpu = replace(kept.on_gpu, radii=kept.radii, **sizes)
+            kept.on_gpu = strand_textures.with_radii(kept.on_gpu, kept.radii)
         wetness = bound.styles.wetness
         if not are_equal(kept.wetness, wetness):
             kept.wetness = wetness
@@ -110,7 +128,7 @@ class Making:
         places = pose.rooted(kept.rooted_on[1], kept.places, kept.points[:, 0])
         drawn = kept.on_gpu
         if _is_deformed(kept.pose):
-            rest = strand_textures.places_texture(kept.points, kept.radii, drawn.row_strands)
+            rest = strand_textures.packed_texture(kept.points, drawn.row_strands)
         else:
             rest, kept.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
         self.carrier = strand_carrier.new_carrier(rest, drawn.point_count, places, surface.rest)

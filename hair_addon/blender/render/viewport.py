@@ -107,7 +107,8 @@ def _draw_hair(context):
     )
     if kept.outline is not None:
         kept.outline.show()
-    if not kept.picture.is_fine:
+    # At rest, the programs that the next edit needs are compiled: one a redraw, as each may take a second.
+    if not kept.picture.is_fine or hair_cache.prepare_makers():
         region.tag_redraw()
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
         landmark_warp,
         mesh,
         nearest_rotation,
+        packed_strands,
         resampling,
         root_frames,
         sampling,

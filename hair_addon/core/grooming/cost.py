@@ -12,7 +12,10 @@ from .groom import POINT_COUNT, GuideSettings, HairSettings
 # root: triangle (4), its corners and barycentric coordinates (12 each).
 _POINT_BYTES, _CURVE_BYTES = 16, 65
 _SLOT_BYTES = 8  # which guide, and its weight
-_TEXEL_BYTES = 16  # RGBA, single precision
+# Bytes on the GPU. A point, and what a strand has beside its points: its root, its range, a random number; and where
+# every fourth point of it sees the world, in four textures of half precision.
+_TEXEL_BYTES, _HEAD_BYTES = 8, 12
+_SEEN_STEP, _SEEN_BYTES = 4, 32
 
 # While it is worked on. A triangle of the surface, a guide, a strand.
 _FACE_WORK_BYTES, _GUIDE_WORK_BYTES, _STRAND_WORK_BYTES = 760, 3300, 680
@@ -45,8 +48,12 @@ def curves_bytes(strand_count: int, point_count: int = POINT_COUNT, slot_count: 
 
 
 def gpu_bytes(strand_count: int, point_count: int = POINT_COUNT) -> int:
-    """Memory of strands on the GPU [bytes], but for the end of the texture's last row."""
-    return strand_count * point_count * _TEXEL_BYTES
+    """Memory of drawn strands on the GPU [bytes]: of their points, and of the light that reaches them.
+
+    That is while nobody edits them, and but for the ends of the textures' last rows.
+    """
+    seen_count = -(-(point_count - 1) // _SEEN_STEP) + 1
+    return strand_count * (point_count * _TEXEL_BYTES + _HEAD_BYTES + seen_count * _SEEN_BYTES)
 
 
 def guide_work_bytes(settings: GuideSettings, face_count: int) -> int:

@@ -9,7 +9,7 @@ from hair_addon.core.shading import appearance
 from hair_addon.core.shading.fibre import angles, energy_conserving, kajiya_kay, longitudinal, marschner
 from hair_addon.core.shading.fibre.principled import variance_from_roughness
 from hair_addon.core.shading.tables import dual_scattering, lookup_tables
-from tests.support import glsl
+from tests.support import drawn_strands, glsl
 
 AXES = ["ANGLES", "COSINES"]  # in the order of AXES_ANGLES and AXES_COSINES in marschner.glsl
 
@@ -294,6 +294,15 @@ def test_strip_passes_every_side_of_every_point_once_apart_from_its_ends(strip):
     np.testing.assert_array_equal(counts, np.where(is_end, 2, 1))
 
 
+STRAND_PLACE = """
+vec3 place_of(int strand, int point, int point_count, int row_strands)
+{
+  ivec2 first = packed_first(strand, 0, point_count, row_strands);
+  return packed_place(strands, first, packed_head(strands, first), point);
+}
+"""
+
+
 @pytest.mark.parametrize(("strand_count", "point_count"), [(1, 2), (1000, 41), (3, 5000)])
 def test_strand_texture_holds_the_points_where_the_shader_looks(rng, strand_count, point_count):
     points = rng.random((strand_count, point_count, 3), dtype=np.float32)
@@ -301,14 +310,16 @@ def test_strand_texture_holds_the_points_where_the_shader_looks(rng, strand_coun
     uploaded = strand_textures.upload_strands(points, radii)
     strand, point = (grid.ravel() for grid in np.indices((strand_count, point_count)))
     found = glsl.evaluate(
-        glsl.source("include/strand.glsl"),
-        "vec4",
-        f"texelFetch(strands, strand_texel(strand, point, {point_count}, {uploaded.row_strands}), 0)",
+        glsl.source("include/packed_strand.glsl") + STRAND_PLACE,
+        "vec3",
+        f"place_of(strand, point, {point_count}, {uploaded.row_strands})",
         textures={"strands": uploaded.texture},
         strand=strand,
         point=point,
-    )
-    np.testing.assert_array_equal(found, np.concatenate([points, radii[..., None]], axis=-1).reshape(-1, 4))
+    ).reshape(points.shape)
+    assert drawn_strands.are_drawn(found, points)
+    np.testing.assert_allclose(found, drawn_strands.places(uploaded), rtol=0.0, atol=2.0**-22)
+    np.testing.assert_allclose(drawn_strands.radii(uploaded), radii, rtol=0.0, atol=2.0**-16 * radii.max())
 
 
 def test_strip_side_is_a_unit_vector_across_the_strand_that_faces_the_viewer(fibres):

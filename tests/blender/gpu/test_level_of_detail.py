@@ -48,7 +48,7 @@ def test_further_hair_has_fewer_strands_and_points_one_by_one(many):
 def drawn_strands(strand_count, steps):
     """Which strands a shader draws, turn after turn."""
     record = drawing.strand_record(
-        SimpleNamespace(strand_count=strand_count, point_count=2, row_strands=1),
+        SimpleNamespace(strand_count=strand_count, point_count=2, row_strands=1, radius_strands=1, radius_unit=1.0),
         uniforms.VIEW.record(),
         np.eye(4),
         steps,

@@ -35,7 +35,7 @@ def lit(lights, hair, surfaces, places, size=512):
     receiver = drawing.upload_surface(*[np.repeat(places, 3, axis=0).astype(np.float32)] * 2)
     view = ambient_visibility._view_of_surface(receiver)
     view["seen_opacity"] = 1.0
-    target = ambient_visibility._Target((view, receiver.places))
+    target = ambient_visibility._Target((view, {"places": receiver.places, "strand_radii": receiver.places}))
     target.add(lights, maps.samplers)
     texels = np.concatenate([np.array(t.read()).reshape(-1, 4) for t in target.textures.values()], axis=1)
     return texels[:, :6].sum(axis=1)[: 3 * len(places) : 3]  # of the six sides

@@ -11,6 +11,7 @@ from hair_addon.blender.gpu import strand_carrier, strand_textures
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import surface_deform
 from hair_addon.core.geometry.mesh import Faces
+from tests.support import drawn_strands
 
 SIDE, STRANDS, POINTS = 9, 700, 7
 CLOSE = 4e-6  # [m] beside places of 1 m
@@ -58,10 +59,6 @@ def carrier_of(rooted):
     return strand_carrier.new_carrier(uploaded(points).texture, POINTS, places, vertices)
 
 
-def texels(strands):
-    return np.array(strands.texture.read(), np.float32).reshape(-1, POINTS, 4)[:STRANDS]
-
-
 def test_strands_are_where_warp_carries_them(blender, rooted):
     vertices, faces, places, points = rooted
     carrier, strands = carrier_of(rooted), uploaded(np.zeros_like(points))
@@ -69,26 +66,24 @@ def test_strands_are_where_warp_carries_them(blender, rooted):
         motion = surface_deform.motion(vertices, bent(vertices, amount), faces)
         strands = carrier.carry(strands, motion)
         wanted = surface_deform.carry(points, motion, *places)
-        found = texels(strands)
-        np.testing.assert_allclose(found[..., :3], wanted, rtol=0.0, atol=CLOSE)
+        found = drawn_strands.places(strands)
+        np.testing.assert_allclose(found, wanted, rtol=0.0, atol=CLOSE)
         still = (motion.after == vertices).all(axis=1) & (motion.axes == np.eye(3)[:2]).all(axis=(1, 2))
         is_still = still[places[0]].all(axis=1)
         assert 0.1 < is_still.mean() < 0.9
-        np.testing.assert_array_equal(found[is_still, :, :3], points[is_still])
-        np.testing.assert_array_equal(found[..., 3], strands.radii)
-        corners = found[..., :3].reshape(-1, 3)
-        np.testing.assert_array_equal(strands.bounds, [corners.min(axis=0), corners.max(axis=0)])
+        np.testing.assert_array_equal(found[is_still], drawn_strands.places(uploaded(points))[is_still])
+        corners = found.reshape(-1, 3)
+        np.testing.assert_allclose(strands.bounds, [corners.min(axis=0), corners.max(axis=0)], rtol=0.0, atol=CLOSE)
 
 
 def test_at_rest_strands_are_the_same_bits(blender, rooted):
     vertices, faces, _places, points = rooted
     carrier = carrier_of(rooted)
     strands = carrier.carry(uploaded(points), surface_deform.motion(vertices, bent(vertices, 3.0), faces))
-    before = texels(strands)
+    before = drawn_strands.places(strands)
     strands = carrier.carry(strands, None)
-    np.testing.assert_array_equal(texels(strands)[..., :3], points)
-    moved = np.array(strands.moved.points.read(), np.float32).reshape(-1, POINTS + 1, 4)[:STRANDS, 1:]
-    np.testing.assert_array_equal(moved, before)
+    np.testing.assert_array_equal(drawn_strands.places(strands), drawn_strands.places(uploaded(points)))
+    np.testing.assert_array_equal(drawn_strands.places_before(strands, STRANDS), before)
     assert strands.moved.turn == 2
 
 

@@ -16,6 +16,7 @@ from hair_addon.core.geometry.mesh import SurfacePoints
 from hair_addon.core.grooming import following
 from hair_addon.core.interpolation import hair_binding
 from hair_addon.core.interpolation.guide_weights import find_candidates
+from tests.support import drawn_strands
 
 # Of a strand's length, by which it may differ: sums in single precision, in another order.
 CLOSE = 1e-5
@@ -61,7 +62,7 @@ def by_warp(binding, guides, axes):
 
 
 def new_maker(binding, point_count, axes):
-    return strand_maker.new_maker(strand_maker.bound_strands(binding), profile(point_count), axes)
+    return strand_maker.new_maker(strand_maker.bound_strands(binding), point_count, axes)
 
 
 def uploaded(points):
@@ -70,13 +71,6 @@ def uploaded(points):
 
 def profile(point_count):
     return np.linspace(2e-4, 1e-5, point_count, dtype=np.float32)
-
-
-def texels(texture, count, texels_each):
-    """(count, texels_each, 4) of a texture whose rows hold whole strands."""
-    rows = np.array(texture.read(), np.float32).reshape(texture.height, texture.width, 4)
-    in_row = texture.width // texels_each
-    return rows[:, : in_row * texels_each].reshape(-1, texels_each, 4)[:count]
 
 
 AXES = np.array([[0.0, -2.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]])
@@ -97,14 +91,13 @@ def test_strands_are_those_of_warp(blender, rng, point_count, slots, limits):
     before = uploaded(np.zeros_like(wanted))
     maker = new_maker(binding, point_count, AXES)
     made = maker.make(before, guides.numpy())
-    found = texels(made.texture, STRANDS, point_count)
+    found = drawn_strands.places(made)
     lengths = np.linalg.norm(np.diff(wanted, axis=1), axis=2).sum(axis=1)
-    error = np.linalg.norm(found[..., :3] - wanted, axis=2).max(axis=1)
+    error = np.linalg.norm(found - wanted, axis=2).max(axis=1)
     # Places of 1 m have half a unit of their last digit beside it, twice.
     assert (error <= CLOSE * lengths + 4.0 * 2.0**-23).all(), error.max()
-    np.testing.assert_array_equal(found[..., 3], before.radii)
-    places = found[..., :3].reshape(-1, 3)
-    np.testing.assert_array_equal(made.bounds, [places.min(axis=0), places.max(axis=0)])
+    places, close = found.reshape(-1, 3), drawn_strands.tolerance(found).max()
+    np.testing.assert_allclose(made.bounds, [places.min(axis=0), places.max(axis=0)], rtol=0.0, atol=close)
     centre, radius = made.ball
     assert (np.linalg.norm(places - centre, axis=1) <= radius * (1.0 + 1e-6)).all()
 
@@ -125,15 +118,15 @@ def test_an_edit_leaves_where_strands_were(blender, rng):
     first = uploaded(by_warp(binding, guides, np.eye(3)))
     maker = new_maker(binding, 9, np.eye(3))
     once = maker.make(first, guides.numpy())
-    there = texels(once.texture, STRANDS, 9)
+    there = drawn_strands.places(once)
     combed = guides.numpy() + np.linspace(0.0, 0.1, 9, dtype=np.float32)[:, None]
     twice = maker.make(once, combed)
     assert twice.texture is once.texture
     assert twice.moved.turn == once.moved.turn + 1
-    np.testing.assert_array_equal(texels(twice.moved.points, STRANDS, 10)[:, 1:], there)
+    np.testing.assert_array_equal(drawn_strands.places_before(twice, STRANDS), there)
     rows = np.array(twice.moved.rows.read(), np.float32).ravel()[:STRANDS]
     np.testing.assert_array_equal(rows, np.arange(1, STRANDS + 1))
-    assert np.abs(texels(twice.texture, STRANDS, 9) - there).max() > 0.01
+    assert np.abs(drawn_strands.places(twice) - there).max() > 0.01
 
 
 def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
@@ -145,7 +138,7 @@ def test_much_hair_keeps_no_second_texture(blender, rng, monkeypatch):
     assert maker.changes.moved.width * maker.changes.moved.height == 1
     made = maker.make(uploaded(np.zeros_like(wanted)), guides.numpy())
     assert made.moved.turn == 2
-    np.testing.assert_allclose(texels(made.texture, STRANDS, 9)[..., :3], wanted, rtol=0.0, atol=CLOSE)
+    np.testing.assert_allclose(drawn_strands.places(made), wanted, rtol=0.0, atol=CLOSE)
 
 
 def test_an_edit_uploads_guides_and_nothing_else(blender, rng, monkeypatch):

@@ -13,6 +13,7 @@ from hair_addon.core.styling import bend, braid, clump, curl, frizz, lean, progr
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.program import Cutter
 from hair_addon.core.styling.style_inputs import Inputs
+from tests.support import drawn_strands
 from tests.support.styled import head
 
 # Of a strand's length, by which it may differ: sums in single precision, in another order.
@@ -21,7 +22,6 @@ CLOSE = 1e-5
 # tips of rolls, and where strands turn past the centre of their clump.
 SENSITIVE = 2.0
 STRANDS = 150
-RADII = np.linspace(2e-4, 1e-5, 41, dtype=np.float32)
 
 STACKS = {
     "cut": (trim.Settings(factor=0.8, random=0.6, undercoat=0.3, vary=0.2),),
@@ -60,14 +60,12 @@ def uploaded(strands):
 
 
 def made(maker, hair, styling, strands):
-    """((S, P, 3) points, (S, P) radii) after the GPU has made strands in an uploaded texture, whose bounds it knows."""
+    """(S, P, 3) points after the GPU has made strands in an uploaded texture, whose bounds it knows."""
     on_gpu = maker.make(strands, styling.guides(hair.guides).numpy())
-    texels = np.array(on_gpu.texture.read(), np.float32).reshape(on_gpu.texture.height, on_gpu.texture.width, 4)
-    in_row = on_gpu.texture.width // on_gpu.point_count
-    texels = texels[:, : in_row * on_gpu.point_count].reshape(-1, on_gpu.point_count, 4)[: on_gpu.strand_count]
-    boxes = texels[..., :3].reshape(-1, 3)
-    np.testing.assert_array_equal(on_gpu.bounds, [boxes.min(axis=0), boxes.max(axis=0)])
-    return texels[..., :3], texels[..., 3]
+    points = drawn_strands.places(on_gpu)
+    corners, close = points.reshape(-1, 3), drawn_strands.tolerance(points).max()
+    np.testing.assert_allclose(on_gpu.bounds, [corners.min(axis=0), corners.max(axis=0)], rtol=0.0, atol=close)
+    return points
 
 
 def errors(hair, points, wanted):
@@ -93,12 +91,11 @@ def assert_same(hair, rng, styles, axes=None, **given):
     styling, wanted = hair.bound(*styles, **given), hair.styled(*styles, **given)
     assert style_maker.can_style(styling)
     before = uploaded(wanted)
-    maker = style_maker.maker_of(hair.binding, styling, before.radii[0], axes)
-    points, radii = made(maker, hair, styling, before)
+    maker = style_maker.maker_of(hair.binding, styling, before.point_count, axes)
+    points = made(maker, hair, styling, before)
     found = np.sort(errors(hair, points @ np.linalg.inv(axes).T.astype(np.float32), wanted))
     if found[-1] > CLOSE:
         assert (found <= np.maximum(CLOSE, SENSITIVE * shaken(hair, rng, wanted, *styles, **given))).all()
-    np.testing.assert_array_equal(radii, before.radii)
     return maker, before, wanted
 
 
@@ -140,7 +137,7 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
     """The rows of each pass, and neither guides nor textures; then strands are those of the new settings."""
     styles = STACKS["locks that curl"]
     styling = hair.bound(*styles)
-    maker = style_maker.maker_of(hair.binding, styling, RADII, np.eye(3))
+    maker = style_maker.maker_of(hair.binding, styling, 41, np.eye(3))
     strands = maker.make(uploaded(hair.plain), hair.guides.numpy())
     changed = styles[0], replace(styles[1], radius=0.02), styles[2]
     other, sizes = hair.bound(*changed), []
@@ -152,8 +149,8 @@ def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
         )
         watched.setattr(gpu.types, "GPUTexture", None)
         watched.setattr(gpu.types, "GPUUniformBuf", None)
-        assert style_maker.maker_of(hair.binding, other, RADII, np.eye(3), maker) is maker
-        points, _radii = made(maker, hair, other, strands)
+        assert style_maker.maker_of(hair.binding, other, 41, np.eye(3), maker) is maker
+        points = made(maker, hair, other, strands)
     assert sizes == [uniforms.STYLING.dtype.itemsize] * 3  # of strands, and of centres on two levels
     assert len(shaders.program_cache) == programs
     assert np.quantile(errors(hair, points, hair.styled(*changed)), 0.95) <= CLOSE
@@ -166,17 +163,17 @@ def test_masks_that_are_painted_further(hair, rng, one_program):
         inputs = Inputs(masks={("Mask", "", False): Mask(None if weights is None else weights.astype(np.float32))})
         styles = clump.Settings(size=0.04), curl.Settings(mask="" if weights is None else "Mask")
         styling = hair.bound(*styles, inputs=inputs)
-        before, maker = maker, style_maker.maker_of(hair.binding, styling, RADII, np.eye(3), maker)
+        before, maker = maker, style_maker.maker_of(hair.binding, styling, 41, np.eye(3), maker)
         assert before in (None, maker)
-        points, _radii = made(maker, hair, styling, strands)
+        points = made(maker, hair, styling, strands)
         assert np.quantile(errors(hair, points, hair.styled(*styles, inputs=inputs)), 0.95) <= CLOSE
 
 
 def test_other_clumps_are_bound_again(hair, one_program):
     styling = hair.bound(clump.Settings(size=0.04))
-    maker = style_maker.maker_of(hair.binding, styling, RADII, np.eye(3))
+    maker = style_maker.maker_of(hair.binding, styling, 41, np.eye(3))
     for styles in [(clump.Settings(size=0.03, levels=1),), ()]:
-        other = style_maker.maker_of(hair.binding, hair.bound(*styles), RADII, np.eye(3), maker)
+        other = style_maker.maker_of(hair.binding, hair.bound(*styles), 41, np.eye(3), maker)
         assert other is not maker
 
 

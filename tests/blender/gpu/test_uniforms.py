@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What fills a uniform block in Python is what the shader reads."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from hair_addon.blender.gpu import uniforms
 from hair_addon.core.params import declared
-from hair_addon.core.shading.fibre import kajiya_kay
+from hair_addon.core.shading.fibre import kajiya_kay, strand_variation
 from hair_addon.core.shading.tables import lookup_tables
 from tests.support import glsl
 
@@ -44,6 +46,18 @@ def number(record, start=1):
             record[member] = np.arange(start, start + values.size).reshape(values.shape)
             start += values.size
     return start
+
+
+@pytest.mark.parametrize(
+    "block",
+    [*PROBED, *map(uniforms.settings_block, (lookup_tables.Settings, kajiya_kay.Settings, strand_variation.Settings))],
+    ids=lambda block: block.type_name,
+)
+def test_a_vec3_takes_four_words_as_metal_has_it(block):
+    """The Metal Shading Language pads it to 16 bytes, where std140 lets a scalar into the last four."""
+    fields = sorted((offset, form.shape) for form, offset, *_title in block.dtype.fields.values())
+    for (offset, shape), (after, _shape) in pairwise(fields):
+        assert shape != (3,) or after - offset >= 16
 
 
 @pytest.mark.parametrize("block", PROBED, ids=lambda block: block.type_name)

@@ -16,6 +16,7 @@ from hair_addon.blender.live import handlers, invalidation, live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.core.grooming import following
 from hair_addon.core.interpolation.guide_weights import reach
+from tests.support import drawn_strands
 from tests.support.counting import counts_of
 from tests.support.reading import attribute, points, write_points
 
@@ -31,9 +32,7 @@ def window(monkeypatch):
 
 def drawn(hair):
     """(S, P, 3) in the texture that the shader reads."""
-    on_gpu = hair_cache.strands_on_gpu(hair.data)
-    texels = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)
-    return texels[: on_gpu.strand_count, :, :3]
+    return drawn_strands.places(hair_cache.strands_on_gpu(hair.data))
 
 
 def stroke(guides, combed_guides, steps=4):
@@ -103,7 +102,7 @@ def test_only_strands_of_moved_guides_are_uploaded(hair, window, monkeypatch):
     monkeypatch.setattr(
         strand_textures, "move_strands", lambda s, chosen, p: (moved.append(chosen), real(s, chosen, p))[1]
     )
-    before = points(hair)
+    before = drawn(hair)
     for _ in stroke(guides, [7], steps=1):
         after = drawn(hair)
     has_moved = (after != before).any(axis=(1, 2))
@@ -185,13 +184,13 @@ def test_sliders_that_keep_roots_search_nothing_and_write_when_they_are_let_go(h
     for value in values:
         setattr(settings, name, value)
         bpy.context.view_layer.update()
-        assert not np.array_equal(drawn(hair), before)
+        assert not drawn_strands.are_drawn(drawn(hair), before)
     for _ in range(3):
         bpy.context.view_layer.update()
     assert (calls["searches"], calls["uploads"], calls["writes"]) == (0, 3, 0)
     live_hair.write_all()
     assert calls["writes"] == 1
-    assert np.array_equal(points(hair), drawn(hair))
+    assert drawn_strands.are_drawn(drawn(hair), points(hair))
     assert np.array_equal(attribute(hair, "root_triangle"), roots)
     assert not hair.data.vellus.is_stale
     assert np.array_equal(points(hair), grown_from_nothing(hair))
@@ -258,7 +257,7 @@ def test_regenerated_hair_is_redrawn(hair, monkeypatch):
     settings = replace(pipeline.inputs_of(hair.data)[1], seed=7)
     pipeline.interpolate_hair(hair.data.vellus.guide_curves, settings, bpy.context.evaluated_depsgraph_get(), hair.data)
     bpy.context.view_layer.update()
-    assert np.array_equal(drawn(hair), points(hair)) and not np.array_equal(drawn(hair), before)
+    assert drawn_strands.are_drawn(drawn(hair), points(hair)) and not np.array_equal(drawn(hair), before)
     assert (calls["uploads"], calls["moves"]) == (1, 0)
 
 
@@ -287,11 +286,11 @@ def test_undo_and_redo_keep_hair_and_guides_together(hair, window, is_written_be
     bpy.context.view_layer.update()
     live_hair.write_all()
     assert np.array_equal(points(bpy.data.objects["Hair"]), before)
-    assert np.array_equal(drawn(bpy.data.objects["Hair"]), before)
+    assert drawn_strands.are_drawn(drawn(bpy.data.objects["Hair"]), before)
     bpy.ops.ed.redo()
     bpy.context.view_layer.update()
     live_hair.write_all()
-    assert np.array_equal(points(bpy.data.objects["Hair"]), wanted)
+    assert drawn_strands.are_drawn(wanted, points(bpy.data.objects["Hair"]))
     assert np.array_equal(drawn(bpy.data.objects["Hair"]), wanted)
 
 
@@ -328,7 +327,7 @@ def test_changes_before_a_pending_write_are_evaluated(hair, sphere, window):
         bpy.context.view_layer.update()
     np.testing.assert_allclose(np.linalg.norm(drawn(hair)[:, 0], axis=1), 1.43, atol=0.01)
     live_hair.write_all()
-    assert np.array_equal(points(hair), drawn(hair))
+    assert drawn_strands.are_drawn(drawn(hair), points(hair))
 
 
 def test_a_file_saved_in_the_middle_of_a_stroke_gets_its_hair(hair, window, tmp_path, monkeypatch):

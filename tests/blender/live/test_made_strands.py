@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import curves
-from hair_addon.blender.gpu import ambient_visibility, drawing, maker_choice, shaders, strand_maker
+from hair_addon.blender.gpu import ambient_visibility, drawing, maker_choice, shaders, strand_maker, strand_textures
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
@@ -19,6 +19,7 @@ from hair_addon.blender.settings import preferences
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following
 from tests.blender.render.test_hair_places import view3d
+from tests.support import drawn_strands
 from tests.support.counting import counts_of
 from tests.support.made_strands import CLOSE, comb, drawn, grown
 from tests.support.reading import points
@@ -49,13 +50,30 @@ def test_a_stroke_computes_nothing_here_and_is_written_without_a_jump(watched, m
     assert np.abs(shown - before).max() > 0.01
 
 
+def test_drawn_strands_take_eight_bytes_a_point(hair, window):
+    """And the memory of what makes them is counted with them."""
+    drawn(hair)
+    on_gpu = hair_cache.strands_on_gpu(hair.data)
+    rows = on_gpu.texture.height * on_gpu.row_strands
+    strands = strand_textures.bytes_of([on_gpu.texture, on_gpu.radii_texture])
+    assert strands <= rows * 8 * (on_gpu.point_count + 1) + 4 * on_gpu.point_count
+    before = hair_cache.drawn_bytes(hair.data)
+    assert before > strands
+    for _ in range(3):  # bound by the first, made on the GPU by the next
+        comb(3)
+        drawn(hair)
+    assert hair_cache.drawn_bytes(hair.data) > before
+    hair_cache.strand_cache.invalidate(hair.data.session_uid)
+    assert hair_cache.drawn_bytes(hair.data) is None
+
+
 def test_bounds_are_those_of_what_is_shown(watched):
     first = hair_cache.strands_on_gpu(watched.data)
     for along in (0.3, 0.3, -0.6):  # out of the first ones, and back
         comb(60, along=(along, 0.0, 0.0))
         shown = drawn(watched).reshape(-1, 3)
         bounds = hair_cache.strands_on_gpu(watched.data).bounds
-        np.testing.assert_array_equal(bounds, [shown.min(axis=0), shown.max(axis=0)])
+        np.testing.assert_allclose(bounds, [shown.min(axis=0), shown.max(axis=0)], rtol=0.0, atol=2e-6)
     assert first.texture is hair_cache.strands_on_gpu(watched.data).texture
 
 
@@ -93,7 +111,7 @@ def test_settings_of_weights_are_followed_where_strands_are_drawn(watched, setti
     comb(20)
     shown = drawn(watched)
     on_gpu = hair_cache.strands_on_gpu(watched.data)
-    radii = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)[: on_gpu.strand_count, :, 3]
+    radii = drawn_strands.radii(on_gpu)
     live_hair.write_all()
     assert (calls["searches"], calls["uploads"], calls["writes"]) == (0, 0, 1)
     monkeypatch.undo()
@@ -118,7 +136,7 @@ def test_strands_that_are_read_again_are_those_of_now(watched):
     comb(30)
     drawn(watched)
     hair_cache.strand_cache.clear()
-    np.testing.assert_array_equal(drawn(watched), grown(watched))
+    assert drawn_strands.are_drawn(drawn(watched), grown(watched))
 
 
 def test_a_driver_that_lacks_something_uploads_as_before(watched, monkeypatch):

@@ -5,13 +5,14 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import uniforms
+from hair_addon.blender.gpu import shaders, uniforms
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import hair_cache
 from hair_addon.blender.settings import style_items
 from hair_addon.core.grooming import following
 from hair_addon.core.styling import bend, clump, curl, frizz, lean, wet
+from tests.support import drawn_strands
 from tests.support.counting import counts_of
 from tests.support.made_strands import CLOSE, comb, drawn, grown
 from tests.support.reading import points
@@ -26,7 +27,7 @@ def test_styles_that_the_gpu_cannot_apply_are_made_as_before(watched, monkeypatc
     drawn(watched)
     assert not hair_cache.may_make(watched.data.session_uid)
     comb(60)
-    np.testing.assert_array_equal(drawn(watched), bindings.of(watched.data).points)
+    assert drawn_strands.are_drawn(drawn(watched), bindings.of(watched.data).points)
 
 
 # [m] that single strands of clumps may differ by, where they turn past a center; other settings move hair by far more.
@@ -66,6 +67,18 @@ def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, sty
     np.testing.assert_allclose(shown, written(watched), rtol=0.0, atol=CLOSE)
     np.testing.assert_array_equal(drawn(watched), shown)
     assert np.abs(shown - grown(watched)).max() > 0.01  # without styles
+
+
+def test_programs_are_compiled_before_the_first_edit_one_at_a_time(watched):
+    watched.data.vellus.hair.point_count = 19  # as nowhere else
+    add_styles(watched, clump.Settings(size=0.3, levels=1), bend.Settings())
+    known = [len(shaders.program_cache)]
+    while hair_cache.prepare_makers():
+        known.append(len(shaders.program_cache))
+    assert known[-1] > known[0] and set(np.diff(known)) == {1}
+    comb(5)
+    drawn(watched)
+    assert len(shaders.program_cache) == known[-1]
 
 
 def test_hair_of_another_number_of_points_than_its_guides(watched, monkeypatch):
@@ -158,9 +171,7 @@ def test_wetness_and_the_radii_that_swell_with_it(watched, monkeypatch):
         slide(watched, 0, "vary", vary)
         shown = drawn(watched)
         on_gpu, bound = hair_cache.strands_on_gpu(watched.data), bindings.of(watched.data)
-        radii = np.array(on_gpu.texture.read(), np.float32).reshape(-1, on_gpu.point_count, 4)[
-            : on_gpu.strand_count, :, 3
-        ]
+        radii = drawn_strands.radii(on_gpu)
         np.testing.assert_array_equal(radii, np.broadcast_to(bound.radii, radii.shape))
         assert on_gpu.greatest_radius == bound.radii.max()
         assert (on_gpu.wetness is None) == (vary == 0.0)

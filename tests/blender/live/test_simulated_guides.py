@@ -9,6 +9,7 @@ from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
+from tests.support import drawn_strands
 from tests.support.reading import points, write_points
 
 
@@ -75,9 +76,7 @@ def test_other_guides_are_shown_as_combed(followed):
 def test_the_guides_that_are_drawn_are_simulated(followed):
     guides, _hair = followed
     show(guides, swung(guides))
-    drawn = np.array(hair_cache.strands_on_gpu(guides.data).texture.read(), np.float32).reshape(-1, 4)[:, :3]
-    expected = swung(guides)
-    np.testing.assert_allclose(drawn[: expected.size // 3].reshape(expected.shape), expected, atol=1e-6)
+    assert drawn_strands.are_drawn(drawn_strands.places(hair_cache.strands_on_gpu(guides.data)), swung(guides))
 
 
 def test_undo_shows_guides_as_combed(followed):

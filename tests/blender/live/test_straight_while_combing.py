@@ -12,6 +12,7 @@ from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import style_items
 from hair_addon.core.styling import clump, curl, lean, steps
+from tests.support import drawn_strands
 from tests.support.counting import counts_of
 from tests.support.reading import points, write_points
 
@@ -43,12 +44,7 @@ def combed(hair, window):
 
 def shown(hair):
     """(S, P, 3) in the texture that viewports draw."""
-    return in_texture(hair_cache.strands_on_gpu(hair.data))
-
-
-def in_texture(strands):
-    texels = np.array(strands.texture.read(), np.float32).reshape(-1, strands.point_count, 4)
-    return texels[: strands.strand_count, :, :3]
+    return drawn_strands.places(hair_cache.strands_on_gpu(hair.data))
 
 
 def stroke(combed_guides, steps=3):
@@ -133,7 +129,7 @@ def test_renders_pictures_and_exports_are_styled(combed):
     wanted, straight = made_anew(combed, is_styled=True), shown(combed)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     picture = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
-    np.testing.assert_allclose(in_texture(picture.hair[0][0]), wanted, atol=1e-6)
+    np.testing.assert_allclose(drawn_strands.places(picture.hair[0][0]), wanted, atol=1e-6)
     np.testing.assert_allclose(api.points(combed.data), wanted, atol=1e-6)
     list(stroke([3, 4], steps=1))
     wanted = made_anew(combed, is_styled=True)
@@ -148,7 +144,7 @@ def test_the_switch_acts_at_once(combed):
     assert not np.allclose(straight, points(combed), atol=0.01)
     switch.shows_styles_while_combing = True
     bpy.context.view_layer.update()
-    assert np.array_equal(shown(combed), points(combed))
+    assert drawn_strands.are_drawn(shown(combed), points(combed))
     switch.shows_styles_while_combing = False
     bpy.context.view_layer.update()
     np.testing.assert_array_equal(shown(combed), straight)

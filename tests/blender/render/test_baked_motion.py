@@ -8,7 +8,9 @@ import pytest
 from hair_addon.blender.groom.dynamics import frame_folders, guide_baking
 from hair_addon.blender.render import motion_vectors
 from hair_addon.core.files import frame_cache
+from hair_addon.core.geometry import packed_strands
 from hair_addon.core.long_work import run_now
+from tests.support import drawn_strands
 from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import points
 from tests.support.rendering import rendered
@@ -84,8 +86,8 @@ def test_vectors_lead_from_frame_to_frame(baked, tmp_path, monkeypatch):
     def drawing(drawn, motion, *others):
         for moment in (motion.before, motion.now, motion.after):
             ((texture, (strand_count, point_count), *_place),) = moment.hair.values()
-            texels = np.array(texture.read(), np.float32).reshape(-1, 4)[: strand_count * point_count, :3]
-            seen.append(texels.reshape(strand_count, point_count, 3))
+            texels = drawn_strands.texels(texture, strand_count, packed_strands.texel_count(point_count))
+            seen.append(packed_strands.unpack(texels))
         return draw(drawn, motion, *others)
 
     monkeypatch.setattr(motion_vectors, "draw", drawing)

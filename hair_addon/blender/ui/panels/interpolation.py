@@ -8,6 +8,7 @@ from ...data.scene import triangle_count
 from ...data.strands.curves import is_hand_made
 from ...groom.diagnostics import parting_warnings
 from ...groom.selection import active_of_kind, guides_of, hair_of
+from ...render import hair_cache
 from ...settings.translations import interface_text
 from .. import setting_rows
 from .tab import HairTab, draw_work, megabytes, split, write, write_status
@@ -39,7 +40,7 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
         setting_rows.row(layout, state, "guide_curves")
         setting_rows.strand_rows(layout, state.hair, hair.surface)
         setting_rows.row(layout, state, "is_live")
-        _draw_cost(layout, state.hair)
+        _draw_cost(layout, state.hair, hair_cache.drawn_bytes(hair))
         if hair.surface is not None:
             face_count = triangle_count(hair.surface, context.view_layer)
             costs = cost.hair_seconds, cost.hair_work_bytes
@@ -49,13 +50,13 @@ class VELLUS_PT_interpolation(HairTab, bpy.types.Panel):
         layout.operator("vellus.interpolate_hair", text=text, icon=icon)
 
 
-def _draw_cost(layout, group):
-    """Draw the memory estimate for the strand count."""
+def _draw_cost(layout, group, drawn_bytes):
+    """Draw the memory estimate for the strand count, and what the GPU has where strands are drawn."""
     slot_count = group.neighbour_limit if group.guide_map else 0
     text = interface_text(
         "{memory}, {gpu_memory} on the GPU",
         memory=megabytes(cost.curves_bytes(group.strand_count, slot_count=slot_count)),
-        gpu_memory=megabytes(cost.gpu_bytes(group.strand_count)),
+        gpu_memory=megabytes(cost.gpu_bytes(group.strand_count) if drawn_bytes is None else drawn_bytes),
     )
     layout.label(text=text, icon="MEMORY", translate=False)
 

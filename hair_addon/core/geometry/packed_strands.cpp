@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// One strand as texels of two floats each: its root and its range, then the offsets of its points from the root.
+//
+// The body of `_pack` in packed_strands.py. Parameters:
+//
+//   array_t<vec3> points    (S, P) positions, contiguous
+//   int strand              index into the first axis
+//   array_t<vec2> texels    (S, P + 1), contiguous
+//
+// Constants:
+//
+//   MOST                    steps on each side of the root
+
+#if !defined(__CUDA_ARCH__)
+  const int point_count = points.shape[1];
+  const float* place = (const float*)(points.data + (size_t)strand * point_count);
+  float* out = (float*)(texels.data + (size_t)strand * (point_count + 1));
+  const float x = place[0], y = place[1], z = place[2];
+  float range = 0.0f;
+  float not_finite = 0.0f;  // becomes NaN with the first coordinate that is not
+  for (int i = 1; i < point_count; ++i) {
+    const float along_x = __builtin_fabsf(place[3 * i] - x);
+    const float along_y = __builtin_fabsf(place[3 * i + 1] - y);
+    const float along_z = __builtin_fabsf(place[3 * i + 2] - z);
+    not_finite += 0.0f * (along_x + along_y + along_z);
+    const float most_x = along_x > along_y ? along_x : along_y;
+    const float most = most_x > along_z ? most_x : along_z;
+    range = most > range ? most : range;
+  }
+  out[0] = x;
+  out[1] = y;
+  out[2] = z;
+  out[3] = range + not_finite;
+  const bool is_wide = range > 1e-30f && not_finite == 0.0f;
+  const float steps = is_wide ? (float)MOST / range : 0.0f;
+  const float middle = (float)MOST + 1.5f;  // which half a step is added to, as integers are cut off
+  unsigned* words = (unsigned*)(out + 2);
+  for (int i = 1; i < point_count; ++i) {
+    const unsigned column = (unsigned)(int)(is_wide ? (place[3 * i] - x) * steps + middle : middle);
+    const unsigned row = (unsigned)(int)(is_wide ? (place[3 * i + 1] - y) * steps + middle : middle);
+    const unsigned layer = (unsigned)(int)(is_wide ? (place[3 * i + 2] - z) * steps + middle : middle);
+    const unsigned low = (column << 10) | (layer & 1023u);
+    const unsigned high = (row << 10) | (layer >> 10);
+    // Bit 30 set and bit 29 clear: a normal number, whatever the others are.
+    words[2 * i] = (low & 0x1FFFFFFFu) | ((low & 0x20000000u) << 2) | 0x40000000u;
+    words[2 * i + 1] = (high & 0x1FFFFFFFu) | ((high & 0x20000000u) << 2) | 0x40000000u;
+  }
+#endif

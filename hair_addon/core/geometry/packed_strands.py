@@ -1,0 +1,64 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands in eight bytes a point, as they are drawn: offsets from the root in steps of the strand's own range.
+
+A strand of P points is P + 1 texels of two floats: (root x, root y), (root z, range), then its points but for the root.
+An offset has 20 bits along each axis, so that each coordinate is within 2^-20 of the strand's greatest, beside the
+rounding of places: a strand that fills a picture of 4,000 pixels is drawn within 0.004 of them. The 60 bits are in two
+floats that are normal numbers whatever their values are: textures of floats keep the bits of these alone.
+shaders/include/packed_strand.glsl is the twin.
+"""
+
+import numpy as np
+import warp as wp
+
+from ..kernels import native_code, parallel
+from ..kernels.checks import require_count
+from ..kernels.parallel import Rows
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+HEAD_TEXELS = 2  # of a strand, before its points; the root is not repeated among these
+MOST = 2**19 - 1  # steps from the root to the end of the range, on each side: the root itself is one of the steps
+_MIDDLE = MOST + 1
+
+
+@wp.func_native(native_code.body(__file__, "packed_strands.cpp", MOST=MOST))
+def _pack_strand(points: wp.array2d[wp.vec3], strand: int, texels: wp.array2d[wp.vec2]):  # type: ignore[empty-body]
+    """Write the texels of one strand."""
+
+
+@wp.kernel
+def _pack(points: wp.array2d[wp.vec3], texels: wp.array2d[wp.vec2]):
+    strand = wp.tid()
+    _pack_strand(points, strand, texels)
+
+
+def texel_count(point_count: int) -> int:
+    """Texels of a strand of so many points."""
+    return HEAD_TEXELS + point_count - 1
+
+
+def pack(points: np.ndarray, texels: np.ndarray) -> None:
+    """Write the texels of strands.
+
+    points: (S, P, 3) float32; texels: (S, P + 1, 2) float32, contiguous. Strands with a coordinate that is not finite
+    are such again. Raises `HairError` where counts do not match.
+    """
+    strand_count, point_count, _xyz = points.shape
+    if not strand_count:
+        return
+    points = np.ascontiguousarray(points, np.float32)
+    require_count("texels", texels.size, strand_count * texel_count(point_count) * 2)
+    inputs = [Rows(wp.array(points, dtype=wp.vec3, device="cpu", copy=False))]
+    outputs = [wp.array(texels, dtype=wp.vec2, device="cpu", copy=False)]
+    parallel.launch(_pack, strand_count, inputs, outputs, "cpu")
+
+
+def unpack(texels: np.ndarray) -> np.ndarray:
+    """(S, P, 3) float32 of (S, P + 1, 2) texels."""
+    head = texels[:, :HEAD_TEXELS].reshape(-1, 1, 4)
+    words = np.ascontiguousarray(texels[:, HEAD_TEXELS:]).view(np.uint32)
+    low, high = np.moveaxis((words & 0x1FFFFFFF) | (words >> 31) << 29, -1, 0)
+    steps = np.stack([low >> 10, high >> 10, (low & 1023) | (high & 1023) << 10], axis=-1).astype(np.float32) - _MIDDLE
+    offsets = steps * (head[..., 3:] / np.float32(MOST))
+    return head[..., :3] + np.pad(offsets, ((0, 0), (1, 0), (0, 0)))
