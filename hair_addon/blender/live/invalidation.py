@@ -8,12 +8,12 @@ stale.
 from ..data import guide_map_readers, subdivided_surfaces
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, world_texture
-from ..groom import bindings
+from ..groom import bindings, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
 from ..render import composite, hair_cache, region_pictures, viewport
 from ..settings import animated
-from . import dynamics_state, every_frame, reported, simulated_hair, unlocked_renders
+from . import dynamics_state, every_frame, moving_surfaces, reported, simulated_hair, unlocked_renders
 
 # Copies of Blender's data, and what was made of them. Undo and redo put other data in its place.
 COPIES = (
@@ -29,6 +29,8 @@ COPIES = (
     reported.guide_cache,
     reported.painting_cache,
     reported.axes_cache,
+    paused_hair.paused_cache,
+    moving_surfaces.moved_cache,
     guide_map_readers.reading_cache,
 )
 
