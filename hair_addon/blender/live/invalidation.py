@@ -5,7 +5,7 @@ What makes single ones stale is in `events`. Functions of their arguments alone,
 stale.
 """
 
-from ..data import guide_map_readers, subdivided_surfaces
+from ..data import guide_map_readers, scene, subdivided_surfaces
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, world_texture
 from ..groom import bindings, paused_hair
@@ -37,6 +37,7 @@ COPIES = (
 # Values keyed by everything they depend on, or that check by themselves whether they are up to date.
 OTHERS = (
     hair_cache.shading_cache,
+    scene.surface_cache,
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,

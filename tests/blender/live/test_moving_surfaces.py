@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import follow_nodes
-from hair_addon.blender.groom import paused_hair
 from hair_addon.blender.host import scene_time
-from hair_addon.blender.live import handlers, moving_surfaces
+from hair_addon.blender.live import moving_surfaces
 from tests.blender.live.test_carried_strands import bend
 from tests.support.made_strands import CLOSE, drawn
 from tests.support.reading import evaluated_points, points
