@@ -4,8 +4,8 @@
 .venv/bin/python tests/benchmarks/edit_guides.py --strands 30000 100000
 
 Guides are combed, a slider of their weights or of a style moves, the surface bends with the frames or by a slider, or
-simulated guides play. Hair is shaded by the Marschner model with shadows, as a viewport draws meanwhile. Strands are made
-by the compute device and uploaded, or made where they are drawn; the bytes that a change uploads are counted.
+simulated guides play. Hair is shaded by the Marschner model with shadows, as a viewport draws meanwhile. Strands are
+made by the compute device and uploaded, or made where they are drawn; the bytes that a change uploads are counted.
 """
 
 import argparse

@@ -6,6 +6,7 @@ stale.
 """
 
 from ..data import guide_map_readers, scene, subdivided_surfaces
+from ..data.pictures import drawn_meshes
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, world_texture
 from ..groom import bindings, paused_hair
@@ -38,6 +39,7 @@ COPIES = (
 OTHERS = (
     hair_cache.shading_cache,
     scene.surface_cache,
+    drawn_meshes.layout_cache,
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,
