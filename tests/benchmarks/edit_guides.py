@@ -35,6 +35,7 @@ from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.styling.kinds import KINDS
 from tests.benchmarks.draw_frames import Frame
+from tests.support.counting import Traffic
 
 REPETITIONS = 50
 ACTIONS = ("stroke", "slider", "surface", "bending", "playback")
@@ -176,23 +177,6 @@ def bend(surface, frames):
     for frame in range(0, frames, 10):
         key.value = 0.2 + 0.8 * (frame // 10 % 2)
         key.keyframe_insert("value", frame=frame)
-
-
-class Traffic:
-    """Bytes that go to textures and come back while this is entered."""
-
-    def __enter__(self):
-        self.sent, self._buffer = 0, gpu.types.Buffer
-
-        def buffer(kind, size, values):
-            self.sent += int(np.prod(size)) * (1 if kind == "UBYTE" else 4)
-            return self._buffer(kind, size, values)
-
-        gpu.types.Buffer = buffer
-        return self
-
-    def __exit__(self, *_error):
-        gpu.types.Buffer = self._buffer
 
 
 def measure(editing, action, repetitions):
