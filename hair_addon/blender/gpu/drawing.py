@@ -202,15 +202,14 @@ def draw_strip(strands, program, record, lights, samplers=None):
     _draw(strands.batch, program, record, lights, {"strands": strands.texture, **(samplers or {})}, count)
 
 
-def walk_strands(strands, program, record, lights, samplers, images, constants):
+def walk_strands(strands, program, record, blocks, samplers, images, constants):
     """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
 
-    lights: on the GPU; samplers, images: {name: texture} that it reads and writes; constants: {name: int}.
+    blocks: {instance: GPUUniformBuf}, the record as "view", and "lights"; samplers, images: {name: texture} that it reads and writes; constants: {name: int}.
     """
     runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
     groups = -(-int(record["drawn_strands"]) * runs // shaders.RUN_GROUP_SIZE)
     rows = -(-groups // MOST_GROUPS)
-    blocks = {"view": uniforms.uniform_buffer(record), "lights": lights}
     with bound(program, blocks, {"strands": strands.texture, **samplers}):
         for name, texture in images.items():
             program.image(name, texture)

@@ -151,10 +151,13 @@ class VisibilityBuffer:
         self._has_strips = False
         program = shaders.segments_program()
         images = {"depths": self.depths, "segments": self.segments}
+        all_blocks = [
+            {"view": uniforms.uniform_buffer(placed.record), "lights": placed.lights} for placed in self._hair
+        ]
         for is_depth in (1, 0):
-            for placed in self._hair:
+            for placed, blocks in zip(self._hair, all_blocks, strict=True):
                 constants = {"first_segment": placed.first, "is_depth": is_depth}
-                drawing.walk_strands(placed.strands, program, placed.record, placed.lights, {}, images, constants)
+                drawing.walk_strands(placed.strands, program, placed.record, blocks, {}, images, constants)
 
     def nearest_depths(self):
         """`depths` with those of surfaces where there is no hair."""
