@@ -205,7 +205,8 @@ def draw_strip(strands, program, record, lights, samplers=None):
 def walk_strands(strands, program, record, blocks, samplers, images, constants):
     """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
 
-    blocks: {instance: GPUUniformBuf}, the record as "view", and "lights"; samplers, images: {name: texture} that it reads and writes; constants: {name: int}.
+    blocks: {instance: GPUUniformBuf}, the record as "view", and "lights"; samplers, images: {name: texture} that it
+    reads and writes; constants: {name: int}.
     """
     runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
     groups = -(-int(record["drawn_strands"]) * runs // shaders.RUN_GROUP_SIZE)
