@@ -3,13 +3,15 @@
 
 .venv/bin/python tests/benchmarks/edit_guides.py --strands 30000 100000
 
-Guides are combed, a slider of their weights or of a style moves, the surface bends, or simulated guides play. Hair is
-shaded by the Marschner model with shadows, as a viewport draws meanwhile. Strands are made by the compute device and
-uploaded, or made where they are drawn; the bytes that a change uploads are counted.
+Guides are combed, a slider of their weights or of a style moves, the surface bends with the frames or by a slider, or
+simulated guides play. Hair is shaded by the Marschner model with shadows, as a viewport draws meanwhile. Strands are
+made by the compute device and uploaded, or made where they are drawn; the bytes that a change uploads are counted.
 """
 
 import argparse
+import cProfile
 import os
+import pstats
 import sys
 import time
 from pathlib import Path
@@ -27,16 +29,18 @@ from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import maker_choice, strand_maker
 from hair_addon.blender.gpu.shadows import ShadowMaps
 from hair_addon.blender.groom import bindings
-from hair_addon.blender.host import running
+from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene, hair_cache
 from hair_addon.blender.settings import preferences, style_items
 from hair_addon.core.styling.kinds import KINDS
 from tests.benchmarks.draw_frames import Frame
+from tests.support.counting import Traffic
 from tests.support import drawn_strands
 
 REPETITIONS = 50
-ACTIONS = ("stroke", "slider", "surface", "playback")
+ACTIONS = ("stroke", "slider", "surface", "bending", "playback")
+_OF_SURFACE = {"surface", "bending"}
 
 # What is timed by itself, each waited for; the host has the rest.
 PARTS = {
@@ -87,9 +91,20 @@ class Editing:
         bpy.context.view_layer.update()
 
     def surface(self):
-        """Go to the next frame of a surface that bends."""
+        """Show the next frame of a surface that bends while the animation plays."""
         self.turn += 1
-        bpy.context.scene.frame_set(self.turn)
+        self.evaluate(lambda: bpy.context.scene.frame_set(self.turn))
+
+    def bending(self):
+        """Bend the surface by a slider."""
+        self.turn += 1
+        key = self.hair.data.surface.data.shape_keys.key_blocks["Bent"]
+        key.value = 0.2 + 0.1 * (self.turn % 8)
+        self.evaluate(bpy.context.view_layer.update)
+
+    def evaluate(self, work):
+        """Let Blender evaluate the scene, and handlers follow."""
+        work()
 
     def playback(self):
         """Show guides where they were simulated in the next frame."""
@@ -105,7 +120,7 @@ class Editing:
     def once(self, action):
         """One change to the finished picture."""
         getattr(self, action)()
-        is_played, is_hair_only = action in {"surface", "playback"}, action != "surface"
+        is_played, is_hair_only = action in {*_OF_SURFACE, "playback"}, action not in _OF_SURFACE
         self.drawn = self.read(
             before=self.drawn if is_hair_only else None,
             former=self.drawn if is_played else None,
@@ -148,8 +163,11 @@ class Editing:
         return found | {"host": whole - sum(found.values())}
 
 
+PARTS["evaluation"] = (Editing, "evaluate")
+
+
 def bend(surface, frames):
-    """Let a surface bend to and fro by a shape key with keyframes."""
+    """Let a surface bend to and fro by a shape key, with keyframes unless `frames` is 0."""
     surface.shape_key_add(name="Basis")
     key = surface.shape_key_add(name="Bent")
     places = np.empty(3 * len(key.data), np.float32)
@@ -160,23 +178,6 @@ def bend(surface, frames):
     for frame in range(0, frames, 10):
         key.value = 0.2 + 0.8 * (frame // 10 % 2)
         key.keyframe_insert("value", frame=frame)
-
-
-class Traffic:
-    """Bytes that go to textures and come back while this is entered."""
-
-    def __enter__(self):
-        self.sent, self._buffer = 0, gpu.types.Buffer
-
-        def buffer(kind, size, values):
-            self.sent += int(np.prod(size)) * (1 if kind == "UBYTE" else 4)
-            return self._buffer(kind, size, values)
-
-        gpu.types.Buffer = buffer
-        return self
-
-    def __exit__(self, *_error):
-        gpu.types.Buffer = self._buffer
 
 
 def measure(editing, action, repetitions):
@@ -205,6 +206,9 @@ def main():
     parser.add_argument("--ways", nargs="+", default=["COMPUTE", "GPU"], help="where strands are made")
     parser.add_argument("--devices", nargs="+", default=["cpu"], help="Warp devices of the way by uploads")
     parser.add_argument("--repetitions", type=int, default=REPETITIONS)
+    parser.add_argument(
+        "--profile", type=int, default=0, metavar="LINES", help="also print what takes most on the host"
+    )
     options = parser.parse_args()
     hair_addon.register()
     gpu.init()
@@ -240,8 +244,9 @@ def _measure_way(options, strand_count, device, action, share, way):
     bpy.context.view_layer.update()
     live_hair.write_all()
     head.light()
-    if action == "surface":
-        bend(hair.data.surface, 4 * options.repetitions)
+    if action in _OF_SURFACE:
+        bend(hair.data.surface, 4 * options.repetitions if action == "surface" else 0)
+    scene_time.is_shown_moving = lambda: action == "surface"
     bpy.context.view_layer.update()
     frame = Frame(*options.size, 1)
     editing = Editing(guides, hair, frame, share)
@@ -254,8 +259,22 @@ def _measure_way(options, strand_count, device, action, share, way):
         f"({low:.2f} to {high:.2f})   {shown}   sent {sent / 1e6:.2f} MB",
         flush=True,
     )
-    if action != "surface":
+    if options.profile:
+        _print_profile(editing, action, options.profile)
+    if action not in _OF_SURFACE:
         _print_error(hair)
+
+
+def _print_profile(editing, action, line_count):
+    """The functions of this side that take most, of twenty changes."""
+    profile = cProfile.Profile()
+    profile.enable()
+    for _ in range(20):
+        editing.once(action)
+    editing.frame.wait()
+    profile.disable()
+    for order in ("tottime", "cumulative"):
+        pstats.Stats(profile).strip_dirs().sort_stats(order).print_stats(line_count)
 
 
 def _print_error(hair):

@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""How often hair is searched, uploaded and written: counted where it happens."""
+"""How often hair is searched, uploaded and written, and bytes that are uploaded: counted where it happens."""
+
+import gpu
+import numpy as np
 
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import strand_textures
@@ -28,3 +31,20 @@ def counts_of(monkeypatch):
         for module, name in functions:
             monkeypatch.setattr(module, name, counted(kind, getattr(module, name)))
     return counts
+
+
+class Traffic:
+    """Bytes that go to textures while this is entered: `sent`."""
+
+    def __enter__(self):
+        self.sent, self._buffer = 0, gpu.types.Buffer
+
+        def buffer(kind, size, values):
+            self.sent += int(np.prod(size)) * (1 if kind == "UBYTE" else 4)
+            return self._buffer(kind, size, values)
+
+        gpu.types.Buffer = buffer
+        return self
+
+    def __exit__(self, *_error):
+        gpu.types.Buffer = self._buffer

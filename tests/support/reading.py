@@ -20,9 +20,9 @@ def points(curves_object):
     return positions.reshape(len(curves.curves), -1, 3)
 
 
-def evaluated_points(curves_object):
+def evaluated_points(curves_object, depsgraph=None):
     """(S, P, 3) float32 in local coordinates of what Blender renders: after the object's modifiers."""
-    curves = curves_object.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    curves = curves_object.evaluated_get(depsgraph or bpy.context.evaluated_depsgraph_get()).data
     positions = np.empty((len(curves.points), 3), np.float32)
     curves.attributes["position"].data.foreach_get("vector", positions.ravel())
     return positions.reshape(len(curves.curves), -1, 3)

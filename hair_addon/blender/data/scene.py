@@ -1,156 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Surfaces and cameras: Blender's data → arrays."""
 
-import hashlib
 from dataclasses import dataclass
-from functools import cached_property
 
 import bmesh
 import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...core import geometry
 from ...core.errors import HairError
 from ...core.geometry.mesh import Faces, TriMesh
 from ...core.geometry.texture import Texture
+from ..host.caches import Cache
 from ..host.notices import can_be_drawn, name_of
 from . import subdivided_surfaces
+from .surfaces import Surface, transformed
 
 _MOST_CORNERS = 100_000  # of a face: the time to triangulate one grows faster than its corners
 
-
-@dataclass(frozen=True)
-class Surface:
-    """A mesh object at rest: world axes and scale [m], with the object's origin at zero.
-
-    So gravity is -Z and lengths are true, and an object far from the world's origin loses no precision. At rest means
-    before shape keys and modifiers deform it: hair is generated there, and deformed with the surface
-    (surface_deform.py).
-    """
-
-    name: str
-    mesh: TriMesh
-    faces: Faces
-    rest: np.ndarray  # (V, 3) float32, vertices at rest in local coordinates
-    posed: np.ndarray  # (V, 3) float32, where they are now, in local coordinates
-    corner_uvs: np.ndarray | None  # (F, 3, 2) float32, None without a UV map
-    uv_map: str
-    to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → these
-    is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
-    cage_corners: int  # of the faces that modifiers subdivide to a smooth surface, 0 for none
-    smooth_rest: np.ndarray  # (V, 3) float32, vertices on the smooth surface at rest; `rest` itself where none is
-
-    @cached_property
-    def to_local_axes(self):
-        """(3, 3) float64: these coordinates → local ones."""
-        return np.linalg.inv(self.to_world_axes)
-
-    def to_local(self, points):
-        """(S, P, 3) points of strands → the object's local coordinates, float32."""
-        return geometry.transform.transformed(points, self.to_local_axes)
-
-    def from_local(self, positions):
-        """Transform (..., 3) local coordinates to this space, float32."""
-        return _transformed(positions, self.to_world_axes)
-
-    @property
-    def is_deformed(self):
-        """Whether shape keys or modifiers deform it."""
-        return not np.array_equal(self.rest, self.posed)
-
-    @cached_property
-    def posed_mesh(self):
-        """The deformed `TriMesh`, with modifiers and shape keys, whose size the artist sees."""
-        return TriMesh(self.from_local(self.posed), self.mesh.triangles) if self.is_deformed else self.mesh
-
-    def is_at_rest_as(self, other):
-        """Whether strands generated on one also fit the other."""
-        mine, its = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
-        return self.cage_corners == other.cage_corners and all(map(np.array_equal, mine, its))
-
-    def is_same(self, other):
-        """Whether another surface equals this one, so that cached results are valid."""
-        mine, its = (
-            (s.rest, s.posed, s.mesh.triangles, s.faces.corner_vertices, s.faces.starts, s.to_world_axes, s.corner_uvs)
-            for s in (self, other)
-        )
-        named = [(s.name, s.uv_map, s.cage_corners) for s in (self, other)]
-        return named[0] == named[1] and all(map(np.array_equal, mine, its))
-
-    @property
-    def mirror_normal(self):
-        """(3,) unit: of the plane across the object's own X axis."""
-        normal = self.to_local_axes[0]
-        return normal / np.linalg.norm(normal)
-
-    @cached_property
-    def shape(self):
-        """The `TriMesh` at rest of which `mesh` is a rotated and uniformly scaled copy; None otherwise.
-
-        Roots are placed on it, so that rotation and scale of the object do not move them, not even by rounding,
-        which relaxation would amplify.
-        """
-        axes = self.to_world_axes
-        squares = axes.T @ axes
-        if not np.allclose(squares, np.eye(3) * np.trace(squares) / 3.0, rtol=0.0, atol=1e-5 * np.trace(squares)):
-            return None
-        # A mirrored object's triangles are wound the other way, as those of the rest mirrored at its origin are.
-        return TriMesh(-self.rest if self.is_mirrored else self.rest, self.mesh.triangles)
-
-    def root_vertices(self, points):
-        """(N, 3) int32: the vertices that surface points lie between, in Blender's order of corners."""
-        vertices = self.mesh.triangles[points.triangle]
-        return np.ascontiguousarray(vertices[:, [0, 2, 1]]) if self.is_mirrored else vertices
-
-    def places(self, points):
-        """(N, 3) int32 vertices and (N, 3) float32 barycentric coordinates of points, in Blender's order of corners."""
-        return self.root_vertices(points), self.swap_winding(points).barycentric
-
-    @property
-    def scale(self):
-        """The mean scale of the object: metres in a unit of its local coordinates."""
-        return abs(np.linalg.det(self.to_world_axes)) ** (1.0 / 3.0)
-
-    @cached_property
-    def extent(self):
-        """The longest side of the box around its vertices at rest, in local coordinates."""
-        return float(np.ptp(self.rest, axis=0).max())
-
-    @cached_property
-    def topology(self):
-        """A key of the triangles and their order; the same for a mirrored mesh."""
-        triangles = self.mesh.triangles[:, [0, 2, 1]] if self.is_mirrored else self.mesh.triangles
-        return hashlib.blake2b(triangles.tobytes(), digest_size=16).hexdigest()
-
-    def to_local_normals(self, normals):
-        """(N, 3) unit normals → unit normals in local coordinates: the inverse transpose of `to_local`."""
-        if np.array_equal(self.to_world_axes, np.eye(3)):
-            return normals
-        local = normals @ self.to_world_axes.astype(np.float32)
-        return local / np.linalg.norm(local, axis=-1, keepdims=True)
-
-    def identities(self, roots):
-        """(S,) int32 identities and (S,) float32 random numbers in [0, 1), independent of the other strands."""
-
-        return geometry.root_frames.identities(self.swap_winding(roots))
-
-    def uvs(self, points):
-        """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
-        if self.corner_uvs is None:
-            return np.zeros((len(points), 2), np.float32)
-        return np.einsum("nc,ncu->nu", points.barycentric, self.corner_uvs[points.triangle]).astype(np.float32)
-
-    def swap_winding(self, points):
-        """The same points with barycentric coordinates in Blender's order of corners, or back."""
-        return points.wound_otherwise() if self.is_mirrored else points
-
-
-def _transformed(positions, matrix):
-    """(..., 3) float32 positions by a (3, 3) matrix, float32; the positions themselves where it changes nothing."""
-    if np.array_equal(matrix, np.eye(3)):
-        return np.asarray(positions, np.float32)
-    return np.asarray(positions, np.float32) @ matrix.T.astype(np.float32)
+# session_uid of a surface → (`_Reading`, `Surface`, (F, 3) corners of its triangles) that were read last.
+surface_cache = Cache(capacity=16)
 
 
 def read_surface(surface_object, depsgraph):
@@ -163,50 +32,100 @@ def read_surface(surface_object, depsgraph):
     determinant = np.linalg.det(to_world_axes)
     if not np.isfinite(to_world_axes).all() or abs(determinant) < 1e-30:
         raise HairError(f'"{name_of(surface_object)}" has a scale of zero: change its scale.')
-    evaluated = surface_object.evaluated_get(depsgraph)
+    evaluated, known = surface_object.evaluated_get(depsgraph), surface_cache.get(surface_object.session_uid)
     mesh = evaluated.to_mesh()
     try:
         posed = vertex_positions(mesh)
         rest = _rest_positions(mesh, posed)
         faces = faces_of(mesh)
-        if rest is not posed and (np.diff(faces.starts) > 3).any():
-            # Where polygons are cut depends on where vertices are: triangles are to stay the same in every pose.
-            # Written to the attribute, positions would not reach triangles that Blender shares with the evaluated mesh.
-            mesh.vertices.foreach_set("co", rest.ravel())
-        corners = triangle_corners(mesh, faces, name_of(surface_object))
-        triangles = faces.corner_vertices[corners]
-        corner_uvs, uv_map = None, ""
-        if mesh.uv_layers.active is not None:
-            uv_map = name_of(mesh.uv_layers.active)
-            uvs = np.empty((len(mesh.loops), 2), np.float32)
-            mesh.uv_layers.active.uv.foreach_get("vector", uvs.ravel())
-            corner_uvs = uvs[corners]
+        uv_map, loop_uvs = _loop_uvs(mesh)
+        read = _Reading(name_of(surface_object), rest, faces, uv_map, loop_uvs, to_world_axes, rest is not posed)
+        if known is None or not known[0].is_same(read):
+            if read.has_rest and (np.diff(faces.starts) > 3).any():
+                # Where polygons are cut depends on where vertices are: triangles are to stay the same in every pose.
+                # Written to the attribute, positions would not reach triangles that Blender shares with the evaluated
+                # mesh.
+                mesh.vertices.foreach_set("co", rest.ravel())
+            corners = triangle_corners(mesh, faces, read.name)
+            known = None
     finally:
         evaluated.to_mesh_clear()
-    cage_corners, smooth_rest = 0, rest
-    if rest is not posed and np.isfinite(rest).all():
+    cage_corners = 0
+    if read.has_rest and np.isfinite(rest).all():
         cage_corners = subdivided_surfaces.cage_corners(surface_object, depsgraph, faces)
-        smooth_rest = subdivided_surfaces.smooth_positions(rest, faces, cage_corners)
-    is_mirrored = bool(determinant < 0.0)
+    if known is not None and known[1].cage_corners == cage_corners:
+        return known[1].posed_at(posed if read.has_rest else known[1].rest)
+    if known is not None:
+        corners = known[2]
+    surface = _surface_of(read, posed, corners, cage_corners)
+    surface_cache.keep(surface_object.session_uid, (read, surface, corners))
+    return surface
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """What a `Surface` follows from, but for its pose: arrays as of `Surface`."""
+
+    name: str
+    rest: np.ndarray
+    faces: Faces
+    uv_map: str
+    loop_uvs: np.ndarray | None  # (C, 2) float32
+    to_world_axes: np.ndarray
+    has_rest: bool  # whether Blender stores where vertices are at rest
+
+    def is_same(self, other):
+        named = [(reading.name, reading.uv_map, reading.has_rest) for reading in (self, other)]
+        if named[0] != named[1] or (self.loop_uvs is None) != (other.loop_uvs is None):
+            return False
+        mine, its = (
+            (
+                r.rest,
+                r.faces.corner_vertices,
+                r.faces.starts,
+                r.to_world_axes,
+                np.float32(0) if r.loop_uvs is None else r.loop_uvs,
+            )
+            for r in (self, other)
+        )
+        return all(map(np.array_equal, mine, its))
+
+
+def _surface_of(read, posed, corners, cage_corners):
+    """The `Surface` of a `_Reading` whose triangles have (F, 3) corners."""
+    smooth_rest = subdivided_surfaces.smooth_positions(read.rest, read.faces, cage_corners)
+    triangles = read.faces.corner_vertices[corners]
+    corner_uvs = None if read.loop_uvs is None else read.loop_uvs[corners]
+    is_mirrored = bool(np.linalg.det(read.to_world_axes) < 0.0)
     if is_mirrored:
         triangles = np.ascontiguousarray(triangles[:, [0, 2, 1]])
         corner_uvs = None if corner_uvs is None else corner_uvs[:, [0, 2, 1]]
     with np.errstate(invalid="ignore"):  # non-finite values are rejected by the check of the mesh
-        smooth = None if smooth_rest is rest else _transformed(smooth_rest, to_world_axes)
-        mesh = TriMesh(_transformed(rest, to_world_axes), triangles, smooth)
+        smooth = None if smooth_rest is read.rest else transformed(smooth_rest, read.to_world_axes)
+        mesh = TriMesh(transformed(read.rest, read.to_world_axes), triangles, smooth)
     return Surface(
-        name_of(surface_object),
+        read.name,
         mesh,
-        faces,
-        rest,
+        read.faces,
+        read.rest,
         posed,
         corner_uvs,
-        uv_map,
-        to_world_axes,
+        read.uv_map,
+        read.to_world_axes,
         is_mirrored,
         cage_corners,
         smooth_rest,
     )
+
+
+def _loop_uvs(mesh):
+    """(name of the active UV map, (C, 2) float32 of the mesh's corners); ("", None) without one."""
+    layer = mesh.uv_layers.active
+    if layer is None:
+        return "", None
+    uvs = np.empty((len(mesh.loops), 2), np.float32)
+    layer.uv.foreach_get("vector", uvs.ravel())
+    return name_of(layer), uvs
 
 
 def read_own_mesh(surface_object, to_world_axes):
@@ -214,7 +133,7 @@ def read_own_mesh(surface_object, to_world_axes):
     mesh = surface_object.data
     faces = faces_of(mesh)
     triangles = faces.corner_vertices[triangle_corners(mesh, faces, name_of(surface_object))]
-    return TriMesh(_transformed(vertex_positions(mesh), to_world_axes), triangles)
+    return TriMesh(transformed(vertex_positions(mesh), to_world_axes), triangles)
 
 
 def present_depsgraph():

@@ -214,11 +214,12 @@ WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
 _FIRST_SHARE = 8
 
 
-def walk_strands(strands, program, record, lights, samplers, images, constants, part=WALK_ALL):
+def walk_strands(strands, program, record, blocks, samplers, images, constants, part=WALK_ALL):
     """Run a compute program of `shaders` that walks along segments on those of a record of `strand_record`.
 
-    lights: on the GPU; samplers, images: {name: texture} that it reads and writes; constants: {name: int}; part: of the
-    strands, all or those of `WALK_FIRST` or `WALK_OTHERS`, which are all together.
+    blocks: {instance: GPUUniformBuf}, the record as "view", and "lights"; samplers, images: {name: texture} that it
+    reads and writes; constants: {name: int}; part: of the strands, all or those of `WALK_FIRST` or `WALK_OTHERS`, which
+    are all together.
     """
     runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
     strand_count = int(record["drawn_strands"])
@@ -228,7 +229,6 @@ def walk_strands(strands, program, record, lights, samplers, images, constants, 
         return
     groups = -(-walked * runs // shaders.RUN_GROUP_SIZE)
     rows = -(-groups // MOST_GROUPS)
-    blocks = {"view": uniforms.uniform_buffer(record), "lights": lights}
     with bound(program, blocks, {**strand_samplers(strands), **samplers}):
         for name, texture in images.items():
             program.image(name, texture)

@@ -70,13 +70,18 @@ class ShadowMaps:
             return
         loose = drawing.bounding_sphere(hair)
         self._sphere = loose = _steady(loose, self._sphere) if is_steady and self._sphere else loose
+        views = {}
         for index in range(min(int(lights["count"]), self.layer_count)) if chosen is None else (chosen,):
             view = self._aimed(index, lights["light"][index], hair, loose)
             if view is not None and lights["light"][index]["casts_shadow"]:
                 lights["light"][index]["shadow_layer"] = index
                 view["light_index"] = index
+                views[index] = view
+        if views:
+            light_block = uniforms.uniform_buffer(lights)  # each map reads its own light alone
+            for index, view in views.items():
                 cast = (hair, surfaces) if casters is None else casters(index)
-                self._draw_light(index, view, lights, *cast, steps)
+                self._draw_light(index, view, lights, light_block, *cast, steps)
 
     def _aimed(self, index, light, hair, loose):
         """What `_aim` returns and writes, kept while the light and the sphere stay."""
@@ -97,11 +102,10 @@ class ShadowMaps:
             self._views[index] = aimed_by, view.copy(), {name: light[name].copy() for name in _AIMED}
         return view
 
-    def _draw_light(self, layer, view, lights, hair, surfaces, steps):
+    def _draw_light(self, layer, view, lights, light_block, hair, surfaces, steps):
         hidden = {"hidden_depth": self._drawn_surfaces(layer, view, lights, surfaces)}
         self._fronts.clear(format="UINT", value=(_NOTHING,))
         self._backs.clear(format="UINT", value=(0,))
-        light_block = uniforms.uniform_buffer(lights)
         placed = [(strands, _record(strands, view, to_world, steps)) for strands, to_world in hair]
         if self._in_compute:
             self._walk(layer, placed, light_block, hidden)
@@ -129,12 +133,13 @@ class ShadowMaps:
         program = shaders.strand_shadow_program()
         samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
-        for strands, record in placed:
-            drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 1})
+        placed = [(*one, {"view": uniforms.uniform_buffer(one[1]), "lights": lights}) for one in placed]
+        for strands, record, blocks in placed:
+            drawing.walk_strands(strands, program, record, blocks, samplers, images, {"is_front": 1})
         self._fill_fronts(layer)
         self._counts.clear(format="UINT", value=(0,))
-        for strands, record in placed:
-            drawing.walk_strands(strands, program, record, lights, samplers, images, {"is_front": 0})
+        for strands, record, blocks in placed:
+            drawing.walk_strands(strands, program, record, blocks, samplers, images, {"is_front": 0})
         self._filter(self._hair_layers, layer, shadow_programs.counts_program(), counts=self._counts)
 
     def _draw_strips(self, layer, placed, lights, hidden):

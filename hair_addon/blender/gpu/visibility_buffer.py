@@ -152,10 +152,13 @@ class VisibilityBuffer:
         """Find the nearest segments by a compute program: first depths, then indices."""
         self._copy_depths()
         self._has_strips = False
+        all_blocks = [
+            {"view": uniforms.uniform_buffer(placed.record), "lights": placed.lights} for placed in self._hair
+        ]
         # A few strands hide most of the others, and those behind a head are hidden by it.
         for part, is_depth in ((drawing.WALK_FIRST, 1), (drawing.WALK_OTHERS, 1), (drawing.WALK_ALL, 0)):
             self._find_farthest()
-            self._walk(part, is_depth)
+            self._walk(all_blocks, part, is_depth)
 
     def _find_farthest(self):
         """Fill the tiles with the farthest of their depths."""
@@ -164,14 +167,12 @@ class VisibilityBuffer:
             program.image("farthest_depths", self._farthest)
             drawing.dispatch_over(program, (self._farthest.width, self._farthest.height))
 
-    def _walk(self, part, is_depth):
+    def _walk(self, all_blocks, part, is_depth):
         program = shaders.segments_program()
         images, samplers = {"depths": self.depths, "segments": self.segments}, {"farthest_depths": self._farthest}
-        for placed in self._hair:
+        for placed, blocks in zip(self._hair, all_blocks, strict=True):
             constants = {"first_segment": placed.first, "is_depth": is_depth, "are_tiles_known": int(HAS_TILES)}
-            drawing.walk_strands(
-                placed.strands, program, placed.record, placed.lights, samplers, images, constants, part
-            )
+            drawing.walk_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
 
     def nearest_depths(self):
         """`depths` with those of surfaces where there is no hair."""

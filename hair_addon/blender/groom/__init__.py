@@ -14,6 +14,7 @@ if TYPE_CHECKING:
         grown_guides,
         guide_maps,
         hair_systems,
+        paused_hair,
         pipeline,
         reweighed_hair,
         selection,

@@ -34,6 +34,12 @@ def is_playing():
     return screen is not None and screen.is_animation_playing
 
 
+def is_shown_moving():
+    """Return whether any window plays the animation, or its frame is dragged."""
+    screens = [window.screen for manager in bpy.data.window_managers for window in manager.windows]
+    return any(screen.is_animation_playing or screen.is_scrubbing for screen in screens)
+
+
 def present_scene():
     """Return the active scene."""
     return bpy.context.scene

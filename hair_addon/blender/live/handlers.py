@@ -5,7 +5,7 @@ import bpy
 from bpy.app.handlers import persistent
 
 from ..data.strands import curves_objects
-from ..groom import bindings, pipeline, staleness
+from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
 from ..host.notices import name_of
@@ -17,6 +17,7 @@ from . import (
     every_frame,
     invalidation,
     live_hair,
+    moving_surfaces,
     older_files,
     refused_hair,
     reported,
@@ -49,8 +50,10 @@ def after_depsgraph_update(scene, depsgraph):
     if _is_opening:
         _is_opening = False
         return
-    changed = [update.id.original for update in depsgraph.updates if update.is_updated_geometry]
-    for surface_object in _deformed(depsgraph):
+    deformed = _deformed(depsgraph)
+    moving_surfaces.shape_changed(deformed & _surfaces())
+    changed = [u.id.original for u in depsgraph.updates if u.is_updated_geometry and not _is_only_carried(u, deformed)]
+    for surface_object in deformed:
         events.surface_moved(surface_object)
         # Hair waits until the surface leaves edit and paint modes.
         if surface_object.mode == "OBJECT":
@@ -83,6 +86,19 @@ def after_depsgraph_update(scene, depsgraph):
     if running.job() is None:
         stored_guide_maps.follow(depsgraph)
         live_hair.follow_masks(_painted(depsgraph), depsgraph)
+
+
+def _surfaces():
+    """The objects that strands grow on."""
+    return {datablock.surface for datablock in bpy.data.hair_curves} - {None}
+
+
+def _is_only_carried(update, deformed):
+    """Whether Blender reports paused Curves because their surface moved: what was tagged by itself has all flags."""
+    datablock = update.id.original
+    if not isinstance(datablock, bpy.types.Curves) or datablock.surface not in deformed:
+        return False
+    return paused_hair.is_paused(datablock) and not (update.is_updated_transform or update.is_updated_shading)
 
 
 def _painted(depsgraph):
@@ -194,7 +210,9 @@ def after_frame_change(scene, depsgraph):
     """Deform strands with their surfaces in this frame; regenerate animated hair, in renders too."""
     if scene_time.is_shown(depsgraph):
         events.scene_changed(is_hair_only=_is_hair_only_in_frame(depsgraph))
-        for surface_object in _deformed(depsgraph):
+        deformed = _deformed(depsgraph)
+        moving_surfaces.frame_changed(deformed & _surfaces())
+        for surface_object in deformed:
             events.surface_moved(surface_object)
     if scene_time.may_write(scene, depsgraph) and animated.follow(depsgraph):
         # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
@@ -213,6 +231,7 @@ def after_frame_change(scene, depsgraph):
 @persistent
 def before_reading(*_args):
     """Write hair before its Curves are read by a save or a render, and what a render reads of hair's own scene."""
+    moving_surfaces.resume()
     live_hair.write_all()
     if bpy.app.background:  # in a window a timer repairs, and a render runs beside it
         composite.repair()
@@ -233,7 +252,8 @@ def before_saving(*_args):
 
 @persistent
 def after_import(*_args):
-    """Make the names of styles readable, which Blender passes to a rename."""
+    """Make the names of styles readable, which Blender passes to a rename; what was saved paused goes on."""
+    moving_surfaces.resume()
     for hair in _of_kind("HAIR"):
         style_items.make_names_readable(hair.vellus)
 
@@ -273,6 +293,7 @@ def after_undo(*_args):
     global _is_undone
     _is_undone = True
     live_hair.cancel_writing()
+    moving_surfaces.resume()  # which may have been kept paused
     invalidation.data_replaced()
 
 
@@ -285,8 +306,9 @@ def after_render(scene, *_args):
 
 @persistent
 def after_playing(*_args):
-    """Put back the playback that Play from Start has changed."""
+    """Put back the playback that Play from Start has changed, and let Blender carry hair again."""
     every_frame.end()
+    moving_surfaces.resume()
 
 
 _HANDLERS = (
@@ -323,5 +345,6 @@ def unregister():
         if bpy.app.timers.is_registered(timer):
             bpy.app.timers.unregister(timer)
     every_frame.end()
+    moving_surfaces.resume()
     live_hair.write_all()
     composite.suspend()

@@ -5,15 +5,16 @@ What makes single ones stale is in `events`. Functions of their arguments alone,
 stale.
 """
 
-from ..data import guide_map_readers, subdivided_surfaces
+from ..data import guide_map_readers, scene, subdivided_surfaces
+from ..data.pictures import drawn_meshes
 from ..data.strands import simulated_guides
 from ..gpu import light_grid, lights, shaders, surface_shading, world_texture
-from ..groom import bindings
+from ..groom import bindings, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
 from ..render import composite, hair_cache, region_pictures, viewport
 from ..settings import animated
-from . import dynamics_state, every_frame, reported, simulated_hair, unlocked_renders
+from . import dynamics_state, every_frame, moving_surfaces, reported, simulated_hair, unlocked_renders
 
 # Copies of Blender's data, and what was made of them. Undo and redo put other data in its place.
 COPIES = (
@@ -29,12 +30,16 @@ COPIES = (
     reported.guide_cache,
     reported.painting_cache,
     reported.axes_cache,
+    paused_hair.paused_cache,
+    moving_surfaces.moved_cache,
     guide_map_readers.reading_cache,
 )
 
 # Values keyed by everything they depend on, or that check by themselves whether they are up to date.
 OTHERS = (
     hair_cache.shading_cache,
+    scene.surface_cache,
+    drawn_meshes.layout_cache,
     subdivided_surfaces.smooth_cache,
     region_pictures.picture_cache,
     viewport.display_table_cache,

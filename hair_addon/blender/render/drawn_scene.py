@@ -79,7 +79,8 @@ def read(
         # Scenes without hair have no cost.
         return _EMPTY
     if before is None or before.shadow_maps is None:
-        meshes, is_shaded = drawn_meshes.read_drawn_meshes(depsgraph, viewport), viewport is None or not is_hair_only
+        meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, is_moving=former is not None)
+        is_shaded = viewport is None or not is_hair_only
         surfaces, clear, receivers = _upload(meshes, is_shaded)
         if viewport is None:
             corners = _corners_of(meshes)

@@ -212,6 +212,11 @@ def _strands_of(session_uid):
     return None if kept is _REFUSED else kept
 
 
+def is_pose_seen(surface_object):
+    """Whether a viewport has drawn strands on a surface since that moved."""
+    return pose_cache.get(surface_object.session_uid) is not None
+
+
 def invalidate_pose(surface_object):
     """A surface may carry its strands to another place: with the next redraw they are uploaded there."""
     pose_cache.invalidate(surface_object.session_uid)

@@ -16,9 +16,10 @@ from ..data import scene
 from ..data.strands import curves_objects
 from ..gpu import drawing, shaders
 from ..gpu.display_transform import DisplayTransform
-from ..groom import bindings
+from ..groom import bindings, paused_hair
 from ..host import scene_time
 from ..host.caches import Cache
+from ..host.engines import ENGINE
 from ..host.notices import say
 from ..materials import looks
 from . import drawn_scene, hair_cache, hair_picture, region_pictures, selected_hair
@@ -26,8 +27,6 @@ from .outline import HairOutline
 
 # Pixels: guides are lines of constant width.
 _GUIDE_WIDTH = 2.0
-
-ENGINE = "VELLUS"  # name of our render engine
 
 _handles = []  # of draw handlers
 
@@ -43,7 +42,7 @@ class _View:
     drawn: drawn_scene.DrawnScene | None = None
     outdated: drawn_scene.DrawnScene | None = None  # from before hair changed, and nothing else
     former: drawn_scene.DrawnScene | None = None  # from before anything changed
-    is_playing: bool = False  # whether it was read while the animation played
+    is_playing: bool = False  # whether it was read while the animation played, or something moved a surface
 
 
 def register():
@@ -158,7 +157,7 @@ def drawn_scene_of(context):
     view = view_cache.get(key)
     if view is None or view.shows != shows:  # what one viewport leaves out is no change of the scene
         view = view_cache.keep(key, _View(shows))
-    is_playing = scene_time.is_playing()
+    is_playing = scene_time.is_playing() or paused_hair.is_any()
     if view.is_playing and not is_playing and view.drawn is not None:  # refined at rest
         view.outdated, view.drawn = view.drawn, None
     if view.drawn is None:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import HairError
+from ..kernels.checks import require_count, require_indices
 
 # Of the box around a mesh along each axis, into the cells by which triangles are put in order.
 _HALVINGS = 10
@@ -122,6 +123,26 @@ class Faces:
 
     corner_vertices: np.ndarray
     starts: np.ndarray
+
+    def around(self, vertex_count: int) -> tuple[np.ndarray, np.ndarray]:
+        """(V+1,) int32 starts and (C,) int32: the faces around each vertex, in the order of their corners.
+
+        vertex_count: of a mesh that all corners are of. Raises `HairError` where these are no such polygons.
+        """
+        ends, faces = self._around
+        require_indices("vertices", self.corner_vertices, vertex_count)
+        return np.append(ends, np.full(vertex_count + 1 - len(ends), len(faces), np.int32)), faces
+
+    @cached_property
+    def _around(self):
+        sizes = np.diff(self.starts)
+        if len(self.starts) == 0 or self.starts[0] != 0 or (sizes < 3).any():
+            raise HairError("Each polygon of a mesh needs three corners or more.")
+        require_count("corners of polygons", len(self.corner_vertices), int(self.starts[-1]))
+        require_indices("vertices", self.corner_vertices, np.iinfo(np.int32).max)  # none is negative
+        order = np.argsort(self.corner_vertices, kind="stable")
+        faces = np.repeat(np.arange(len(sizes), dtype=np.int32), sizes)[order]
+        return np.append(0, np.cumsum(np.bincount(self.corner_vertices))).astype(np.int32), faces
 
 
 def from_arrays(vertices: ArrayLike, triangles: ArrayLike) -> TriMesh:

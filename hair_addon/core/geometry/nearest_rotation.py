@@ -37,18 +37,14 @@ def _size(matrix: wp.mat33d):
     return wp.sqrt(wp.ddot(matrix, matrix))
 
 
-@wp.kernel
-def _polar_factors(
-    matrices: wp.array[wp.mat33d],
-    # outputs
-    out_rotations: wp.array[wp.mat33d],
-    out_is_found: wp.array[wp.int32],
-):
-    index = wp.tid()
-    size = _size(matrices[index])
+@wp.func
+def polar_factor(given: wp.mat33d):
+    """(U V^T of U Σ V^T, 1); where the iteration is not accurate the second is 0."""
+    size = _size(given)
+    matrix = given
     is_found = int(0)
     if size > wp.float64(0.0):
-        matrix = matrices[index] / size
+        matrix = given / size
         if wp.abs(wp.determinant(matrix)) > wp.float64(_LEAST_VOLUME):
             for _step in range(_STEPS):
                 inverse = wp.transpose(wp.inverse(matrix))
@@ -59,5 +55,17 @@ def _polar_factors(
                 if change < wp.float64(_LAST_CHANGE):
                     break
             is_found = int(1)
-            out_rotations[index] = matrix
+    return matrix, is_found
+
+
+@wp.kernel
+def _polar_factors(
+    matrices: wp.array[wp.mat33d],
+    # outputs
+    out_rotations: wp.array[wp.mat33d],
+    out_is_found: wp.array[wp.int32],
+):
+    index = wp.tid()
+    rotation, is_found = polar_factor(matrices[index])
+    out_rotations[index] = rotation
     out_is_found[index] = is_found

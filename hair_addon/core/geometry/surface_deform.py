@@ -69,32 +69,30 @@ def _around(faces, vertices, vertex_count):
 
 def vertex_axes(before: np.ndarray, after: np.ndarray, faces: Faces) -> np.ndarray:
     """(V, 2, 3) float32: where the rotation at each vertex takes the x and the y axis; unturned where no face is."""
-    starts = faces.starts[:-1]
-    corners = np.stack(
-        [faces.corner_vertices[starts], faces.corner_vertices[starts + 1], faces.corner_vertices[faces.starts[1:] - 1]]
-    )
-    of_corners = np.repeat(_gradients(before, after, corners.T), np.diff(faces.starts), axis=0).T.copy()
-    sums = np.stack([np.bincount(faces.corner_vertices, part, minlength=len(before)) for part in of_corners], axis=1)
-    # The mean without normalisation, which the nearest rotation ignores; zero where nothing moves.
-    is_moved = _has_moving_face(before, after, faces) & sums.any(axis=1)
-    rotations = nearest_rotation.nearest_rotations(sums[is_moved].reshape(-1, 3, 3))
-    axes = np.tile(np.eye(3, dtype=np.float32)[:2], (len(before), 1, 1))
-    axes[is_moved] = np.swapaxes(rotations, 1, 2)[:, :2]
-    return axes
+    vertex_count = len(before)
+    require_count("vertices", len(after), vertex_count)
+    starts, around = faces.around(vertex_count)
+    before, after = _shared(before, np.float32, wp.vec3), _shared(after, np.float32, wp.vec3)
+    face_count = len(faces.starts) - 1
+    gradients = wp.empty(face_count, dtype=wp.mat33d, device="cpu")
+    moves = wp.empty(face_count, dtype=wp.int32, device="cpu")
+    corners = _shared(faces.corner_vertices, np.int32, wp.int32)
+    of_face = [Rows(_shared(part, np.int32, wp.int32)) for part in (faces.starts[:-1], faces.starts[1:])]
+    parallel.launch(_face_gradients, face_count, [*of_face, corners, before, after], [gradients, moves], "cpu")
+    axes = wp.empty((vertex_count, 2), dtype=wp.vec3, device="cpu")
+    is_found = wp.empty(vertex_count, dtype=wp.int32, device="cpu")
+    of_vertex = [Rows(_shared(part, np.int32, wp.int32)) for part in (starts[:-1], starts[1:])]
+    shared = [_shared(around, np.int32, wp.int32), gradients, moves]
+    parallel.launch(_vertex_axes, vertex_count, [*of_vertex, *shared], [axes, is_found], "cpu")
+    found = axes.numpy()
+    for vertex in np.flatnonzero(is_found.numpy() == 0):  # flattened: few
+        total = gradients.numpy()[around[starts[vertex] : starts[vertex + 1]]].sum(axis=0)
+        found[vertex] = nearest_rotation.nearest_rotations(total[None])[0].T[:2]
+    return found
 
 
-def _gradients(before, after, corners):
-    """(F, 9) float64: of each face's deformation the gradient, zero of faces without area; corners: (F, 3) int32."""
-    kinds = (corners, np.int32, wp.vec3i), (before, np.float32, wp.vec3), (after, np.float32, wp.vec3)
-    require_count("vertices", len(after), len(before))
-    require_indices("vertices", corners, len(before))
-    corners, before, after = (
-        wp.array(np.ascontiguousarray(array, scalar), dtype=kind, device="cpu", copy=False)
-        for array, scalar, kind in kinds
-    )
-    gradients = wp.empty(len(corners), dtype=wp.mat33d, device="cpu")
-    parallel.launch(_face_gradients, len(corners), [Rows(corners), before, after], [gradients], "cpu")
-    return gradients.numpy().reshape(-1, 9)
+def _shared(array, scalar, kind):
+    return wp.array(np.ascontiguousarray(array, scalar), dtype=kind, device="cpu", copy=False)
 
 
 @wp.func
@@ -110,27 +108,60 @@ def _basis(vertices: wp.array[wp.vec3], corners: wp.vec3i):
 
 @wp.kernel
 def _face_gradients(
-    corners: wp.array[wp.vec3i],
+    firsts: wp.array[wp.int32],
+    ends: wp.array[wp.int32],
+    corner_vertices: wp.array[wp.int32],
     before: wp.array[wp.vec3],
     after: wp.array[wp.vec3],
     # outputs
     out_gradients: wp.array[wp.mat33d],
+    out_moves: wp.array[wp.int32],
 ):
+    """Of each face's deformation the gradient, zero of faces without area, and whether any of its corners moves."""
     face = wp.tid()
-    was = _basis(before, corners[face])
+    first, end = firsts[face], ends[face]
+    corners = wp.vec3i(corner_vertices[first], corner_vertices[first + 1], corner_vertices[end - 1])
+    was = _basis(before, corners)
     gradient = wp.mat33d()
     if wp.abs(wp.determinant(was)) > wp.float64(1e-30):
-        gradient = _basis(after, corners[face]) * wp.inverse(was)
+        gradient = _basis(after, corners) * wp.inverse(was)
     out_gradients[face] = gradient
+    moves = int(0)
+    for corner in range(first, end):
+        vertex = corner_vertices[corner]
+        if not before[vertex] == after[vertex]:
+            moves = 1
+    out_moves[face] = moves
 
 
-def _has_moving_face(before, after, faces):
-    """(V,) bool: whether any corner of a vertex' faces moves."""
-    corners_move = (before != after).any(axis=1)[faces.corner_vertices]
-    faces_move = np.logical_or.reduceat(corners_move, faces.starts[:-1]) if len(corners_move) else corners_move
-    is_moved = np.zeros(len(before), bool)
-    is_moved[faces.corner_vertices[np.repeat(faces_move, np.diff(faces.starts))]] = True
-    return is_moved
+@wp.kernel
+def _vertex_axes(
+    firsts: wp.array[wp.int32],
+    ends: wp.array[wp.int32],
+    around: wp.array[wp.int32],
+    gradients: wp.array[wp.mat33d],
+    moves: wp.array[wp.int32],
+    # outputs
+    out_axes: wp.array2d[wp.vec3],
+    out_is_found: wp.array[wp.int32],
+):
+    """Rotations nearest to the mean around each vertex, without normalisation, which they ignore."""
+    vertex = wp.tid()
+    total = wp.mat33d()
+    is_moved = int(0)
+    for index in range(firsts[vertex], ends[vertex]):
+        face = around[index]
+        total += gradients[face]
+        is_moved += moves[face]
+    out_axes[vertex, 0] = wp.vec3(1.0, 0.0, 0.0)
+    out_axes[vertex, 1] = wp.vec3(0.0, 1.0, 0.0)
+    out_is_found[vertex] = 1
+    if is_moved > 0 and wp.ddot(total, total) > wp.float64(0.0):
+        rotation, is_found = nearest_rotation.polar_factor(total)
+        out_is_found[vertex] = is_found
+        for axis in range(2):
+            x, y, z = rotation[0, axis], rotation[1, axis], rotation[2, axis]
+            out_axes[vertex, axis] = wp.vec3(float(x), float(y), float(z))
 
 
 def carry(

@@ -5,6 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ....core.geometry.mesh import Faces
+from ...host.caches import Cache
 from ...host.notices import can_be_drawn, name_of
 from .. import scene
 from . import surface_materials
@@ -31,8 +33,28 @@ class DrawnMesh:
         return self.parts is not None and all(material.is_clear for _first, _count, material in self.parts)
 
 
-def read_drawn_meshes(depsgraph, viewport=None):
-    """A `DrawnMesh` for every mesh that a 3-D viewport shows as a surface, or without one a render; instances too."""
+@dataclass(frozen=True)
+class _Layout:
+    """Triangles of a mesh in the order in which they are drawn, which a mesh keeps while it moves."""
+
+    faces: Faces
+    slots: np.ndarray  # (F,) material indices of its polygons, empty where it has one material
+    loops: np.ndarray  # (3 F',) corners of its triangles
+    runs: tuple  # (material slot, number of its triangles)
+
+    def fits(self, faces, slots):
+        mine, its = ((f.corner_vertices, f.starts, s) for f, s in ((self.faces, self.slots), (faces, slots)))
+        return all(map(np.array_equal, mine, its))
+
+
+layout_cache = Cache(capacity=64)  # session_uid of a mesh object → `_Layout`
+
+
+def read_drawn_meshes(depsgraph, viewport=None, is_moving=False):
+    """A `DrawnMesh` for every mesh that a 3-D viewport shows as a surface, or without one a render; instances too.
+
+    is_moving: whether polygons may be cut as they were before a moment ago, while their corners are the same.
+    """
     meshes = []
     for instance in depsgraph.object_instances:
         if instance.object.type == "MESH" and instance.show_self and _is_surface_seen(instance, viewport):
@@ -40,7 +62,8 @@ def read_drawn_meshes(depsgraph, viewport=None):
             matrix = np.array(instance.matrix_world, np.float64)
             if not can_be_drawn(instance.object, matrix):
                 continue
-            meshes.append(replace(_read_drawn_mesh(instance.object, matrix, is_holdout), owner=owner_of(instance)))
+            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving)
+            meshes.append(replace(mesh, owner=owner_of(instance)))
     return [mesh for mesh in meshes if len(mesh.positions)]
 
 
@@ -62,46 +85,54 @@ def _is_surface_seen(instance, viewport):
     return placed.original.visible_in_viewport_get(viewport) and instance.object.display_type in {"TEXTURED", "SOLID"}
 
 
-def _read_drawn_mesh(mesh_object, to_world, is_holdout):
+def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving):
     mesh = mesh_object.to_mesh()
     try:
         vertices = scene.vertex_positions(mesh)
-        faces = scene.faces_of(mesh)
-        triangles = scene.triangle_corners(mesh, faces, name_of(mesh_object))
-        runs = () if is_holdout else _material_runs(mesh_object, mesh)
-        if len(runs) > 1:
-            triangles = triangles[np.concatenate([chosen for _material, chosen in runs])]
-        loops = triangles.ravel()
-        corners = faces.corner_vertices[loops]
+        layout = _layout(mesh_object, mesh, is_holdout, is_moving)
         loop_normals = np.empty((len(mesh.loops), 3), np.float32)
         mesh.corner_normals.foreach_get("vector", loop_normals.ravel())
-        parts = () if is_holdout else _parts(runs)
-        uvs = _read_uvs(mesh, loops, parts)
+        parts = () if is_holdout else _parts(mesh_object, layout.runs)
+        uvs = _read_uvs(mesh, layout.loops, parts)
     finally:
         mesh_object.to_mesh_clear()
-    positions = vertices[corners] @ to_world[:3, :3].T + to_world[:3, 3]
-    normals = loop_normals[loops] @ np.linalg.pinv(to_world[:3, :3])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    shown = None if is_holdout else parts
-    color = surface_color(mesh_object)
-    return DrawnMesh(positions.astype(np.float32), normals.astype(np.float32), uvs, shown, color=color)
+    positions = (vertices @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
+    normals = loop_normals @ np.linalg.pinv(to_world[:3, :3])
+    normals /= np.maximum(np.sqrt(np.einsum("nc,nc->n", normals, normals)), 1e-12)[:, None]
+    placed = positions[layout.faces.corner_vertices[layout.loops]], normals.astype(np.float32)[layout.loops]
+    return DrawnMesh(*placed, uvs, None if is_holdout else parts, color=surface_color(mesh_object))
 
 
-def _material_runs(mesh_object, mesh):
-    """[(`SurfaceMaterial`, indices of its triangles)] of an evaluated mesh, with as many as it has."""
+def _layout(mesh_object, mesh, is_holdout, is_moving):
+    """The `_Layout` of an evaluated mesh: with `is_moving` the one before, if it fits."""
+    faces, slots = scene.faces_of(mesh), np.zeros(0, np.int32)
+    if len(mesh_object.material_slots) > 1 and not is_holdout:
+        slots = np.zeros(len(mesh.polygons), np.int32)
+        mesh.polygons.foreach_get("material_index", slots)
+        slots = np.clip(slots, 0, len(mesh_object.material_slots) - 1)
+    uid = mesh_object.original.session_uid
+    known = layout_cache.get(uid) if is_moving else None
+    if known is not None and known.fits(faces, slots):
+        return known
+    triangles = scene.triangle_corners(mesh, faces, name_of(mesh_object))
+    runs = ((0, len(triangles)),)
+    if len(slots):
+        polygons = np.empty(len(triangles), np.int32)
+        mesh.loop_triangles.foreach_get("polygon_index", polygons)
+        of_triangles = slots[polygons]
+        used, counts = np.unique(of_triangles, return_counts=True)
+        runs = tuple(zip(used.tolist(), counts.tolist(), strict=True))
+        triangles = triangles[np.argsort(of_triangles, kind="stable")]
+    return layout_cache.keep(uid, _Layout(faces, slots, triangles.ravel(), runs))
+
+
+def _parts(mesh_object, runs):
+    """`DrawnMesh.parts` of an evaluated mesh, with as many materials as it has."""
     materials = [slot.material for slot in mesh_object.material_slots] or [None]
-    slots = np.zeros(len(mesh.loop_triangles), np.int32)
-    if len(materials) > 1 and len(slots):
-        mesh.loop_triangles.foreach_get("material_index", slots)
-        slots = np.clip(slots, 0, len(materials) - 1)
-    return [(surface_materials.read_material(materials[slot]), np.flatnonzero(slots == slot)) for slot in set(slots)]
-
-
-def _parts(runs):
-    ends = 3 * np.cumsum([len(chosen) for _material, chosen in runs])
+    ends = 3 * np.cumsum([count for _slot, count in runs])
     return tuple(
-        (int(end) - 3 * len(chosen), 3 * len(chosen), material)
-        for (material, chosen), end in zip(runs, ends, strict=True)
+        (int(end) - 3 * count, 3 * count, surface_materials.read_material(materials[slot]))
+        for (slot, count), end in zip(runs, ends, strict=True)
     )
 
 

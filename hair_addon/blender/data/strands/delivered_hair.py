@@ -99,4 +99,5 @@ def new_probe(hair_object):
             probe.modifiers.remove(modifier)
     if following is not None:
         follow_nodes.modifier_of(probe).show_viewport = True
+        follow_nodes.pause(probe, False)
     return probe

@@ -6,6 +6,8 @@ add-on. Nodes find a root by its stored vertices, and need no UV map; on a surfa
 as a finer subdivision for renders, by the nearest point of the surface at rest.
 """
 
+from collections import Counter
+
 import bpy
 
 from ....core import geometry
@@ -13,14 +15,18 @@ from ...host.notices import name_of
 
 _NAME = "Vellus Follow Surface"
 # Of the nodes below. Groups of other versions, from older files, are not changed: on surfaces without subdivision they
-# do the same, and on others hair takes a new one.
-_VERSION = 3
+# do the same. Hair takes a new one where strands would turn from the faces of a cage, as they do in groups before
+# `_SMOOTH_SINCE`, and where `_PAUSING` is all that a group lacks.
+_VERSION = 4
+_SMOOTH_SINCE = 3
+_PAUSING = ("GeometryNodeIsViewport", "FunctionNodeBooleanMath", "GeometryNodeSwitch")
 # Of the group: identifiers, which stay when an artist renames inputs, and types.
 _INPUTS = {
     "Surface": ("Socket_1", "NodeSocketObject"),
     "Vertices": ("Socket_2", "NodeSocketInt"),
     "Combed": ("Socket_3", "NodeSocketBool"),
     "Cage Corners": ("Socket_4", "NodeSocketInt"),
+    "Paused": ("Socket_5", "NodeSocketBool"),
 }
 ROOT_VERTICES = ("root_vertex_0", "root_vertex_1", "root_vertex_2")
 
@@ -40,7 +46,8 @@ def set_surface(curves_object, surface_object, vertex_count, is_combed, cage_cor
     """
     for modifier in curves_object.modifiers:
         if modifier.type == "NODES" and _is_ours(modifier.node_group):
-            if cage_corners and _is_of_older_version(modifier.node_group):
+            group = modifier.node_group
+            if (cage_corners and _is_before(group, _SMOOTH_SINCE)) or _lacks_pausing(group):
                 modifier.node_group = _group()
             inputs = {
                 "Surface": surface_object,
@@ -48,10 +55,43 @@ def set_surface(curves_object, surface_object, vertex_count, is_combed, cage_cor
                 "Combed": is_combed,
                 "Cage Corners": cage_corners,
             }
-            for name in _intact_inputs(modifier.node_group):
+            for name in inputs.keys() & set(_intact_inputs(modifier.node_group)):
                 socket = getattr(modifier.properties.inputs, _INPUTS[name][0])
                 if socket.value != inputs[name]:
                     socket.value = inputs[name]
+
+
+def _lacks_pausing(group):
+    """Whether a group is as version 3 made it; one that an artist has added nodes to is to stay."""
+    if not _is_before(group, _VERSION) or _is_before(group, _SMOOTH_SINCE):
+        return False
+    kinds = Counter(node.bl_idname for node in group.nodes)
+    return kinds + Counter(_PAUSING) == Counter(node.bl_idname for node in _group().nodes)
+
+
+def is_paused(curves_object):
+    """Whether viewports' evaluation leaves an object's strands at rest; never in a render's."""
+    return any(_paused_input(modifier).value for modifier in _pausable_modifiers(curves_object))
+
+
+def pause(curves_object, is_paused):
+    """Let viewports' evaluation leave an object's strands at rest, or carry them again; whether there is a way to."""
+    modifiers = _pausable_modifiers(curves_object)
+    for modifier in modifiers:
+        if _paused_input(modifier).value != is_paused:
+            _paused_input(modifier).value = is_paused
+            curves_object.update_tag(refresh={"DATA"})  # Blender does not notice
+    return bool(modifiers)
+
+
+def _paused_input(modifier):
+    return getattr(modifier.properties.inputs, _INPUTS["Paused"][0])
+
+
+def _pausable_modifiers(curves_object):
+    """Those of our modifiers whose nodes can be paused: not in older files, or where an artist removed the input."""
+    found = (m for m in curves_object.modifiers if m.type == "NODES" and _is_ours(m.node_group))
+    return [modifier for modifier in found if "Paused" in _intact_inputs(modifier.node_group)]
 
 
 def modifier_of(curves_object):
@@ -63,12 +103,12 @@ def modifier_of(curves_object):
 def is_older(curves_object):
     """Whether an object's strands turn from the flat faces of a cage, as files of older versions have it."""
     modifier = modifier_of(curves_object)
-    return modifier is not None and _is_of_older_version(modifier.node_group)
+    return modifier is not None and _is_before(modifier.node_group, _SMOOTH_SINCE)
 
 
-def _is_of_older_version(group):
-    version = group["vellus_version"]
-    return not isinstance(version, int) or version < _VERSION  # anything may stand in a damaged file
+def _is_before(group, version):
+    found = group["vellus_version"]
+    return not isinstance(found, int) or found < version  # anything may stand in a damaged file
 
 
 def modifiers_of_artist(curves_object):
@@ -109,6 +149,7 @@ def _group():
     group.interface.new_socket("Curves", in_out="INPUT", socket_type="NodeSocketGeometry")
     for name, (_identifier, kind) in _INPUTS.items():
         group.interface.new_socket(name, in_out="INPUT", socket_type=kind)
+    group.interface.items_tree["Paused"].hide_in_modifier = True
     group.interface.new_socket("Curves", in_out="OUTPUT", socket_type="NodeSocketGeometry")
     _Tree(group).build()
     return group
@@ -160,8 +201,13 @@ class _Tree:
         )
         # An undeformed surface costs only a comparison.
         is_deformed = self._is_deformed(info.outputs["Geometry"])
-        inputs = {"Switch": is_deformed, "False": at_rest, "True": moved.outputs[0]}
-        self._node("NodeGroupOutput", {0: self._node("GeometryNodeSwitch", inputs, input_type="GEOMETRY").outputs[0]})
+        carried = self._switch(is_deformed, at_rest, moved.outputs[0], "GEOMETRY")
+        self._node("NodeGroupOutput", {0: self._switch(self._is_paused(given), carried, given["Curves"], "GEOMETRY")})
+
+    def _is_paused(self, given):
+        """Never in renders: these carry strands whatever a viewport does."""
+        in_viewport = self._node("GeometryNodeIsViewport").outputs[0]
+        return self._node("FunctionNodeBooleanMath", {0: given["Paused"], 1: in_viewport}, operation="AND").outputs[0]
 
     def _is_deformed(self, surface):
         position = self._node("GeometryNodeInputPosition").outputs[0]
@@ -172,8 +218,7 @@ class _Tree:
     def _with_turns_for_brushes(self, curves, is_combed):
         """Store the deformation for sculpt brushes, which only Blender's own node provides."""
         deformed = self._node("GeometryNodeDeformCurvesOnSurface", {0: curves}).outputs[0]
-        inputs = {"Switch": is_combed, "False": curves, "True": deformed}
-        return self._node("GeometryNodeSwitch", inputs, input_type="GEOMETRY").outputs[0]
+        return self._switch(is_combed, curves, deformed, "GEOMETRY")
 
     def _smooth_rest(self, surface, cage_corners, rest):
         """The surface and, per vertex, where it is on the smooth surface at rest: smooth_surface.py."""
@@ -289,9 +334,9 @@ class _Tree:
     def _on_domain(self, value, data_type, domain):
         return self._node("GeometryNodeFieldOnDomain", {0: value}, data_type=data_type, domain=domain).outputs[0]
 
-    def _switch(self, condition, otherwise, value):
+    def _switch(self, condition, otherwise, value, kind="VECTOR"):
         inputs = {"Switch": condition, "False": otherwise, "True": value}
-        return self._node("GeometryNodeSwitch", inputs, input_type="VECTOR").outputs[0]
+        return self._node("GeometryNodeSwitch", inputs, input_type=kind).outputs[0]
 
     def _vector(self, operation, *vectors, scale=None):
         node = self._node("ShaderNodeVectorMath", dict(enumerate(vectors)), operation=operation)

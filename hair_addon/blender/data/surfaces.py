@@ -1,0 +1,153 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A surface that hair grows on, as arrays."""
+
+import hashlib
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from ...core import geometry
+from ...core.geometry.mesh import Faces, TriMesh
+
+# What does not follow from where vertices are posed, and is kept in another pose.
+_AT_REST = ("to_local_axes", "shape", "extent", "topology")
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A mesh object at rest: world axes and scale [m], with the object's origin at zero.
+
+    So gravity is -Z and lengths are true, and an object far from the world's origin loses no precision. At rest means
+    before shape keys and modifiers deform it: hair is generated there, and deformed with the surface
+    (surface_deform.py).
+    """
+
+    name: str
+    mesh: TriMesh
+    faces: Faces
+    rest: np.ndarray  # (V, 3) float32, vertices at rest in local coordinates
+    posed: np.ndarray  # (V, 3) float32, where they are now, in local coordinates
+    corner_uvs: np.ndarray | None  # (F, 3, 2) float32, None without a UV map
+    uv_map: str
+    to_world_axes: np.ndarray  # (3, 3) float64: local coordinates → these
+    is_mirrored: bool  # negative scale: triangles are wound the other way than in Blender
+    cage_corners: int  # of the faces that modifiers subdivide to a smooth surface, 0 for none
+    smooth_rest: np.ndarray  # (V, 3) float32, vertices on the smooth surface at rest; `rest` itself where none is
+
+    @cached_property
+    def to_local_axes(self):
+        """(3, 3) float64: these coordinates → local ones."""
+        return np.linalg.inv(self.to_world_axes)
+
+    def to_local(self, points):
+        """(S, P, 3) points of strands → the object's local coordinates, float32."""
+        return geometry.transform.transformed(points, self.to_local_axes)
+
+    def from_local(self, positions):
+        """Transform (..., 3) local coordinates to this space, float32."""
+        return transformed(positions, self.to_world_axes)
+
+    @property
+    def is_deformed(self):
+        """Whether shape keys or modifiers deform it."""
+        return not np.array_equal(self.rest, self.posed)
+
+    @cached_property
+    def posed_mesh(self):
+        """The deformed `TriMesh`, with modifiers and shape keys, whose size the artist sees."""
+        return TriMesh(self.from_local(self.posed), self.mesh.triangles) if self.is_deformed else self.mesh
+
+    def posed_at(self, posed):
+        """The same surface with its vertices at (V, 3) float32 local positions."""
+        other = replace(self, posed=posed)
+        other.__dict__.update({name: self.__dict__[name] for name in _AT_REST if name in self.__dict__})
+        return other
+
+    def is_at_rest_as(self, other):
+        """Whether strands generated on one also fit the other."""
+        mine, its = ((s.rest, s.mesh.triangles, s.to_world_axes) for s in (self, other))
+        return self.cage_corners == other.cage_corners and all(map(np.array_equal, mine, its))
+
+    def is_same(self, other):
+        """Whether another surface equals this one, so that cached results are valid."""
+        mine, its = (
+            (s.rest, s.posed, s.mesh.triangles, s.faces.corner_vertices, s.faces.starts, s.to_world_axes, s.corner_uvs)
+            for s in (self, other)
+        )
+        named = [(s.name, s.uv_map, s.cage_corners) for s in (self, other)]
+        return named[0] == named[1] and all(map(np.array_equal, mine, its))
+
+    @property
+    def mirror_normal(self):
+        """(3,) unit: of the plane across the object's own X axis."""
+        normal = self.to_local_axes[0]
+        return normal / np.linalg.norm(normal)
+
+    @cached_property
+    def shape(self):
+        """The `TriMesh` at rest of which `mesh` is a rotated and uniformly scaled copy; None otherwise.
+
+        Roots are placed on it, so that rotation and scale of the object do not move them, not even by rounding,
+        which relaxation would amplify.
+        """
+        axes = self.to_world_axes
+        squares = axes.T @ axes
+        if not np.allclose(squares, np.eye(3) * np.trace(squares) / 3.0, rtol=0.0, atol=1e-5 * np.trace(squares)):
+            return None
+        # A mirrored object's triangles are wound the other way, as those of the rest mirrored at its origin are.
+        return TriMesh(-self.rest if self.is_mirrored else self.rest, self.mesh.triangles)
+
+    def root_vertices(self, points):
+        """(N, 3) int32: the vertices that surface points lie between, in Blender's order of corners."""
+        vertices = self.mesh.triangles[points.triangle]
+        return np.ascontiguousarray(vertices[:, [0, 2, 1]]) if self.is_mirrored else vertices
+
+    def places(self, points):
+        """(N, 3) int32 vertices and (N, 3) float32 barycentric coordinates of points, in Blender's order of corners."""
+        return self.root_vertices(points), self.swap_winding(points).barycentric
+
+    @property
+    def scale(self):
+        """The mean scale of the object: metres in a unit of its local coordinates."""
+        return abs(np.linalg.det(self.to_world_axes)) ** (1.0 / 3.0)
+
+    @cached_property
+    def extent(self):
+        """The longest side of the box around its vertices at rest, in local coordinates."""
+        return float(np.ptp(self.rest, axis=0).max())
+
+    @cached_property
+    def topology(self):
+        """A key of the triangles and their order; the same for a mirrored mesh."""
+        triangles = self.mesh.triangles[:, [0, 2, 1]] if self.is_mirrored else self.mesh.triangles
+        return hashlib.blake2b(triangles.tobytes(), digest_size=16).hexdigest()
+
+    def to_local_normals(self, normals):
+        """(N, 3) unit normals → unit normals in local coordinates: the inverse transpose of `to_local`."""
+        if np.array_equal(self.to_world_axes, np.eye(3)):
+            return normals
+        local = normals @ self.to_world_axes.astype(np.float32)
+        return local / np.linalg.norm(local, axis=-1, keepdims=True)
+
+    def identities(self, roots):
+        """(S,) int32 identities and (S,) float32 random numbers in [0, 1), independent of the other strands."""
+
+        return geometry.root_frames.identities(self.swap_winding(roots))
+
+    def uvs(self, points):
+        """(N, 2) float32 UV coordinates of surface points; zeros without a UV map."""
+        if self.corner_uvs is None:
+            return np.zeros((len(points), 2), np.float32)
+        return np.einsum("nc,ncu->nu", points.barycentric, self.corner_uvs[points.triangle]).astype(np.float32)
+
+    def swap_winding(self, points):
+        """The same points with barycentric coordinates in Blender's order of corners, or back."""
+        return points.wound_otherwise() if self.is_mirrored else points
+
+
+def transformed(positions, matrix):
+    """(..., 3) float32 positions by a (3, 3) matrix, float32; the positions themselves where it changes nothing."""
+    if np.array_equal(matrix, np.eye(3)):
+        return np.asarray(positions, np.float32)
+    return np.asarray(positions, np.float32) @ matrix.T.astype(np.float32)

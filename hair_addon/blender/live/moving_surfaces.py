@@ -1,0 +1,75 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surfaces that an animation, a slider or a bone moves: Blender carries their hair again when they have come to rest.
+
+A script that moves a surface and reads hair sees it carried: hair is paused only while viewports draw between one move
+and the next.
+"""
+
+import time
+
+import bpy
+
+from ..groom import paused_hair
+from ..host import running, scene_time
+from ..host.caches import Cache
+from ..render import hair_cache
+
+_REST = 0.3  # seconds without a move after which a surface is at rest
+_TOGETHER = 1.0  # seconds between two moves that may be of one interaction
+
+# Name prefix of operators that move objects and bones while a mouse button is held.
+_TRANSFORMS = "TRANSFORM_OT_"
+
+moved_cache = Cache()  # session_uid of a surface → when it moved, by `time.monotonic`
+
+
+def frame_changed(surfaces):
+    """Surfaces have another shape in this frame: pause their hair while the animation plays."""
+    if surfaces and scene_time.is_shown_moving():
+        _pause(surfaces)
+
+
+def shape_changed(surfaces):
+    """Surfaces have got another shape: pause their hair if viewports have drawn the one before, a moment ago.
+
+    To be called before their poses are invalidated.
+    """
+    now, dragged = time.monotonic(), set()
+    for surface_object in surfaces:
+        before = moved_cache.get(surface_object.session_uid)
+        moved_cache.keep(surface_object.session_uid, now)
+        if before is not None and now - before < _TOGETHER and hair_cache.is_pose_seen(surface_object):
+            dragged.add(surface_object)
+    if dragged or (surfaces and paused_hair.is_any()):
+        _pause(dragged)
+
+
+def _pause(surfaces):
+    paused_hair.pause(surfaces)
+    _cancel()  # put off with every move
+    if paused_hair.is_any() and running.has_window():
+        bpy.app.timers.register(resume_at_rest, first_interval=_REST, persistent=True)
+
+
+def resume_at_rest():
+    """For `bpy.app.timers`: let Blender carry hair once nothing moves; seconds until the next try, or None."""
+    if scene_time.is_shown_moving() or _is_transforming():
+        return _REST
+    paused_hair.resume()
+    return None
+
+
+def resume():
+    """Let Blender carry all hair, before anybody may read it."""
+    _cancel()
+    paused_hair.resume()
+
+
+def _cancel():
+    if bpy.app.timers.is_registered(resume_at_rest):
+        bpy.app.timers.unregister(resume_at_rest)
+
+
+def _is_transforming():
+    windows = (window for manager in bpy.data.window_managers for window in manager.windows)
+    return any(operator.bl_idname.startswith(_TRANSFORMS) for window in windows for operator in window.modal_operators)
