@@ -11,6 +11,7 @@ const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as 
 
 // Standard errors by which the means of two blocks may differ.
 const float TOLERANCE = 2.0;
+const float MOST_GAIN = 8.0;  // of what is lit: more light comes to all strands alike, also to dark ones
 const float TOLERANCE_OF_LIGHT = 3.0;  // where nothing but lights has moved
 
 void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
@@ -83,6 +84,21 @@ vec4 previous_at(vec2 place)
   return total / weight;
 }
 
+// Mean light of a picture and its coverage, of the samples around a place, before and now: of the same samples, so that
+// which strands they are on is no noise of the change [Schied18].
+void light_around(vec2 place, out vec4 earlier, out vec3 later)
+{
+  ivec2 blocks = textureSize(light_now, 0);
+  vec2 at = block_place(place * float(history.samples_per_side), blocks);
+  earlier = vec4(0.0);
+  later = vec3(0.0);
+  for (int turn = 0; turn < 4; turn++) {
+    vec2 beside = at + (vec2(turn & 1, turn >> 1) - 0.5) / vec2(blocks);
+    earlier += 0.25 * textureLod(light_before, beside, 0.0);
+    later += 0.25 * textureLod(light_now, beside, 0.0).rgb;
+  }
+}
+
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -103,15 +119,24 @@ void main()
   if (!is_background) {  // where hair has gone, its own noise is no reason to keep some of it
     deviation = max(deviation, textureLod(before_deviation, there, 0.0));
   }
+  vec4 light = previous_at(place);
   float tolerance = TOLERANCE;
-  if (is_still) {  // how much of a block hair covers is noise, and only its light may have changed
+  if (is_still) {
+    vec4 earlier;
+    vec3 later;
+    light_around(place, earlier, later);
+    vec3 change = later / max(earlier.rgb, vec3(1e-6));
+    vec3 gain = min(change, vec3(MOST_GAIN));
+    vec3 more = max(later - gain * earlier.rgb, vec3(0.0)) / max(earlier.a, 1e-3);
+    light.rgb = gain * light.rgb + more * light.a;
+    mean_before.rgb = gain * mean_before.rgb + more * mean_before.a;
+    // How much of a block hair covers is noise, and only its light may have changed.
     mean *= mean_before.a / max(mean.a, 0.25 * mean_before.a + 1e-4);
     tolerance = TOLERANCE_OF_LIGHT;
   }
   // Half floats resolve a thousandth.
   vec4 bound = (tolerance / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
-  vec4 light = previous_at(place);
   // In proportion: what is black beside a bright edge remains so.
   vec4 factor = clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
   light *= is_still ? vec4(factor.rgb, 1.0) : factor;

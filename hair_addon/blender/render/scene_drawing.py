@@ -30,6 +30,12 @@ def draw_hair(drawn, view, buffer, is_viewport=False):
     buffer.add_hair(_hair_in_view(drawn, view, is_viewport), lights, view)
 
 
+def relight_hair(drawn, view, buffer):
+    """Return a texture of a viewport's hair as a `VisibilityBuffer` has it from a view, in the light of a `DrawnScene`."""
+    lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
+    return buffer.relight(_hair_in_view(drawn, view, is_viewport=True), lights, view)
+
+
 def find_hair(drawn, view, buffer, chosen=None):
     """Find the nearest strands of hair for a `VisibilityBuffer` as a viewport shows them, and shade none.
 

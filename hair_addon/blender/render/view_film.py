@@ -26,7 +26,7 @@ class ViewFilm:
     def restart(self, is_moved=False):
         """Start another picture: as `HairPicture.restart`."""
         if is_moved:
-            self._history.turn(self._film.light, self._film.pass_count)
+            self._history.turn(self._film.light, self._film.pass_count / self._pass_total)
             self._first_turn += self._film.pass_count
         else:
             self._history.forget()
