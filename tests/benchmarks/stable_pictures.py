@@ -4,8 +4,8 @@
 Each movement begins at rest and is drawn with one pass a frame, as a viewport does while it lasts, alone and with what
 was shown before, and as pictures that have come to rest. Printed are display levels of 255, where hair is: the 99th
 percentile of how far a pixel changes from one frame to the next, for the three; the largest change; how far the means
-of the moving picture and of a pass alone are from that of the resting one, over all frames and in the worst of them; and
-the 99th percentile of the moving picture's distance from it.
+of the moving picture and of a pass alone are from that of the resting one, over all frames and in the worst of them;
+and the 99th percentile of the moving picture's distance from it.
 
 .venv/bin/python tests/benchmarks/stable_pictures.py --strands 10000 --size 240 180
 """

@@ -31,7 +31,7 @@ def draw_hair(drawn, view, buffer, is_viewport=False):
 
 
 def relight_hair(drawn, view, buffer):
-    """Return a texture of a viewport's hair as a `VisibilityBuffer` has it from a view, in the light of a `DrawnScene`."""
+    """Return a texture of the hair that a `VisibilityBuffer` has from a view, in the light of a `DrawnScene`."""
     lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
     return buffer.relight(_hair_in_view(drawn, view, is_viewport=True), lights, view)
 
