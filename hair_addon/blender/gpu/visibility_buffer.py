@@ -99,17 +99,13 @@ class VisibilityBuffer:
             first += found[-1].segment_count
         return found
 
-    def relight(self, hair, lights, view):
-        """Return a texture of the light of the samples that `find_hair` found, in other light; `color` is kept.
+    def relight(self, hair, lights, view, picture):
+        """Fill a picture with the light of the samples in which `find_hair` found hair, in other light.
 
-        hair, lights, view: as for `find_hair`, of the same strands from the same view.
+        hair, lights, view: as for `find_hair`, of the same strands from the same view. `color` is kept.
         """
-        with self.surfaces_of_part():
-            pass
-        texture = self.part()
         for placed in self._placed(hair, lights, view):
-            self._shade(placed, texture)
-        return texture
+            self._shade(placed, picture)
 
     @property
     def segment_ranges(self):

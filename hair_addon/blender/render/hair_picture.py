@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A viewport's picture of hair: linear light, refined pass by pass while nothing moves."""
 
+import functools
+
 import gpu
 import numpy as np
 
@@ -62,8 +64,10 @@ class HairPicture:
         takes part in it until it is fine; is_shadowed: whether it darkens surfaces by the shadow of hair.
         """
         camera, turn = (world_to_view, view_to_clip), self._first_turn + self.pass_count
-        if self.pass_count == 0 and self._view is not None and not is_shadowed:
-            self._history.follow_light(drawn, camera, self._view, self._pass)
+        if self.pass_count == 0:
+            view, is_lit = self._view, is_shadowed and not is_see_through
+            relight = functools.partial(scene_drawing.relight_viewport, drawn, view, self._pass, is_lit)
+            self._history.follow_light(drawn, camera, self._pass, relight)
         self._view = view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, turn)
         is_outlined = outline is not None and not outline.is_fine
         if is_outlined:

@@ -12,7 +12,7 @@ import gpu
 import numpy as np
 
 from ..gpu import drawing, history_programs, strand_textures, uniforms
-from . import motion_vectors, scene_drawing
+from . import motion_vectors
 
 _COLOR, _PASSES = "RGBA16F", "R16F"
 
@@ -116,10 +116,11 @@ class History:
         self._blocks = [_Targets(blocks, (_COLOR, _COLOR), True) for _ in range(2)]
         self._block_batch = strand_textures.bare_vertices(6 * blocks[0] * blocks[1], "TRIS")
 
-    def follow_light(self, drawn, camera, view, buffer):
+    def follow_light(self, drawn, camera, buffer, relight):
         """Find how the light of the last pass changes with a `DrawnScene`, where nothing but lights has moved.
 
-        camera: its (world to view, view to clip); view, buffer: record and `VisibilityBuffer` of that pass.
+        camera: its (world to view, view to clip); buffer: `VisibilityBuffer` of that pass; relight: returns a texture
+        of its samples in the light of the scene.
         """
         self._is_relit = self._seen is not None and self._seen.is_still(_seen(drawn, camera))
         if not self._is_relit:
@@ -129,30 +130,30 @@ class History:
             self._relit = [_Targets(size, (_COLOR, _COLOR), True) for _ in range(2)]
         program = history_programs.blocks_program()
         self._relit[0].fill(program, {"picture": buffer.color}, weight=1.0)
-        self._relit[1].fill(program, {"picture": scene_drawing.relight_hair(drawn, view, buffer)}, weight=1.0)
+        self._relit[1].fill(program, {"picture": relight()}, weight=1.0)
 
-    def add(self, drawn, camera, view, buffer, light, pass_count, part_left, has_shadows=False):
+    def add(self, drawn, camera, view, buffer, light, pass_count, part_left, has_lit_surfaces=False):
         """Take note of a pass, the pass_count-th of a picture.
 
         drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; buffer: its
         `VisibilityBuffer`; light: (texture, weight) of the passes so far, their sum and what to divide it by;
-        part_left: of all passes, those that are still to come; has_shadows: whether shadows on surfaces are
-        in it, which lights move.
+        part_left: of all passes, those that are still to come; has_lit_surfaces: whether surfaces, or
+        shadows on them, are in it.
         """
         if pass_count == 1:
-            self._turn_to(drawn, camera, view, buffer, light, has_shadows)
+            self._turn_to(drawn, camera, view, buffer, light, has_lit_surfaces)
         if self._is_carried:
             self._is_carried = part_left > 0.0
         if self._is_carried:
             self._mix(light, pass_count, part_left)
 
-    def _turn_to(self, drawn, camera, view, buffer, light, has_shadows):
+    def _turn_to(self, drawn, camera, view, buffer, light, has_lit_surfaces):
         before, self._seen = self._seen, _seen(drawn, camera)
         self._is_carried = before is not None and _are_same(before.looks, self._seen.looks)
         if self._is_carried:
-            self._carry(before, drawn, view, buffer, light, has_shadows)
+            self._carry(before, drawn, view, buffer, light, has_lit_surfaces)
 
-    def _carry(self, before, drawn, view, buffer, light, has_shadows):
+    def _carry(self, before, drawn, view, buffer, light, has_lit_surfaces):
         now = self._seen
         record = uniforms.HISTORY.record()
         record["now_to_before"] = (before.world_to_clip @ np.linalg.inv(now.world_to_clip)).T
@@ -161,8 +162,7 @@ class History:
         record["has_hair_motion"] = has_hair = not now.places.has_still_hair(before.places)
         has_same_strands = now.places.has_same_strands(before.places)
         record["most_passes"] = _MOST_PASSES if has_same_strands else _MOST_OF_OTHERS
-        # Shadows on surfaces go with a light: they would leave a trail.
-        record["is_still"] = self._is_relit and not has_shadows
+        record["is_still"], record["has_lit_surfaces"] = self._is_relit, has_lit_surfaces
         if record["is_still"]:
             record["most_passes"] = _MOST_OF_STILL
         motion = light[0]
