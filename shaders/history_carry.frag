@@ -7,10 +7,12 @@
 
 const uint NO_SEGMENT = 0x7FFFFFFFu;
 const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
+const float MOST_OF_LIT_SURFACE = 24.0;  // where only lights move: shadows on surfaces go with them, and leave a trail
 const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways
 
 // Standard errors by which the means of two blocks may differ.
 const float TOLERANCE = 2.0;
+const float MOST_GAIN = 8.0;  // of what is lit: more light comes to all strands alike, also to dark ones
 const float TOLERANCE_OF_LIGHT = 3.0;  // where nothing but lights has moved
 
 void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
@@ -83,6 +85,34 @@ vec4 previous_at(vec2 place)
   return total / weight;
 }
 
+// Mean light of a picture and its coverage, of the samples around a place, before and now: of the same samples, so that
+// which strands they are on is no noise of the change [Schied18].
+void light_around(vec2 place, out vec4 earlier, out vec3 later)
+{
+  ivec2 blocks = textureSize(light_now, 0);
+  vec2 at = block_place(place * float(history.samples_per_side), blocks);
+  earlier = vec4(0.0);
+  later = vec3(0.0);
+  for (int turn = 0; turn < 4; turn++) {
+    vec2 beside = at + (vec2(turn & 1, turn >> 1) - 0.5) / vec2(blocks);
+    earlier += 0.25 * textureLod(light_before, beside, 0.0);
+    later += 0.25 * textureLod(light_now, beside, 0.0).rgb;
+  }
+}
+
+// Whether hair is in the samples of a pixel or around it, up to four pixels away: a thin strand is in few of them.
+bool is_near_hair(ivec2 pixel)
+{
+  int side = history.samples_per_side;
+  ivec2 last = ivec2(history.size.xy) * side - 1;
+  bool is_found = false;
+  for (int turn = 0; turn < 25 && !is_found; turn++) {
+    ivec2 place = clamp((pixel + 2 * ivec2(turn % 5, turn / 5) - 4) * side, ivec2(0), last);
+    is_found = texelFetch(segments, place, 0).r < NO_SEGMENT;
+  }
+  return is_found;
+}
+
 void main()
 {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -93,6 +123,7 @@ void main()
   passes = 0.0;
   bool is_still = history.is_still != 0;
   bool is_background = false;
+  bool is_hair_alone = is_still && (history.has_lit_surfaces == 0 || is_near_hair(pixel));
   vec2 place = is_still ? vec2(pixel) + 0.5 : place_before(pixel, is_background);
   if (any(lessThan(place, vec2(0.0))) || any(greaterThan(place, history.size.xy))) {
     return;
@@ -103,22 +134,34 @@ void main()
   if (!is_background) {  // where hair has gone, its own noise is no reason to keep some of it
     deviation = max(deviation, textureLod(before_deviation, there, 0.0));
   }
+  vec4 light = previous_at(place);
   float tolerance = TOLERANCE;
-  if (is_still) {  // how much of a block hair covers is noise, and only its light may have changed
+  if (is_still) {
+    vec4 earlier;
+    vec3 later;
+    light_around(place, earlier, later);
+    vec3 change = later / max(earlier.rgb, vec3(1e-6));
+    vec3 gain = min(change, vec3(MOST_GAIN));
+    vec3 more = max(later - gain * earlier.rgb, vec3(0.0)) / max(earlier.a, 1e-3);
+    light.rgb = gain * light.rgb + more * light.a;
+    mean_before.rgb = gain * mean_before.rgb + more * mean_before.a;
+  }
+  if (is_hair_alone) {
+    // How much of a block hair covers is noise, and only its light may have changed.
     mean *= mean_before.a / max(mean.a, 0.25 * mean_before.a + 1e-4);
     tolerance = TOLERANCE_OF_LIGHT;
   }
   // Half floats resolve a thousandth.
   vec4 bound = (tolerance / float(BLOCK_SIDE)) * deviation + 2e-3 * (mean + mean_before) + 1e-5;
   vec4 allowed = clamp(mean_before, mean - bound, mean + bound);
-  vec4 light = previous_at(place);
   // In proportion: what is black beside a bright edge remains so.
   vec4 factor = clamp(allowed / max(mean_before, vec4(1e-6)), vec4(0.0), vec4(2.0));
-  light *= is_still ? vec4(factor.rgb, 1.0) : factor;
+  light *= is_hair_alone ? vec4(factor.rgb, 1.0) : factor;
   vec4 excess = abs(mean_before - mean) / bound;
   float most = max(max(excess.r, excess.g), max(excess.b, excess.a));
   color = light;
   passes = textureLod(before_passes, place / history.size.xy, 0.0).r;
-  passes = min(passes, is_background ? MOST_OF_BACKGROUND : history.most_passes) / max(0.5 * most, 1.0);
+  float most_passes = (is_still && !is_hair_alone) ? MOST_OF_LIT_SURFACE : history.most_passes;
+  passes = min(passes, is_background ? MOST_OF_BACKGROUND : most_passes) / max(0.5 * most, 1.0);
   passes /= max(distance(place, vec2(pixel) + 0.5) / SLOW, 1.0);
 }

@@ -23,7 +23,8 @@ def carry_program():
     of_blocks = ("before_mean", "before_deviation", "now_mean", "now_deviation")
     for slot, name in enumerate(("depths", "segments")):
         info.sampler(slot, "UINT_2D", name)
-    for slot, name in enumerate(("before", "before_passes", *of_blocks, "motion"), start=2):
+    of_light = ("light_before", "light_now")
+    for slot, name in enumerate(("before", "before_passes", *of_blocks, "motion", *of_light), start=2):
         info.sampler(slot, "FLOAT_2D", name)
     return shaders.compile_drawing(info, "history_carry.vert", "history_carry.frag", _PICTURE)
 

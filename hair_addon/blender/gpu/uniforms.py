@@ -207,6 +207,7 @@ HISTORY = Block(
         "has_hair_motion": "int",  # whether it has moved, and not only the view: by the texture of motion vectors
         "has_surface_motion": "int",
         "is_still": "int",  # whether nothing has moved but lights: what is in a pixel was there before
+        "has_lit_surfaces": "int",  # whether surfaces, or shadows on them, are in the picture beside hair
         "most_passes": "float",  # that the picture before may be worth
     },
 )

@@ -79,7 +79,15 @@ class VisibilityBuffer:
         """
         self.segments.clear(format="UINT", value=(NO_SEGMENT,))
         draw = self._find if (shaders.has_image_atomics() if in_compute is None else in_compute) else self._draw_strips
-        self._hair, first = [], 0
+        self._hair = self._placed(hair, lights, view)
+        if self._hair and self._hair[-1].first + self._hair[-1].segment_count > NO_SEGMENT:
+            self._hair = []
+            raise HairError("Too many strands for one picture: hide some hair or some of its instances.")
+        draw()
+
+    def _placed(self, hair, lights, view):
+        """[_Placed] of arguments of `find_hair`."""
+        found, first = [], 0
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
         for index, (strands, shading, to_world, surface_color, samplers, steps) in enumerate(hair):
             record = drawing.strand_record(strands, view, to_world, steps)
@@ -90,12 +98,17 @@ class VisibilityBuffer:
             record["surface_color"][:3] = surface_color
             light_block = light_blocks[index if lights.shape else 0]
             window = drawing.window_of(strands, record, self.size)
-            self._hair.append(_Placed(strands, shading, record, samplers, first, light_block, window))
-            first += self._hair[-1].segment_count
-        if first > NO_SEGMENT:
-            self._hair = []
-            raise HairError("Too many strands for one picture: hide some hair or some of its instances.")
-        draw()
+            found.append(_Placed(strands, shading, record, samplers, first, light_block, window))
+            first += found[-1].segment_count
+        return found
+
+    def relight(self, hair, lights, view, picture):
+        """Fill a picture with the light of the samples in which `find_hair` found hair, in other light.
+
+        hair, lights, view: as for `find_hair`, of the same strands from the same view. `color` is kept.
+        """
+        for placed in self._placed(hair, lights, view):
+            self._shade(placed, picture)
 
     @property
     def segment_ranges(self):

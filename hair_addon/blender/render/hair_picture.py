@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A viewport's picture of hair: linear light, refined pass by pass while nothing moves."""
 
+import functools
+
 import gpu
 import numpy as np
 
@@ -30,6 +32,7 @@ class HairPicture:
         self._sides = range(self.per_side)
         self.pass_count = self._first_turn = 0
         self._history = History(self.size, self.per_side)
+        self._view = None  # record of the last pass
         self._pass = VisibilityBuffer(*samples)
         self._color = gpu.types.GPUTexture(self.size, format="RGBA16F")
         self._depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
@@ -47,7 +50,7 @@ class HairPicture:
     def restart(self, is_moved=False):
         """Start another picture; is_moved: of the same things from elsewhere, or elsewhere."""
         if is_moved:
-            self._history.turn((self._color, self.pass_count), self.pass_count)
+            self._history.turn((self._color, self.pass_count), self.pass_count / self._pass_total)
             self._first_turn += self.pass_count
         else:
             self._history.forget()
@@ -60,8 +63,12 @@ class HairPicture:
         world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not hide hair; outline: a `HairOutline` that
         takes part in it until it is fine; is_shadowed: whether it darkens surfaces by the shadow of hair.
         """
-        turn = self._first_turn + self.pass_count
-        view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, turn)
+        camera, turn = (world_to_view, view_to_clip), self._first_turn + self.pass_count
+        if self.pass_count == 0:
+            view, is_lit = self._view, is_shadowed and not is_see_through
+            relight = functools.partial(scene_drawing.relight_viewport, drawn, view, self._pass, is_lit)
+            self._history.follow_light(drawn, camera, self._pass, relight)
+        self._view = view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, turn)
         is_outlined = outline is not None and not outline.is_fine
         if is_outlined:
             outline.add_pass(drawn, view, self._pass)
@@ -78,7 +85,7 @@ class HairPicture:
                 self._sum.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
             self._accumulate()
         self.pass_count += 1
-        camera, part_left = (world_to_view, view_to_clip), 1.0 - self.pass_count / self._pass_total
+        part_left = 1.0 - self.pass_count / self._pass_total
         light = self._color, self.pass_count
         self._history.add(drawn, camera, view, self._pass, light, self.pass_count, part_left, is_shadowed)
 

@@ -57,6 +57,22 @@ class _Seen:
     places: motion_vectors.Places
     world_to_clip: np.ndarray
 
+    def is_still(self, other):
+        """Whether nothing but lights differs from other `_Seen` hair."""
+        return (
+            np.array_equal(self.world_to_clip, other.world_to_clip)
+            and _are_same(self.looks, other.looks)
+            and self.places.has_still_hair(other.places)
+            and self.places.has_still_surfaces(other.places)
+        )
+
+
+def _seen(drawn, camera):
+    """`_Seen` of a `DrawnScene` from a camera (world to view, view to clip)."""
+    # Of hair that is wet in places, which may be mixed in other ways than before.
+    looks = tuple(layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers)
+    return _Seen(looks, motion_vectors.places(drawn, *camera), camera[1] @ camera[0])
+
 
 class History:
     """What a picture of size (width, height) [pixels] showed before, with per_side² samples of a pixel in a pass."""
@@ -67,6 +83,8 @@ class History:
         self._carried = self._blocks = self._block_batch = None
         self._seen = None
         self._is_carried = False
+        self._relit = None  # _Targets: blocks of samples in the light before, and in the light now
+        self._is_relit = False
 
     @property
     def picture(self):
@@ -81,14 +99,14 @@ class History:
         """Start without what was shown before."""
         self._seen, self._is_carried = None, False
 
-    def turn(self, light, pass_count):
-        """Keep what is shown, as something has moved; light: as for `add`, of pass_count passes."""
-        if self._seen is None or not pass_count:
+    def turn(self, light, part_done):
+        """Keep what is shown, as something has moved; light: as for `add`; part_done: of all passes, those in it."""
+        if self._seen is None or not part_done:
             return
         if self._shown is None:
             self._allocate()
         if not self._is_carried:
-            self._mix(light, pass_count, 0.0)
+            self._mix(light, part_done * _MOST_OF_STILL, 0.0)
         self._shown, self._before = self._before, self._shown
 
     def _allocate(self):
@@ -98,31 +116,44 @@ class History:
         self._blocks = [_Targets(blocks, (_COLOR, _COLOR), True) for _ in range(2)]
         self._block_batch = strand_textures.bare_vertices(6 * blocks[0] * blocks[1], "TRIS")
 
-    def add(self, drawn, camera, view, buffer, light, pass_count, part_left, has_shadows=False):
+    def follow_light(self, drawn, camera, buffer, relight):
+        """Find how the light of the last pass changes with a `DrawnScene`, where nothing but lights has moved.
+
+        camera: its (world to view, view to clip); buffer: `VisibilityBuffer` of that pass; relight: returns a texture
+        of its samples in the light of the scene.
+        """
+        self._is_relit = self._seen is not None and self._seen.is_still(_seen(drawn, camera))
+        if not self._is_relit:
+            return
+        if self._relit is None:
+            size = tuple(-(-length // history_programs.BLOCK_SIDE) for length in buffer.size)
+            self._relit = [_Targets(size, (_COLOR, _COLOR), True) for _ in range(2)]
+        program = history_programs.blocks_program()
+        self._relit[0].fill(program, {"picture": buffer.color}, weight=1.0)
+        self._relit[1].fill(program, {"picture": relight()}, weight=1.0)
+
+    def add(self, drawn, camera, view, buffer, light, pass_count, part_left, has_lit_surfaces=False):
         """Take note of a pass, the pass_count-th of a picture.
 
         drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; buffer: its
         `VisibilityBuffer`; light: (texture, weight) of the passes so far, their sum and what to divide it by;
-        part_left: of all passes, those that are still to come; has_shadows: whether shadows on surfaces are
-        in it, which lights move.
+        part_left: of all passes, those that are still to come; has_lit_surfaces: whether surfaces, or
+        shadows on them, are in it.
         """
         if pass_count == 1:
-            self._turn_to(drawn, camera, view, buffer, light, has_shadows)
+            self._turn_to(drawn, camera, view, buffer, light, has_lit_surfaces)
         if self._is_carried:
             self._is_carried = part_left > 0.0
         if self._is_carried:
             self._mix(light, pass_count, part_left)
 
-    def _turn_to(self, drawn, camera, view, buffer, light, has_shadows):
-        before, world_to_clip = self._seen, camera[1] @ camera[0]
-        # Of hair that is wet in places, which may be mixed in other ways than before.
-        looks = tuple(layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers)
-        self._seen = _Seen(looks, motion_vectors.places(drawn, *camera), world_to_clip)
-        self._is_carried = before is not None and _are_same(before.looks, looks)
+    def _turn_to(self, drawn, camera, view, buffer, light, has_lit_surfaces):
+        before, self._seen = self._seen, _seen(drawn, camera)
+        self._is_carried = before is not None and _are_same(before.looks, self._seen.looks)
         if self._is_carried:
-            self._carry(before, drawn, view, buffer, light, has_shadows)
+            self._carry(before, drawn, view, buffer, light, has_lit_surfaces)
 
-    def _carry(self, before, drawn, view, buffer, light, has_shadows):
+    def _carry(self, before, drawn, view, buffer, light, has_lit_surfaces):
         now = self._seen
         record = uniforms.HISTORY.record()
         record["now_to_before"] = (before.world_to_clip @ np.linalg.inv(now.world_to_clip)).T
@@ -131,9 +162,7 @@ class History:
         record["has_hair_motion"] = has_hair = not now.places.has_still_hair(before.places)
         has_same_strands = now.places.has_same_strands(before.places)
         record["most_passes"] = _MOST_PASSES if has_same_strands else _MOST_OF_OTHERS
-        is_same_view = np.array_equal(before.world_to_clip, now.world_to_clip)
-        # Shadows on surfaces go with a light: they would leave a trail.
-        record["is_still"] = is_same_view and has_same_strands and not (has_hair or has_surfaces or has_shadows)
+        record["is_still"], record["has_lit_surfaces"] = self._is_relit, has_lit_surfaces
         if record["is_still"]:
             record["most_passes"] = _MOST_OF_STILL
         motion = light[0]
@@ -152,6 +181,8 @@ class History:
             "now_mean": now_blocks.textures[0],
             "now_deviation": now_blocks.textures[1],
             "motion": motion,
+            "light_before": (self._relit or self._blocks)[0].textures[0],
+            "light_now": (self._relit or self._blocks)[1].textures[0],
             "depths": buffer.nearest_depths(),
             "segments": buffer.segments,
         }

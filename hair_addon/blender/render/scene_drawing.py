@@ -30,6 +30,31 @@ def draw_hair(drawn, view, buffer, is_viewport=False):
     buffer.add_hair(_hair_in_view(drawn, view, is_viewport), lights, view)
 
 
+def relight_viewport(drawn, view, buffer, is_shadowed=False):
+    """Return a texture of what a `VisibilityBuffer` has in its samples, as a viewport lays it over Blender's drawing.
+
+    In the light of a `DrawnScene`; view: record that it was drawn with; is_shadowed: with the shadow of hair.
+    """
+    with buffer.surfaces_of_part():
+        if is_shadowed:
+            draw_viewport_shadow(drawn, view)
+    return _relight_hair(drawn, view, buffer, buffer.part(), is_viewport=True)
+
+
+def relight(drawn, view, buffer, is_transparent):
+    """The same as a render shows it: with surfaces, and with the background unless it is to be left empty."""
+    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
+    with buffer.surfaces_of_part(background=background):
+        _draw_all_behind_hair(drawn, view, buffer, is_transparent)
+    return _relight_hair(drawn, view, buffer, buffer.part(background=background))
+
+
+def _relight_hair(drawn, view, buffer, picture, is_viewport=False):
+    lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
+    buffer.relight(_hair_in_view(drawn, view, is_viewport), lights, view, picture)
+    return picture
+
+
 def find_hair(drawn, view, buffer, chosen=None):
     """Find the nearest strands of hair for a `VisibilityBuffer` as a viewport shows them, and shade none.
 
@@ -51,9 +76,13 @@ def draw_behind_hair(drawn, view, buffer, is_transparent):
     """Fill a `VisibilityBuffer` with the background, unless it is to be left empty, and with all surfaces."""
     background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
     with buffer.surfaces(background):
-        if drawn.world.image is not None and not is_transparent:
-            world_texture.draw_background(drawn.world, view, *buffer.size)
-        draw_surfaces(drawn, view)
+        _draw_all_behind_hair(drawn, view, buffer, is_transparent)
+
+
+def _draw_all_behind_hair(drawn, view, buffer, is_transparent):
+    if drawn.world.image is not None and not is_transparent:
+        world_texture.draw_background(drawn.world, view, *buffer.size)
+    draw_surfaces(drawn, view)
 
 
 def draw_arrival(drawn, view, buffer):

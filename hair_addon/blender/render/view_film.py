@@ -1,6 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The picture of a viewport with Rendered shading: a film, and what was shown before something moved."""
 
+import functools
+
+from . import scene_drawing
 from .film import Film
 from .hair_picture import SAMPLE_COUNT
 from .history import History
@@ -17,6 +20,7 @@ class ViewFilm:
         self._history = History(size, per_side)
         self._pass_total = -(-SAMPLE_COUNT // per_side**2)
         self._first_turn = 0
+        self._view = None  # record of the last pass
 
     @property
     def is_fine(self):
@@ -26,7 +30,7 @@ class ViewFilm:
     def restart(self, is_moved=False):
         """Start another picture: as `HairPicture.restart`."""
         if is_moved:
-            self._history.turn(self._film.light, self._film.pass_count)
+            self._history.turn(self._film.light, self._film.pass_count / self._pass_total)
             self._first_turn += self._film.pass_count
         else:
             self._history.forget()
@@ -36,9 +40,14 @@ class ViewFilm:
     def add_pass(self, drawn, world_to_view, view_to_clip, lens=None):
         """Draw a `DrawnScene` once more: arguments as for `Film.add_pass`."""
         film, camera = self._film, (world_to_view, view_to_clip)
-        view = film.add_pass(drawn, *camera, film.size, self._first_turn + film.pass_count, lens=lens)
+        if film.pass_count == 0:
+            relight = functools.partial(scene_drawing.relight, drawn, self._view, film.samples, film.is_transparent)
+            self._history.follow_light(drawn, camera, film.samples, relight)
+        self._view = view = film.add_pass(drawn, *camera, film.size, self._first_turn + film.pass_count, lens=lens)
         part_left = 1.0 - film.pass_count / self._pass_total
-        self._history.add(drawn, camera, view, film.samples, film.light, film.pass_count, part_left, has_shadows=True)
+        self._history.add(
+            drawn, camera, view, film.samples, film.light, film.pass_count, part_left, has_lit_surfaces=True
+        )
 
     def show(self):
         """Lay the picture over the viewport that is bound."""

@@ -54,6 +54,10 @@ def turn_camera(degrees):
     bpy.context.scene.camera.rotation_euler.z = angle
 
 
+def turn_light(degrees):
+    bpy.data.objects["Sun"].rotation_euler = (0.9, 0.0, np.radians(2.0 * degrees))
+
+
 def comb(guides, way):
     """Move the guides by their parts of a way, from root to tip."""
     combed = points(guides)
@@ -70,7 +74,7 @@ def biggest_change(frames):
     return np.quantile(np.abs(np.diff(shown, axis=0)).max(axis=-1)[:, is_hair], 0.99)
 
 
-MOVEMENTS = [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera)]
+MOVEMENTS = [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera), ("HAIR", turn_light)]
 
 
 @pytest.mark.parametrize(("kind", "turn"), MOVEMENTS)
@@ -131,6 +135,20 @@ def test_light_that_goes_out_is_gone_in_a_few_frames(lit):
     drawn = read_drawn()
     after = [move(picture, drawn, camera())[..., :3].mean() for _ in range(4)]
     assert after[-1] < 0.05 * before and after == sorted(after, reverse=True)
+
+
+def test_light_that_changes_is_shown_at_once(lit):
+    """With the first pass, and in each part of the picture: more light, little, and again as much as before."""
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
+    picture, side = new_picture("HAIR"), SIZE // 8
+    rest(picture, read_drawn(), camera())
+    for energy in (4.0, 0.5, 3.0):
+        bpy.data.objects["Sun"].data.energy = energy
+        drawn = read_drawn()
+        shown, still = move(picture, drawn, camera()), rest(new_picture("HAIR"), drawn, camera())
+        np.testing.assert_allclose(shown.mean(axis=(0, 1)), still.mean(axis=(0, 1)), rtol=0.02)
+        parts = [of.reshape(8, side, 8, side, 4).mean(axis=(1, 3)) for of in (shown, still)]
+        np.testing.assert_allclose(*parts, rtol=0.1, atol=0.1 * parts[1].max())
 
 
 def test_another_look_is_shown_at_once(lit):
