@@ -16,8 +16,8 @@ SIZE = 760, 760  # pixels of a picture
 CAMERA, LOOK_AT, LENS = (0.42, -1.40, 0.745), Vector((0.0, -0.033, 0.692)), 126.0  # [m], [m], [mm]
 NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
 # Absorption per fibre radius at the roots, which a key light from above would else show brighter than the lengths, and
-# the part of it at the tips, which the sun has bleached. Light that is scattered once takes little color from hair, so that
-# the classic model shows light brown lengths as olive: it has darker ones.
+# the part of it at the tips, which the sun has bleached. Light that is scattered once takes little color from hair: the
+# classic model shows light brown lengths as olive, and has darker ones.
 AUBURN, CHESTNUT = (1.05, 2.07, 3.91), (0.50, 1.15, 2.80)
 _AUBURN_TIP, _CHESTNUT_TIP = 0.18, 0.50
 GAZE, AHEAD = CAMERA, (0.0, -1.50, 0.735)  # [m]: what the eyes look at; straight ahead

@@ -100,7 +100,7 @@ def test_a_wide_light_sets_slowly(elevation, scene):
 
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_a_plane_that_light_grazes_does_not_shade_itself(angle, scene, rng):
-    """With hair the sun has a map of shadows; where strands are too thin to cast any, the plane is as light as without."""
+    """With hair the sun has a map of shadows: where strands are too thin to cast any, the plane stays as light."""
     plane = plane_and_sun(scene, 0.25, angle)
     alone = light_along_x(1)
     radii = add_sheet(scene, plane, rng).data.attributes["radius"].data
