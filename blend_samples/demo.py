@@ -3,7 +3,7 @@
 
 Writes head.blend, kajiya_kay.png, marschner.png, dual_scattering.png, styled.png (the same hair, curly) and
 tables/{m,n,n_trt}.exr to a folder. --cycles adds cycles.png, the scene of dual_scattering.png by Cycles, which takes
-minutes; with --only-cycles there is nothing else. README's picture by Cycles has --cycles-samples 256.
+minutes; with --only-cycles there is nothing else. README's picture by Cycles has --cycles-samples 128.
 """
 
 import argparse
