@@ -19,7 +19,7 @@ NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
 # the part of it at the tips, which the sun has bleached. Light that is scattered once takes little color from hair: the
 # classic model shows light brown lengths as olive, and has darker ones.
 AUBURN, CHESTNUT = (1.05, 2.07, 3.91), (0.50, 1.15, 2.80)
-_AUBURN_TIP, _CHESTNUT_TIP = 0.18, 0.50
+_AUBURN_TIP, _CHESTNUT_TIP = 0.18, 0.40
 GAZE, AHEAD = CAMERA, (0.0, -1.50, 0.735)  # [m]: what the eyes look at; straight ahead
 FSTOP = 8.0
 
