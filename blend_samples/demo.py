@@ -3,7 +3,7 @@
 
 Writes head.blend, kajiya_kay.png, marschner.png, dual_scattering.png, styled.png (the same hair, curly) and
 tables/{m,n,n_trt}.exr to a folder. --cycles adds cycles.png, the scene of dual_scattering.png by Cycles, which takes
-minutes; with --only-cycles there is nothing else.
+minutes; with --only-cycles there is nothing else. README's picture by Cycles has --cycles-samples 128.
 """
 
 import argparse
@@ -33,7 +33,7 @@ from hair_addon.core.imaging.pixel_sampling import PictureSettings
 STYLE = "CURLY"  # of styled.png
 SAMPLES_PER_SIDE = 3  # of each pixel
 PORTRAIT_SAMPLES_PER_SIDE = 4  # of dual_scattering.png
-CYCLES_SAMPLES = 32  # and denoised, as Blender does unless told otherwise
+CYCLES_SAMPLES = 32  # by default; denoised, as Blender does unless told otherwise
 MODELS = {"Kajiya-Kay": "KAJIYA_KAY", "Marschner": "MARSCHNER"}
 REPORT_MILLISECONDS = {"recursion": 12.546, "subdivision": 5.653, "matrix": None}
 STRAND_COUNTS = (30_000, 10_000)  # the portrait's own first, whose shadows are there
@@ -46,6 +46,7 @@ def main():
     parser.add_argument("--out", type=Path, default=Path("out/demo"))
     parser.add_argument("--cycles", action="store_true", help="also render the portrait by Cycles")
     parser.add_argument("--only-cycles", action="store_true", help="make no other picture and no table")
+    parser.add_argument("--cycles-samples", type=int, default=CYCLES_SAMPLES, help="of each pixel by Cycles")
     options = parser.parse_args()
     out = options.out.resolve()
     out.mkdir(parents=True, exist_ok=True)
@@ -58,7 +59,7 @@ def main():
     print(f"{len(guides.data.curves)} guides, {len(hair.data.curves)} strands in {time.perf_counter() - started:.1f} s")
     bpy.context.view_layer.objects.active = hair
     if options.cycles or options.only_cycles:
-        draw_by_cycles(hair.data, out / "cycles.png")
+        draw_by_cycles(hair.data, out / "cycles.png", options.cycles_samples)
     if options.only_cycles:
         return
     bpy.ops.vellus.bake_tables(directory=str(out / "tables"))
@@ -108,20 +109,20 @@ def draw(drawn, path, has_blur=True, samples_per_side=SAMPLES_PER_SIDE):
 def as_auburn(hair):
     """Auburn hair by the energy-conserving model, in a context."""
     look = hair.vellus.appearance
-    before = look.mode, tuple(look.absorption), look.roughness
+    before = look.mode, tuple(look.absorption), look.roughness, look.tip_absorption
     portrait.make_auburn(hair)
     try:
         yield
     finally:
-        look.mode, look.absorption, look.roughness = before
+        look.mode, look.absorption, look.roughness, look.tip_absorption = before
 
 
-def draw_by_cycles(hair, path):
+def draw_by_cycles(hair, path, sample_count):
     """Render the portrait by Cycles: the same scene, and the material that Vellus gives to hair."""
     width, height = portrait.SIZE
     with as_auburn(hair):
         bpy.context.view_layer.update()
-        api.render(path, engine="cycles", width=width, height=height, sample_count=CYCLES_SAMPLES)
+        api.render(path, engine="cycles", width=width, height=height, sample_count=sample_count)
 
 
 def draw_styled(hair, path):

@@ -24,8 +24,8 @@ from hair_addon.blender.render import offscreen
 from hair_addon.core.files.whole_file import whole_file
 
 COUNT = 24
-WIDTH, HEIGHT = 960, 540
-COLUMNS, SMALLER = 6, 4  # of the sheet: pictures in a row, pixels that become one
+SIZE, LENS = 540, 120.0  # pixels of a side of a picture, [mm]: it holds the hair
+COLUMNS, SMALLER = 6, 3  # of the sheet: pictures in a row, pixels that become one
 
 
 def main():
@@ -68,7 +68,8 @@ def _build(path):
     for curve in skull.animation_data.action.layers[0].strips[0].channelbags[0].fcurves:
         for key in curve.keyframe_points:
             key.interpolation = "LINEAR"
-    scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = COUNT, WIDTH, HEIGHT
+    scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = COUNT, SIZE, SIZE
+    scene.camera.data.lens = LENS
     with whole_file(path) as partial:
         bpy.ops.wm.save_as_mainfile(filepath=str(partial), compress=True, copy=True)
 

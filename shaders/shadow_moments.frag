@@ -16,6 +16,15 @@ vec3 values_at(int tap)
   return (is_depth != 0) ? vec3(warped_depth(values.r), 0.0, values.r) : values;
 }
 
+// What the curve of the warp adds to the mean of two places on either side of one at this depth. A slope has none: a surface
+// that light grazes would shade itself. Where the three are not in line, a surface is in front of another.
+float curve_of_warp(float depth, float before, float after)
+{
+  float mean = 0.5 * (before + after);
+  float in_line = 1.0 - clamp(abs(mean - depth) / max(0.5 * abs(after - before), 1e-6), 0.0, 1.0);
+  return in_line * (0.5 * (warped_depth(before) + warped_depth(after)) - warped_depth(mean));
+}
+
 void main()
 {
   here = ivec2(gl_FragCoord.xy);
@@ -24,6 +33,7 @@ void main()
   vec3 total = vec3(0.0, middle.yz);
   float squares = 0.0;  // of differences to the middle, which keep their digits
   float slope = 0.0;
+  float curve = 0.0;
   float weights = 1.0;
   float reach = 0.0;
   // A Gaussian from tap to tap: the ratio of one weight to the one before falls by the same factor each time.
@@ -38,6 +48,7 @@ void main()
     before.x -= middle.x;
     after.x -= middle.x;
     total += weight * (before + after);
+    curve += 2.0 * weight * curve_of_warp(middle.z, before.z, after.z);
     squares += weight * (before.x * before.x + after.x * after.x);
     slope += weight * float(tap) * (after.x - before.x);
     weights += 2.0 * weight;
@@ -46,5 +57,5 @@ void main()
   vec3 mean = total / weights;
   float variance = max(squares / weights - mean.x * mean.x, 0.0);
   float beside_slope = max(variance - slope * slope / (reach * weights), 0.0);
-  color = vec4(mean.x + middle.x, mean.y + min(variance, STEP * beside_slope), mean.z, 1.0);
+  color = vec4(mean.x + middle.x - curve / weights, mean.y + min(variance, STEP * beside_slope), mean.z, 1.0);
 }

@@ -39,10 +39,10 @@ def build(head_object, openings):
     lashes = [lash for opening in openings for lash in _lashes(opening)]
     return (
         _hair(
-            "Brows", brows, head_object, strand_count=1000, radius=4.5e-5, tip_taper=0.3, color=BROWN, roughness=0.35
+            "Brows", brows, head_object, strand_count=1500, radius=4.2e-5, tip_taper=0.3, color=BROWN, roughness=0.35
         ),
         _hair(
-            "Lashes", lashes, head_object, strand_count=560, radius=6.5e-5, tip_taper=0.3, color=BLACK, roughness=0.7
+            "Lashes", lashes, head_object, strand_count=900, radius=6.5e-5, tip_taper=0.3, color=BLACK, roughness=0.7
         ),
     )
 

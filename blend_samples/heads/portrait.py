@@ -16,9 +16,10 @@ SIZE = 760, 760  # pixels of a picture
 CAMERA, LOOK_AT, LENS = (0.42, -1.40, 0.745), Vector((0.0, -0.033, 0.692)), 126.0  # [m], [m], [mm]
 NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
 # Absorption per fibre radius at the roots, which a key light from above would else show brighter than the lengths, and
-# the part of it at the tips, which the sun has bleached.
-AUBURN, CHESTNUT = (1.05, 2.07, 3.91), (0.42, 1.02, 2.55)
-_TIP_ABSORPTION = 0.18
+# the part of it at the tips, which the sun has bleached. Light that is scattered once takes little color from hair: the
+# classic model shows light brown lengths as olive, and has darker ones.
+AUBURN, CHESTNUT = (1.05, 2.07, 3.91), (0.50, 1.15, 2.80)
+_AUBURN_TIP, _CHESTNUT_TIP = 0.18, 0.40
 GAZE, AHEAD = CAMERA, (0.0, -1.50, 0.735)  # [m]: what the eyes look at; straight ahead
 FSTOP = 8.0
 
@@ -65,14 +66,14 @@ def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
     look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", CHESTNUT
     look.cuticle_angle, look.roughness = math.radians(5.0), roughness_from_beta_r(math.radians(7.5))
     look.random_color = 0.2
-    look.tip_absorption, look.gradient_start, look.gradient_end = _TIP_ABSORPTION, 0.05, 0.42
+    look.tip_absorption, look.gradient_start, look.gradient_end = _CHESTNUT_TIP, 0.05, 0.42
     return guides, hair
 
 
 def make_auburn(hair):
     """Give hair Curves the look of the picture that README begins with."""
     look = hair.vellus.appearance
-    look.mode, look.absorption, look.roughness = "energy", AUBURN, 0.25
+    look.mode, look.absorption, look.roughness, look.tip_absorption = "energy", AUBURN, 0.25, _AUBURN_TIP
 
 
 def set_styles(hair):

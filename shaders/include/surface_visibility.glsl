@@ -78,7 +78,8 @@ void surface_visibility(
   float texel = 1.0 / float(textureSize(hair_front, 0).x);
   vec2 aside = turn;
   float away = FIRST_DISTANCE;
-  float lit = 0.0;
+  // The maps of surfaces are blurred already. Beside the place they would be those of another depth.
+  float seen = lit_part(at, depth, SURFACE_BIAS);
   float between = 0.0;
   vec3 through = vec3(0.0);
   for (int tap = 0; tap < TAP_COUNT; tap++) {
@@ -87,10 +88,7 @@ void surface_visibility(
     float meters = away * light.extent;
     float reach = meters * across.scale / max(across.w - meters, 0.25 * across.w);
     if (direct > 0.0) {
-      // The maps of surfaces are blurred already.
-      float seen = lit_part(at + vec3(aside * texel, 0.0), depth, SURFACE_BIAS);
       vec3 near = at + vec3(aside * (sqrt(part) * max(tangent * reach, texel)), 0.0);
-      lit += seen;
       between += seen * exp(-crossed_before_surface(near, depth));
     }
     // Half of the light of an even sheet of hair arrives from within 45 degrees.
@@ -106,6 +104,6 @@ void surface_visibility(
       away = clamp(depth - ends.y, 0.0, LARGEST_DISTANCE);
     }
   }
-  past_surfaces = direct * lit / float(TAP_COUNT);
+  past_surfaces = direct * seen;
   past_hair = (vec3(direct * between) + through) / float(TAP_COUNT);
 }

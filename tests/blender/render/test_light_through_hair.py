@@ -96,3 +96,12 @@ def test_a_wide_light_sets_slowly(elevation, scene):
     cosine = 1.0 / np.sqrt(1.0 + tangent**2)  # to the middle: a sun's strength is that on a plane across it
     expected = np.maximum(height * cosine, 0.0).mean() / cosine.mean()
     np.testing.assert_allclose(light_along_x(1).mean(), expected, atol=0.015)
+
+
+def test_a_plane_that_light_grazes_does_not_shade_itself(scene, rng):
+    """With hair the sun has a map of shadows: where strands are too thin to cast any, the plane stays as light."""
+    plane = plane_and_sun(scene, 0.25, 0.4)
+    alone = light_along_x(1)
+    radii = add_sheet(scene, plane, rng).data.attributes["radius"].data
+    radii.foreach_set("value", np.full(len(radii), 1e-9, np.float32))
+    np.testing.assert_allclose(light_along_x(1), alone, rtol=0.02)

@@ -182,13 +182,15 @@ def test_presets_replace_styles_and_leave_the_rest(styled, preset):
 
 def test_presets_fit_the_surface(hair):
     operate(bpy.ops.vellus.apply_style_preset, preset="CURLY")
-    plain = style_presets.read("CURLY").styles
-    assert styles()[1].radius == pytest.approx(plain[1].radius * SPHERE_FACTOR, rel=0.02)
-    assert styles()[1].coherence == plain[1].coherence
+    (plain,) = (style for style in style_presets.read("CURLY").styles if isinstance(style, curl.Settings))
+    (fitted,) = (style for style in styles() if isinstance(style, curl.Settings))
+    (locks,) = (style for style in styles() if isinstance(style, clump.Settings))
+    assert fitted.radius == pytest.approx(plain.radius * SPHERE_FACTOR, rel=0.02)
+    assert fitted.coherence == plain.coherence
     factor, spacing = hair_styles.surface_fit(bpy.data.hair_curves["Hair"])
     assert factor == pytest.approx(SPHERE_FACTOR, rel=0.02)
     assert spacing == pytest.approx(math.sqrt(4.0 * math.pi / 500), rel=0.02)
-    assert styles()[0].size == pytest.approx(4.0 * spacing, rel=0.01)
+    assert locks.size == pytest.approx(4.0 * spacing, rel=0.01)
 
 
 def test_a_preset_may_come_after_the_present_styles(styled):
