@@ -73,7 +73,7 @@ def fingerprint(points: np.ndarray, out: np.ndarray | None = None) -> str:
         outputs, kernel = [*outputs, _blocks(copies[:whole_count].reshape(part_count, PART, BLOCK))], _sums_and_copies
     if part_count:
         given = [Rows(_blocks(words[:whole_count].reshape(part_count, PART, BLOCK)))]
-        parallel.launch(kernel, part_count, inputs=given, outputs=outputs, device="cpu", least_rows=32)
+        parallel.launch(kernel, part_count, inputs=given, outputs=outputs, device="cpu", least_rows=128)
     rest = np.concatenate([sums.ravel(), words[whole_count:]]).astype(np.uint64)
     odd = 2 * np.arange(len(rest), dtype=np.uint64) + np.uint64(1)
     return f"{int((odd * rest).sum(dtype=np.uint64)) ^ len(words):016x}"

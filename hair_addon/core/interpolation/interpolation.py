@@ -79,7 +79,7 @@ def _by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep
         inputs=[Rows(guide_points), Rows(guide_normals)],
         outputs=[offsets],
         device=roots.device,
-        least_rows=256,
+        least_rows=1024,
     )
     points = parallel.empty_vectors((len(roots), point_count), roots.device) if out is None else out
     parallel.launch(

@@ -133,8 +133,8 @@ def write_uvs(curves, surface):
 
 def write_points(curves, growing):
     """Write the points of strands that `make_strands` created; growing: a future of local (S, P, 3) float32."""
-    # Blender copies the array that it shares with its last evaluation, half of the writing time: do it while strands are
-    # computed.
+    # Blender copies the array that it shares with its last evaluation, half of the writing time: it does so while
+    # strands are computed.
     attributes.unshare_positions(curves)
     _write_positions(curves, growing.result())
     curves.update_tag()
