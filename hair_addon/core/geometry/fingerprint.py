@@ -5,6 +5,7 @@ import numpy as np
 import warp as wp
 
 from ..kernels import parallel
+from ..kernels.checks import require_count
 from ..kernels.parallel import Rows
 
 wp.set_module_options({"enable_backward": False})
@@ -12,6 +13,12 @@ wp.set_module_options({"enable_backward": False})
 BLOCK = 16  # words that one vector holds
 PART = 256  # blocks that one thread adds up
 block = wp.types.vector(length=BLOCK, dtype=wp.uint32)
+
+
+@wp.func
+def _mixed(words: block):
+    # The upper half is added again, so that a sign bit, which an odd factor does not move, affects other bits.
+    return words + wp.uint32(31) * (words / wp.uint32(65536))
 
 
 @wp.kernel
@@ -24,26 +31,54 @@ def _sums(
     total = block(wp.uint32(0))
     row = blocks[part]
     for place in range(row.shape[0]):
-        words = row[place]
-        # The upper half is added again, so that a sign bit, which an odd factor does not move, affects other bits.
-        mixed = words + wp.uint32(31) * (words / wp.uint32(65536))
-        total += wp.uint32(2 * place + 1) * mixed
+        total += wp.uint32(2 * place + 1) * _mixed(row[place])
     out_sums[part] = total
 
 
-def fingerprint(points: np.ndarray) -> str:
+@wp.kernel
+def _sums_and_copies(
+    blocks: wp.array2d[block],
+    # outputs
+    out_sums: wp.array[block],
+    out_blocks: wp.array2d[block],
+):
+    part = wp.tid()
+    total = block(wp.uint32(0))
+    row = blocks[part]
+    out_row = out_blocks[part]
+    for place in range(row.shape[0]):
+        words = row[place]
+        out_row[place] = words
+        total += wp.uint32(2 * place + 1) * _mixed(words)
+    out_sums[part] = total
+
+
+def fingerprint(points: np.ndarray, out: np.ndarray | None = None) -> str:
     """16 hexadecimal digits of the bits of an array (..., 3) float32: those of another one differ, but for a freak.
 
     The sum of its words, each times an odd number that depends on its index: integers, so that it is the same on
     every machine, and nearly as fast as reading memory.
+
+    out: contiguous float32, as many, that the points are copied to meanwhile: they are read once for both.
     """
     words = np.ascontiguousarray(points, np.float32).view(np.uint32).ravel()
     part_count = len(words) // (BLOCK * PART)
-    whole = words[: part_count * BLOCK * PART].reshape(part_count, PART, BLOCK)
+    whole_count = part_count * BLOCK * PART
     sums = np.empty((part_count, BLOCK), np.uint32)
+    outputs, kernel = [_blocks(sums)], _sums
+    if out is not None:
+        require_count("numbers to copy to", out.size, len(words))
+        copies = out.reshape(-1, copy=False).view(np.uint32)
+        copies[whole_count:] = words[whole_count:]
+        outputs, kernel = [*outputs, _blocks(copies[:whole_count].reshape(part_count, PART, BLOCK))], _sums_and_copies
     if part_count:
-        blocks, there = (wp.array(a, dtype=block, device="cpu", copy=False) for a in (whole, sums))
-        parallel.launch(_sums, part_count, inputs=[Rows(blocks)], outputs=[there], device="cpu", least_rows=32)
-    rest = np.concatenate([sums.ravel(), words[whole.size :]]).astype(np.uint64)
+        given = [Rows(_blocks(words[:whole_count].reshape(part_count, PART, BLOCK)))]
+        parallel.launch(kernel, part_count, inputs=given, outputs=outputs, device="cpu", least_rows=128)
+    rest = np.concatenate([sums.ravel(), words[whole_count:]]).astype(np.uint64)
     odd = 2 * np.arange(len(rest), dtype=np.uint64) + np.uint64(1)
     return f"{int((odd * rest).sum(dtype=np.uint64)) ^ len(words):016x}"
+
+
+def _blocks(words):
+    """(..., BLOCK) uint32 as Warp's array of blocks."""
+    return wp.array(words, dtype=block, device="cpu", copy=False)

@@ -4,7 +4,10 @@
 Warp is imported late, because the import is slow.
 """
 
-from concurrent.futures import Future, ThreadPoolExecutor, wait
+import threading
+import time
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -21,8 +24,9 @@ if TYPE_CHECKING:
     from ..interpolation.guide_weights import GuideWeights
     from ..styling.stack import Styling
 
-# Seconds for other threads to start their kernels, before this one takes the GIL again.
-HEAD_START = 0.001
+# Seconds for other threads to prepare their kernels at most, and to start them, before this one takes the GIL again:
+# what it does then may hold the GIL for longer than the kernels take.
+PREPARATION, HEAD_START = 0.02, 0.0005
 
 _AS_BOUND = np.eye(3)  # the axes of a binding itself
 
@@ -33,22 +37,24 @@ def strands_now(
     weights: "GuideWeights",
     styling: "Styling | None" = None,
     out: "wp.array2d[wp.vec3] | None" = None,
+    under_way: Callable[[], None] | None = None,
 ) -> "wp.array2d[wp.vec3]":
     """Return (S, P) vec3 [m] on the binding's device: strands for the guides as combed now.
 
     It computes the weighted sum, and applies styles to it. `follow_some` does the same for some of the strands.
 
     guides: as strands follow them, which are those of `Styling.guides` for styled strands; weights: from `weights_now`
-    for the same guides; out: array to fill and return, None for a new one.
+    for the same guides; out: array to fill and return, None for a new one; under_way: called when the strands' kernels
+    run, before styles.
     """
-    points = _weighted_sum(binding, guides, weights, out)
+    points = _weighted_sum(binding, guides, weights, out, under_way)
     if styling is not None:
         centres = [level.binding for level in styling.levels]
         styling.apply(points, [(_weighted_sum(own, guides, weights_now(own, guides)), None) for own in centres])
     return points
 
 
-def _weighted_sum(binding, guides, weights, out=None):
+def _weighted_sum(binding, guides, weights, out=None, under_way=None):
     # A kernel given memory of another device reads garbage, or causes an error that affects its whole device.
     guide_points = guides.points.to(binding.positions.device)
     return interpolation.interpolation.interpolate(
@@ -59,6 +65,7 @@ def _weighted_sum(binding, guides, weights, out=None):
         weights,
         binding.keep_length,
         out,
+        under_way,
     )
 
 
@@ -103,11 +110,15 @@ def growing_points(
         require_count("points", out.size, 3 * strand_count * guides.point_count)
         there = wp.array(out, dtype=wp.vec3, device="cpu", copy=False)
 
+    is_under_way = threading.Event()
+
     def grow():
         if device.is_cpu:
-            strands_now(binding, guides, weights, styling, out=there)
+            strands_now(binding, guides, weights, styling, there, is_under_way.set)
         else:
-            wp.copy(there, strands_now(binding, guides, weights, styling))
+            made = strands_now(binding, guides, weights, styling)
+            is_under_way.set()
+            wp.copy(there, made)
             wp.synchronize_device(device)
         geometry.transform.transformed(out, axes, out)
         return out
@@ -115,7 +126,9 @@ def growing_points(
     with_a_thread = ThreadPoolExecutor(1, "vellus")
     growing = with_a_thread.submit(grow)
     with_a_thread.shutdown(wait=False)  # its thread ends with its work
-    wait([growing], timeout=HEAD_START)
+    growing.add_done_callback(lambda _done: is_under_way.set())  # after an error, too
+    is_under_way.wait(PREPARATION)
+    time.sleep(HEAD_START)
     return growing
 
 

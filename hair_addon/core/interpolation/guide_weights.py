@@ -257,7 +257,7 @@ def limited(
         inputs=[Rows(guide_points), Rows(guide_normals)],
         outputs=[shapes],
         device=device,
-        least_rows=256,
+        least_rows=1024,
     )
     weights = wp.empty_like(guide_weights.weights)
     parallel.launch(

@@ -21,6 +21,8 @@ guides, segments are added up to points by a scan over lanes [Harris07], and a s
 gpu_interpolation.py.
 """
 
+from collections.abc import Callable
+
 import warp as wp
 
 from ..geometry.hash_grid import LIMIT
@@ -43,11 +45,13 @@ def interpolate(
     guide_weights: GuideWeights,
     keep_length: float = 1.0,
     out: wp.array2d[wp.vec3] | None = None,
+    under_way: Callable[[], None] | None = None,
 ) -> wp.array2d[wp.vec3]:
     """(S, P) vec3 [m]: strands at roots (S,) [m] with unit normals (S,) that follow guides (G, P) [m], normals (G,).
 
     keep_length: how much of the way from Eq. 10 to segments as long as the guides' on average, 0 to 1; out: array to
-    fill and return, None for a new one. Raises `HairError` where counts do not match.
+    fill and return, None for a new one; under_way: on the processor, as of `parallel.launch`. Raises `HairError` where
+    counts do not match.
     """
     require_count("normals", len(normals), len(roots))
     require_count("guide normals", len(guide_normals), len(guide_points))
@@ -60,11 +64,11 @@ def interpolate(
     if out is not None:
         require_count("strands to fill", len(out), len(roots))
         require_count("points to fill", out.shape[1], guide_points.shape[1])
-    by = _by_vectors if roots.device.is_cpu else by_lanes
-    return by(roots, normals, guide_points, guide_normals, guide_weights, keep_length, out)
+    given = roots, normals, guide_points, guide_normals, guide_weights, keep_length, out
+    return _by_vectors(*given, under_way) if roots.device.is_cpu else by_lanes(*given)
 
 
-def _by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep_length, out):
+def _by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep_length, out, under_way):
     """What `interpolate` returns; all arrays on the processor."""
     guide_count, point_count = guide_points.shape
     group_count = -(-(point_count - 1) // LANES)
@@ -75,7 +79,7 @@ def _by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep
         inputs=[Rows(guide_points), Rows(guide_normals)],
         outputs=[offsets],
         device=roots.device,
-        least_rows=256,
+        least_rows=1024,
     )
     points = parallel.empty_vectors((len(roots), point_count), roots.device) if out is None else out
     parallel.launch(
@@ -92,6 +96,7 @@ def _by_vectors(roots, normals, guide_points, guide_normals, guide_weights, keep
         ],
         outputs=[points],
         device=roots.device,
+        under_way=under_way,
     )
     return points
 

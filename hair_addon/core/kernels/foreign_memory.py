@@ -5,8 +5,11 @@ import numpy as np
 import warp as wp
 
 
-def write(address: int, values: np.ndarray) -> None:
-    """Write float32 values to the processor's memory from an address on, where as many must have their place."""
-    values = np.ascontiguousarray(values, np.float32).ravel()
-    if len(values):
-        wp.array(ptr=address, dtype=wp.float32, shape=values.shape, device="cpu").assign(values)
+def at(address: int, count: int) -> np.ndarray:
+    """(count,) float32 in the processor's memory from an address on, where as many must have their place.
+
+    It is valid as long as the other program leaves that memory where it is.
+    """
+    if not count:
+        return np.empty(0, np.float32)
+    return wp.array(ptr=address, dtype=wp.float32, shape=(count,), device="cpu").numpy()

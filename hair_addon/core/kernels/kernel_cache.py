@@ -44,6 +44,14 @@ def launch(
     wp.launch(kernel, dim, inputs=inputs, outputs=outputs, device=device, block_dim=block_dim)
 
 
+def prepared(
+    kernel: wp.Kernel, dim: int | Sequence[int], inputs: Sequence[Any], device: wp.DeviceLike = None
+) -> wp.Launch:
+    """`launch` with everything done but the launch itself, whose method `launch` takes some microseconds of Python."""
+    load(device, kernel.module)
+    return wp.launch(kernel, dim, inputs=inputs, device=device, record_cmd=True)
+
+
 def load(device: wp.DeviceLike, *modules: wp.Module) -> None:
     """Load Warp modules on a device: seconds where they must be compiled, microseconds where they are loaded.
 

@@ -6,7 +6,9 @@ among threads, each with a launch of its own. `launch` is for rows that do not d
 sums over rows. On a GPU either is one launch.
 """
 
+import itertools
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -40,11 +42,13 @@ def launch(
     outputs: list[wp.array],
     device: wp.DeviceLike,
     least_rows: int = LEAST_ROWS,
+    under_way: Callable[[], None] | None = None,
 ) -> None:
     """Run a kernel, one thread per row. inputs: `Rows`, and arguments shared by all threads; outputs: arrays of rows.
 
-    least_rows: fewer are not worth a thread of the processor. Raises `HairError` where an array has another number of
-    rows.
+    least_rows: fewer are not worth a thread of the processor. under_way: called when all threads are about to begin,
+    which need nothing of Python from then on until the end: whoever holds the interpreter does not keep them waiting.
+    Raises `HairError` where an array has another number of rows.
     """
     device = wp.get_device(device)
     given = [*inputs, *map(Rows, outputs)]
@@ -54,12 +58,14 @@ def launch(
     if row_count == 0:
         return
     core_count = _core_count(device)
-    part_count = min(core_count * PARTS_PER_CORE, row_count // least_rows) if core_count > 1 else 1
+    # A thread that takes a second part has to come back to Python for it.
+    most = core_count * (PARTS_PER_CORE if under_way is None else 1)
+    part_count = min(most, row_count // least_rows) if core_count > 1 else 1
 
     def arguments(_part, first, end):
         return [value.part(first, end) if isinstance(value, Rows) else value for value in given]
 
-    _launch_parts(kernel, arguments, row_count, max(1, part_count), device)
+    _launch_parts(kernel, arguments, row_count, max(1, part_count), device, under_way)
 
 
 def share_count(row_count: int, device: wp.DeviceLike, least_rows: int = LEAST_ROWS) -> int:
@@ -86,9 +92,11 @@ def _core_count(device):
     return (os.process_cpu_count() or 1) if device.is_cpu else 1
 
 
-def _launch_parts(kernel, arguments, row_count, part_count, device):
+def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=None):
     """Launch a kernel on parts of the rows, on as many threads as cores; arguments(part, first, end) are a part's."""
     if part_count == 1:
+        if under_way is not None:
+            under_way()
         kernel_cache.launch(kernel, dim=row_count, inputs=arguments(0, 0, row_count), device=device)
         return
     bounds = np.linspace(0, row_count, part_count + 1).astype(int).tolist()
@@ -98,6 +106,19 @@ def _launch_parts(kernel, arguments, row_count, part_count, device):
         kernel_cache.launch(kernel, dim=end - first, inputs=arguments(part, first, end), device=device)
 
     kernel_cache.load(device, kernel.module)  # once, not by each thread
+    if under_way is not None:
+        parts = zip(range(part_count), bounds, bounds[1:], strict=False)
+        prepared = [
+            kernel_cache.prepared(kernel, end - first, arguments(part, first, end), device)
+            for part, first, end in parts
+        ]
+        numbers = itertools.count(1)
+
+        def launch_part(part):
+            if next(numbers) == part_count:  # all others have begun
+                under_way()
+            prepared[part].launch()
+
     with ThreadPoolExecutor(min(_core_count(device), part_count)) as pool:
         list(pool.map(launch_part, range(part_count)))  # where the first exception is raised again
 

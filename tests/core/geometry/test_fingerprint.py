@@ -6,6 +6,7 @@ import os
 import numpy as np
 import pytest
 
+from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.fingerprint import fingerprint
 
 
@@ -19,6 +20,18 @@ def test_the_same_points_leave_the_same_fingerprint(points, monkeypatch):
     assert found == fingerprint(points.copy()) == fingerprint(points.reshape(-1, 3))
     monkeypatch.setattr(os, "process_cpu_count", lambda: 7)
     assert found == fingerprint(points)
+
+
+@pytest.mark.parametrize("count", [0, 1, 33, 120, 500])
+def test_copied_points_are_the_points(points, count):
+    """And the fingerprint is that of the points; nothing beside them is written."""
+    there = np.full(3 * 41 * 500 + 7, np.nan, np.float32)
+    copies = there[3 : 3 + 3 * 41 * count]
+    assert fingerprint(points[:count], copies) == fingerprint(points[:count])
+    np.testing.assert_array_equal(copies, points[:count].ravel())
+    assert np.isnan(there).sum() == len(there) - len(copies)
+    with pytest.raises(HairError):
+        fingerprint(points, copies[:-1])
 
 
 CHANGES = {

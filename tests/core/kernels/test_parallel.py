@@ -44,6 +44,23 @@ def test_rows_are_computed_once_each_on_any_number_of_cores(rng, monkeypatch, ro
     np.testing.assert_allclose(out_sums.numpy(), (factors * values).sum(axis=1), rtol=1e-6)
 
 
+@pytest.mark.parametrize("core_count", [1, 2, 5])
+def test_who_waits_for_kernels_to_begin_hears_of_it_once(rng, monkeypatch, core_count):
+    """While no row may be done yet, and with the same results."""
+    monkeypatch.setattr(os, "process_cpu_count", lambda: core_count)
+    values = wp.array(rng.random((50_001, 3), np.float32), dtype=float, device=DEVICE, ndim=2)
+    factors = wp.array(np.float32([1.0, 2.0, 4.0]), dtype=float, device=DEVICE)
+    outputs = [wp.zeros_like(values), wp.zeros(len(values), dtype=float, device=DEVICE)]
+    begun = []
+
+    def under_way():
+        begun.append(bool(outputs[1].numpy().all()))
+
+    parallel.launch(_scale, len(values), [Rows(values), factors], outputs, DEVICE, under_way=under_way)
+    assert begun == [False]
+    np.testing.assert_array_equal(outputs[0].numpy(), factors.numpy() * values.numpy())
+
+
 def test_no_thread_is_left(rng):
     before = threading.active_count()
     test_rows_are_computed_once_each_on_any_number_of_cores(rng, pytest.MonkeyPatch(), 50_001, 2)

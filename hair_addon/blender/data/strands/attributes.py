@@ -3,7 +3,7 @@
 
 import numpy as np
 
-from ....core import kernels
+from ....core import geometry, kernels
 
 # Data types that can be read as arrays: (name of the value property, components, dtype).
 LAYOUTS = {
@@ -44,18 +44,27 @@ def write(curves, name, data_type, domain, values):
 def write_positions(curves, points, name="position"):
     """Write float32 points (..., 3) of all curves, those of linked and overridden Curves too, which no file keeps.
 
-    name: of the attribute, which is there.
+    name: of the attribute, which is there. Returns the fingerprint of the points, which are read once for both.
     """
-    data, points = curves.attributes[name].data, np.ascontiguousarray(points, np.float32)
-    if not is_from_library(curves):
-        data.foreach_set("vector", points.ravel())
-        return
-    # Where Blender's interface lets nobody edit, `foreach_set` does nothing without a word. Single elements may be
-    # written, by the first of which Blender unshares the array from its evaluated copies.
+    data, points = curves.attributes[name].data, np.asarray(points, np.float32)
     if points.size != 3 * len(data):
         raise ValueError("points are not as many as those of the curves")
+    if not len(data):
+        return geometry.fingerprint.fingerprint(points)
+    # Into Blender's own memory: `foreach_set` takes one thread, and where Blender's interface lets nobody edit it does
+    # nothing, without a word. Single elements may be written there.
+    unshare_positions(curves, name)
+    there = kernels.foreign_memory.at(data[0].as_pointer(), points.size)
+    written = geometry.fingerprint.fingerprint(points, there)
+    data[0].vector = there[:3]  # so that Blender forgets the bounds of the points before
+    return written
+
+
+def unshare_positions(curves, name="position"):
+    """Give points of Curves memory of their own, which they share with evaluated copies and steps of undo."""
+    data = curves.attributes[name].data
     if len(data):
-        kernels.foreign_memory.write(data[0].as_pointer(), points)
+        _ = data[0]  # the first access to an element does it
 
 
 def is_from_library(curves):

@@ -28,9 +28,7 @@ _ROOT_TOLERANCE = 1e-4
 
 def _write_positions(curves, points):
     """Write points (..., 3) float32 of all curves, and their fingerprint for `is_combed`."""
-
-    attributes.write_positions(curves, points)
-    curves.vellus.written = geometry.fingerprint.fingerprint(points)
+    curves.vellus.written = attributes.write_positions(curves, points)
 
 
 def _write_radii(curves, radii):
@@ -135,9 +133,9 @@ def write_uvs(curves, surface):
 
 def write_points(curves, growing):
     """Write the points of strands that `make_strands` created; growing: a future of local (S, P, 3) float32."""
-    # The first access to points makes Blender copy the array shared with its last evaluation, half of the writing time:
-    # do it while strands are computed.
-    _ = curves.attributes["position"].data[0]
+    # Blender copies the array that it shares with its last evaluation, half of the writing time: it does so while
+    # strands are computed.
+    attributes.unshare_positions(curves)
     _write_positions(curves, growing.result())
     curves.update_tag()
 

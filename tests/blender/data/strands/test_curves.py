@@ -8,6 +8,7 @@ from mathutils import Matrix
 
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves
+from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import mesh as mesh_math
 from hair_addon.core.geometry.mesh import SurfacePoints
 from tests.support.reading import attribute, points, vertex_positions
@@ -38,6 +39,22 @@ def test_curves_carry_what_blender_expects(kind, request, nodes, sphere):
     assert len(set(attribute(made, "id"))) == len(made.data.curves)
     evaluated = made.evaluated_get(bpy.context.evaluated_depsgraph_get())
     assert np.array_equal(attribute(evaluated, "rest_position", 3), points(made).reshape(-1, 3))
+
+
+def test_written_points_reach_what_is_evaluated_and_no_copy(hair):
+    """Blender shares arrays among copies of a datablock, its evaluated ones and those of undo."""
+    copy, before = hair.data.copy(), points(hair)
+    evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert np.array_equal(attribute(evaluated, "position", 3), before.reshape(-1, 3))
+    curves.write_moved(hair.data, 3.0 * before)
+    hair.data.update_tag()
+    evaluated = hair.evaluated_get(bpy.context.evaluated_depsgraph_get())
+    assert np.array_equal(attribute(evaluated, "position", 3), 3.0 * before.reshape(-1, 3))
+    radius = attribute(hair, "radius").max()
+    np.testing.assert_allclose(np.max(evaluated.bound_box, axis=0), 3.0 * before.max(axis=(0, 1)), atol=2.0 * radius)
+    assert np.array_equal(curves.read_points(copy), before.reshape(-1, 3))
+    with pytest.raises((ValueError, HairError)):
+        curves.write_moved(hair.data, before[1:])
 
 
 def test_roots_lie_on_the_surface_with_its_normal_and_uv(hair, sphere):
