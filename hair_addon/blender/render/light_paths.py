@@ -118,7 +118,6 @@ def _surroundings(drawn):
         np.concatenate([np.zeros((0, 3), np.float32), *corners]),
         np.concatenate([np.zeros((0, 3)), *colors]),
         found,
-        drawn_count,
         importance,
         world_texture.picture_of(drawn.world),
     )
