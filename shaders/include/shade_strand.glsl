@@ -26,7 +26,7 @@ vec3 towards_viewer()
 }
 
 // Radiance towards the viewer of the place that `find_place` found, where paths through a grid have found all light but
-// that which comes straight from lamps.
+// that which is drawn here: of lamps, straight from them. There the grid has what the maps miss, which may be negative.
 vec3 strand_light_on_grid()
 {
   vec3 T = strand_tangent;
@@ -54,7 +54,7 @@ vec3 strand_light_on_grid()
       radiance += irradiance * hair_bsdf(T, L, V, blur);
     }
   }
-  return radiance;
+  return max(radiance, vec3(0.0));
 }
 
 // The same by dual scattering.

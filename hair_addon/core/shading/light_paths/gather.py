@@ -16,7 +16,7 @@ from ...kernels import parallel
 from ...kernels.checks import require_count, require_indices
 from . import grid_walk
 from .fibre_walk import PI, Fibre, even_return, turn, value
-from .grid_walk import PASSED, STRAND, Medium, Met, fibre_of, walk
+from .grid_walk import PASSED, STRAND, Medium, fibre_of, seen_place, walk
 from .light_sources import Lit, Sources, choose, lit_by, on_disk, world_radiance
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
 
@@ -26,7 +26,7 @@ _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _LAMPS_AT_ONCE = wp.constant(8)  # that light a seen strand
-_OFFSETS_AT_ONCE = wp.constant(4)  # over its width
+_OFFSETS_AT_ONCE = wp.constant(16)  # over its width
 _LEAST_PATHS = 4096  # fewer are not worth a thread
 
 
@@ -60,10 +60,10 @@ class Rays:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Strands that a viewer sees, at N places: where paths start."""
+    """Strands that a viewer sees, in N rays: where paths start."""
 
     segments: np.ndarray  # (N,) of a grid
-    positions: np.ndarray  # (N, 3) [m]
+    positions: np.ndarray  # (N, 3) [m] of any points of the rays
     directions: np.ndarray  # (N, 3) unit vectors towards the viewer
     drawn: np.ndarray  # (N, 3) radiance that is drawn of them without paths
 
@@ -159,18 +159,16 @@ def _gather(
     seen_positions: wp.array[wp.vec3],
     seen_viewers: wp.array[wp.vec3],
     seed: int,
+    out_position: wp.array[wp.vec3],
     out_light: wp.array[wp.vec3],
     out_even: wp.array[wp.vec3],
     first: int,
 ):
     path = first + wp.tid()
     state = wp.rand_init(seed, path)
-    met = Met()
-    met.kind = STRAND
-    met.index = seen_segments[path]
-    met.position = seen_positions[path]
-    met.offset = 2.0 * wp.randf(state) - 1.0
     direction = -seen_viewers[path]
+    met = seen_place(medium, seen_segments[path], seen_positions[path], direction, 2.0 * wp.randf(state) - 1.0)
+    out_position[path] = met.position
     weight = wp.vec3(1.0, 1.0, 1.0)
     light = wp.vec3(0.0, 0.0, 0.0)
     event = int(0)
@@ -266,11 +264,12 @@ def gather(
         medium, sources = _medium(grid, surroundings.albedo, mesh), _sources(surroundings)
         places = [wp.array(seen.segments.astype(np.int32), dtype=int)]
         places += [_vectors(values) for values in (seen.positions, seen.directions)]
-        light, even = (wp.zeros(count, dtype=wp.vec3) for _ in range(2))
-        _launch(_gather, count, [medium, sources, *places, seed, light, even], device)
-        light, even = light.numpy() - seen.drawn, even.numpy()
+        found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
+        _launch(_gather, count, [medium, sources, *places, seed, *found], device)
+        positions, light, even = (array.numpy() for array in found)
+    light = light - seen.drawn
     x, y, z = grid.voxels
-    at = ((seen.positions - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(int).clip(0, np.array([x, y, z]) - 1)
+    at = ((positions - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(int).clip(0, np.array([x, y, z]) - 1)
     system = grid.systems[grid.strands[seen.segments]]
     voxel = ((system * z + at[:, 2]) * y + at[:, 1]) * x + at[:, 0]
     most = len(grid.kept) * x * y * z

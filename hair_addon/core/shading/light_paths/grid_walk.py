@@ -159,3 +159,25 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
                     going = 0
     met.position = position + direction * end
     return met
+
+
+@wp.func
+def seen_place(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3, spare: float):
+    """`Met` of a ray through a position with a segment that it is known to meet, nearest to its axis.
+
+    spare: the offset of a ray that passes beside it, as one does where thin strands are drawn wider.
+    """
+    start = medium.points[segment] - position
+    along = medium.points[segment + 1] - medium.points[segment]
+    normal = wp.cross(direction, along)
+    squared = wp.max(wp.dot(normal, normal), 1e-30)
+    part = wp.clamp(wp.dot(wp.cross(start, direction), normal) / squared, 0.0, 1.0)
+    radius = medium.radii[segment] + part * (medium.radii[segment + 1] - medium.radii[segment])
+    met = Met()
+    met.kind = STRAND
+    met.index = segment
+    met.offset = -wp.dot(start, normal) / (wp.sqrt(squared) * wp.max(radius, 1e-12))
+    if wp.abs(met.offset) > 1.0:
+        met.offset = spare
+    met.position = position + start + part * along + normal * (met.offset * radius / wp.sqrt(squared))
+    return met
