@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A path's way to the next strand or surface: through a grid of segments, cell by cell [Amanatides87].
 
-A segment is a ribbon that faces the path: it is met where the path comes nearest to its axis, within its radius.
+A segment is a ribbon that faces the path: it is met where the path comes nearest to its axis, within its radius. So is
+the wedge that two segments leave open on the outside of a bend, where the path comes nearest to the point between them.
 """
 
 import warp as wp
@@ -69,6 +70,17 @@ def fibre_of(medium: Medium, segment: int):
 
 
 @wp.func
+def is_in_bend(medium: Medium, segment: int, end: wp.vec3, direction: wp.vec3):
+    """Whether a ray beyond a segment's end, which is at `end` from the ray's start, is before the strand's next one."""
+    if segment + 2 >= medium.points.shape[0]:
+        return False
+    if medium.strands[segment + 2] != medium.strands[segment]:
+        return False
+    normal = wp.cross(direction, medium.points[segment + 2] - medium.points[segment + 1])
+    return wp.dot(wp.cross(end, direction), normal) < 0.0
+
+
+@wp.func
 def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3):
     """(distance along a ray of unit direction, offset from the axis) where a segment is met; `FAR` where it is not."""
     start = medium.points[segment] - position
@@ -87,6 +99,14 @@ def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3
             if wp.abs(beside) < radius and way > 0.0:
                 distance = way
                 offset = beside / radius
+        elif part >= 1.0:
+            end = start + along
+            way = wp.dot(end, direction)
+            aside = end - way * direction
+            radius = medium.radii[segment + 1]
+            if way > 0.0 and wp.dot(aside, aside) < radius * radius and is_in_bend(medium, segment, end, direction):
+                distance = way
+                offset = -wp.dot(aside, normal) / (wp.sqrt(squared) * radius)
     return distance, offset
 
 
