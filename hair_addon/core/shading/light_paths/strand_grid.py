@@ -105,8 +105,10 @@ def _register(
         along = points[first + 1] - start
         parts = 1 + wp.clamp(int(wp.length(along) / wp.min(cell)), 0, _MOST_PARTS)
         reach = radius + 0.5 * wp.length(cell)
-        before_a = wp.vec3(wp.inf, wp.inf, wp.inf)
-        before_b = before_a
+        before_a = start
+        before_b = start
+        before_low = wp.vec3i(0, 0, 0)
+        before_high = wp.vec3i(-1, -1, -1)
         for part in range(parts):
             a = start + along * (float(part) / float(parts))
             b = start + along * (float(part + 1) / float(parts))
@@ -122,14 +124,18 @@ def _register(
                     for x in range(low[0], high[0] + 1):
                         middle = wp.vec3(float(x) + 0.5, float(y) + 0.5, float(z) + 0.5)
                         centre = corner + wp.cw_mul(middle, cell)
-                        is_new = part == 0 or not _touches(before_a, before_b, centre, reach)
-                        if is_new and _touches(a, b, centre, reach):
+                        is_known = x >= before_low[0] and y >= before_low[1] and z >= before_low[2]
+                        is_known = is_known and x <= before_high[0] and y <= before_high[1] and z <= before_high[2]
+                        is_known = is_known and _touches(before_a, before_b, centre, reach)
+                        if not is_known and _touches(a, b, centre, reach):
                             index = (z * shape[1] + y) * shape[0] + x
                             at = wp.atomic_add(out_ends, index, 1)
                             if is_counting == 0:
                                 out_segments[at] = first
             before_a = a
             before_b = b
+            before_low = low
+            before_high = high
 
 
 def build(
