@@ -4,12 +4,14 @@
 Prints each scene with the ratio of its hair's mean colour (Vellus / Cycles, channel by channel) and the structural
 similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and
 distribution.png, the part of the scenes up to each deviation, with --dual beside that of a scenes.json by dual
-scattering. Cycles' pictures are kept by the scene and the points of its hair: another run renders only what changed.
+scattering. Cycles' pictures are kept in --references with the extent of their hair: another run, on any machine,
+renders only what changed. --references-only renders them and nothing else, so that processes can share the seeds.
 """
 
 import argparse
 import hashlib
 import json
+import math
 import os
 import sys
 import time
@@ -27,20 +29,25 @@ from blend_samples.comparisons import random_scene
 from blend_samples.sheets import line_plot, picture_pairs
 from hair_addon import api
 
-_VERSION = 1  # of how references are rendered
+_VERSION = 2  # of how references are rendered
+_SAME_HAIR = 2e-4  # [m] that processors may differ in the mean and the spread of the same hair's points
 
 
 def main():
     """Render, draw, measure."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--out", type=Path, default=Path("out/random_scenes"))
+    parser.add_argument("--references", type=Path, help="folder of Cycles' pictures; OUT/cycles without it")
+    parser.add_argument("--references-only", action="store_true", help="render missing references, measure nothing")
     parser.add_argument("--seeds", type=int, nargs="+", default=(0, 30), help="FIRST END, and any number of such pairs")
     parser.add_argument("--size", type=int, default=144, help="pixels along a side")
     parser.add_argument("--samples", type=int, default=48, help="samples a pixel, of Cycles")
     parser.add_argument("--scattering", default="GRID", choices=("GRID", "DUAL"), help="of the scene's render settings")
     parser.add_argument("--dual", type=Path, help="scenes.json of a run with --scattering DUAL, for the plot")
     options = parser.parse_args()
-    (options.out / "cycles").mkdir(parents=True, exist_ok=True)
+    options.references = options.references or options.out / "cycles"
+    for folder in (options.out, options.references):
+        folder.mkdir(parents=True, exist_ok=True)
     prepare()
     rows, pairs = [], []
     ranges = zip(options.seeds[::2], options.seeds[1::2], strict=True)
@@ -49,6 +56,9 @@ def main():
         curves = random_scene.build(values)
         bpy.context.scene.vellus.multiple_scattering = options.scattering
         reference = by_cycles(values, curves, options)
+        if options.references_only:
+            print(f"{seed:4}  reference", flush=True)
+            continue
         started = time.process_time()
         picture = by_vellus(options.size)
         row = {
@@ -63,6 +73,8 @@ def main():
         print(line(row), flush=True)
         rows.append(row)
         pairs.append((f"{seed}: " + " ".join(f"{value:.2f}" for value in row["ratio"]), reference, picture))
+    if options.references_only:
+        return
     (options.out / "scenes.json").write_text(json.dumps(rows, indent=1))
     print(summary(rows))
     dual = [] if options.dual is None else json.loads(options.dual.read_text())
@@ -81,9 +93,22 @@ def prepare():
 
 def by_cycles(values, curves, options):
     """(H, W, 4) linear premultiplied pixels of the hair, path traced, or kept from an earlier run."""
-    path = options.out / "cycles" / f"{values['seed']}_{key(values, curves, options)}.npy"
-    if path.is_file():
-        return np.load(path)
+    path = options.references / f"{values['seed']}_{key(values, options)}.npy"
+    extent = hair_extent(curves)
+    kept = path.with_suffix(".json")
+    if path.is_file() and kept.is_file():
+        distance = between(json.loads(kept.read_text()), extent)
+        if distance < _SAME_HAIR:
+            return np.load(path)
+        print(f"{values['seed']:4}  rendering again: the kept reference's hair differs by {distance:.2g} m", flush=True)
+    pixels = path_traced(path.with_suffix(".exr"), options)
+    np.save(path, pixels)
+    kept.write_text(json.dumps(extent))
+    return pixels
+
+
+def path_traced(path, options):
+    """(H, W, 4) linear premultiplied pixels of the scene by Cycles; path: of a file that is deleted again."""
     blender_scene = bpy.context.scene
     render, cycles = blender_scene.render, blender_scene.cycles
     render.engine, render.film_transparent = "CYCLES", True
@@ -95,24 +120,32 @@ def by_cycles(values, curves, options):
     cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = cycles.diffuse_bounces = 64
     cycles.sample_clamp_indirect = cycles.sample_clamp_direct = 0.0
     cycles.blur_glossy = 0.0  # Filter Glossy would make hair rougher after the first bounce
-    render.filepath = str(path.with_suffix(".exr").resolve())
+    render.filepath = str(path.resolve())
     bpy.ops.render.render(write_still=True)
     image = bpy.data.images.load(render.filepath, check_existing=False)
     pixels = np.empty(image.size[0] * image.size[1] * 4, np.float32)
     image.pixels.foreach_get(pixels)
     bpy.data.images.remove(image)
     Path(render.filepath).unlink()
-    pixels = pixels.reshape(options.size, options.size, 4)
-    np.save(path, pixels)
-    return pixels
+    return pixels.reshape(options.size, options.size, 4)
 
 
-def key(values, curves, options):
-    """A key of a reference: the scene's values, the hair's points to a tenth of a millimetre, and the sampling."""
-    found = hashlib.sha256(json.dumps([_VERSION, values, options.size, options.samples]).encode())
-    for hair in curves:
-        found.update(np.rint(api.points(hair) * 1e4).astype(np.int32).tobytes())
-    return found.hexdigest()[:16]
+def key(values, options):
+    """A key of a reference: the scene's values and the sampling."""
+    return hashlib.sha256(json.dumps([_VERSION, values, options.size, options.samples]).encode()).hexdigest()[:16]
+
+
+def hair_extent(curves):
+    """Of each hair the number of its points, their mean and their spread along X, Y, Z [m]: plain values."""
+    found = [api.points(hair).reshape(-1, 3).astype(np.float64) for hair in curves]
+    return [[len(points), points.mean(axis=0).tolist(), points.std(axis=0).tolist()] for points in found]
+
+
+def between(first, second):
+    """The largest difference of two extents in a mean or a spread [m]; infinite for other numbers of points."""
+    if [one[0] for one in first] != [one[0] for one in second]:
+        return math.inf
+    return max(float(np.abs(np.subtract(one[1:], other[1:])).max()) for one, other in zip(first, second, strict=True))
 
 
 def by_vellus(size):

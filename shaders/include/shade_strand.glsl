@@ -46,7 +46,8 @@ bool is_visible(vec3 irradiance)
   return max(irradiance.r, max(irradiance.g, irradiance.b)) > LEAST_IRRADIANCE;
 }
 
-// Radiance towards the viewer where paths through a grid have found all light but that which comes straight from lamps.
+// Radiance towards the viewer where paths through a grid have found all light but that which is drawn here: of lamps,
+// straight from them. There the grid has what the maps miss, which may be negative.
 vec3 strand_light_on_grid(SeenStrand strand)
 {
   vec3 radiance = drawn_lobes.w * light_among_strands(drawn_position) * strand.returned;
@@ -59,7 +60,7 @@ vec3 strand_light_on_grid(SeenStrand strand)
       radiance += arriving * hair_bsdf(strand.T, lamp.L, strand.V, blur);
     }
   }
-  return radiance;
+  return max(radiance, vec3(0.0));
 }
 
 // The same by dual scattering.

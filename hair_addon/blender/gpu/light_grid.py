@@ -14,7 +14,7 @@ none_cache = Cache(capacity=1)
 def upload(means):
     """A texture of light (Z, Y, X, 3), linear between voxels."""
     texels = np.ones((*means.shape[:3], 4), np.float32)
-    texels[..., :3] = np.minimum(means, _GREATEST)
+    texels[..., :3] = np.clip(means, -_GREATEST, _GREATEST)
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     texture = gpu.types.GPUTexture(means.shape[2::-1], format="RGBA16F", data=data)
     texture.filter_mode(True)

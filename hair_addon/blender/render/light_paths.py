@@ -11,6 +11,7 @@ from ...core.shading.fibre import strand_variation
 from ...core.shading.fibre.principled import varied_roughness
 from ..gpu import drawing, light_grid, world_texture
 from ..settings import preferences
+from . import seen_strands
 
 _PATHS_A_PIXEL = 16
 _LEAST_PATHS, _MOST_PATHS = 50_000, 400_000  # over the part of the picture that holds the hair
@@ -33,27 +34,32 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
         return drawn
     looks = [layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers]
     is_usual = all(layer.fibre is not None for layer in looks) and drawn.lamps.are_linked_to_all
-    rays = rays_of(drawn.hair, world_to_view, view_to_clip) if is_usual else None
-    if rays is None:
+    window = window_of(drawn.hair, world_to_view, view_to_clip) if is_usual else None
+    if window is None:
         return drawn
     fibres = [layer.fibre[0] for layer in looks]
     firsts = np.cumsum([0, *(len(shading.layers) for _strands, shading, *_ in drawn.hair)])
     systems = [_strands_of(*hair[:3], first) for hair, first in zip(drawn.hair, firsts[:-1], strict=True)]
     if not light_paths.strand_grid.has_area(systems):
         return drawn
-    grid = light_paths.strand_grid.build(systems, fibres)
-    sums = light_paths.gather.gather(grid, _surroundings(drawn), rays, count, len(systems), seed, preferences.device())
-    seen = [
-        {**textures, "light_grid": light_grid.upload(light_paths.voxel_means.smooth_ratios(of_hair, count))}
-        for textures, of_hair in zip(drawn.hair_visibility, sums, strict=True)
+    device = preferences.device()
+    grid = light_paths.strand_grid.build(systems, fibres, device=device)
+    seen = seen_strands.find(drawn, grid, (world_to_view, view_to_clip), window, count, seed)
+    if not len(seen.segments):
+        return drawn
+    sums = light_paths.gather.gather(grid, _surroundings(drawn), seen, seed, device)
+    means = [light_paths.voxel_means.smooth_ratios(of_hair, len(seen.segments)) for of_hair in sums]
+    visibility = [
+        {**textures, "light_grid": light_grid.upload(of_hair)}
+        for textures, of_hair in zip(drawn.hair_visibility, means, strict=True)
     ]
     lights = drawn.lights.copy()
     lights["grid_corner"][:3], lights["grid_scale"][:3] = grid.corner, 1.0 / (grid.cell * grid.shape)
-    return replace(drawn, lights=lights, hair_lights=None, hair_visibility=seen)
+    return replace(drawn, lights=lights, hair_lights=None, hair_visibility=visibility)
 
 
-def rays_of(hair, world_to_view, view_to_clip):
-    """`gather.Rays` over the rectangle of a picture that holds all hair; None where it is outside."""
+def window_of(hair, world_to_view, view_to_clip):
+    """(low, high) corners (2,) in clip space of the part of a picture that holds all hair; None where it is outside."""
     world_to_clip = np.asarray(view_to_clip, float) @ np.asarray(world_to_view, float)
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in hair])
     box = centre + radius * (2.0 * np.indices((2, 2, 2)).reshape(3, -1).T - 1.0)
@@ -62,15 +68,7 @@ def rays_of(hair, world_to_view, view_to_clip):
     if (clip[:, 3] > 1e-6).all():
         at = clip[:, :2] / clip[:, 3:]
         low, high = np.clip(at.min(axis=0), -1.0, 1.0), np.clip(at.max(axis=0), -1.0, 1.0)
-    if (high <= low).any():
-        return None
-    corners = []
-    for depth in (-1.0, 1.0):
-        for x, y in ((low[0], low[1]), (high[0], low[1]), (low[0], high[1])):
-            point = np.linalg.solve(world_to_clip, [x, y, depth, 1.0])
-            corners.append(point[:3] / point[3])
-    near, near_x, near_y, far, far_x, far_y = corners
-    return light_paths.gather.Rays(near, near_x - near, near_y - near, far, far_x - far, far_y - far)
+    return None if (high <= low).any() else (low, high)
 
 
 def _strands_of(strands, shading, to_world, first):
@@ -118,7 +116,6 @@ def _surroundings(drawn):
         np.concatenate([np.zeros((0, 3), np.float32), *corners]),
         np.concatenate([np.zeros((0, 3)), *colors]),
         found,
-        drawn_count,
         importance,
         world_texture.picture_of(drawn.world),
     )

@@ -163,12 +163,11 @@ def even_return(fibre: Fibre, viewer: wp.vec3):
 
 
 @wp.func
-def turn(fibre: Fibre, viewer: wp.vec3, weight: wp.vec3, random: wp.uint32):
-    """(direction of light that goes to the viewer, the path's weight then, random state)."""
+def turn(fibre: Fibre, viewer: wp.vec3, weight: wp.vec3, h: float, random: wp.uint32):
+    """(direction of light that goes to the viewer, the path's weight then, random state), at an offset h."""
     state = random
     sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
     cos_o = wp.sqrt(1.0 - sin_o * sin_o)
-    h = 2.0 * wp.randf(state) - 1.0
     fresnel = reflectance(cos_o * wp.sqrt(1.0 - h * h), fibre.eta)
     crossing = transmittance(h, sin_o, cos_o, fibre.eta, fibre.sigma_a)
     of_r = wp.dot(weight, attenuation(0, fresnel, crossing))

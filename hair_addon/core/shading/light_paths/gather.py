@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light among strands: paths from the viewer through a grid of their pieces, gathered at the strands that are seen.
+"""Light among strands: paths from seen strands through a grid of all, gathered by voxel.
 
-Light of lamps that meets a seen strand without having met anything is left out: it is drawn with sharp shadows. All
-other light is here: what strands, surfaces and the world send to the seen strands, after any number of events. Beside
-it is what the same strands would send back of even light: by the ratio of both each strand of a voxel is shaded as
-itself, and their mean is that of the paths.
+Each path finds all light that its strand sends to the viewer, after any number of events. Of lamps' light that has met
+nothing, which the picture draws with sharp shadows, only what is missing there is kept. Beside it is what the same
+strands would send back of even light: by the ratio of both each strand of a voxel is shaded as itself, and their mean
+is that of the paths.
 """
 
 from dataclasses import dataclass
@@ -13,11 +13,11 @@ import numpy as np
 import warp as wp
 
 from ...kernels import parallel
-from ...kernels.checks import require_count
+from ...kernels.checks import require_count, require_indices
 from . import grid_walk
-from .fibre_walk import PI, even_return, turn, value
-from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
-from .light_sources import Sources, lit_by, on_disk, world_radiance
+from .fibre_walk import PI, Fibre, even_return, turn, value
+from .grid_walk import PASSED, STRAND, Medium, fibre_of, seen_place, walk
+from .light_sources import Lit, Sources, choose, lit_by, on_disk, world_radiance
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -25,7 +25,8 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
-_VOXEL = wp.constant(float(CELLS_A_VOXEL))
+_LAMPS_AT_ONCE = wp.constant(8)  # that light a seen strand
+_OFFSETS_AT_ONCE = wp.constant(16)  # over its width
 _LEAST_PATHS = 4096  # fewer are not worth a thread
 
 
@@ -34,15 +35,13 @@ class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
     corners: (3 F, 3) of triangles [m]; albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light`
-    in shaders/include/lights.glsl; drawn_count: of how many, the first, light on seen strands is left out; importance:
-    (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude and latitude
-    as core/imaging/environment.py takes it apart.
+    in shaders/include/lights.glsl; importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without
+    lamps, a picture of longitude and latitude as core/imaging/environment.py takes it apart.
     """
 
     corners: np.ndarray
     albedo: np.ndarray
     lamps: np.ndarray
-    drawn_count: int
     importance: np.ndarray
     world: np.ndarray
 
@@ -59,6 +58,16 @@ class Rays:
     far_y: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Strands that a viewer sees, in N rays: where paths start."""
+
+    segments: np.ndarray  # (N,) of a grid
+    positions: np.ndarray  # (N, 3) [m] of any points of the rays
+    directions: np.ndarray  # (N, 3) unit vectors towards the viewer
+    drawn: np.ndarray  # (N, 3) radiance that is drawn of them without paths
+
+
 @wp.struct
 class _Rays:
     near: wp.vec3
@@ -71,20 +80,41 @@ class _Rays:
 
 
 @wp.func
-def _light_of_lamps(
-    medium: Medium, sources: Sources, first: int, position: wp.vec3, normal: wp.vec3, own: int, random: wp.uint32
-):
-    """(direction, irradiance, random state) of a lamp's light that arrives; normal: of a surface, 0 on strand `own`."""
-    lit, state = lit_by(sources, first, position, 0.5 * medium.least_cell, random)
-    arriving = lit.irradiance
-    if wp.dot(normal, normal) > 0.0:
-        arriving = arriving * (wp.max(wp.dot(normal, lit.direction), 0.0) / PI)
-    if lit.casts_shadow > 0 and wp.max(arriving) > 0.0:
-        met, after = walk(medium, position, lit.direction, lit.distance, own, state)
-        state = after
+def _arriving(medium: Medium, lit: Lit, position: wp.vec3, own: int):
+    """Irradiance of a lamp's light that arrives at a place on strand `own`, -1 for a surface."""
+    if lit.casts_shadow > 0 and wp.max(lit.irradiance) > 0.0:
+        met = walk(medium, position, lit.direction, lit.distance, own)
         if met.kind != PASSED:
-            arriving = wp.vec3(0.0, 0.0, 0.0)
-    return lit.direction, arriving, state
+            return wp.vec3(0.0, 0.0, 0.0)
+    return lit.irradiance
+
+
+@wp.func
+def _light_at_once(
+    medium: Medium, sources: Sources, fibre: Fibre, viewer: wp.vec3, position: wp.vec3, own: int, random: wp.uint32
+):
+    """(radiance of lamps' light that a seen strand sends to the viewer, random state): the mean over its width."""
+    state = random
+    light = wp.vec3(0.0, 0.0, 0.0)
+    turns = wp.min(sources.count, _LAMPS_AT_ONCE)
+    for index in range(turns):
+        chosen = index
+        share = float(1.0)
+        if sources.count > _LAMPS_AT_ONCE:
+            any_lamp, one_over_chance, after = choose(sources, state)
+            state = after
+            chosen = any_lamp
+            share = one_over_chance / float(turns)
+        lit, after = lit_by(sources, chosen, position, 0.5 * medium.least_cell, state)
+        state = after
+        arriving = _arriving(medium, lit, position, own)
+        if wp.max(arriving) > 0.0:
+            shift = wp.randf(state)
+            for step in range(_OFFSETS_AT_ONCE):
+                h = 2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0
+                scattered = value(fibre, viewer, lit.direction, h) * (share / float(_OFFSETS_AT_ONCE))
+                light += wp.cw_mul(arriving, scattered)
+    return light, state
 
 
 @wp.func
@@ -98,15 +128,13 @@ def _off_surface(normal: wp.vec3, random: wp.uint32):
 
 
 @wp.kernel
-def _gather(
+def _find(
     medium: Medium,
-    sources: Sources,
     rays: _Rays,
     seed: int,
-    voxels: wp.vec3i,
-    out_voxel: wp.array[int],
-    out_light: wp.array[wp.vec3],
-    out_even: wp.array[wp.vec3],
+    out_segment: wp.array[int],
+    out_position: wp.array[wp.vec3],
+    out_viewer: wp.array[wp.vec3],
     first: int,
 ):
     path = first + wp.tid()
@@ -115,121 +143,166 @@ def _gather(
     y = (float(path / rays.side) + wp.randf(state)) / float(rays.side)
     position = rays.near + x * rays.near_x + y * rays.near_y
     direction = wp.normalize(rays.far + x * rays.far_x + y * rays.far_y - position)
+    met = walk(medium, position, direction, _FAR, -1)
+    out_segment[path] = -1
+    if met.kind == STRAND:
+        out_segment[path] = met.index
+    out_position[path] = met.position
+    out_viewer[path] = -direction
+
+
+@wp.kernel
+def _gather(
+    medium: Medium,
+    sources: Sources,
+    seen_segments: wp.array[int],
+    seen_positions: wp.array[wp.vec3],
+    seen_viewers: wp.array[wp.vec3],
+    seed: int,
+    out_position: wp.array[wp.vec3],
+    out_light: wp.array[wp.vec3],
+    out_even: wp.array[wp.vec3],
+    first: int,
+):
+    path = first + wp.tid()
+    state = wp.rand_init(seed, path)
+    direction = -seen_viewers[path]
+    met = seen_place(medium, seen_segments[path], seen_positions[path], direction, 2.0 * wp.randf(state) - 1.0)
+    out_position[path] = met.position
     weight = wp.vec3(1.0, 1.0, 1.0)
     light = wp.vec3(0.0, 0.0, 0.0)
     event = int(0)
-    own = int(-1)
     while event < _MOST_EVENTS:
-        met, after = walk(medium, position, direction, _FAR, own, state)
-        state = after
         if met.kind == PASSED:
-            if event > 0:
-                light += wp.cw_mul(weight, world_radiance(sources, direction))
+            light += wp.cw_mul(weight, world_radiance(sources, direction))
             event = _MOST_EVENTS
-        elif met.kind == STRAND:
-            fibre = fibre_of(medium, met.index)
-            viewer = -direction
-            position = met.position
-            own = medium.strands[met.index]
-            first_lamp = int(0)
-            if event == 0:
-                at = wp.cw_div(position - medium.corner, medium.cell) / _VOXEL
-                vx = wp.clamp(int(at[0]), 0, voxels[0] - 1)
-                vy = wp.clamp(int(at[1]), 0, voxels[1] - 1)
-                vz = wp.clamp(int(at[2]), 0, voxels[2] - 1)
-                out_voxel[path] = ((medium.systems[met.index] * voxels[2] + vz) * voxels[1] + vy) * voxels[0] + vx
-                out_even[path] = even_return(fibre, viewer)
-                first_lamp = sources.drawn_count
-            if first_lamp < sources.count:
-                towards, arriving, after = _light_of_lamps(
-                    medium, sources, first_lamp, position, wp.vec3(0.0, 0.0, 0.0), own, state
-                )
-                state = after
-                if wp.max(arriving) > 0.0:
-                    h = 2.0 * wp.randf(state) - 1.0
-                    light += wp.cw_mul(wp.cw_mul(weight, arriving), value(fibre, viewer, towards, h))
-            direction, weight, after = turn(fibre, viewer, weight, state)
-            state = after
-        elif event == 0:
-            event = _MOST_EVENTS  # a surface is seen
         else:
-            position = met.position + met.normal * (1e-4 * medium.least_cell)
-            own = -1
-            weight = wp.cw_mul(weight, medium.albedo[met.index])
-            if sources.count > 0:
-                towards, arriving, after = _light_of_lamps(medium, sources, 0, position, met.normal, own, state)
+            position = met.position
+            own = int(-1)
+            if met.kind == STRAND:
+                fibre = fibre_of(medium, met.index)
+                viewer = -direction
+                own = medium.strands[met.index]
+                h = -met.offset
+                if event == 0:
+                    out_even[path] = even_return(fibre, viewer)
+                    at_once, after = _light_at_once(medium, sources, fibre, viewer, position, own, state)
+                    state = after
+                    light += at_once
+                elif sources.count > 0:
+                    chosen, share, after = choose(sources, state)
+                    lit, later = lit_by(sources, chosen, position, 0.5 * medium.least_cell, after)
+                    state = later
+                    arriving = _arriving(medium, lit, position, own)
+                    if wp.max(arriving) > 0.0:
+                        scattered = value(fibre, viewer, lit.direction, h) * share
+                        light += wp.cw_mul(wp.cw_mul(weight, arriving), scattered)
+                direction, weight, after = turn(fibre, viewer, weight, h, state)
                 state = after
-                light += wp.cw_mul(weight, arriving)
-            direction, after = _off_surface(met.normal, state)
-            state = after
-        event += 1
-        brightest = wp.max(weight)
-        if brightest < _DIM:
-            if wp.randf(state) * _DIM >= brightest:
-                event = _MOST_EVENTS
-            weight = weight * (_DIM / wp.max(brightest, 1e-12))
+            else:
+                normal = met.normal
+                position = position + normal * (1e-4 * medium.least_cell)
+                weight = wp.cw_mul(weight, medium.albedo[met.index])
+                if sources.count > 0:
+                    chosen, share, after = choose(sources, state)
+                    lit, later = lit_by(sources, chosen, position, 0.5 * medium.least_cell, after)
+                    state = later
+                    cosine = wp.dot(normal, lit.direction)
+                    if cosine > 0.0:
+                        light += wp.cw_mul(weight, _arriving(medium, lit, position, -1)) * (share * cosine / PI)
+                direction, after = _off_surface(normal, state)
+                state = after
+            event += 1
+            brightest = wp.max(weight)
+            if brightest < _DIM:
+                if wp.randf(state) * _DIM >= brightest:
+                    event = _MOST_EVENTS
+                weight = weight * (_DIM / wp.max(brightest, 1e-12))
+            if event < _MOST_EVENTS:
+                met = walk(medium, position, direction, _FAR, own)
     out_light[path] = light
 
 
-def gather(
-    grid: StrandGrid,
-    surroundings: Surroundings,
-    rays: Rays,
-    path_count: int,
-    system_count: int = 1,
-    seed: int = 0,
-    device: wp.DeviceLike = "cpu",
-) -> np.ndarray:
-    """(systems, Z, Y, X, 6) float64 by voxel: sums over paths of their light RGB, and of what even light would give.
+def seen_by(
+    grid: StrandGrid, corners: np.ndarray, rays: Rays, path_count: int, seed: int = 0, device: wp.DeviceLike = "cpu"
+) -> Seen:
+    """The strands that rays meet before a surface, triangles of corners (3 F, 3): nothing is drawn of them yet.
 
-    path_count: of rays over the picture, rounded to a square; system_count: how many hair systems the grid is of.
+    path_count: of rays over the picture, rounded to a square; those that meet no strand are left out.
     """
     side = max(1, round(path_count**0.5))
     with wp.ScopedDevice(device):
-        mesh = _mesh(surroundings)
-        medium, sources = _medium(grid, surroundings, mesh), _sources(surroundings)
-        voxel = wp.full(side * side, -1, dtype=int)
-        light, even = (wp.zeros(side * side, dtype=wp.vec3) for _ in range(2))
-        corners = [wp.vec3(*map(float, getattr(rays, name))) for name in ("near", "near_x", "near_y")]
-        corners += [wp.vec3(*map(float, getattr(rays, name))) for name in ("far", "far_x", "far_y")]
+        mesh = _mesh(corners)
+        medium = _medium(grid, np.zeros((len(corners) // 3, 3)), mesh)
+        segments = wp.full(side * side, -1, dtype=int)
+        positions, viewers = (wp.zeros(side * side, dtype=wp.vec3) for _ in range(2))
         lens = _Rays()
-        lens.near, lens.near_x, lens.near_y, lens.far, lens.far_x, lens.far_y = corners
+        for name in ("near", "near_x", "near_y", "far", "far_x", "far_y"):
+            setattr(lens, name, wp.vec3(*map(float, getattr(rays, name))))
         lens.side = side
-        inputs = [medium, sources, lens, seed, wp.vec3i(*grid.voxels), voxel, light, even]
-        shares = parallel.share_count(side * side, wp.get_device(device), _LEAST_PATHS)
-        parallel.launch_shares(_gather, side * side, inputs, [[] for _ in range(shares)], device)
-        found, light, even = (array.numpy() for array in (voxel, light, even))
+        inputs = [medium, lens, seed, segments, positions, viewers]
+        _launch(_find, side * side, inputs, device)
+        found, positions, viewers = (array.numpy() for array in (segments, positions, viewers))
     is_hair = found >= 0
-    count = system_count * int(np.prod(grid.voxels))
-    channels = [*light[is_hair].T, *even[is_hair].T]
-    sums = [np.bincount(found[is_hair], weights=values, minlength=count) for values in channels]
-    return np.stack(sums, axis=-1).reshape(system_count, *grid.voxels[::-1], 6)
+    count = int(is_hair.sum())
+    return Seen(found[is_hair], positions[is_hair], viewers[is_hair], np.zeros((count, 3), np.float32))
 
 
-def _mesh(surroundings):
-    """A `wp.Mesh` of the triangles, None without."""
-    corners = np.ascontiguousarray(surroundings.corners, np.float32).reshape(-1, 3)
-    require_count("surface colors", 3 * len(surroundings.albedo), len(corners))
+def gather(
+    grid: StrandGrid, surroundings: Surroundings, seen: Seen, seed: int = 0, device: wp.DeviceLike = "cpu"
+) -> np.ndarray:
+    """(systems, Z, Y, X, 6) float64 by voxel: sums over paths of their light RGB, and of what even light would give.
+
+    The light is less what is drawn without paths, and below zero where too much of it is.
+    """
+    count = len(seen.segments)
+    require_indices("segments", seen.segments, len(grid.points) - 1)
+    for name in ("positions", "directions", "drawn"):
+        require_count(name, len(getattr(seen, name)), count)
+    with wp.ScopedDevice(device):
+        mesh = _mesh(surroundings.corners)
+        medium, sources = _medium(grid, surroundings.albedo, mesh), _sources(surroundings)
+        places = [wp.array(seen.segments.astype(np.int32), dtype=int)]
+        places += [_vectors(values) for values in (seen.positions, seen.directions)]
+        found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
+        _launch(_gather, count, [medium, sources, *places, seed, *found], device)
+        positions, light, even = (array.numpy() for array in found)
+    light = light - seen.drawn
+    x, y, z = grid.voxels
+    at = ((positions - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(int).clip(0, np.array([x, y, z]) - 1)
+    system = grid.systems[grid.strands[seen.segments]]
+    voxel = ((system * z + at[:, 2]) * y + at[:, 1]) * x + at[:, 0]
+    most = len(grid.kept) * x * y * z
+    sums = [np.bincount(voxel, weights=values, minlength=most) for values in (*light.T, *even.T)]
+    return np.stack(sums, axis=-1).reshape(len(grid.kept), z, y, x, 6)
+
+
+def _launch(kernel, count, inputs, device):
+    shares = parallel.share_count(count, wp.get_device(device), _LEAST_PATHS)
+    if count:
+        parallel.launch_shares(kernel, count, inputs, [[] for _ in range(shares)], device)
+
+
+def _mesh(corners):
+    """A `wp.Mesh` of triangles, None without."""
+    corners = np.ascontiguousarray(corners, np.float32).reshape(-1, 3)
     if not len(corners):
         return None
     return wp.Mesh(wp.array(corners, dtype=wp.vec3), wp.array(np.arange(len(corners), dtype=np.int32), dtype=int))
 
 
-def _medium(grid, surroundings, mesh):
+def _medium(grid, albedo, mesh):
+    require_count("surface colors", len(albedo), 0 if mesh is None else len(mesh.indices) // 3)
     medium = Medium()
     medium.corner, medium.cell = wp.vec3(*grid.corner.tolist()), wp.vec3(*grid.cell.tolist())
-    medium.shape, medium.density = wp.vec3i(*grid.shape), float(grid.area / np.prod(grid.cell))
-    medium.least_cell = float(grid.cell.min())
-    medium.starts = wp.array(grid.starts, dtype=int)
-    medium.tangents = wp.array(grid.tangents, dtype=wp.vec3)
-    medium.sigma_a = wp.array(grid.sigma_a, dtype=wp.vec3)
-    medium.roughness = wp.array(grid.roughness, dtype=float)
-    medium.fibres, medium.systems, medium.strands = (
-        wp.array(indices, dtype=int) for indices in (grid.fibres, grid.systems, grid.strands)
-    )
+    medium.shape, medium.least_cell = wp.vec3i(*grid.shape), float(grid.cell.min())
+    medium.starts, medium.segments = wp.array(grid.starts, dtype=int), wp.array(grid.segments, dtype=int)
+    medium.points, medium.sigma_a = _vectors(grid.points), _vectors(grid.sigma_a)
+    medium.radii, medium.roughness = wp.array(grid.radii, dtype=float), wp.array(grid.roughness, dtype=float)
+    medium.strands, medium.fibres = wp.array(grid.strands, dtype=int), wp.array(grid.fibres, dtype=int)
     medium.fibre_rows = wp.array(grid.fibre_rows, dtype=float)
     medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
-    medium.albedo = _vectors(surroundings.albedo)
+    medium.albedo = _vectors(albedo)
     return medium
 
 
@@ -237,7 +310,7 @@ def _sources(surroundings):
     lamps = surroundings.lamps
     require_count("lamps", len(surroundings.importance), len(lamps))
     sources = Sources()
-    sources.count, sources.drawn_count = len(lamps), min(surroundings.drawn_count, len(lamps))
+    sources.count = len(lamps)
     sources.kind = wp.array(lamps["kind"].astype(np.int32), dtype=int)
     sources.position, sources.axis, sources.power = (
         _vectors(lamps[name][:, :3]) for name in ("position", "axis", "power")

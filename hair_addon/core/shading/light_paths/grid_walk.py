@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's way through the grid to the next strand or surface, cell by cell [Amanatides87].
+"""A path's way to the next strand or surface: through a grid of segments, cell by cell [Amanatides87].
 
-In a cell strands stand anywhere, with equal chance. A path meets their pieces as if all lay across it, and each of them
-with a chance of the sine between its tangent and the path [Woodcock65].
+A segment is a ribbon that faces the path: it is met where the path comes nearest to its axis, within its radius. So is
+the wedge that two segments leave open on the outside of a bend, where the path comes nearest to the point between them.
 """
 
 import warp as wp
@@ -24,14 +24,14 @@ class Medium:
     cell: wp.vec3
     least_cell: float
     shape: wp.vec3i
-    density: float  # [1/m] of one piece in a cell
     starts: wp.array[int]
-    tangents: wp.array[wp.vec3]
+    segments: wp.array[int]
+    points: wp.array[wp.vec3]
+    radii: wp.array[float]
     sigma_a: wp.array[wp.vec3]
+    strands: wp.array[int]
     roughness: wp.array[float]
     fibres: wp.array[int]
-    systems: wp.array[int]
-    strands: wp.array[int]
     fibre_rows: wp.array2d[float]
     mesh: wp.uint64
     has_mesh: int
@@ -40,22 +40,27 @@ class Medium:
 
 @wp.struct
 class Met:
-    """What a path meets: a piece of a strand or a triangle, where, and the triangle's normal against the path."""
+    """What a path meets: a segment, by its first point, or a triangle; where; the triangle's normal against the path.
+
+    offset: from the segment's axis, a part of the radius, positive along cross(path, tangent).
+    """
 
     kind: int
     index: int
     position: wp.vec3
     normal: wp.vec3
+    offset: float
 
 
 @wp.func
-def fibre_of(medium: Medium, piece: int):
-    """The `Fibre` of a piece."""
+def fibre_of(medium: Medium, segment: int):
+    """The `Fibre` of a segment."""
     fibre = Fibre()
-    row = medium.fibres[piece]
-    fibre.tangent = medium.tangents[piece]
-    fibre.sigma_a = medium.sigma_a[piece]
-    fibre.roughness = medium.roughness[piece]
+    strand = medium.strands[segment]
+    row = medium.fibres[strand]
+    fibre.tangent = wp.normalize(medium.points[segment + 1] - medium.points[segment])
+    fibre.sigma_a = 0.5 * (medium.sigma_a[segment] + medium.sigma_a[segment + 1])
+    fibre.roughness = medium.roughness[strand]
     fibre.eta = medium.fibre_rows[row, 0]
     fibre.scale = medium.fibre_rows[row, 1]
     fibre.tilt = medium.fibre_rows[row, 2]
@@ -65,15 +70,49 @@ def fibre_of(medium: Medium, piece: int):
 
 
 @wp.func
-def random_way(random: float):
-    """Optical depth to the next event."""
-    return -wp.log(1.0 - wp.min(random, 0.9999999))
+def is_in_bend(medium: Medium, segment: int, end: wp.vec3, direction: wp.vec3):
+    """Whether a ray beyond a segment's end, which is at `end` from the ray's start, is before the strand's next one."""
+    if segment + 2 >= medium.points.shape[0]:
+        return False
+    if medium.strands[segment + 2] != medium.strands[segment]:
+        return False
+    normal = wp.cross(direction, medium.points[segment + 2] - medium.points[segment + 1])
+    return wp.dot(wp.cross(end, direction), normal) < 0.0
 
 
 @wp.func
-def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int, random: wp.uint32):
-    """(`Met` within a distance [m], random state) of a ray; own: the strand that it leaves, which it does not meet."""
-    state = random
+def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3):
+    """(distance along a ray of unit direction, offset from the axis) where a segment is met; `FAR` where it is not."""
+    start = medium.points[segment] - position
+    along = medium.points[segment + 1] - medium.points[segment]
+    normal = wp.cross(direction, along)
+    squared = wp.dot(normal, normal)
+    distance = float(FAR)
+    offset = float(0.0)
+    if squared > 1e-12 * wp.dot(along, along):
+        # The closest points of two lines.
+        part = wp.dot(wp.cross(start, direction), normal) / squared
+        if part >= 0.0 and part < 1.0:
+            radius = medium.radii[segment] + part * (medium.radii[segment + 1] - medium.radii[segment])
+            beside = -wp.dot(start, normal) / wp.sqrt(squared)
+            way = wp.dot(wp.cross(start, along), normal) / squared
+            if wp.abs(beside) < radius and way > 0.0:
+                distance = way
+                offset = beside / radius
+        elif part >= 1.0:
+            end = start + along
+            way = wp.dot(end, direction)
+            aside = end - way * direction
+            radius = medium.radii[segment + 1]
+            if way > 0.0 and wp.dot(aside, aside) < radius * radius and is_in_bend(medium, segment, end, direction):
+                distance = way
+                offset = -wp.dot(aside, normal) / (wp.sqrt(squared) * radius)
+    return distance, offset
+
+
+@wp.func
+def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
+    """`Met` within a distance [m] of a ray; own: the strand that it leaves, which it does not meet."""
     met = Met()
     met.kind = PASSED
     end = most
@@ -115,34 +154,22 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
                 far_side = float(cell[axis])
             leave[axis] = (medium.corner[axis] + far_side * medium.cell[axis] - position[axis]) / direction[axis]
 
-    left = random_way(wp.randf(state))
     going = medium.shape[0] + medium.shape[1] + medium.shape[2]  # more cells are on no ray, whatever its numbers are
     if here >= last:
         going = 0
     while going > 0:
         going -= 1
-        to = wp.min(wp.min(leave[0], leave[1]), wp.min(leave[2], last))
+        to = wp.min(leave[0], wp.min(leave[1], leave[2]))
         index = (cell[2] * medium.shape[1] + cell[1]) * medium.shape[0] + cell[0]
-        first = medium.starts[index]
-        count = medium.starts[index + 1] - first
-        if count > 0:
-            density = float(count) * medium.density
-            depth = density * wp.max(to - here, 0.0)
-            while left < depth and going > 0:
-                here += left / density
-                piece = first + wp.min(int(wp.randf(state) * float(count)), count - 1)
-                along = wp.dot(medium.tangents[piece], direction)
-                is_met = wp.randf(state) < wp.sqrt(wp.max(0.0, 1.0 - along * along))
-                if is_met and medium.strands[piece] != own:
-                    met.kind = STRAND
-                    met.index = piece
-                    end = here
-                    going = 0
-                left = random_way(wp.randf(state))
-                depth = density * (to - here)
-            left -= depth
-        here = to
-        if to >= last:
+        for turn in range(medium.starts[index], medium.starts[index + 1]):
+            segment = medium.segments[turn]
+            distance, offset = crossing(medium, segment, position, direction)
+            if distance < end and medium.strands[segment] != own:
+                end = distance
+                met.kind = STRAND
+                met.index = segment
+                met.offset = offset
+        if to >= wp.min(end, last):
             going = 0
         for axis in range(3):
             if going > 0 and to == leave[axis]:
@@ -151,4 +178,26 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
                 if cell[axis] < 0 or cell[axis] >= medium.shape[axis]:
                     going = 0
     met.position = position + direction * end
-    return met, state
+    return met
+
+
+@wp.func
+def seen_place(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3, spare: float):
+    """`Met` of a ray through a position with a segment that it is known to meet, nearest to its axis.
+
+    spare: the offset of a ray that passes beside it, as one does where thin strands are drawn wider.
+    """
+    start = medium.points[segment] - position
+    along = medium.points[segment + 1] - medium.points[segment]
+    normal = wp.cross(direction, along)
+    squared = wp.max(wp.dot(normal, normal), 1e-30)
+    part = wp.clamp(wp.dot(wp.cross(start, direction), normal) / squared, 0.0, 1.0)
+    radius = medium.radii[segment] + part * (medium.radii[segment + 1] - medium.radii[segment])
+    met = Met()
+    met.kind = STRAND
+    met.index = segment
+    met.offset = -wp.dot(start, normal) / (wp.sqrt(squared) * wp.max(radius, 1e-12))
+    if wp.abs(met.offset) > 1.0:
+        met.offset = spare
+    met.position = position + start + part * along + normal * (met.offset * radius / wp.sqrt(squared))
+    return met

@@ -13,10 +13,9 @@ SUN, POINT, SPOT, AREA = (wp.constant(kind) for kind in range(4))  # as `core.im
 
 @wp.struct
 class Sources:
-    """Lamps, of which the last few light strands nowhere else, and a picture of the world without lamps."""
+    """Lamps, and a picture of the world without them."""
 
     count: int
-    drawn_count: int  # of the first, whose light on what is seen is drawn
     kind: wp.array[int]
     position: wp.array[wp.vec3]
     axis: wp.array[wp.vec3]
@@ -28,7 +27,7 @@ class Sources:
 
 @wp.struct
 class Lit:
-    """Light of a lamp at a place: unit vector towards it, distance [m], irradiance over the lamp's chance."""
+    """Light of a lamp at a place: unit vector towards it, distance [m], irradiance."""
 
     direction: wp.vec3
     distance: float
@@ -82,21 +81,25 @@ def area_falloff(cosine: float, cos_cone: float):
 
 
 @wp.func
-def lit_by(sources: Sources, first: int, position: wp.vec3, least: float, random: wp.uint32):
-    """(`Lit` by one of the lamps from `first` on, random state); least: distance [m] below which no light grows.
+def choose(sources: Sources, random: wp.uint32):
+    """(index of one of the lamps, one over its chance, random state)."""
+    state = random
+    chosen = int(0)
+    before = wp.randf(state)
+    while chosen < sources.count - 1 and before >= sources.chance[chosen]:
+        before -= sources.chance[chosen]
+        chosen += 1
+    return chosen, 1.0 / wp.max(sources.chance[chosen], 1e-12), state
+
+
+@wp.func
+def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, random: wp.uint32):
+    """(`Lit` by a lamp, random state); least: distance [m] below which no light grows.
 
     Nor does it nearer than half the lamp's radius: few paths with very much light would be noise.
     """
     state = random
     lit = Lit()
-    in_all = float(0.0)
-    for index in range(first, sources.count):
-        in_all += sources.chance[index]
-    chosen = int(first)
-    before = wp.randf(state) * in_all
-    while chosen < sources.count - 1 and before >= sources.chance[chosen]:
-        before -= sources.chance[chosen]
-        chosen += 1
     kind = sources.kind[chosen]
     axis = sources.axis[chosen]
     shape = sources.shape[chosen]
@@ -124,5 +127,4 @@ def lit_by(sources: Sources, first: int, position: wp.vec3, least: float, random
         if kind == AREA:
             part = wp.max(cosine, 0.0) / (PI * far * far) * area_falloff(cosine, shape[1])
         lit.irradiance = part * sources.power[chosen]
-    lit.irradiance = lit.irradiance * (in_all / wp.max(sources.chance[chosen], 1e-12))
     return lit, state

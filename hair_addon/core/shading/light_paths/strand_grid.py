@@ -1,26 +1,30 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands as a medium: pieces of equal area in the cells of a grid.
+"""Strands as segments in the cells of a grid, for paths of light that meet them.
 
-Light meets a strand in proportion to its length, its width and the sine between its tangent and the light. So strands
-are cut into pieces of equal length × width; how many are in a cell says how dense it is, and a piece drawn from them
-has the tangents, colors and roughness that are there. [Moon08] stores a mean direction and a spread instead.
+Every segment is in each cell that it touches with its width, so a path that walks from cell to cell finds the nearest
+one by few tests. Very many strands are thinned out: the rest is wider, and stops as much light.
 """
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 
 from ...errors import HairError
+from ...kernels import kernel_cache
 from ...kernels.checks import require_count, require_indices
 from ..fibre import marschner
 from ..fibre.principled import scale_from_radial_roughness
 
-PIECE_COUNT = 1_500_000  # of all strands: most cells are empty
-_PIECES_A_SEGMENT = 64  # of few strands, at most
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+SEGMENT_COUNT = 3_000_000  # at most, of all strands
 CELL_COUNT = 3_000_000
 MOST_CELLS = 400  # along a side
 CELLS_A_VOXEL = 2  # along a side of the voxels that light is averaged in
+_LEAST_SEGMENTS = 8  # of a strand, that it can bend
+_MOST_PARTS = wp.constant(2 * MOST_CELLS)  # of a segment, each about as long as a cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,22 +42,33 @@ class Strands:
     fibre: np.ndarray  # (S,)
 
 
+@dataclass(frozen=True)
+class Kept:
+    """Strands of a system in a grid: each `stride`-th, of `point_count` points each, from `first_point` on."""
+
+    stride: int
+    point_count: int
+    first_point: int
+
+
 @dataclass(frozen=True, eq=False)
 class StrandGrid:
-    """N pieces of strands in the order of the cells (Z, Y, X) that they are in; cell (0, 0, 0) is at `corner`."""
+    """S strands of N points in all, and their segments in the order of cells (Z, Y, X); (0, 0, 0) is at `corner`."""
 
     corner: np.ndarray  # (3,) [m]
     cell: np.ndarray  # (3,) sides [m]
     shape: tuple[int, int, int]  # X, Y, Z: multiples of `CELLS_A_VOXEL`
-    area: float  # length × width of a piece [m²]
-    starts: np.ndarray  # (cells + 1,) first piece of each
-    tangents: np.ndarray  # (N, 3) float32, unit
+    starts: np.ndarray  # (cells + 1,) int32: first of each in `segments`
+    segments: np.ndarray  # (M,) int32: first points of segments, once for each cell that they are in
+    points: np.ndarray  # (N, 3) float32 [m]
+    radii: np.ndarray  # (N,) float32 [m]
     sigma_a: np.ndarray  # (N, 3) float32
-    roughness: np.ndarray  # (N,) float32
-    fibres: np.ndarray  # (N,) int32: rows of `fibre_rows`
-    systems: np.ndarray  # (N,) int32: which hair
-    strands: np.ndarray  # (N,) int32: which strand of all hair
+    strands: np.ndarray  # (N,) int32: whose point it is
+    roughness: np.ndarray  # (S,) float32
+    fibres: np.ndarray  # (S,) int32: rows of `fibre_rows`
+    systems: np.ndarray  # (S,) int32: which hair
     fibre_rows: np.ndarray  # (F, 5) float32: ior, azimuthal scale, tilt, shift of TRT in tilts, coat
+    kept: tuple[Kept, ...]  # of each system
 
     @property
     def voxels(self) -> tuple[int, int, int]:
@@ -62,11 +77,73 @@ class StrandGrid:
         return x // CELLS_A_VOXEL, y // CELLS_A_VOXEL, z // CELLS_A_VOXEL
 
 
+@wp.func
+def _touches(a: wp.vec3, b: wp.vec3, centre: wp.vec3, reach: float):
+    """Whether the part from a to b comes within a reach of a cell's centre."""
+    along = b - a
+    t = wp.clamp(wp.dot(centre - a, along) / wp.max(wp.dot(along, along), 1e-30), 0.0, 1.0)
+    return wp.length(a + t * along - centre) < reach
+
+
+@wp.kernel
+def _register(
+    points: wp.array[wp.vec3],
+    radii: wp.array[float],
+    strands: wp.array[int],
+    corner: wp.vec3,
+    cell: wp.vec3,
+    shape: wp.vec3i,
+    is_counting: int,
+    out_ends: wp.array[int],
+    out_segments: wp.array[int],
+):
+    """Count the segments of each cell, or fill each cell's from the end before it on."""
+    first = wp.tid()
+    if strands[first] == strands[first + 1]:
+        radius = wp.max(radii[first], radii[first + 1])
+        start = points[first]
+        along = points[first + 1] - start
+        parts = 1 + wp.clamp(int(wp.length(along) / wp.min(cell)), 0, _MOST_PARTS)
+        reach = radius + 0.5 * wp.length(cell)
+        before_a = start
+        before_b = start
+        before_low = wp.vec3i(0, 0, 0)
+        before_high = wp.vec3i(-1, -1, -1)
+        for part in range(parts):
+            a = start + along * (float(part) / float(parts))
+            b = start + along * (float(part + 1) / float(parts))
+            low = wp.vec3i(0, 0, 0)
+            high = wp.vec3i(0, 0, 0)
+            for axis in range(3):
+                least = (wp.min(a[axis], b[axis]) - radius - corner[axis]) / cell[axis]
+                most = (wp.max(a[axis], b[axis]) + radius - corner[axis]) / cell[axis]
+                low[axis] = wp.clamp(int(wp.floor(least)), 0, shape[axis] - 1)
+                high[axis] = wp.clamp(int(wp.floor(most)), 0, shape[axis] - 1)
+            for z in range(low[2], high[2] + 1):
+                for y in range(low[1], high[1] + 1):
+                    for x in range(low[0], high[0] + 1):
+                        middle = wp.vec3(float(x) + 0.5, float(y) + 0.5, float(z) + 0.5)
+                        centre = corner + wp.cw_mul(middle, cell)
+                        is_known = x >= before_low[0] and y >= before_low[1] and z >= before_low[2]
+                        is_known = is_known and x <= before_high[0] and y <= before_high[1] and z <= before_high[2]
+                        is_known = is_known and _touches(before_a, before_b, centre, reach)
+                        if not is_known and _touches(a, b, centre, reach):
+                            index = (z * shape[1] + y) * shape[0] + x
+                            at = wp.atomic_add(out_ends, index, 1)
+                            if is_counting == 0:
+                                out_segments[at] = first
+            before_a = a
+            before_b = b
+            before_low = low
+            before_high = high
+
+
 def build(
     systems: Sequence[Strands],
     fibres: Sequence[marschner.Settings],
-    piece_count: int = PIECE_COUNT,
+    segment_count: int = SEGMENT_COUNT,
     cell_count: int = CELL_COUNT,
+    device: wp.DeviceLike = "cpu",
 ) -> StrandGrid:
     """The grid of all `Strands`; fibres: settings that their `fibre` counts.
 
@@ -77,35 +154,38 @@ def build(
         require_count("values of roughness", len(strands.roughness), len(strands.points))
         require_count("fibers", len(strands.fibre), len(strands.points))
         require_indices("fibers", strands.fibre, len(fibres))
-    areas = [_segment_areas(strands) for strands in systems]
-    total = float(sum(area.sum() for area in areas))
-    if not 0.0 < total < np.inf:
+    if not 0.0 < sum(float(_segment_areas(strands).sum()) for strands in systems) < np.inf:
         raise HairError("Light needs strands of a length and a width above zero.")
-    random = np.random.default_rng(0)
-    piece_count = min(piece_count, _PIECES_A_SEGMENT * sum(area.size for area in areas))
-    counts = [max(1, round(piece_count * float(area.sum()) / total)) for area in areas]
-    pieces = [_cut(*each, random) for each in zip(systems, areas, counts, strict=True)]
-    places, tangents, sigma_a, roughness, fibre, strand = map(np.concatenate, zip(*pieces, strict=True))
-    before = np.cumsum([0, *(len(strands.points) for strands in systems)])[:-1]
-    corner, cell, shape = _cells(places, cell_count)
-    x, y, z = np.minimum(((places - corner) / cell).astype(int), np.array(shape) - 1).T
-    within = (z * shape[1] + y) * shape[0] + x
-    order = np.argsort(within, kind="stable")
-    starts = np.zeros(int(np.prod(shape)) + 1, np.int32)
-    np.cumsum(np.bincount(within, minlength=len(starts) - 1), out=starts[1:])
+    share = segment_count / max(sum(strands.radii[:, 1:].size for strands in systems), 1)
+    kept, parts, point_count = [], [], 0
+    for strands in systems:
+        found, *part = _thinned(strands, share)
+        kept.append(Kept(*found, point_count))
+        parts.append(part)
+        point_count += len(part[0])
+    points, radii, sigma_a = (np.concatenate([part[index] for part in parts]) for index in range(3))
+    roughness, fibre = (np.concatenate([part[index] for part in parts]) for index in (3, 4))
+    counts = [len(part[3]) for part in parts]
+    strand_of_points = np.repeat(
+        np.arange(sum(counts), dtype=np.int32), np.repeat([one.point_count for one in kept], counts)
+    )
+    corner, cell, shape = _cells(points, float(radii.max()), cell_count)
+    starts, segments = _registered(points, radii, strand_of_points, (corner, cell, shape), device)
     return StrandGrid(
         corner,
         cell,
         shape,
-        total / len(places),
         starts,
-        tangents[order].astype(np.float32),
-        sigma_a[order].astype(np.float32),
-        roughness[order].astype(np.float32),
-        fibre[order].astype(np.int32),
-        np.repeat(np.arange(len(counts), dtype=np.int32), counts)[order],
-        (strand + np.repeat(before, counts))[order].astype(np.int32),
+        segments,
+        points,
+        radii,
+        sigma_a,
+        strand_of_points,
+        roughness.astype(np.float32),
+        fibre.astype(np.int32),
+        np.repeat(np.arange(len(counts), dtype=np.int32), counts),
         np.array([_fibre_row(settings) for settings in fibres], np.float32),
+        tuple(kept),
     )
 
 
@@ -114,35 +194,63 @@ def has_area(systems: Sequence[Strands]) -> bool:
     return any(_segment_areas(strands).any() for strands in systems)
 
 
+def segment_of(grid: StrandGrid, system: int, strands: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """(N,) segments of a grid that show strands (N,) of a system at places (N,) along them, root 0 to tip 1."""
+    kept = grid.kept[system]
+    along = np.clip((places * (kept.point_count - 1)).astype(int), 0, kept.point_count - 2)
+    return kept.first_point + strands // kept.stride * kept.point_count + along
+
+
 def _segment_areas(strands):
     """(S, P - 1) length × width of segments [m²]."""
     lengths = np.linalg.norm(np.diff(strands.points, axis=1), axis=-1)
     return lengths * (strands.radii[:, 1:] + strands.radii[:, :-1])
 
 
-def _cut(strands, areas, count, random):
-    """Places (N, 3), tangents, sigma_a, roughness, fibre and strand of `count` pieces of equal area."""
-    ends = np.cumsum(areas.ravel(), dtype=np.float64)
-    wanted = (np.arange(count) + random.random(count)) / count * ends[-1]
-    segment = np.minimum(np.searchsorted(ends, wanted), len(ends) - 1)
-    strand, start = np.divmod(segment, areas.shape[1])
-    t = 1.0 - np.clip((ends[segment] - wanted) / np.maximum(areas.ravel()[segment], 1e-30), 0.0, 1.0)
-    first, second = strands.points[strand, start], strands.points[strand, start + 1]
-    along = second - first
-    tangents = along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-20)
-    sigma_a = strands.absorption(strand, (start + t) / areas.shape[1])
-    places = first + along * t[:, None]
-    return places, tangents, sigma_a, strands.roughness[strand], strands.fibre[strand], strand
+def _thinned(strands, share):
+    """((stride, point count), points (N, 3), radii, sigma_a, roughness, fibre) with about a share of the segments."""
+    count, point_count = strands.radii.shape
+    most = max(point_count - 1, 1)
+    wanted = most  # segments of a strand
+    if share < 1.0:
+        wanted = max(int(share * most), min(most, _LEAST_SEGMENTS))
+    stride = max(1, round(wanted / (share * most))) if share < 1.0 else 1
+    at = np.rint(np.linspace(0, point_count - 1, wanted + 1)).astype(int)
+    chosen = np.arange(0, count, stride)
+    points = strands.points[chosen][:, at].reshape(-1, 3).astype(np.float32)
+    radii = (strands.radii[chosen][:, at] * (count / len(chosen))).reshape(-1).astype(np.float32)
+    along = np.tile(at / most, len(chosen))
+    sigma_a = strands.absorption(np.repeat(chosen, len(at)), along)
+    found = stride, len(at)
+    return found, points, radii, sigma_a.astype(np.float32), strands.roughness[chosen], strands.fibre[chosen]
 
 
-def _cells(places, cell_count):
-    """(corner, sides, numbers along X, Y, Z) of cells that fill the box around all places; nearly cubes."""
-    low, high = places.min(axis=0).astype(np.float64), places.max(axis=0).astype(np.float64)
+def _cells(places, radius, cell_count):
+    """(corner, sides, numbers along X, Y, Z) of cells that fill the box around all strands; nearly cubes."""
+    low, high = places.min(axis=0).astype(np.float64) - radius, places.max(axis=0).astype(np.float64) + radius
     least = 1e-6 * max(float((high - low).max()), 1e-6)
     size = np.maximum(high - low, least)
-    cell = max(float(np.prod(size) / cell_count) ** (1.0 / 3.0), float(size.max()) / MOST_CELLS)
+    cell = max(float(np.prod(size) / cell_count) ** (1.0 / 3.0), float(size.max()) / MOST_CELLS, radius)
     shape = np.maximum(np.ceil(size / (cell * CELLS_A_VOXEL)).astype(int), 1) * CELLS_A_VOXEL
     return low, size / shape, tuple(shape.tolist())
+
+
+def _registered(points, radii, strands, cells, device):
+    """(starts, segments) of `StrandGrid`."""
+    corner, cell, shape = cells
+    with wp.ScopedDevice(device):
+        given = [wp.array(points, dtype=wp.vec3), wp.array(radii, dtype=float), wp.array(strands, dtype=int)]
+        given += [wp.vec3(*corner.tolist()), wp.vec3(*cell.tolist()), wp.vec3i(*shape)]
+        counts = wp.zeros(int(np.prod(shape)), dtype=int)
+        none = wp.zeros(1, dtype=int)
+        kernel_cache.launch(_register, len(points) - 1, [*given, 1, counts, none], device=device)
+        starts = np.zeros(len(counts) + 1, np.int64)
+        np.cumsum(counts.numpy(), out=starts[1:])
+        if starts[-1] > np.iinfo(np.int32).max:
+            raise HairError("Strands are too wide for light among them: use dual scattering.")
+        ends, segments = wp.array(starts[:-1], dtype=int), wp.zeros(max(int(starts[-1]), 1), dtype=int)
+        kernel_cache.launch(_register, len(points) - 1, [*given, 0, ends, segments], device=device)
+        return starts.astype(np.int32), segments.numpy()
 
 
 def _fibre_row(settings):

@@ -47,7 +47,9 @@ def _turns(
     out_even: wp.array[wp.vec3],
 ):
     path = wp.tid()
-    direction, weight, _state = fibre_walk.turn(_fibre(row), viewer, wp.vec3(1.0, 1.0, 1.0), wp.rand_init(7, path))
+    state = wp.rand_init(7, path)
+    h = 2.0 * wp.randf(state) - 1.0
+    direction, weight, _state = fibre_walk.turn(_fibre(row), viewer, wp.vec3(1.0, 1.0, 1.0), h, state)
     out_directions[path] = direction
     out_weights[path] = weight
     out_even[path] = fibre_walk.even_return(_fibre(row), viewer)

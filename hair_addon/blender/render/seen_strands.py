@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The strands that a camera sees, and what is drawn of them without light among strands: where paths of light start."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...core.shading import light_paths
+from ..gpu import drawing
+from ..gpu.visibility_buffer import VisibilityBuffer
+from . import scene_drawing
+
+_MOST_SAMPLES = 4096  # along a side
+
+
+def find(drawn, grid, camera, window, count, turn):
+    """`gather.Seen` of a `DrawnScene` in a window of a camera's picture, at about `count` places.
+
+    grid: `StrandGrid` of the scene's hair; camera: (4, 4) world to view and view to clip; window: (low, high) corners
+    (2,) in clip space; turn: which of several for the same picture.
+    """
+    whole, tile = _samples(camera[1], window, count)
+    view = drawing.pass_record(*camera, whole, turn, tile)
+    buffer = VisibilityBuffer(*tile[2:])
+    lights = drawn.lights.copy()
+    lights["grid_scale"][:3] = 1.0  # lamps alone: there is no grid of light yet
+    with drawing.ALONE:
+        with buffer.surfaces():
+            scene_drawing.draw_hiding(drawn, view)
+        scene_drawing.draw_hair(replace(drawn, lights=lights, hair_lights=None), view, buffer)
+        shape = tile[3], tile[2]
+        found = np.array(buffer.segments.read(), np.int64).reshape(shape)
+        color = np.array(buffer.color.read(), np.float32).reshape(*shape, 4)[..., :3]
+    segments, rows, columns = [np.zeros(0, int)], [np.zeros(0, int)], [np.zeros(0, int)]
+    for system, (first, segment_count) in enumerate(buffer.segment_ranges):
+        row, column = np.nonzero((found >= first) & (found < first + segment_count))
+        a_strand = drawn.hair[system][0].point_count - 1
+        strand, place = np.divmod(found[row, column] - first, a_strand)
+        segments.append(light_paths.strand_grid.segment_of(grid, system, strand, (place + 0.5) / a_strand))
+        rows.append(row)
+        columns.append(column)
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    near, directions = _rays(view, tile, row, column)
+    return light_paths.gather.Seen(np.concatenate(segments), near, -directions, color[row, column])
+
+
+def _samples(view_to_clip, window, count):
+    """((width, height) of a picture [samples], (left, bottom, width, height) of the window in it)."""
+    parts = 0.5 * (window[1] - window[0])
+    aspect = abs(view_to_clip[1, 1] / view_to_clip[0, 0])
+    height = (count / (parts[0] * parts[1] * aspect)) ** 0.5
+    size = np.array([aspect * height, height])
+    size *= min(1.0, _MOST_SAMPLES / (size * parts).max())
+    whole = np.maximum(np.rint(size), 1).astype(int)
+    low = np.floor((0.5 * window[0] + 0.5) * whole).astype(int)
+    high = np.minimum(np.maximum(np.ceil((0.5 * window[1] + 0.5) * whole).astype(int), low + 1), whole)
+    low = np.minimum(low, high - 1)
+    return tuple(whole.tolist()), (*low.tolist(), *(high - low).tolist())
+
+
+def _rays(view, tile, row, column):
+    """(points on the near plane (N, 3), unit directions) of rays through samples of a tile."""
+    to_world = np.linalg.inv(view["world_to_clip"].T.astype(np.float64))
+    x, y = (column + 0.5) / tile[2] * 2.0 - 1.0, (row + 0.5) / tile[3] * 2.0 - 1.0
+    ends = []
+    for depth in (-1.0, 1.0):
+        clip = np.stack([x, y, np.full(len(x), depth), np.ones(len(x))], axis=-1) @ to_world.T
+        ends.append(clip[:, :3] / clip[:, 3:])
+    way = ends[1] - ends[0]
+    return ends[0], way / np.linalg.norm(way, axis=1, keepdims=True)
