@@ -281,7 +281,7 @@ def test_register_is_light(tmp_path):
     # Compiled by the first run, as on an artist's machine, whatever the environment says of bytecode.
     kept = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(tmp_path)}
     run_python(source, **kept)
-    assert min(float(run_python(source, **kept).split()[-1]) for _ in range(2)) < 0.5
+    assert any(float(run_python(source, **kept).split()[-1]) < 0.5 for _ in range(2))
 
 
 # RELIABILITY: somebody hostile supplies the .blend; and an extension has no business on the network.

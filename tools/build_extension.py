@@ -95,10 +95,14 @@ def fetch(wheel: Path) -> None:
         raise BuildError(f"The manifest names {wheel.name}, which requirements.lock does not pin; correct its wheels.")
 
 
+def kernel_folder() -> Path:
+    """Where `compiled_kernels` has or will have them: a folder for each version of the sources."""
+    return ROOT / "build" / "kernels" / compile_kernels.sources_digest()[:16]
+
+
 def compiled_kernels() -> Path:
     """Return the folder of this platform's compiled kernels, compiled in 20 s if the sources have changed."""
-    # A folder for each version of the sources, which appears whole: two processes may build at once.
-    folder = ROOT / "build" / "kernels" / compile_kernels.sources_digest()[:16]
+    folder = kernel_folder()  # which appears whole: two processes may build at once
     if not compile_kernels.are_up_to_date(folder):
         print("compiling kernels", flush=True)
         partial = folder.with_name(f"{folder.name}-{os.getpid()}")

@@ -16,8 +16,8 @@ def follow(depsgraph):
     have_nodes_changed = any(isinstance(i, bpy.types.NodeTree | bpy.types.Material) for i in changed)
     if have_nodes_changed:
         guide_map_readers.reading_cache.clear()
-    with_modifiers = {i.data for i in changed if isinstance(i, bpy.types.Object) and i.type == "CURVES"}
-    for hair in bpy.data.hair_curves if have_nodes_changed else with_modifiers:
+    of_changed_objects = {i.data for i in changed if isinstance(i, bpy.types.Object) and i.type == "CURVES"}
+    for hair in bpy.data.hair_curves if have_nodes_changed else of_changed_objects:
         if _lacks_map(hair) and guide_map_readers.are_read(hair):
             _store(hair, depsgraph)
 

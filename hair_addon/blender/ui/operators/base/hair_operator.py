@@ -2,7 +2,22 @@
 """Base of all operators: when they can run; `HairError` is reported without changes."""
 
 from .....core.errors import HairError
+from ....groom.selection import guides_of, hair_of
 from ....settings.translations import CONTEXT, error_text, report_text
+
+
+@classmethod
+def needs_hair(cls, context):
+    """The `applies` of operators on the active hair."""
+    cls.poll_message_set("Select hair.")
+    return hair_of(context.object) is not None
+
+
+@classmethod
+def needs_guides(cls, context):
+    """The `applies` of operators on the guides of the active hair or mesh."""
+    cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
+    return guides_of(context.object) is not None
 
 
 class HairOperator:

@@ -7,7 +7,7 @@ from .....core.dynamics.rod.presets import PRESETS, applied
 from ....groom.selection import guides_of
 from ....groom.transfer import groom_settings
 from ....settings import properties
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_guides
 
 
 class VELLUS_OT_apply_dynamics_preset(HairOperator, bpy.types.Operator):
@@ -23,11 +23,7 @@ class VELLUS_OT_apply_dynamics_preset(HairOperator, bpy.types.Operator):
             {identifier: tooltip for identifier, (_label, tooltip, _changes) in PRESETS.items()},
         )
     }
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
-        return guides_of(context.object) is not None
+    applies = needs_guides
 
     def change(self, context):
         guides = guides_of(context.object)

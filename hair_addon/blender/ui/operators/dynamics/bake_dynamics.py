@@ -10,6 +10,7 @@ from ....groom.selection import guides_of
 from ....host import memory, scene_time
 from ....settings import properties
 from ....settings.translations import report_text
+from ..base.hair_operator import needs_guides
 from ..base.modal import LongOperator
 
 
@@ -23,11 +24,7 @@ class VELLUS_OT_bake_dynamics(LongOperator, bpy.types.Operator):
             "Start Over", "Simulate all frames again; when off, baking goes on after the frames that are there", False
         )
     }
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
-        return guides_of(context.object) is not None
+    applies = needs_guides
 
     def seconds(self, context):
         guides, frames = guides_of(context.object), scene_time.scene_frames()

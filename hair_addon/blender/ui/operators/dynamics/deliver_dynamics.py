@@ -6,6 +6,7 @@ import bpy
 from ....groom.selection import guides_of
 from ....io import delivery
 from ....settings.translations import report_text
+from ..base.hair_operator import needs_guides
 from ..base.modal import LongOperator
 
 
@@ -15,11 +16,7 @@ Blender without Vellus show the same hair"""
 
     bl_idname = "vellus.deliver_dynamics"
     bl_label = "Deliver Hair"
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
-        return guides_of(context.object) is not None
+    applies = needs_guides
 
     def seconds(self, context):
         return float("inf")  # how long the animation itself takes is not known

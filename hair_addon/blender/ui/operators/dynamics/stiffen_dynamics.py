@@ -9,7 +9,7 @@ from .....core.params import declared
 from ....data.strands import curves
 from ....groom.dynamics import dynamics_notes, guide_simulation
 from ....groom.selection import guides_of
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_guides
 
 _MOST = next(details.high for name, _default, details in declared(DynamicsSettings) if name == "bend_stiffness")
 
@@ -19,11 +19,7 @@ class VELLUS_OT_stiffen_dynamics(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.stiffen_dynamics"
     bl_label = "Stiffen"
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select guides, the mesh they grow on, or hair that follows them.")
-        return guides_of(context.object) is not None
+    applies = needs_guides
 
     def change(self, context):
         guides = guides_of(context.object)

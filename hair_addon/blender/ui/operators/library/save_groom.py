@@ -8,6 +8,7 @@ from ....groom.selection import hair_of
 from ....host.notices import name_of
 from ....io import groom_library
 from ....settings import asset_libraries, properties
+from ..base.hair_operator import needs_hair
 from ..base.modal import LongOperator
 
 
@@ -23,11 +24,7 @@ class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):
         "catalog": properties.text("Catalog", "Catalog of the groom, such as Hair/Short. Leave empty for none"),
         "overwrites": properties.switch("Overwrite", "Replace a groom of the same name", False),
     }
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def invoke(self, context, _event):
         if not self.library:

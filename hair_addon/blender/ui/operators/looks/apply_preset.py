@@ -7,7 +7,7 @@ from .....core.shading.presets import PRESETS
 from ....groom.selection import hair_of
 from ....materials import looks
 from ....settings import properties
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_hair
 
 
 class VELLUS_OT_apply_preset(HairOperator, bpy.types.Operator):
@@ -20,11 +20,7 @@ class VELLUS_OT_apply_preset(HairOperator, bpy.types.Operator):
             "Look", "Look to apply", {identifier: label for identifier, (label, _look) in PRESETS.items()}
         )
     }
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def change(self, context):
         label, look = PRESETS[self.preset]

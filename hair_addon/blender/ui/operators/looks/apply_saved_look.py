@@ -6,7 +6,7 @@ import bpy
 from ....groom.selection import hair_of
 from ....materials import looks
 from ....settings import properties, saved_looks
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_hair
 
 
 class VELLUS_OT_apply_saved_look(HairOperator, bpy.types.Operator):
@@ -15,11 +15,7 @@ class VELLUS_OT_apply_saved_look(HairOperator, bpy.types.Operator):
     bl_idname = "vellus.apply_saved_look"
     bl_label = "Apply Saved Look"
     __annotations__ = {"name": properties.text("Name", "Saved look")}
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def change(self, context):
         looks.apply_look(hair_of(context.object), saved_looks.read(self.name))

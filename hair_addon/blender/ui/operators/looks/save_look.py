@@ -5,7 +5,7 @@ import bpy
 
 from ....groom.selection import hair_of
 from ....settings import properties, saved_looks
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_hair
 
 
 class VELLUS_OT_save_look(HairOperator, bpy.types.Operator):
@@ -15,11 +15,7 @@ class VELLUS_OT_save_look(HairOperator, bpy.types.Operator):
     bl_label = "Save Look"
     bl_options = {"REGISTER"}
     __annotations__ = {"name": properties.text("Name", "Name of the look")}
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def invoke(self, context, _event):
         return context.window_manager.invoke_props_dialog(self)

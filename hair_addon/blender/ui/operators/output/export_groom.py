@@ -4,12 +4,12 @@
 import bpy
 
 from .....core.files.export_settings import ExportSettings
-from ....groom.selection import hair_of
 from ....host import paths
 from ....io import groom_export, groom_sources
 from ....settings import properties, setting_properties
 from ....settings.translations import error_text
 from ..base.file_browser import BrowsedOperator
+from ..base.hair_operator import needs_hair
 
 
 class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
@@ -24,11 +24,7 @@ class VELLUS_OT_export_groom(BrowsedOperator, bpy.types.Operator):
         **setting_properties.annotations(ExportSettings),
     }
     asked = "filepath"
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def seconds(self, context):
         return float("inf")  # how long an animation takes is not known

@@ -12,6 +12,7 @@ from ....settings import properties, setting_properties
 from ....settings.translations import interface_text
 from ... import setting_rows
 from ..base.asked import AskedOperator
+from ..base.hair_operator import needs_hair
 
 
 class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
@@ -23,11 +24,7 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
         **setting_properties.annotations(CardSettings),
         "folder": properties.folder("Folder for the textures. Leave empty to pack them into the .blend file"),
     }
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def draw(self, context):
         setting_rows.all_rows(self.layout, self.properties, CardSettings)

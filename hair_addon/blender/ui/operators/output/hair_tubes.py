@@ -10,6 +10,7 @@ from ....settings import setting_properties
 from ....settings.translations import interface_text
 from ... import setting_rows
 from ..base.asked import AskedOperator
+from ..base.hair_operator import needs_hair
 
 
 class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
@@ -18,11 +19,7 @@ class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
     bl_idname = "vellus.hair_tubes"
     bl_label = "Hair Tubes"
     __annotations__ = setting_properties.annotations(TubeSettings)
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def draw(self, context):
         setting_rows.all_rows(self.layout, self.properties, TubeSettings)

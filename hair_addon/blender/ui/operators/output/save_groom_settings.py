@@ -11,6 +11,7 @@ from ....groom.transfer import groom_settings
 from ....host import paths
 from ....settings import properties
 from ..base.file_browser import BrowsedOperator
+from ..base.hair_operator import needs_hair
 
 
 class VELLUS_OT_save_groom_settings(BrowsedOperator, bpy.types.Operator):
@@ -24,11 +25,7 @@ class VELLUS_OT_save_groom_settings(BrowsedOperator, bpy.types.Operator):
         "filter_glob": properties.only_files("*.json"),
     }
     asked = "filepath"
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def seconds(self, context):
         return 0.0

@@ -7,7 +7,7 @@ from .....core.styling.kinds import DESCRIPTIONS, OFFERS
 from ....groom.selection import hair_of
 from ....groom.styles import hair_styles
 from ....settings import properties
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_hair
 from .base import fit_switch
 
 
@@ -25,11 +25,7 @@ class VELLUS_OT_add_style(HairOperator, bpy.types.Operator):
         ),
         "is_fitted": fit_switch(),
     }
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def change(self, context):
         offer = OFFERS[self.style]

@@ -6,7 +6,7 @@ import bpy
 from ....groom.selection import hair_of
 from ....groom.styles import hair_styles
 from ....settings import properties, saved_styles
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_hair
 from .base import keep_switch
 
 
@@ -22,11 +22,7 @@ class VELLUS_OT_apply_saved_style(HairOperator, bpy.types.Operator):
         ),
         "keeps_styles": keep_switch(),
     }
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def change(self, context):
         preset = saved_styles.read(self.name)

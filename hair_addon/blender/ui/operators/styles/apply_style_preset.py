@@ -7,7 +7,7 @@ from .....core.files import style_presets
 from ....groom.selection import hair_of
 from ....groom.styles import hair_styles
 from ....settings import properties
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_hair
 from .base import fit_switch, keep_switch
 
 
@@ -21,11 +21,7 @@ class VELLUS_OT_apply_style_preset(HairOperator, bpy.types.Operator):
         "is_fitted": fit_switch(),
         "keeps_styles": keep_switch(),
     }
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def change(self, context):
         preset = style_presets.read(self.preset)

@@ -5,7 +5,7 @@ import bpy
 
 from ....groom.selection import hair_of
 from ....groom.styles import hair_styles
-from ..base.hair_operator import HairOperator
+from ..base.hair_operator import HairOperator, needs_hair
 
 
 class VELLUS_OT_use_points(HairOperator, bpy.types.Operator):
@@ -13,11 +13,7 @@ class VELLUS_OT_use_points(HairOperator, bpy.types.Operator):
 
     bl_idname = "vellus.use_points"
     bl_label = "Use Points for Curls"
-
-    @classmethod
-    def applies(cls, context):
-        cls.poll_message_set("Select hair.")
-        return hair_of(context.object) is not None
+    applies = needs_hair
 
     def change(self, context):
         return "{count} points per strand", {"count": hair_styles.use_points(hair_of(context.object))}
