@@ -97,7 +97,7 @@ class Editing:
     def bending(self):
         """Bend the surface by a slider."""
         self.turn += 1
-        key = self.hair.data.surface.data.shape_keys.key_blocks["Bent"]
+        key = self.hair.surface.data.shape_keys.key_blocks["Bent"]
         key.value = 0.2 + 0.1 * (self.turn % 8)
         self.evaluate(bpy.context.view_layer.update)
 

@@ -20,7 +20,8 @@ MOST_GROUPS = 65535
 
 _SAMPLED = 500  # strands whose lengths are compared
 
-_AT_ONCE = 400  # strands that are brought into the order of texels
+_AT_ONCE = 400  # strands of which all points are gone through at once
+_POINTS_AT_ONCE = 16_400  # that are brought into the order of texels
 
 _MOVE_GROUP_SIZE = 64  # points that one work group of `_move_program` brings to their places
 
@@ -148,8 +149,9 @@ def places_texture(points, radii, row_strands):
     texels = np.empty((row_count * row_strands, point_count, 4), np.float32)
     texels[strand_count:] = 0.0
     # Number by number, of as many strands as the processor's caches hold: half the time of all at once.
-    for first in range(0, strand_count, _AT_ONCE):
-        some = slice(first, min(first + _AT_ONCE, strand_count))
+    at_once = max(1, _POINTS_AT_ONCE // point_count)
+    for first in range(0, strand_count, at_once):
+        some = slice(first, min(first + at_once, strand_count))
         for axis in range(3):
             texels[some, :, axis] = points[some, :, axis]
         texels[some, :, 3] = radii[some]

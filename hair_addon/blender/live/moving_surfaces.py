@@ -14,8 +14,10 @@ from ..host import running, scene_time
 from ..host.caches import Cache
 from ..render import hair_cache
 
-_REST = 0.3  # seconds without a move after which a surface is at rest
-_TOGETHER = 1.0  # seconds between two moves that may be of one interaction
+_REST = 0.2  # seconds without a move, twice in turn, after which a surface is at rest
+_TOGETHER = (
+    4.0  # seconds between two moves that may be of one interaction: where a processor draws, a picture takes long
+)
 
 # Name prefix of operators that move objects and bones while a mouse button is held.
 _TRANSFORMS = "TRANSFORM_OT_"
@@ -48,7 +50,12 @@ def _pause(surfaces):
     paused_hair.pause(surfaces)
     _cancel()  # put off with every move
     if paused_hair.is_any() and running.has_window():
-        bpy.app.timers.register(resume_at_rest, first_interval=_REST, persistent=True)
+        bpy.app.timers.register(settle, first_interval=_REST, persistent=True)
+
+
+def settle():
+    """For `bpy.app.timers`: wait once more, as the next move may have waited for a picture to be drawn."""
+    bpy.app.timers.register(resume_at_rest, first_interval=_REST, persistent=True)
 
 
 def resume_at_rest():
@@ -66,8 +73,9 @@ def resume():
 
 
 def _cancel():
-    if bpy.app.timers.is_registered(resume_at_rest):
-        bpy.app.timers.unregister(resume_at_rest)
+    for timer in (settle, resume_at_rest):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
 
 
 def _is_transforming():

@@ -172,6 +172,8 @@ def test_a_dragged_slider_pauses_hair_until_it_rests(bent):
     assert not are_paused()
     drag(bent, 0.3, 0.4)
     assert are_paused() and is_at_rest(bent)
+    assert bpy.app.timers.is_registered(moving_surfaces.settle)
+    moving_surfaces.settle()
     assert bpy.app.timers.is_registered(moving_surfaces.resume_at_rest)
     shown = drawn(bent)
     assert moving_surfaces.resume_at_rest() is None
