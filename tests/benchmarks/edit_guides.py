@@ -71,8 +71,10 @@ class Editing:
 
     def read(self, **details):
         """The `DrawnScene` as a viewport reads it."""
-        context = bpy.context
-        return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), **details)
+        context, areas = bpy.context, bpy.context.window_manager.windows[0].screen.areas
+        viewport = next(area.spaces.active for area in areas if area.type == "VIEW_3D")
+        depsgraph = context.evaluated_depsgraph_get()
+        return drawn_scene.read(context.scene, context.view_layer, depsgraph, viewport, **details)
 
     def stroke(self):
         """Follow guides that were combed back or forth."""

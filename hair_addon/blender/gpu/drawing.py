@@ -276,9 +276,13 @@ def bound(program, blocks, samplers):
 
 
 def upload_surface(positions, normals, uvs=None):
-    """(3 F, 3) float32 corner positions and unit normals in world space, (3 F, 2) UVs or none → `SurfaceOnGPU`."""
+    """(3 F, 3) float32 corner positions and unit normals in world space, (3 F, 2) UVs → `SurfaceOnGPU`.
+
+    Normals, of what is drawn as depth alone, and UVs may be None.
+    """
     row_corners = min(len(positions), TEXTURE_WIDTH)
     places = places_texture(positions[:, None], np.zeros((len(positions), 1), np.float32), row_corners)
+    normals = np.zeros_like(positions) if normals is None else normals
     uvs = np.zeros((len(positions), 2), np.float32) if uvs is None else uvs
     corners = {"position": positions, "normal": normals, "uv": uvs}
     return SurfaceOnGPU(places, row_corners, len(positions), geometry.fingerprint.fingerprint(positions), corners)

@@ -79,8 +79,9 @@ def read(
         # Scenes without hair have no cost.
         return _EMPTY
     if before is None or before.shadow_maps is None:
-        meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, is_moving=former is not None)
         is_shaded = viewport is None or not is_hair_only
+        has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # by which hair's shadow falls on them
+        meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
         surfaces, clear, receivers = _upload(meshes, is_shaded)
         if viewport is None:
             corners = _corners_of(meshes)
