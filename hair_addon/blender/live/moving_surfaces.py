@@ -25,6 +25,10 @@ _TRANSFORMS = "TRANSFORM_OT_"
 moved_cache = Cache()  # session_uid of a surface → when it moved, by `time.monotonic`
 
 
+# session_uid of a surface → True: its mesh was reported while hair was paused, and may have other weights.
+unchecked_cache = Cache()
+
+
 def frame_changed(surfaces):
     """Surfaces have another shape in this frame: pause their hair while the animation plays."""
     if surfaces and scene_time.is_shown_moving():
@@ -62,7 +66,7 @@ def resume_at_rest():
     """For `bpy.app.timers`: let Blender carry hair once nothing moves; seconds until the next try, or None."""
     if scene_time.is_shown_moving() or _is_transforming():
         return _REST
-    paused_hair.resume()
+    resume()
     return None
 
 
@@ -70,6 +74,22 @@ def resume():
     """Let Blender carry all hair, before anybody may read it."""
     _cancel()
     paused_hair.resume()
+    moved_cache.clear()  # what follows is no move
+    for surface_object in bpy.data.objects if len(unchecked_cache) else ():
+        if unchecked_cache.get(surface_object.session_uid) is not None:
+            surface_object.data.update_tag()  # to be reported again
+    unchecked_cache.clear()
+
+
+def is_to_be_checked_later(surface_object):
+    """Whether the weights of a mesh that Blender reports as edited are compared when it has come to rest.
+
+    Sliders of shape keys report it with each move, and reading weights takes longer than all else.
+    """
+    is_later = paused_hair.is_any()
+    if is_later:
+        unchecked_cache.keep(surface_object.session_uid, True)
+    return is_later
 
 
 def _cancel():
