@@ -93,9 +93,7 @@ def measure(drawn, frame, points, radii):
         frame.wait()
 
     def draw_shadows():
-        drawn.shadow_maps.draw(
-            drawn.lights, [(uploaded[0], to_world)], [surface.batch for surface, _ in drawn.surfaces]
-        )
+        drawn.shadow_maps.draw(drawn.lights, [(uploaded[0], to_world)], [surface for surface, _parts in drawn.surfaces])
         frame.wait()
 
     def see_world():

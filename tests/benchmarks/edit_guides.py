@@ -72,8 +72,10 @@ class Editing:
 
     def read(self, **details):
         """The `DrawnScene` as a viewport reads it."""
-        context = bpy.context
-        return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), **details)
+        context, areas = bpy.context, bpy.context.window_manager.windows[0].screen.areas
+        viewport = next(area.spaces.active for area in areas if area.type == "VIEW_3D")
+        depsgraph = context.evaluated_depsgraph_get()
+        return drawn_scene.read(context.scene, context.view_layer, depsgraph, viewport, **details)
 
     def stroke(self):
         """Follow guides that were combed back or forth."""
@@ -98,7 +100,7 @@ class Editing:
     def bending(self):
         """Bend the surface by a slider."""
         self.turn += 1
-        key = self.hair.data.surface.data.shape_keys.key_blocks["Bent"]
+        key = self.hair.surface.data.shape_keys.key_blocks["Bent"]
         key.value = 0.2 + 0.1 * (self.turn % 8)
         self.evaluate(bpy.context.view_layer.update)
 

@@ -32,11 +32,11 @@ def measure(hair, surfaces, opacities, clear=(), forwards=None):
     of_strands = list(zip(opacities, forwards, strict=True))
     maps = shadows.ShadowMaps(_SIZE, _DIRECTIONS_AT_ONCE)
     targets = [_Target(place) for place in _places(hair, [*surfaces, *clear], of_strands)]
-    steps, batches = _steps(hair), [surface.batch for surface in surfaces]
+    steps = _steps(hair)
     for first in range(0, len(ambient_cube.DIRECTIONS), _DIRECTIONS_AT_ONCE):
         chosen = slice(first, first + _DIRECTIONS_AT_ONCE)
         lights = _suns(ambient_cube.DIRECTIONS[chosen], ambient_cube.WEIGHTS[chosen])
-        maps.draw(lights, hair, batches, steps)
+        maps.draw(lights, hair, surfaces, steps)
         for target in targets:
             target.add(lights, maps.samplers)
     return _split([target.textures for target in targets], len(hair))
@@ -64,8 +64,8 @@ class Renewal:
             self._targets, self._turn = [_Target(place) for place in places], 0
         for target, place in zip(self._targets, places, strict=True):
             target.view, target.places = place
-        batches, turn = [surface.batch for surface in surfaces], self._turn
-        self._maps.draw(self._lights, hair, batches, _steps(hair), is_steady=True, chosen=turn)
+        turn = self._turn
+        self._maps.draw(self._lights, hair, surfaces, _steps(hair), is_steady=True, chosen=turn)
         one = self._lights.copy()
         one["count"], one["light"][0] = 1, self._lights["light"][turn]
         for target in self._targets:

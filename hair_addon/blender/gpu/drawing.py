@@ -9,6 +9,7 @@ import math
 import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 
 import gpu
 import numpy as np
@@ -18,15 +19,32 @@ from . import shaders, uniforms
 from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, bare_vertices, vertex_count
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SurfaceOnGPU:
-    """Triangles of a surface: their batch, and their corners' places in a texture."""
+    """Triangles of a surface: their corners' places in a texture."""
 
-    batch: gpu.types.GPUBatch
     places: gpu.types.GPUTexture
     row_corners: int
     corner_count: int
     fingerprint: str  # of the corners
+    corners: dict  # {attribute: (3 F, N) values} of `batch`
+
+    @cached_property
+    def batch(self) -> gpu.types.GPUBatch:
+        """The triangles with all attributes, uploaded for who needs more than their places."""
+        layout = gpu.types.GPUVertFormat()
+        for name, values in self.corners.items():
+            layout.attr_add(id=name, comp_type="F32", len=values.shape[1], fetch_mode="FLOAT")
+        vertices = gpu.types.GPUVertBuf(layout, self.corner_count)
+        for name, values in self.corners.items():
+            # Other types than contiguous float32 would be accepted silently and drawn incorrectly.
+            vertices.attr_fill(name, np.ascontiguousarray(values, np.float32))
+        return gpu.types.GPUBatch(type="TRIS", buf=vertices)
+
+    @cached_property
+    def bare(self) -> gpu.types.GPUBatch:
+        """The same without attributes: a shader reads `places`."""
+        return bare_vertices(self.corner_count, "TRIS")
 
 
 @dataclass(frozen=True)
@@ -244,8 +262,9 @@ def dispatch_over(program, size):
 
 
 def draw_surface_depth(surface, view, lights, fragment="shadow_surface.frag"):
-    """Draw a surface into a shadow map's first pass, or where it only hides: surface_hides.frag."""
-    _draw(surface, shaders.surface_depth_program(fragment), view, uniforms.uniform_buffer(lights), {})
+    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surface_hides.frag."""
+    program, samplers = shaders.surface_depth_program(fragment), {"places": surface.places}
+    _draw(surface.bare, program, view, uniforms.uniform_buffer(lights), samplers, surface.corner_count)
 
 
 def draw_triangles(surface, program, view, lights, samplers):
@@ -275,19 +294,16 @@ def bound(program, blocks, samplers):
 
 
 def upload_surface(positions, normals, uvs=None):
-    """(3 F, 3) float32 corner positions and unit normals in world space, (3 F, 2) UVs or none → `SurfaceOnGPU`."""
-    layout = gpu.types.GPUVertFormat()
-    layout.attr_add(id="position", comp_type="F32", len=3, fetch_mode="FLOAT")
-    layout.attr_add(id="normal", comp_type="F32", len=3, fetch_mode="FLOAT")
-    layout.attr_add(id="uv", comp_type="F32", len=2, fetch_mode="FLOAT")
-    vertices = gpu.types.GPUVertBuf(layout, len(positions))
-    uvs = np.zeros((len(positions), 2)) if uvs is None else uvs
-    # Other types than contiguous float32 would be accepted silently and drawn incorrectly.
-    for name, values in (("position", positions), ("normal", normals), ("uv", uvs)):
-        vertices.attr_fill(name, np.ascontiguousarray(values, np.float32))
+    """(3 F, 3) float32 corner positions and unit normals in world space, (3 F, 2) UVs → `SurfaceOnGPU`.
+
+    Normals, of what is drawn as depth alone, and UVs may be None.
+    """
     row_corners = min(len(positions), TEXTURE_WIDTH)
-    batch, fingerprint = gpu.types.GPUBatch(type="TRIS", buf=vertices), geometry.fingerprint.fingerprint(positions)
-    return SurfaceOnGPU(batch, _places_texture(positions, row_corners), row_corners, len(positions), fingerprint)
+    places = _places_texture(positions, row_corners)
+    normals = np.zeros_like(positions) if normals is None else normals
+    uvs = np.zeros((len(positions), 2), np.float32) if uvs is None else uvs
+    corners = {"position": positions, "normal": normals, "uv": uvs}
+    return SurfaceOnGPU(places, row_corners, len(positions), geometry.fingerprint.fingerprint(positions), corners)
 
 
 def _places_texture(positions, row_corners):

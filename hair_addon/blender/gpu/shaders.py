@@ -254,10 +254,12 @@ def surface_program():
 @kept
 def surface_depth_program(fragment="shadow_surface.frag"):
     """The program that draws a surface into a shadow map, or one that only hides."""
-    info, varying = surface_info()
+    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
     declare_scene(info, shadow_samplers=(), is_lit=False)
+    info.sampler(0, "FLOAT_2D", "places")
+    varying.smooth("VEC3", "drawn_position")
     info.vertex_out(varying)
-    return compile_drawing(info, "surface.vert", fragment)
+    return compile_drawing(info, "surface_place.vert", fragment)
 
 
 def surface_info():

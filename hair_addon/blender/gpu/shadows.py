@@ -60,7 +60,7 @@ class ShadowMaps:
     def draw(self, lights, hair, surfaces, steps=_ALL, casters=None, is_steady=False, chosen=None):
         """Draw the maps and write each light's part in them into its record.
 
-        lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: batches;
+        lights: a `uniforms.LIGHTS` record, changed; hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU];
         steps: what is drawn of each hair for all of it; casters: a light's index → (hair, surfaces) that cast its
         shadow, None: all; is_steady: whether maps stay aimed where they are as long as hair fits; chosen: index of the
         only light whose map is drawn, None: of all.

@@ -23,7 +23,7 @@ MOST_GROUPS = 65535
 
 _SAMPLED = 500  # strands whose lengths are compared
 
-_AT_ONCE = 400  # strands that are brought into the order of texels
+_AT_ONCE = 400  # strands of which all points are gone through at once
 
 _MOVE_GROUP_SIZE = 64  # texels that one work group of `_move_program` brings to their places
 

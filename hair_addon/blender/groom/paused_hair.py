@@ -28,7 +28,8 @@ def is_paused(datablock: Curves) -> bool:
 def pause(surfaces: set[Object]) -> None:
     """Pause what grows on surfaces that move, unless anything but Vellus may show or read it."""
     if not running.has_window() or running.job() is not None or _is_read_elsewhere():
-        resume()
+        if is_any():  # all objects are gone through, which is too much for each frame
+            resume()
         return
     for datablock in bpy.data.hair_curves:
         if is_paused(datablock):

@@ -57,7 +57,8 @@ def after_depsgraph_update(scene, depsgraph):
         events.surface_moved(surface_object)
         # Hair waits until the surface leaves edit and paint modes.
         if surface_object.mode == "OBJECT":
-            stale_marks.follow_surface(surface_object, depsgraph, surface_object.data in changed)
+            is_edited = surface_object.data in changed and not moving_surfaces.is_to_be_checked_later(surface_object)
+            stale_marks.follow_surface(surface_object, depsgraph, is_edited)
     moved = [u.id.original for u in depsgraph.updates if u.is_updated_geometry or u.is_updated_transform]
     stale_marks.follow_partings(moved, depsgraph)
     stale_marks.follow_flow(moved, depsgraph)

@@ -32,6 +32,7 @@ COPIES = (
     reported.axes_cache,
     paused_hair.paused_cache,
     moving_surfaces.moved_cache,
+    moving_surfaces.unchecked_cache,
     guide_map_readers.reading_cache,
 )
 

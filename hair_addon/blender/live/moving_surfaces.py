@@ -14,13 +14,19 @@ from ..host import running, scene_time
 from ..host.caches import Cache
 from ..render import hair_cache
 
-_REST = 0.3  # seconds without a move after which a surface is at rest
-_TOGETHER = 1.0  # seconds between two moves that may be of one interaction
+_REST = 0.2  # seconds without a move, twice in turn, after which a surface is at rest
+_TOGETHER = (
+    4.0  # seconds between two moves that may be of one interaction: where a processor draws, a picture takes long
+)
 
 # Name prefix of operators that move objects and bones while a mouse button is held.
 _TRANSFORMS = "TRANSFORM_OT_"
 
 moved_cache = Cache()  # session_uid of a surface → when it moved, by `time.monotonic`
+
+
+# session_uid of a surface → True: its mesh was reported while hair was paused, and may have other weights.
+unchecked_cache = Cache()
 
 
 def frame_changed(surfaces):
@@ -48,14 +54,19 @@ def _pause(surfaces):
     paused_hair.pause(surfaces)
     _cancel()  # put off with every move
     if paused_hair.is_any() and running.has_window():
-        bpy.app.timers.register(resume_at_rest, first_interval=_REST, persistent=True)
+        bpy.app.timers.register(settle, first_interval=_REST, persistent=True)
+
+
+def settle():
+    """For `bpy.app.timers`: wait once more, as the next move may have waited for a picture to be drawn."""
+    bpy.app.timers.register(resume_at_rest, first_interval=_REST, persistent=True)
 
 
 def resume_at_rest():
     """For `bpy.app.timers`: let Blender carry hair once nothing moves; seconds until the next try, or None."""
     if scene_time.is_shown_moving() or _is_transforming():
         return _REST
-    paused_hair.resume()
+    resume()
     return None
 
 
@@ -63,11 +74,28 @@ def resume():
     """Let Blender carry all hair, before anybody may read it."""
     _cancel()
     paused_hair.resume()
+    moved_cache.clear()  # what follows is no move
+    for surface_object in bpy.data.objects if len(unchecked_cache) else ():
+        if unchecked_cache.get(surface_object.session_uid) is not None:
+            surface_object.data.update_tag()  # to be reported again
+    unchecked_cache.clear()
+
+
+def is_to_be_checked_later(surface_object):
+    """Whether the weights of a mesh that Blender reports as edited are compared when it has come to rest.
+
+    Sliders of shape keys report it with each move, and reading weights takes longer than all else.
+    """
+    is_later = paused_hair.is_any()
+    if is_later:
+        unchecked_cache.keep(surface_object.session_uid, True)
+    return is_later
 
 
 def _cancel():
-    if bpy.app.timers.is_registered(resume_at_rest):
-        bpy.app.timers.unregister(resume_at_rest)
+    for timer in (settle, resume_at_rest):
+        if bpy.app.timers.is_registered(timer):
+            bpy.app.timers.unregister(timer)
 
 
 def _is_transforming():

@@ -79,8 +79,9 @@ def read(
         # Scenes without hair have no cost.
         return _EMPTY
     if before is None or before.shadow_maps is None:
-        meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, is_moving=former is not None)
         is_shaded = viewport is None or not is_hair_only
+        has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # by which hair's shadow falls on them
+        meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
         surfaces, clear, receivers = _upload(meshes, is_shaded)
         if viewport is None:
             corners = _corners_of(meshes)
@@ -139,13 +140,13 @@ def _fit(maps, lamps):
 def _lit(drawn, lamps, maps, hair_receivers, is_draft=False):
     """A `DrawnScene` with `SceneLights`: as all that is in it is lit by them, with their shadow maps."""
     maps = maps or scene_lights.new_maps(lamps.record)
-    placed, batches = _placed(drawn.hair), [surface.batch for surface, _ in drawn.surfaces]
+    placed, solid = _placed(drawn.hair), [surface for surface, _parts in drawn.surfaces]
     hair_owners = [receiver.owner for receiver in hair_receivers]
-    surface_owners = [receiver.owner for receiver in drawn.receivers[: len(batches)]]
+    surface_owners = [receiver.owner for receiver in drawn.receivers[: len(solid)]]
     steps = _DRAFT_STEPS if is_draft and not _are_made(drawn.hair) else _SHADOW_STEPS
-    casters = lamps.casters(placed, hair_owners, batches, surface_owners)
+    casters = lamps.casters(placed, hair_owners, solid, surface_owners)
     # Where strands are made, what is drawn at rest is what was drawn while they moved.
-    maps.draw(lamps.record, placed, batches, steps, casters, is_steady=is_draft or _are_made(drawn.hair))
+    maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or _are_made(drawn.hair))
     own = {}
     if not lamps.are_alike:
         own = {"hair_lights": lamps.lit(hair_receivers), "surface_lights": lamps.lit(drawn.receivers)}

@@ -181,8 +181,9 @@ def drawn_scene_of(context):
 
 
 def _what_shows(viewport):
-    """Key of a viewport's visibility settings."""
+    """Key of what a viewport shows, and of what is needed to show it."""
     return (
+        viewport.shading.type == "MATERIAL",
         viewport.local_view is not None,
         viewport.use_local_collections,
         viewport.show_object_viewport_mesh,

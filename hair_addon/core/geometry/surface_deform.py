@@ -26,6 +26,10 @@ from .mesh import Faces, require_finite
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
+# Gradients take a tenth of a microsecond each: fewer are not worth a thread.
+_LEAST_FACES = 32_768
+
+
 @dataclass(frozen=True)
 class SurfaceMotion:
     """Positions of a mesh's vertices before and after, (V, 3) float32, and the rotation of the surface there.
@@ -78,7 +82,8 @@ def vertex_axes(before: np.ndarray, after: np.ndarray, faces: Faces) -> np.ndarr
     moves = wp.empty(face_count, dtype=wp.int32, device="cpu")
     corners = _shared(faces.corner_vertices, np.int32, wp.int32)
     of_face = [Rows(_shared(part, np.int32, wp.int32)) for part in (faces.starts[:-1], faces.starts[1:])]
-    parallel.launch(_face_gradients, face_count, [*of_face, corners, before, after], [gradients, moves], "cpu")
+    given = [*of_face, corners, before, after]
+    parallel.launch(_face_gradients, face_count, given, [gradients, moves], "cpu", least_rows=_LEAST_FACES)
     axes = wp.empty((vertex_count, 2), dtype=wp.vec3, device="cpu")
     is_found = wp.empty(vertex_count, dtype=wp.int32, device="cpu")
     of_vertex = [Rows(_shared(part, np.int32, wp.int32)) for part in (starts[:-1], starts[1:])]

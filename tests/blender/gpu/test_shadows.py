@@ -31,7 +31,7 @@ def sun(azimuth, height, radius=0.0):
 def lit(lights, hair, surfaces, places, size=512):
     """(N,) part of a sun's light that arrives at places (N, 3), by way of what the world's visibility reads of maps."""
     maps = shadows.ShadowMaps(size, 1)
-    maps.draw(lights, [(hair, np.eye(4))], [surface.batch for surface in surfaces])
+    maps.draw(lights, [(hair, np.eye(4))], surfaces)
     receiver = drawing.upload_surface(*[np.repeat(places, 3, axis=0).astype(np.float32)] * 2)
     view = ambient_visibility._view_of_surface(receiver)
     view["seen_opacity"] = 1.0

@@ -37,7 +37,7 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
             corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
             corners[3:, :2] = [[-9, -9], [0, 9], [-9, 9]]
             surface = drawing.upload_surface(corners, corners)
-            drawing.draw_surface_depth(surface.batch, view, lights, "surface_hides.frag")
+            drawing.draw_surface_depth(surface, view, lights, "surface_hides.frag")
     hair = [
         (strand_textures.upload_strands(points, radii), shading, to_world, np.zeros(3), none, steps)
         for points, radii, to_world in placed

@@ -5,9 +5,10 @@ import bpy
 import numpy as np
 import pytest
 
+from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves, follow_nodes
 from hair_addon.blender.host import running, scene_time
-from hair_addon.blender.live import handlers, moving_surfaces
+from hair_addon.blender.live import handlers, live_hair, moving_surfaces
 from tests.blender.live.test_carried_strands import bend
 from tests.support.counting import Traffic, counts_of
 from tests.support.made_strands import CLOSE, drawn
@@ -172,6 +173,8 @@ def test_a_dragged_slider_pauses_hair_until_it_rests(bent):
     assert not are_paused()
     drag(bent, 0.3, 0.4)
     assert are_paused() and is_at_rest(bent)
+    assert bpy.app.timers.is_registered(moving_surfaces.settle)
+    moving_surfaces.settle()
     assert bpy.app.timers.is_registered(moving_surfaces.resume_at_rest)
     shown = drawn(bent)
     assert moving_surfaces.resume_at_rest() is None
@@ -189,6 +192,31 @@ def test_a_drag_reads_no_strands(bent, monkeypatch):
         monkeypatch.setattr(curves, name, lambda datablock: read.append(datablock))
     drag(bent, 0.5, 0.6)
     assert not read
+
+
+def test_weights_that_change_while_the_surface_is_dragged_count_at_rest(bent, monkeypatch):
+    surface = bent.data.surface
+    surface.data.shape_keys.animation_data_clear()
+    group = surface.vertex_groups.new(name="Part")
+    group.add(range(len(surface.data.vertices)), 1.0, "REPLACE")
+    bent.data.vellus.hair.density_group = "Part"
+    bpy.context.view_layer.update()
+    live_hair.write_all()
+    drawn(bent)
+    drag(bent, 0.2, 0.3, 0.4)
+    assert are_paused()
+    read = []
+    real = scene.read_vertex_group
+    monkeypatch.setattr(scene, "read_vertex_group", lambda *given: read.append(1) or real(*given))
+    top = [vertex.index for vertex in surface.data.vertices if vertex.co.z > 0.0]
+    group.add(top, 0.0, "REPLACE")
+    drag(bent, 0.5, 0.6)
+    assert not read and are_paused()
+    moving_surfaces.resume_at_rest()
+    bpy.context.view_layer.update()
+    live_hair.write_all()
+    assert read and not are_paused()
+    assert points(bent)[:, 0, 2].max() < 0.25  # of a ball of one, whose faces are as high
 
 
 def test_strands_that_change_while_the_surface_is_dragged_are_drawn_so(bent):

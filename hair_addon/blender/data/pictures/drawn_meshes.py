@@ -21,7 +21,7 @@ class DrawnMesh:
     """
 
     positions: np.ndarray
-    normals: np.ndarray
+    normals: np.ndarray | None  # None where they were not read
     uvs: np.ndarray
     parts: tuple | None
     owner: tuple = ()
@@ -50,10 +50,11 @@ class _Layout:
 layout_cache = Cache(capacity=64)  # session_uid of a mesh object → `_Layout`
 
 
-def read_drawn_meshes(depsgraph, viewport=None, is_moving=False):
+def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=True):
     """A `DrawnMesh` for every mesh that a 3-D viewport shows as a surface, or without one a render; instances too.
 
-    is_moving: whether polygons may be cut as they were before a moment ago, while their corners are the same.
+    is_moving: whether polygons may be cut as they were before a moment ago, while their corners are the same;
+    has_normals: whether they are needed, which Blender computes for each pose.
     """
     meshes = []
     for instance in depsgraph.object_instances:
@@ -62,7 +63,7 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False):
             matrix = np.array(instance.matrix_world, np.float64)
             if not can_be_drawn(instance.object, matrix):
                 continue
-            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving)
+            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, has_normals)
             meshes.append(replace(mesh, owner=owner_of(instance)))
     return [mesh for mesh in meshes if len(mesh.positions)]
 
@@ -85,22 +86,28 @@ def _is_surface_seen(instance, viewport):
     return placed.original.visible_in_viewport_get(viewport) and instance.object.display_type in {"TEXTURED", "SOLID"}
 
 
-def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving):
+def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
     mesh = mesh_object.to_mesh()
     try:
         vertices = scene.vertex_positions(mesh)
         layout = _layout(mesh_object, mesh, is_holdout, is_moving)
-        loop_normals = np.empty((len(mesh.loops), 3), np.float32)
-        mesh.corner_normals.foreach_get("vector", loop_normals.ravel())
+        normals = _corner_normals(mesh, to_world).take(layout.loops, axis=0) if has_normals else None
         parts = () if is_holdout else _parts(mesh_object, layout.runs)
         uvs = _read_uvs(mesh, layout.loops, parts)
     finally:
         mesh_object.to_mesh_clear()
     positions = (vertices @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
-    normals = loop_normals @ np.linalg.pinv(to_world[:3, :3])
+    positions = positions.take(layout.faces.corner_vertices[layout.loops], axis=0)
+    return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, color=surface_color(mesh_object))
+
+
+def _corner_normals(mesh, to_world):
+    """(C, 3) float32 unit normals of a mesh's corners in world space."""
+    local = np.empty((len(mesh.loops), 3), np.float32)
+    mesh.corner_normals.foreach_get("vector", local.ravel())
+    normals = local @ np.linalg.pinv(to_world[:3, :3])
     normals /= np.maximum(np.sqrt(np.einsum("nc,nc->n", normals, normals)), 1e-12)[:, None]
-    placed = positions[layout.faces.corner_vertices[layout.loops]], normals.astype(np.float32)[layout.loops]
-    return DrawnMesh(*placed, uvs, None if is_holdout else parts, color=surface_color(mesh_object))
+    return normals.astype(np.float32)
 
 
 def _layout(mesh_object, mesh, is_holdout, is_moving):

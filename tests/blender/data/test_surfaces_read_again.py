@@ -1,0 +1,131 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surfaces and meshes that are read again keep what is as it was, and are as if they were read for the first time."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.pictures import drawn_meshes
+
+
+@pytest.fixture
+def ball(scene):  # an empty one
+    """A sphere of quads with a UV map, rest positions, a shape key and two materials."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=12, ring_count=8)
+    made = bpy.context.object
+    made.add_rest_position_attribute = True
+    made.shape_key_add(name="Basis")
+    key = made.shape_key_add(name="Bent")
+    key.value = 0.0
+    for point in key.data:
+        point.co.x += point.co.z**2
+    for name in ("First", "Second"):
+        made.data.materials.append(bpy.data.materials.new(name))
+    made.data.polygons.foreach_set("material_index", np.arange(len(made.data.polygons)) % 2)
+    return made
+
+
+def pose(ball):
+    ball.data.shape_keys.key_blocks["Bent"].value += 0.5
+
+
+def move_rest(ball):
+    for block in ball.data.shape_keys.key_blocks:
+        block.data[0].co.z += 0.5
+
+
+def subdivide(ball):
+    ball.modifiers.new("Subdivision", "SUBSURF").levels = 1
+
+
+def subdivide_flat(ball):
+    ball.modifiers.new("Subdivision", "SUBSURF").subdivision_type = "SIMPLE"
+
+
+def turn_faces(ball):
+    ball.data.flip_normals()
+
+
+def move_uvs(ball):
+    ball.data.uv_layers.active.uv[3].vector = (0.25, 0.75)
+
+
+def rename_uvs(ball):
+    ball.data.uv_layers.active.name = "Other"
+
+
+def remove_uvs(ball):
+    ball.data.uv_layers.remove(ball.data.uv_layers.active)
+
+
+def scale(ball):
+    ball.scale = (1.0, 2.0, 1.0)
+
+
+def mirror(ball):
+    ball.scale.x *= -1.0
+
+
+def rename(ball):
+    ball.name = "Other"
+
+
+def forget_rest(ball):
+    ball.add_rest_position_attribute = False
+
+
+def paint_faces(ball):
+    ball.data.polygons.foreach_set("material_index", np.arange(len(ball.data.polygons)) // 20 % 2)
+
+
+CHANGES = [pose, move_rest, subdivide, subdivide_flat, turn_faces, move_uvs, rename_uvs, remove_uvs, scale, mirror]
+CHANGES += [rename, forget_rest, paint_faces, pose]
+
+
+def depsgraph_of(ball):
+    ball.data.update_tag()
+    bpy.context.view_layer.update()
+    return bpy.context.evaluated_depsgraph_get()
+
+
+def same_surfaces(one, other):
+    return one.is_same(other) and np.array_equal(one.smooth_rest, other.smooth_rest) and one.topology == other.topology
+
+
+def test_surfaces_are_as_if_read_for_the_first_time(ball):
+    for change in CHANGES:
+        scene.read_surface(ball, depsgraph_of(ball)).topology  # noqa: B018 (kept with the surface)
+        change(ball)
+        depsgraph = depsgraph_of(ball)
+        again = scene.read_surface(ball, depsgraph)
+        scene.surface_cache.clear()
+        assert same_surfaces(again, scene.read_surface(ball, depsgraph)), change.__name__
+
+
+def test_meshes_that_move_are_drawn_as_if_read_for_the_first_time(ball):
+    """But for the diagonals of quads: each polygon covers the same corners, with the same material."""
+    for change in CHANGES:
+        drawn_meshes.read_drawn_meshes(depsgraph_of(ball))
+        change(ball)
+        depsgraph = depsgraph_of(ball)
+        (again,), (new,) = (drawn_meshes.read_drawn_meshes(depsgraph, is_moving=kept) for kept in (True, False))
+        assert again.parts == new.parts, change.__name__
+        for first, count, _material in again.parts:
+            corners = [np.unique(mesh.positions[first : first + count], axis=0) for mesh in (again, new)]
+            assert np.array_equal(*corners), change.__name__
+
+
+def test_a_pose_cuts_no_polygons(ball, monkeypatch):
+    first = scene.read_surface(ball, depsgraph_of(ball))
+    drawn_meshes.read_drawn_meshes(depsgraph_of(ball), is_moving=True)
+    cut, real = [], scene.triangle_corners
+    monkeypatch.setattr(scene, "triangle_corners", lambda *given: cut.append(1) or real(*given))
+    pose(ball)
+    depsgraph = depsgraph_of(ball)
+    second = scene.read_surface(ball, depsgraph)
+    drawn_meshes.read_drawn_meshes(depsgraph, is_moving=True)
+    assert not cut and second.mesh is first.mesh
+    assert second.is_deformed and not first.is_deformed
+    drawn_meshes.read_drawn_meshes(depsgraph)  # at rest
+    assert len(cut) == 1
