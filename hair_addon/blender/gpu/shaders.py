@@ -168,20 +168,22 @@ def _walk(file, images, constants, shadow_samplers=(), samplers=()):
     return compile_compute(info, file)
 
 
+PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 PICTURE_GROUP_SIZE = 8  # samples along each side of what one work group of a picture's programs fills
 
 
 @kept
 def surface_depths_program():
-    """The compute program that converts depth to integers: see surface_depths.comp."""
+    """The compute program that converts depth to integers, and clears all else: see surface_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()
     info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
     info.sampler(0, "FLOAT_2D", "surface_depth")
-    info.image(0, "R32UI", "UINT_2D", "depths", qualifiers={"WRITE"})
+    for slot, name in enumerate(("depths", "segments")):
+        info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"WRITE"})
+    info.image(2, PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    for name in ("is_start", "is_blank"):
+        info.push_constant("INT", name)
     return compile_compute(info, "surface_depths.comp")
-
-
-PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 
 
 @kept
