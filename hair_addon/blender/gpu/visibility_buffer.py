@@ -11,7 +11,7 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from . import drawing, light_grid, shaders, uniforms
+from . import drawing, light_grid, shaders, uniforms, visibility_programs
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
@@ -53,7 +53,7 @@ class VisibilityBuffer:
         self.color = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
-        tiles = tuple(-(-length // shaders.TILE) for length in self.size)
+        tiles = tuple(-(-length // visibility_programs.TILE) for length in self.size)
         self._farthest = gpu.types.GPUTexture(tiles, format="R32UI")  # of the depths in each
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
@@ -184,7 +184,7 @@ class VisibilityBuffer:
 
     def _find_farthest(self):
         """Fill the tiles with the farthest of their depths."""
-        program = shaders.farthest_depths_program()
+        program = visibility_programs.farthest_depths_program()
         with drawing.bound(program, {}, {"depths": self.depths}):
             program.image("farthest_depths", self._farthest)
             drawing.dispatch_over(program, (self._farthest.width, self._farthest.height))
@@ -210,7 +210,7 @@ class VisibilityBuffer:
 
         On some graphics cards the driver takes longer to clear textures than the program.
         """
-        program = shaders.surface_depths_program()
+        program = visibility_programs.surface_depths_program()
         with drawing.bound(program, {}, {"surface_depth": self.surface_depth}):
             for name, image in (("depths", self.depths), ("segments", self.segments), ("picture", self.color)):
                 program.image(name, image)
