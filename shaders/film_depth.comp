@@ -3,8 +3,7 @@
 // samples that are not background.
 
 #include "include/film_filter.glsl"
-
-const uint NO_SEGMENT = 0x7FFFFFFFu;
+#include "include/no_segment.glsl"
 
 // clip: the transform of a point on the axis to clip space, its last two rows and columns, row by row.
 float distance_at(float depth, vec4 clip)

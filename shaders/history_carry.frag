@@ -4,8 +4,8 @@
 // blocks are compared instead: they may differ as far as noise allows.
 
 #include "include/history_blocks.glsl"
+#include "include/no_segment.glsl"
 
-const uint NO_SEGMENT = 0x7FFFFFFFu;
 const float MOST_OF_BACKGROUND = 1.0;  // where no hair and no surface is near: it has no noise, and may have been hidden
 const float MOST_OF_LIT_SURFACE = 24.0;  // where only lights move: shadows on surfaces go with them, and leave a trail
 const float SLOW = 4.0;  // pixels a frame: at higher speed less is carried, as strands hide each other in other ways

@@ -35,7 +35,7 @@ void read_strand(ivec2 first)
   vec3 direction = strand_normal;
   vec3 before = imageLoad(plain_strands, first).xyz;
   strand_root = before;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec3 here = imageLoad(plain_strands, first + ivec2(i, 0)).xyz;
     vec3 along = here - before;
     float size = length(along);
@@ -118,7 +118,7 @@ void write_strand(int strand, ivec2 first, bool is_touched)
 {
   vec3 from_root = vec3(0.0);
   float range = 0.0;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec4 along = segment_at(i);
     from_root += along.xyz * along.w;
     vec3 extent = abs(drawn_offset(first, i, from_root, is_touched));
@@ -127,7 +127,7 @@ void write_strand(int strand, ivec2 first, bool is_touched)
   vec3 root = (styling.to_drawn * vec4(strand_root, 0.0)).xyz;
   begin_strand(strand, root, range, POINTS, styling.row_packed);
   from_root = vec3(0.0);
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec4 along = segment_at(i);
     from_root += along.xyz * along.w;
     put_point(i, drawn_offset(first, i, from_root, is_touched));
@@ -140,7 +140,7 @@ void write_centre(ivec2 first, bool is_touched)
 {
   vec3 from_root = vec3(0.0);
   float arc = 0.0;
-  for (int i = 0; i < POINTS; i++) {
+  for (int i = 0; i < styling.point_count; i++) {
     vec4 texel = imageLoad(plain_strands, first + ivec2(i, 0));
     if (i > 0) {
       vec4 along = segment_at(i);

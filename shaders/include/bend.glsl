@@ -12,7 +12,7 @@ void bend(Step row)
   vec2 toward = vec2(0.0);
   vec3 u = first_frame(reference(centre_normal, styling.axes));
   vec3 t_before = segment_at(1).xyz;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec3 t = segment_at(i).xyz;
     if (i > 1) {
       u = turned(u, t_before, t);
@@ -26,7 +26,7 @@ void bend(Step row)
   vec2 turn = sine_and_cosine(direction + random_turn * (random_of(row.seed, RANDOM_TURN) - 0.5));
   vec2 way = vec2(psi.x * turn.y - psi.y * turn.x, psi.x * turn.x + psi.y * turn.y);
   float arc = 0.0;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec4 own = segment_at(i);
     arc += own.w;
     vec2 bent = sine_and_cosine(base_amount * angle * profile(course, arc * per_total));

@@ -30,7 +30,7 @@ void clump(Step row)
   float lead = 0.0;
   float weight = 0.0;
   float pull_before = 0.0;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec4 own = segment_at(i);
     float d = own.w;
     arc += d;

@@ -45,7 +45,7 @@ void curl(Step row)
   float radius_before = 0.0;
   float s = 0.0;
   Walk walk = begin_across(u_first, vec2(0.0));
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     float d = segment_at(i).w;
     s += d;
     float x = s * per_total;

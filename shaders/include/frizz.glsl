@@ -52,7 +52,7 @@ void frizz(Step row)
   }
   Walk walk;
   float s = 0.0;
-  for (int i = 0; i < POINTS; i++) {
+  for (int i = 0; i < styling.point_count; i++) {
     if (i > 0) {
       s += segment_at(i).w;
     }

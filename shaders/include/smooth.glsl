@@ -23,7 +23,7 @@ void smooth_strand(Step row)
     put_places(pass == 1);
     int behind = 0;
     int before = 0;
-    for (int i = 1; i < POINTS; i++) {
+    for (int i = 1; i < styling.point_count; i++) {
       vec4 own = segment_at(i);
       float middle = 0.5 * (places[i - 1].w + places[i].w);
       float back = max(middle - reach, 0.0);
@@ -34,7 +34,7 @@ void smooth_strand(Step row)
     }
   }
   float arc = 0.0;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec4 own = segment_at(i);
     arc += own.w;
     float amount = base_amount * profile(course, arc * per_total);

@@ -58,7 +58,7 @@ void exchange()
 void put_total()
 {
   total = 0.0;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     total += segment_at(i).w;
   }
 }
@@ -69,7 +69,7 @@ void put_places(bool are_next)
 {
   vec4 here = vec4(0.0);
   places[0] = here;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec4 along = are_next ? next_at(i) : segment_at(i);
     here += vec4(along.xyz * along.w, along.w);
     places[i] = here;

@@ -22,7 +22,7 @@ float crossing_of(vec3 axis, float plane)
   if (before > 0.0) {
     return 0.0;
   }
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     float beyond = dot(places[i].xyz, axis) - plane;
     if (beyond > 0.0 && before <= 0.0) {
       return places[i - 1].w - segment_at(i).w * before / (beyond - before);
@@ -56,7 +56,7 @@ void trim(Step row)
   }
   wanted = total + base_amount * (wanted - total);
   if (!is_cut) {
-    for (int i = 1; i < POINTS; i++) {
+    for (int i = 1; i < styling.point_count; i++) {
       vec4 own = segment_at(i);
       put_segment(i, own.xyz, own.w * wanted * per_total);
     }
@@ -75,7 +75,7 @@ void trim(Step row)
     float sum = 0.0;
     vec3 before = vec3(0.0);
     vec3 direction = segment_at(1).xyz;
-    for (int i = 1; i < POINTS; i++) {
+    for (int i = 1; i < styling.point_count; i++) {
       float reached = places[i].w * scale;
       while (at < POINTS - 2 && places[at + 1].w < reached) {
         at++;
@@ -93,7 +93,7 @@ void trim(Step row)
     exact = wanted / max(sum, 1e-20);
     if (has_plane) {
       vec3 tip = vec3(0.0);
-      for (int i = 1; i < POINTS; i++) {
+      for (int i = 1; i < styling.point_count; i++) {
         vec4 made = next_at(i);
         tip += made.xyz * (made.w * exact);
       }
@@ -104,7 +104,7 @@ void trim(Step row)
       wanted = max(wanted, 0.0);
     }
   }
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec4 made = next_at(i);
     put_segment(i, made.xyz, made.w * exact);
   }

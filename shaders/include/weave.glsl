@@ -48,7 +48,7 @@ void weave(Step row)
   float arc = 0.0;
   float ahead = 0.0;
   float pull = 0.0;
-  for (int i = 1; i < POINTS; i++) {
+  for (int i = 1; i < styling.point_count; i++) {
     vec4 own = segment_at(i);
     float d = own.w;
     arc += d;

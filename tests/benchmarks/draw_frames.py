@@ -55,7 +55,7 @@ class Frame:
 
     def draw(self, drawn):
         """Draw a `DrawnScene` as a viewport does, whose surfaces Blender shades, and wait until that is done."""
-        with self._buffer.surfaces():
+        with self._buffer.hiding():
             scene_drawing.draw_hiding(drawn, self.view)
         scene_drawing.draw_hair(drawn, self.view, self._buffer)
         self.wait()

@@ -134,19 +134,6 @@ def segments_program():
     return _walk("strand_segments.comp", ("depths", "segments"), constants, samplers=(("farthest_depths", "UINT_2D"),))
 
 
-TILE = 8  # samples along each side of a tile: TILE of shaders/include/tile.glsl
-
-
-@kept
-def farthest_depths_program():
-    """The compute program that finds the farthest depth in each tile: see farthest_depths.comp."""
-    info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
-    info.sampler(0, "UINT_2D", "depths")
-    info.image(0, "R32UI", "UINT_2D", "farthest_depths", qualifiers={"WRITE"})
-    return compile_compute(info, "farthest_depths.comp")
-
-
 @kept
 def strand_shadow_program():
     """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
@@ -168,20 +155,8 @@ def _walk(file, images, constants, shadow_samplers=(), samplers=()):
     return compile_compute(info, file)
 
 
-PICTURE_GROUP_SIZE = 8  # samples along each side of what one work group of a picture's programs fills
-
-
-@kept
-def surface_depths_program():
-    """The compute program that converts depth to integers: see surface_depths.comp."""
-    info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
-    info.sampler(0, "FLOAT_2D", "surface_depth")
-    info.image(0, "R32UI", "UINT_2D", "depths", qualifiers={"WRITE"})
-    return compile_compute(info, "surface_depths.comp")
-
-
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
+PICTURE_GROUP_SIZE = 8  # samples along each side of what one work group of a picture's programs fills
 
 
 @kept

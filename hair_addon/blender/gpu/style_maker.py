@@ -232,7 +232,7 @@ def new_style_maker(binding: HairBinding, styling: "Styling", axes: np.ndarray) 
 def _new_pass(record, data, program, axes, point_count):
     known, record["row_known"], record["known_texels"] = _known(data)
     record["to_drawn"][:3, :3], record["to_drawn"][3, 3] = np.asarray(axes).T, 1.0
-    record["strand_count"] = len(data.normals)
+    record["strand_count"], record["point_count"] = len(data.normals), point_count
     record["row_strands"] = TEXTURE_WIDTH // point_count
     _put_steps(record, program)
     return _Pass(known, record, uniforms.uniform_buffer(record))

@@ -183,6 +183,7 @@ STYLING = Block(
         "axes": "mat4",  # from the coordinates of strands to the surface's own axes
         "to_drawn": "mat4",  # from the coordinates of strands to those that are drawn
         "strand_count": "int",
+        "point_count": "int",  # a constant of the program too: but loops to a constant take drivers longer to compile
         "first_strand": "int",  # where the first of these is in the image
         "row_strands": "int",  # whole strands in a row of each texture
         "row_packed": "int",

@@ -11,12 +11,14 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from . import drawing, light_grid, shaders, uniforms
+from . import drawing, light_grid, shaders, uniforms, visibility_programs
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
-HAS_TILES = True
 NO_SEGMENT = 0x7FFFFFFF  # beyond any possible index
+
+# With fewer segments, it takes longer to find out what is hidden than to draw it.
+_FEW_SEGMENTS = 1 << 20
 
 
 @dataclass(frozen=True)
@@ -51,18 +53,26 @@ class VisibilityBuffer:
         self.color = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
-        tiles = tuple(-(-length // shaders.TILE) for length in self.size)
+        tiles = tuple(-(-length // visibility_programs.TILE) for length in self.size)
         self._farthest = gpu.types.GPUTexture(tiles, format="R32UI")  # of the depths in each
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
         self._has_strips = False  # whether `depths` are of strips alone
         self._parts = {}  # (format, background) → (framebuffer, texture, depth) of additional passes
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
+        self._hiding = gpu.types.GPUFrameBuffer(depth_slot=self.surface_depth)
+        self._is_color_stale = False  # whether `color` is to be cleared
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
     def surfaces(self, background=_NOTHING):
         """The framebuffer that surfaces are drawn into, bound and cleared: a context manager."""
+        self._is_color_stale = False
         return drawing.cleared(self._surfaces, background)
+
+    def hiding(self):
+        """The same of depths alone, where surfaces only hide hair: `color` is transparent behind it."""
+        self._is_color_stale = True
+        return drawing.cleared(self._hiding, _NOTHING)
 
     def add_hair(self, hair, lights, view, in_compute=None):
         """Find the hair in front of the surfaces and shade it: arguments as for `find_hair`."""
@@ -77,13 +87,22 @@ class VisibilityBuffer:
         lights, view: records of `uniforms`, lights one of all hair or (H,) of each; in_compute: whether a compute
         program finds the nearest strands, None: where it can.
         """
-        self.segments.clear(format="UINT", value=(NO_SEGMENT,))
-        draw = self._find if (shaders.has_image_atomics() if in_compute is None else in_compute) else self._draw_strips
         self._hair = self._placed(hair, lights, view)
-        if self._hair and self._hair[-1].first + self._hair[-1].segment_count > NO_SEGMENT:
+        is_refused = bool(self._hair) and self._hair[-1].first + self._hair[-1].segment_count > NO_SEGMENT
+        if not is_refused and (shaders.has_image_atomics() if in_compute is None else in_compute):
+            self._find()
+            return
+        self._clear()
+        if is_refused:
             self._hair = []
             raise HairError("Too many strands for one picture: hide some hair or some of its instances.")
-        draw()
+        self._draw_strips()
+
+    def _clear(self):
+        self.segments.clear(format="UINT", value=(NO_SEGMENT,))
+        if self._is_color_stale:
+            self.color.clear(format="FLOAT", value=_NOTHING)
+            self._is_color_stale = False
 
     def _placed(self, hair, lights, view):
         """[_Placed] of arguments of `find_hair`."""
@@ -163,28 +182,34 @@ class VisibilityBuffer:
 
     def _find(self):
         """Find the nearest segments by a compute program: first depths, then indices."""
-        self._copy_depths()
-        self._has_strips = False
+        self._copy_depths(is_start=True)
+        self._is_color_stale = self._has_strips = False
         all_blocks = [
             {"view": uniforms.uniform_buffer(placed.record), "lights": placed.lights} for placed in self._hair
         ]
-        # A few strands hide most of the others, and those behind a head are hidden by it.
-        for part, is_depth in ((drawing.WALK_FIRST, 1), (drawing.WALK_OTHERS, 1), (drawing.WALK_ALL, 0)):
-            self._find_farthest()
-            self._walk(all_blocks, part, is_depth)
+        if sum(placed.segment_count for placed in self._hair) < _FEW_SEGMENTS:
+            self._walk(all_blocks, drawing.WALK_ALL, is_depth=1)
+            self._walk(all_blocks, drawing.WALK_ALL, is_depth=0)
+            return
+        # A few strands hide most of the others.
+        self._walk(all_blocks, drawing.WALK_FIRST, is_depth=1)
+        self._find_farthest()
+        self._walk(all_blocks, drawing.WALK_OTHERS, is_depth=1, are_tiles_known=True)
+        self._find_farthest()
+        self._walk(all_blocks, drawing.WALK_ALL, is_depth=0, are_tiles_known=True)
 
     def _find_farthest(self):
         """Fill the tiles with the farthest of their depths."""
-        program = shaders.farthest_depths_program()
+        program = visibility_programs.farthest_depths_program()
         with drawing.bound(program, {}, {"depths": self.depths}):
             program.image("farthest_depths", self._farthest)
             drawing.dispatch_over(program, (self._farthest.width, self._farthest.height))
 
-    def _walk(self, all_blocks, part, is_depth):
+    def _walk(self, all_blocks, part, is_depth, are_tiles_known=False):
         program = shaders.segments_program()
         images, samplers = {"depths": self.depths, "segments": self.segments}, {"farthest_depths": self._farthest}
         for placed, blocks in zip(self._hair, all_blocks, strict=True):
-            constants = {"first_segment": placed.first, "is_depth": is_depth, "are_tiles_known": int(HAS_TILES)}
+            constants = {"first_segment": placed.first, "is_depth": is_depth, "are_tiles_known": int(are_tiles_known)}
             drawing.walk_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
 
     def nearest_depths(self):
@@ -194,10 +219,17 @@ class VisibilityBuffer:
             self._has_strips = False
         return self.depths
 
-    def _copy_depths(self):
-        program = shaders.surface_depths_program()
+    def _copy_depths(self, is_start=False):
+        """Fill `depths` with those of surfaces; is_start: and clear all else that is to be cleared.
+
+        On some graphics cards the driver takes longer to clear textures than the program.
+        """
+        program = visibility_programs.surface_depths_program()
         with drawing.bound(program, {}, {"surface_depth": self.surface_depth}):
-            program.image("depths", self.depths)
+            for name, image in (("depths", self.depths), ("segments", self.segments), ("picture", self.color)):
+                program.image(name, image)
+            program.uniform_int("is_start", int(is_start))
+            program.uniform_int("is_blank", int(is_start and self._is_color_stale))
             drawing.dispatch_over(program, self.size)
 
     def _draw_strips(self):

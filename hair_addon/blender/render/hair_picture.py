@@ -72,8 +72,9 @@ class HairPicture:
         is_outlined = outline is not None and not outline.is_fine
         if is_outlined:
             outline.add_pass(drawn, view, self._pass)
-        with self._pass.surfaces():
-            if is_shadowed and not is_see_through:
+        has_shadow = is_shadowed and not is_see_through
+        with self._pass.surfaces() if has_shadow else self._pass.hiding():
+            if has_shadow:
                 scene_drawing.draw_viewport_shadow(drawn, view)
             elif not is_see_through:
                 scene_drawing.draw_hiding(drawn, view)

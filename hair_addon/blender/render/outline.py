@@ -82,7 +82,7 @@ class HairOutline:
 
     def add_pass(self, drawn, view, buffer):
         """Find the hair where nothing hides it in a `VisibilityBuffer`; view: a `uniforms.VIEW` record."""
-        with buffer.surfaces():
+        with buffer.hiding():
             pass
         scene_drawing.find_hair(drawn, view, buffer, self._channels)
         self._add(buffer, zip(self._channels.values(), buffer.segment_ranges, strict=True))

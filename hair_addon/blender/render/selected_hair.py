@@ -70,7 +70,7 @@ class LoneOutline:
         """Find the hair of a `DrawnScene` once more; world_to_view, view_to_clip: (4, 4)."""
         view = drawing.pass_record(world_to_view, view_to_clip, self._buffer.size, self._pass_count)
         self._outline.add_pass(drawn, view, self._buffer)
-        with self._buffer.surfaces():
+        with self._buffer.hiding():
             scene_drawing.draw_hiding(drawn, view)
         scene_drawing.find_hair(drawn, view, self._buffer)
         self._outline.add_seen(self._buffer)

@@ -133,6 +133,17 @@ def test_other_numbers_of_points(hair, rng, point_count):
     assert_same(hair, rng, (bend.Settings(),), point_count=point_count)
 
 
+def test_strands_that_are_made_in_parts_are_the_same(hair, monkeypatch, one_program):
+    """What styles take them from holds some of the strands, of a number that no part divides."""
+    styling = hair.bound(*STACKS["locks that curl"])
+    found = []
+    for count in (STRANDS, 64):
+        monkeypatch.setattr(style_maker, "MOST_AT_ONCE", count)
+        maker = style_maker.maker_of(hair.binding, styling, 41, np.eye(3))
+        found.append(made(maker, hair, styling, uploaded(hair.plain)))
+    np.testing.assert_array_equal(*found)
+
+
 def test_a_slider_uploads_numbers_alone(hair, monkeypatch, one_program):
     """The rows of each pass, and neither guides nor textures; then strands are those of the new settings."""
     styles = STACKS["locks that curl"]

@@ -137,3 +137,15 @@ def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
         left, bottom, width, height = drawing.window_of(on_gpu, drawing.strand_record(on_gpu, view, to_world), SIZE)
         assert ((is_there >= (left, bottom)) & (is_there < (left + width, bottom + height))).all()
         assert width * height < 0.5 * SIZE[0] * SIZE[1]
+
+
+@pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
+def test_leaving_out_what_tiles_hide_changes_no_sample(shading, rng, monkeypatch, view_to_clip):
+    """Much hair behind itself, some of it before the near plane, half of it behind a surface."""
+    placed = [(*tuft(rng, 1500, thickness=0.006), np.eye(4)), (*tuft(rng, 40, thickness=0.02), np.eye(4))]
+    found = []
+    for few in (1 << 30, 0):
+        monkeypatch.setattr(visibility_buffer, "_FEW_SEGMENTS", few)
+        found.append(drawn(placed, view_to_clip, shading, in_compute=True, hiding_at=0.9))
+    for all_walked, some_walked in zip(*found, strict=True):
+        np.testing.assert_array_equal(all_walked, some_walked)

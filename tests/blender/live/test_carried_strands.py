@@ -64,7 +64,7 @@ def test_hair_that_was_opened_on_a_bent_surface_is_carried_from_its_second_pose(
     monkeypatch.setattr(maker_choice, "times", lambda: (1.0, 0.0))
     drawn(hair)
     bend(surface, 0.6)
-    np.testing.assert_allclose(drawn(hair), carried(hair), rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(drawn(hair), carried(hair), rtol=0.0, atol=CLOSE)
 
 
 def test_styles_are_applied_before_strands_are_carried(watched, monkeypatch):

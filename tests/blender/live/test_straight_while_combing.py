@@ -99,19 +99,19 @@ def test_curves_are_styled_once_the_stroke_is_over(combed, monkeypatch):
     wanted = made_anew(combed, is_styled=True)
     assert np.array_equal(points(combed), wanted)
     straight = made_anew(combed, is_styled=False)
-    np.testing.assert_allclose(shown(combed), straight, atol=1e-6)
+    np.testing.assert_allclose(shown(combed), straight, atol=2e-6)
     list(stroke([3, 4], steps=1))
-    np.testing.assert_allclose(shown(combed), made_anew(combed, is_styled=False), atol=1e-6)
+    np.testing.assert_allclose(shown(combed), made_anew(combed, is_styled=False), atol=2e-6)
 
 
 def test_leaving_sculpt_mode_shows_styles(combed):
     list(stroke([3, 4]))
     leave_sculpt_mode()
     wanted = made_anew(combed, is_styled=True)
-    np.testing.assert_allclose(shown(combed), wanted, atol=1e-6)
+    np.testing.assert_allclose(shown(combed), wanted, atol=2e-6)
     live_hair.write_all()
     assert np.array_equal(points(combed), wanted)
-    assert np.array_equal(shown(combed), wanted)
+    assert drawn_strands.are_drawn(shown(combed), wanted)
 
 
 def test_saving_writes_styles_and_shows_straight_hair(combed, tmp_path):
@@ -129,7 +129,7 @@ def test_renders_pictures_and_exports_are_styled(combed):
     wanted, straight = made_anew(combed, is_styled=True), shown(combed)
     depsgraph = bpy.context.evaluated_depsgraph_get()
     picture = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph)
-    np.testing.assert_allclose(drawn_strands.places(picture.hair[0][0]), wanted, atol=1e-6)
+    np.testing.assert_allclose(drawn_strands.places(picture.hair[0][0]), wanted, atol=2e-6)
     np.testing.assert_allclose(api.points(combed.data), wanted, atol=1e-6)
     list(stroke([3, 4], steps=1))
     wanted = made_anew(combed, is_styled=True)
@@ -155,9 +155,9 @@ def test_a_slider_of_a_style_keeps_the_picture_straight(combed):
     straight = shown(combed)
     combed.data.vellus.styles["Curl"].curl.radius = 0.05
     bpy.context.view_layer.update()
-    np.testing.assert_allclose(shown(combed), straight, atol=1e-6)
+    np.testing.assert_allclose(shown(combed), straight, atol=2e-6)
     leave_sculpt_mode()
-    np.testing.assert_allclose(shown(combed), made_anew(combed, is_styled=True), atol=1e-6)
+    np.testing.assert_allclose(shown(combed), made_anew(combed, is_styled=True), atol=2e-6)
 
 
 def test_undo_keeps_the_picture_straight(combed):
@@ -170,4 +170,4 @@ def test_undo_keeps_the_picture_straight(combed):
     bpy.context.view_layer.update()
     hair = bpy.data.objects["Hair"]
     assert bpy.data.objects["Guides"].mode == "SCULPT_CURVES"
-    np.testing.assert_allclose(shown(hair), straight, atol=1e-6)
+    np.testing.assert_allclose(shown(hair), straight, atol=2e-6)

@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""GLSL files → GPU programs that prepare a visibility buffer for the strands that are drawn into it."""
+
+import gpu
+
+from . import shaders
+
+TILE = 8  # samples along each side of a tile: TILE of shaders/include/tile.glsl
+
+
+@shaders.kept
+def farthest_depths_program():
+    """The compute program that finds the farthest depth in each tile: see farthest_depths.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
+    info.sampler(0, "UINT_2D", "depths")
+    info.image(0, "R32UI", "UINT_2D", "farthest_depths", qualifiers={"WRITE"})
+    return shaders.compile_compute(info, "farthest_depths.comp")
+
+
+@shaders.kept
+def surface_depths_program():
+    """The compute program that converts depth to integers, and clears all else: see surface_depths.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
+    info.sampler(0, "FLOAT_2D", "surface_depth")
+    for slot, name in enumerate(("depths", "segments")):
+        info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"WRITE"})
+    info.image(2, shaders.PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    for name in ("is_start", "is_blank"):
+        info.push_constant("INT", name)
+    return shaders.compile_compute(info, "surface_depths.comp")
