@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands beside the cards that stand for them: `python blend_samples/pictures/cards.py` draws docs/manual/cards.png.
 
-Two rows, strands and cards, from three sides in the same light and once with the light behind, rendered by Cycles in a
-quarter of an hour on two cores.
+Two rows, strands and cards, from three sides in the same light and once with the light behind, rendered by Cycles,
+which takes many minutes on two cores.
 """
 
 import argparse
@@ -36,7 +36,7 @@ def main():
     parser.add_argument("--style", default="WAVY")
     parser.add_argument("--strands", type=int, default=12_000)
     parser.add_argument("--cards", type=int, default=1200)
-    parser.add_argument("--samples", type=int, default=64)
+    parser.add_argument("--samples", type=int, default=24)
     parser.add_argument("--textures", type=int, default=1024)
     options = parser.parse_args()
     hair_addon.register()
