@@ -40,6 +40,7 @@ PURE = {
     "core/geometry/bspline.py: _flat_matrix",
     "core/kernels/compiled_kernels.py: _fitting",
     "core/params.py: _declared",
+    "core/shading/appearance.py: _mean_reflectance",
     "core/shading/appearance.py: strand_settings",
     "core/shading/appearance.py: table_settings",
     "core/shading/appearance.py: wetted",

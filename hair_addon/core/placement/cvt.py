@@ -34,6 +34,9 @@ STEPS_KEPT = 7
 LONGEST_STEP = 0.5  # of the way to the next site
 FEWEST_SITES = 260  # minimum count for multilevel placement
 LEAST_CELL = 0.75  # of the mean amount in a cell: sites of smaller ones are crowded
+LEAST_LATE_CELL = 0.6  # with all sites
+SPREAD_AT_ONCE, SPREAD_AFTER_LEVELS = (0.25, 0.5), (0.5,)  # of the rounds with all sites: crowded ones go to gaps
+GAP_SAMPLES = 8  # for each site, where a few are to go to the widest gaps
 RING = 7  # a site and its neighbours in a honeycomb
 LEAST_PAIR = 0.4  # of the part of the surface that two neighbours share in a honeycomb: others get no site between
 GAP_ROUNDS = 4  # adjacent gaps are filled one after the other
@@ -105,8 +108,9 @@ def _place(domain, count, seed, iterations, device, progress):
             sites = _refined(domain, cells, points, sites, counts[level + 1], device)
     # Sites refined from relaxed coarser ones need half of the rounds.
     rounds = iterations if len(counts) == 1 else (iterations + 1) // 2
-    told = _share(progress, 0.3, 1.0)
-    return _descend(domain, CutCells(domain, count, device), sites, rounds, device, told, is_strict=False).sites
+    told, cells = _share(progress, 0.3, 1.0), CutCells(domain, count, device)
+    spread_at = {int(part * rounds) for part in (SPREAD_AT_ONCE if len(counts) == 1 else SPREAD_AFTER_LEVELS)}
+    return _descend(domain, cells, sites, rounds, device, told, is_strict=False, spread_at=spread_at).sites
 
 
 def _start(domain, count, random):
@@ -126,17 +130,23 @@ def _share(progress, first, last):
     return lambda part: progress(first + (last - first) * part)
 
 
-def _descend(domain, cells, sites, iterations, device, progress, steps_kept=STEPS_KEPT, is_strict=True):
+def _descend(
+    domain, cells, sites, iterations, device, progress, steps_kept=STEPS_KEPT, is_strict=True, spread_at=frozenset()
+):
     """The best sites of the given iterations, none of which raised the energy unless `is_strict` is false.
 
     A site that comes to another side, by its normal, may raise it a little: to try shorter steps instead costs as much
-    as going on does.
+    as going on does. spread_at: iterations before which crowded sites go to the widest gaps.
     """
     memory = Memory(steps_kept)
     state = best = _State(domain, cells, sites, device)
     energies = [state.energy]
     for iteration in range(iterations):
         progress(iteration / iterations)
+        spread = _spread(domain, state, device) if iteration in spread_at else None
+        if spread is not None:
+            memory.clear()
+            state = _State(domain, cells, spread, device)
         moves = memory.direction(state.gradient, state.moves if steps_kept else state.lloyd_moves)
         moved = _State(domain, cells, state.stepped(moves), device)
         if moved.energy > (1.0 if is_strict else 1.0 + RISE) * state.energy and len(memory):
@@ -156,14 +166,35 @@ def _descend(domain, cells, sites, iterations, device, progress, steps_kept=STEP
     return _Descent(best.sites, np.array(energies))
 
 
+def _spread(domain, state, device):
+    """Sites of which crowded ones have gone to the widest gaps, where no descent takes them; None if none has.
+
+    Where a few sites begin far from each other, tips of thin parts have more than their share.
+    """
+    sites = state.sites
+    # Masses are of D², so that at the minimum they are proportional to D.
+    amounts = state.sums.masses / np.maximum(domain.density_at(sites), 1e-3)
+    crowded = _crowded(amounts, LEAST_LATE_CELL, state.on)
+    if not len(crowded):
+        return None
+    rest = sites[np.delete(np.arange(len(sites)), crowded)]
+    points, part = domain.samples(GAP_SAMPLES * len(sites))
+    cells = SampledCells(domain, points, part, len(rest), device)
+    gaps = points[_widest_gaps(domain, cells, points, rest, len(sites), device)]
+    triangle, barycentric = sites.triangle.copy(), sites.barycentric.copy()
+    gone = crowded[: len(gaps)]
+    triangle[gone], barycentric[gone] = gaps.triangle, gaps.barycentric
+    return SurfacePoints(triangle, barycentric)
+
+
 class _State:
     """Sites with their energy, its gradient (n, 3) along the surface, and inverse (n, 1) = 1 / (2 m_i)."""
 
     def __init__(self, domain, cells, sites, device):
         self.sites, self._ground = sites, domain
         self.places = positions(domain.mesh, sites).astype(np.float64)
-        self._device, self._on = device, sites_on(domain, sites, device)
-        self.sums = cells.sums(self._on)
+        self._device, self.on = device, sites_on(domain, sites, device)
+        self.sums = cells.sums(self.on)
         self.energy = self.sums.energy
         normals = domain.normals[sites.triangle]
         gradient = -2.0 * self.sums.moments
@@ -173,7 +204,7 @@ class _State:
 
     def moves(self, gradient):
         """(n, 3): nearly the moves that change the gradient by (n, 3)."""
-        return Springs(self._on, self.sums.masses, self._device).moves(gradient)
+        return Springs(self.on, self.sums.masses, self._device).moves(gradient)
 
     def lloyd_moves(self, gradient):
         """(n, 3): the same, where no cell knew of its neighbours."""
@@ -220,17 +251,24 @@ def _thinned(domain, cells, sites, device):
     """
     on = sites_on(domain, sites, device)
     amounts = np.bincount(cells.nearest(on), minlength=len(sites))
-    crowded = np.flatnonzero(amounts < LEAST_CELL * amounts.mean())
-    rings = on.around.numpy()[crowded, :RING]
+    gone = _crowded(amounts, LEAST_CELL, on)
     is_kept = np.ones(len(sites), bool)
+    is_kept[gone] = False
+    numbers = np.maximum(np.cumsum(is_kept) - 1, 0)
+    numbers[gone] = numbers[on.around.numpy()[gone, RING - 1]]  # those near it have its cell now
+    cells.renumber(numbers)
+    return sites[is_kept]
+
+
+def _crowded(amounts, least, on):
+    """Indices of sites whose cells hold less than `least` of the mean amount, the smallest first, and no neighbours."""
+    crowded = np.flatnonzero(amounts < least * amounts.mean())
+    rings = on.around.numpy()[crowded, :RING]
+    is_kept = np.ones(len(amounts), bool)
     for rank in np.argsort(amounts[crowded], kind="stable"):
         if is_kept[rings[rank]].all():
             is_kept[crowded[rank]] = False
-    numbers = np.maximum(np.cumsum(is_kept) - 1, 0)
-    gone = np.flatnonzero(~is_kept[crowded])
-    numbers[crowded[gone]] = numbers[rings[gone, -1]]  # those near it have its cell now
-    cells.renumber(numbers)
-    return sites[is_kept]
+    return crowded[~is_kept[crowded]]
 
 
 def _refined(domain, cells, points, sites, count, device):

@@ -229,6 +229,7 @@ def kajiya_kay_strand_settings(appearance: Appearance) -> kajiya_kay.StrandSetti
     )
 
 
+@lru_cache(maxsize=_KEPT)
 def _mean_reflectance(eta):
     """Directional albedo of a fibre's surface under uniform light."""
     nodes, weights = np.polynomial.legendre.leggauss(32)

@@ -8,6 +8,7 @@ from hair_addon.core.geometry.mesh import TriMesh, positions
 from hair_addon.core.geometry.sampling import sample_surface
 from hair_addon.core.placement import cvt, voronoi
 from hair_addon.core.placement.domain import Domain
+from hair_addon.core.placement.exact_cells import CutCells
 from tests.support.devices import DEVICE
 from tests.support.meshes import flat_grid, subdivided_sphere
 
@@ -32,6 +33,29 @@ def test_thin_flaps_hold_their_share_of_sites(eared):
     mesh, is_flap = eared
     found = [is_flap[cvt.place(mesh, SITE_COUNT, seed, 12, device=DEVICE).triangle].mean() for seed in range(3)]
     assert np.mean(found) == pytest.approx(mesh.areas[is_flap].sum() / mesh.areas.sum(), rel=0.16)
+
+
+def test_crowded_sites_go_to_the_widest_gaps():
+    """Three of many even sites were put beside others: they alone leave, to where they lacked, and nobody does then."""
+    mesh = subdivided_sphere(4)
+    even, moved = cvt.place(mesh, 300, 1, 20, device=DEVICE), [10, 120, 230]
+    beside = even[np.arange(300)]
+    for site in moved:
+        apart = np.linalg.norm(positions(mesh, even) - positions(mesh, even[[site]]), axis=1)
+        other = apart.argsort()[150]
+        beside.triangle[site], beside.barycentric[site] = even.triangle[other], even.barycentric[other]
+    domain = Domain(mesh, 300, device=DEVICE)
+
+    def spread(sites):
+        return cvt._spread(domain, cvt._State(domain, CutCells(domain, 300, DEVICE), sites, DEVICE), DEVICE)
+
+    found = spread(beside)
+    stays = np.all(positions(mesh, found) == positions(mesh, beside), axis=1)
+    assert np.count_nonzero(~stays) == len(moved)
+    gaps = np.linalg.norm(positions(mesh, found)[~stays][:, None] - positions(mesh, even)[moved], axis=2)
+    spacing = np.sqrt(2.0 * mesh.areas.sum() / (300 * 3.0**0.5))
+    assert (gaps.min(axis=0) < 0.5 * spacing).all()
+    assert spread(even) is None and spread(found) is None
 
 
 def _sheet():
