@@ -2,6 +2,8 @@
 // Visibility buffer of strands: first the depth of the nearest segment, then its index.
 
 #include "include/coverage.glsl"
+const bool FILLS_BENDS = true;
+
 #include "include/walk_segment.glsl"
 
 vec2 end_depths;

@@ -2,6 +2,8 @@
 // Strands in a deep opacity map: first the depths of the nearest and of the last, then the opacity of each layer between.
 
 #include "include/opacity.glsl"
+const bool FILLS_BENDS = false;
+
 #include "include/walk_segment.glsl"
 
 vec2 end_depths;
