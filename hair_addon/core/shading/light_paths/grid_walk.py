@@ -3,7 +3,7 @@
 
 A segment is a ribbon that faces the path: it is met where the path comes nearest to its axis, within its radius. So is
 the wedge that two segments leave open on the outside of a bend, where the path comes nearest to the point between them.
-A path meets no ribbon within its width of the start, as in [Embree] and Cycles: strands there are within each other. Of
+A path meets no ribbon within its width of the start, as in [Embree26] and Cycles: strands there are within each other. Of
 the strand that it leaves it meets none before it is as far across: a straight strand does not meet itself.
 """
 
@@ -15,7 +15,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 FAR = wp.constant(1e9)
 _LEAST = wp.constant(1e-9)  # component of a direction
-_NEAREST = wp.constant(2.0)  # radii from a path's start, within which no ribbon is met [Embree]
+_NEAREST = wp.constant(2.0)  # radii from a path's start, within which no ribbon is met [Embree26]
 PASSED, STRAND, SURFACE = (wp.constant(kind) for kind in range(3))  # what ends a path's way
 
 
