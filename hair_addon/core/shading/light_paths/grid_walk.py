@@ -3,7 +3,7 @@
 
 A segment is a ribbon that faces the path: it is met where the path comes nearest to its axis, within its radius. So is
 the wedge that two segments leave open on the outside of a bend, where the path comes nearest to the point between them.
-A path meets no ribbon within its width of the start, as in [Embree26] and Cycles: strands there are within each other. Of
+A path meets no ribbon within its width of its start, as in [Embree26] and Cycles: strands there overlap. Of
 the strand that it leaves it meets none before it is as far across: a straight strand does not meet itself.
 """
 
