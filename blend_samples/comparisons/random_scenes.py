@@ -5,8 +5,8 @@ Prints each scene with the ratio of its hair's mean colour (Vellus / Cycles, cha
 similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and
 distribution.png, the part of the scenes up to each deviation, with --dual beside that of a scenes.json by dual
 scattering. Cycles' pictures are kept in --references with the extent of their hair: another run, on any machine,
-renders only what changed. --references-only renders them and nothing else, so that processes can share the seeds; with --pictures they can
-share those of Vellus too.
+renders only what changed. --references-only renders them and nothing else, so that processes can share the seeds; with
+--pictures they can share those of Vellus too.
 """
 
 import argparse
