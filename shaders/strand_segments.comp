@@ -55,6 +55,8 @@ void meet(ivec2 place, float along, float coverage)
   }
 }
 
+const bool FILLS_BENDS = true;
+
 #include "include/walk_segment.glsl"
 
 void main()

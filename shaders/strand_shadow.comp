@@ -50,6 +50,8 @@ void meet(ivec2 place, float along, float coverage)
   }
 }
 
+const bool FILLS_BENDS = false;
+
 #include "include/walk_segment.glsl"
 
 void main()

@@ -5,7 +5,8 @@ Prints each scene with the ratio of its hair's mean colour (Vellus / Cycles, cha
 similarity, then the distribution; writes worst.png, the ten worst pairs with Cycles above Vellus, scenes.json, and
 distribution.png, the part of the scenes up to each deviation, with --dual beside that of a scenes.json by dual
 scattering. Cycles' pictures are kept in --references with the extent of their hair: another run, on any machine,
-renders only what changed. --references-only renders them and nothing else, so that processes can share the seeds.
+renders only what changed. --references-only renders them and nothing else, so that processes can share the seeds; with
+--pictures they can share those of Vellus too.
 """
 
 import argparse
@@ -39,6 +40,7 @@ def main():
     parser.add_argument("--out", type=Path, default=Path("out/random_scenes"))
     parser.add_argument("--references", type=Path, help="folder of Cycles' pictures; OUT/cycles without it")
     parser.add_argument("--references-only", action="store_true", help="render missing references, measure nothing")
+    parser.add_argument("--pictures", type=Path, help="folder of Vellus' pictures: only those that it lacks are drawn")
     parser.add_argument("--seeds", type=int, nargs="+", default=(0, 30), help="FIRST END, and any number of such pairs")
     parser.add_argument("--size", type=int, default=144, help="pixels along a side")
     parser.add_argument("--samples", type=int, default=48, help="samples a pixel, of Cycles")
@@ -46,7 +48,7 @@ def main():
     parser.add_argument("--dual", type=Path, help="scenes.json of a run with --scattering DUAL, for the plot")
     options = parser.parse_args()
     options.references = options.references or options.out / "cycles"
-    for folder in (options.out, options.references):
+    for folder in filter(None, (options.out, options.references, options.pictures)):
         folder.mkdir(parents=True, exist_ok=True)
     prepare()
     rows, pairs = [], []
@@ -60,7 +62,7 @@ def main():
             print(f"{seed:4}  reference", flush=True)
             continue
         started = time.process_time()
-        picture = by_vellus(options.size)
+        picture = kept_or_drawn(seed, options)
         row = {
             "scene": values,
             "ratio": picture_pairs.ratio(reference, picture).round(4).tolist(),
@@ -146,6 +148,16 @@ def between(first, second):
     if [one[0] for one in first] != [one[0] for one in second]:
         return math.inf
     return max(float(np.abs(np.subtract(one[1:], other[1:])).max()) for one, other in zip(first, second, strict=True))
+
+
+def kept_or_drawn(seed, options):
+    """`by_vellus`, or what an earlier run with the same --pictures has drawn."""
+    if options.pictures is None:
+        return by_vellus(options.size)
+    path = options.pictures / f"{seed}_{options.scattering.lower()}_{options.size}.npy"
+    if not path.is_file():
+        np.save(path, by_vellus(options.size))
+    return np.load(path)
 
 
 def by_vellus(size):

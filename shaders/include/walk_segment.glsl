@@ -5,8 +5,14 @@
 #include "include/segment.glsl"
 #include "include/tile.glsl"
 
+// A program defines whether bends are filled, for what is seen; without, strands cover their length times their width.
+// const bool FILLS_BENDS
+
 // Consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;
+
+// Half width [samples] from which bends are filled: gaps of thinner strands are smaller than a sample.
+const float LEAST_BEND = 1.0;
 
 // Functions that a program defines before it includes this:
 //
@@ -62,6 +68,34 @@ void walk(Segment segment, ivec2 size)
   }
 }
 
+// Samples around the end of a segment that neither it nor the next one covers as `walk` cuts them off: the outside of a bend.
+// start, end, next: their places [samples]; half_width: at the end.
+void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
+{
+  vec2 before = end - start;
+  vec2 after = next - end;
+  bool was_steep = abs(before.y) > abs(before.x);
+  bool is_steep = abs(after.y) > abs(after.x);
+  float left = was_steep ? before.y : before.x;
+  float right = is_steep ? after.y : after.x;
+  // Where both are cut off along the same axis and go on, they meet.
+  if (half_width < LEAST_BEND || (was_steep == is_steep && left * right > 0.0)) {
+    return;
+  }
+  ivec2 low = max(ivec2(ceil(clamp(end - half_width, vec2(-1.0), vec2(1e6)) - 0.5)), ivec2(0));
+  ivec2 high = min(ivec2(ceil(clamp(end + half_width, vec2(-1.0), vec2(1e6)) - 0.5)), size) - 1;
+  for (int row = low.y; row <= high.y; row++) {
+    for (int column = low.x; column <= high.x; column++) {
+      vec2 way = vec2(column, row) + 0.5 - end;
+      bool is_beyond = (was_steep ? way.y : way.x) * left > 0.0;
+      bool is_ahead = (is_steep ? way.y : way.x) * right < 0.0;
+      if (is_beyond && is_ahead && dot(way, way) < half_width * half_width) {
+        meet(ivec2(column, row), 1.0, 1.0);
+      }
+    }
+  }
+}
+
 // The turn of a run among all strands that are drawn, of which one in FIRST_SHARE comes before the others.
 const int FIRST_SHARE = 8;
 const int WALK_ALL = 0;
@@ -101,6 +135,13 @@ void walk_run(ivec2 size)
     if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), segment)) {
       begin(strand, piece, segment, first, second);
       walk(segment, size);
+      if (FILLS_BENDS && piece + 1 < pieces && segment.part.y == 1.0 && segment.half_width.y >= LEAST_BEND) {
+        vec4 third = to_clip(strand_point(strand, texel, head, piece_start(piece + 2)));
+        if (third.z + third.w > 0.0) {
+          vec2 next = sample_place(third, vec2(size)).xy;
+          fill_bend(segment.start.xy, segment.end.xy, next, segment.half_width.y, size);
+        }
+      }
     }
     first = second;
     start = end;

@@ -92,3 +92,18 @@ def test_hair_without_any_area_takes_dual_scattering(scene, rng):
     hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN, radius=0.0)
     light(scene, world=0.3, sun=2.0)
     np.testing.assert_array_equal(picture(scene, "GRID"), picture(scene, "DUAL"))
+
+
+def test_a_thick_ring_covers_its_area(scene):
+    """Also where it turns from rows to columns of the picture."""
+    turn = np.linspace(0.1, 2.0 * np.pi - 0.1, 65)
+    points = np.stack([0.5 * np.cos(turn), 0.0 * turn, 0.5 * np.sin(turn)], axis=-1)
+    curves = bpy.data.hair_curves.new("Ring")
+    curves.add_curves([65])
+    curves.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
+    curves.attributes.new("radius", "FLOAT", "POINT").data.foreach_set("value", np.full(65, 0.1, np.float32))
+    scene.collection.objects.link(bpy.data.objects.new("Ring", curves))
+    curves.vellus.kind = "HAIR"
+    light(scene, world=0.5)
+    drawn = picture(scene, "DUAL")
+    assert drawn[..., 3].sum() * (1.6 / 64) ** 2 == pytest.approx(np.ptp(turn) * 0.5 * 0.2, rel=0.01)

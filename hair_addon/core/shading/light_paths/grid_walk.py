@@ -3,6 +3,8 @@
 
 A segment is a ribbon that faces the path: it is met where the path comes nearest to its axis, within its radius. So is
 the wedge that two segments leave open on the outside of a bend, where the path comes nearest to the point between them.
+A path meets no ribbon within its width of its start, as in [Embree26] and Cycles: strands there overlap. Of
+the strand that it leaves it meets none before it is as far across: a straight strand does not meet itself.
 """
 
 import warp as wp
@@ -13,6 +15,7 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 FAR = wp.constant(1e9)
 _LEAST = wp.constant(1e-9)  # component of a direction
+_NEAREST = wp.constant(2.0)  # radii from a path's start, within which no ribbon is met [Embree26]
 PASSED, STRAND, SURFACE = (wp.constant(kind) for kind in range(3))  # what ends a path's way
 
 
@@ -81,8 +84,11 @@ def is_in_bend(medium: Medium, segment: int, end: wp.vec3, direction: wp.vec3):
 
 
 @wp.func
-def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3):
-    """(distance along a ray of unit direction, offset from the axis) where a segment is met; `FAR` where it is not."""
+def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3, own: int):
+    """(distance along a ray of unit direction, offset from the axis) where a segment is met; `FAR` where it is not.
+
+    own: the strand that the ray leaves.
+    """
     start = medium.points[segment] - position
     along = medium.points[segment + 1] - medium.points[segment]
     normal = wp.cross(direction, along)
@@ -90,13 +96,16 @@ def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3
     distance = float(FAR)
     offset = float(0.0)
     if squared > 1e-12 * wp.dot(along, along):
+        nearest = float(_NEAREST)  # radii along the ray
+        if medium.strands[segment] == own:
+            nearest = nearest * wp.sqrt(wp.dot(along, along) / squared)
         # The closest points of two lines.
         part = wp.dot(wp.cross(start, direction), normal) / squared
         if part >= 0.0 and part < 1.0:
             radius = medium.radii[segment] + part * (medium.radii[segment + 1] - medium.radii[segment])
             beside = -wp.dot(start, normal) / wp.sqrt(squared)
             way = wp.dot(wp.cross(start, along), normal) / squared
-            if wp.abs(beside) < radius and way > 0.0:
+            if wp.abs(beside) < radius and way > nearest * radius:
                 distance = way
                 offset = beside / radius
         elif part >= 1.0:
@@ -104,7 +113,11 @@ def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3
             way = wp.dot(end, direction)
             aside = end - way * direction
             radius = medium.radii[segment + 1]
-            if way > 0.0 and wp.dot(aside, aside) < radius * radius and is_in_bend(medium, segment, end, direction):
+            if (
+                way > nearest * radius
+                and wp.dot(aside, aside) < radius * radius
+                and is_in_bend(medium, segment, end, direction)
+            ):
                 distance = way
                 offset = -wp.dot(aside, normal) / (wp.sqrt(squared) * radius)
     return distance, offset
@@ -112,7 +125,7 @@ def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3
 
 @wp.func
 def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
-    """`Met` within a distance [m] of a ray; own: the strand that it leaves, which it does not meet."""
+    """`Met` within a distance [m] of a ray; own: the strand that it leaves, -1: none."""
     met = Met()
     met.kind = PASSED
     end = most
@@ -163,8 +176,8 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
         index = (cell[2] * medium.shape[1] + cell[1]) * medium.shape[0] + cell[0]
         for turn in range(medium.starts[index], medium.starts[index + 1]):
             segment = medium.segments[turn]
-            distance, offset = crossing(medium, segment, position, direction)
-            if distance < end and medium.strands[segment] != own:
+            distance, offset = crossing(medium, segment, position, direction, own)
+            if distance < end:
                 end = distance
                 met.kind = STRAND
                 met.index = segment

@@ -112,6 +112,25 @@ def test_the_nearest_strand_is_met(rng):
     np.testing.assert_allclose(grid.points[seen.segments[is_segment]], expected, atol=1e-5)
 
 
+def test_strands_within_each_other_do_not_shade_each_other(rng):
+    """Black strands beside others, under a sun at a right angle: one within its width is not met, one beyond it is."""
+    lit = []
+    for distance in (0.015, 0.05):
+        x = np.array([0.0, 0.0])
+        points = np.stack(
+            [np.broadcast_to(x[:, None], (2, 3)), np.zeros((2, 3)), np.tile([-1.0, 0.0, 1.0], (2, 1))], axis=-1
+        )
+        points[1, :, 0] = distance
+        grid = grid_of(points, BLACK, 0.01, cell_count=1_000)
+        along_x = sun((-1.0, 0.0, 0.0))
+        near = np.full(4_000, 1)  # the middle of the first strand
+        places = np.stack([rng.uniform(-0.009, 0.009, 4_000), np.zeros(4_000), np.full(4_000, 0.5)], axis=-1)
+        towards = np.tile([0.0, -1.0, 0.0], (4_000, 1))
+        seen = gather.Seen(near, places, towards, np.zeros((4_000, 3)))
+        lit.append(gather.gather(grid, surroundings(lamps=along_x), seen)[..., 0].sum())
+    assert lit[1] < 0.05 * lit[0]
+
+
 def test_bent_strands_have_no_gaps():
     """A thick ring across the rays: as much is seen as its area says."""
     turn = np.linspace(0.0, 1.9 * np.pi, 12)
@@ -175,16 +194,16 @@ def test_white_fur_sends_back_what_a_random_walk_finds(rng):
     )
     view, light = np.radians(41.0), np.radians(23.0)
     expected = walked(rng, settings, view, light, depth=5.0, count=8_000, blur=0.0025)
-    x, y = rng.uniform(-4.0, 4.0, (2, 40_000))
+    x, y = rng.uniform(-4.0, 4.0, (2, 80_000))
     points = np.stack(np.broadcast_arrays(x[:, None], y[:, None], np.linspace(0.0, 1.0, 3)), axis=-1)
-    grid = grid_of(points, settings.sigma_a, radius=0.004, settings=settings)
+    grid = grid_of(points, settings.sigma_a, radius=0.002, settings=settings, cell_count=200_000)
     lamp = sun((np.cos(light), 0.0, -np.sin(light)), 1.0)
     lamp["radius"] = 2.0 * np.sqrt(0.0025)  # a disk's variance along an axis is a quarter of its radius²
     towards = np.array([-np.cos(view), 0.0, np.sin(view)])
     near = np.array([0.0, -0.25, 1.0]) + 4.0 * towards
     rays = gather.Rays(near, np.array([0.25, 0, 0]), np.array([0, 0.5, 0]), *ends_of(near, towards))
     floor = np.array([(-19, -19, -0.001), (19, -19, -0.001), (0, 38, -0.001)])
-    found = found_by(grid, surroundings(floor, [(0.0, 0.0, 0.0)], lamp), rays, 60_000)
+    found = found_by(grid, surroundings(floor, [(0.0, 0.0, 0.0)], lamp), rays, 40_000)
     seen = found[..., 3:].sum() / 3.0 / mean_even(settings, view)
     assert found[..., 0].sum() / seen == pytest.approx(expected, rel=0.15)  # both are noisy so far off the cone
 
