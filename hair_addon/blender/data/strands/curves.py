@@ -329,7 +329,9 @@ def read_guides(curves, surface, device, known=None, local=None):
     local = read_points(curves) if local is None else local
     flat = local.ravel()
     # The sum of squares tells it in a tenth of the time, where it does not overflow.
-    if not (np.isfinite(flat @ flat) or np.isfinite(flat).all()):
+    with np.errstate(over="ignore", invalid="ignore"):
+        squared = flat @ flat
+    if not (np.isfinite(squared) or np.isfinite(flat).all()):
         sentence = '"{name}" has non-finite coordinates: undo, or delete those guides.'
         raise HairError(sentence, name=name_of(curves))
     points = surface.from_local(local)
