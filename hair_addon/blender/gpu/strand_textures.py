@@ -171,6 +171,7 @@ def packed_texture(points, row_strands):
 
 
 _TEXEL_BYTES = {"RG32F": 8, "R32F": 4, "R16": 2, "RGBA32F": 16}
+_MOST_OF_R16 = 65535  # steps from 0 to 1
 _SEEN_BYTES = 32  # of a point in the visibility textures
 
 
@@ -210,7 +211,21 @@ def _radii_texture(radii, row_strands):
     texture_format, unit = ("R16", greatest) if np.isfinite(greatest) and greatest > 0.0 else ("R32F", 1.0)
     texels = np.zeros((-(-strand_count // row_strands) * row_strands, point_count), np.float32)
     np.divide(radii, unit, out=texels[:strand_count])
+    if texture_format == "R16":
+        _to_steps(texels)
     return _texture(texture_format, row_strands * point_count, texels), strand_count, unit
+
+
+def _to_steps(numbers):
+    """Make numbers in [0, 1], in place, such that the nearest ones of 16 bits come of them whatever the driver does.
+
+    Blender's Vulkan cuts them off where OpenGL rounds: a quarter of a step more is the same step for either.
+    """
+    numbers *= np.float32(_MOST_OF_R16)
+    np.rint(numbers, out=numbers)
+    numbers += np.float32(0.25)
+    numbers /= np.float32(_MOST_OF_R16)
+    np.minimum(numbers, np.float32(1.0), out=numbers)
 
 
 def _texture(texture_format, width, texels):
