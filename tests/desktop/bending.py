@@ -29,7 +29,7 @@ from tests.desktop.window import (  # noqa: E402
 ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
 OUT = Path(OUT)
 
-LAST = 12  # frame that is played to
+LAST = 6  # frame that is played to
 facts = {"is_done": False}
 
 
@@ -75,7 +75,7 @@ def hair_on_a_ball_that_bends():
     with in_viewport():
         bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
         bpy.context.object.name = "Ball"
-        bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=100, length=0.06, strand_count=3000)
+        bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=100, length=0.06, strand_count=1000)
     ball().shape_key_add(name="Basis")
     bent = ball().shape_key_add(name="Bent")
     for point in bent.data:
@@ -89,7 +89,7 @@ def hair_on_a_ball_that_bends():
     view.view_location, view.view_distance = (0.02, 0.0, 0.02), 0.7
     with in_viewport():
         bpy.ops.object.select_all(action="DESELECT")
-    yield from wait(1.0)
+    yield from wait(0.5)
 
 
 def played():
@@ -106,7 +106,7 @@ def played():
     yield from wait(0.5)
     facts["stopped"] = state()
     facts["stopped_frame"] = bpy.context.scene.frame_current
-    take_picture(OUT / "stopped.png")
+    take_picture(OUT / "stopped.png", redraws=1)
     playing, stopped = facts.pop("playing_light"), offscreen_light(addon())
     is_hair = (playing[..., 3] > 0.0) | (stopped[..., 3] > 0.0)
     facts["covered"] = float(is_hair.mean())
@@ -120,7 +120,7 @@ def played_beside_eevee():
     with in_viewport():
         bpy.ops.screen.animation_play()
     at = bpy.context.scene.frame_current
-    yield from wait_for(lambda: bpy.context.scene.frame_current >= at + 4, 120.0)
+    yield from wait_for(lambda: bpy.context.scene.frame_current >= at + 2, 120.0)
     facts["beside EEVEE"] = state()
     with in_viewport():
         bpy.ops.screen.animation_cancel(restore_frame=False)
@@ -131,14 +131,14 @@ def played_beside_eevee():
 def dragged():
     """A slider bends the surface step by step, and rests."""
     ball().data.shape_keys.animation_data_clear()
-    yield from wait(1.0)
+    yield from wait(0.5)
     for step in range(8):
         slider().value = 0.1 * step
         yield
     facts["dragged"] = state()
-    yield from wait(2.0)
+    yield from wait_for(lambda: not state()[0], 20.0)
     facts["rested"] = state()
-    take_picture(OUT / "rested.png")
+    take_picture(OUT / "rested.png", redraws=1)
 
 
 def walk():

@@ -17,6 +17,8 @@ SCRIPT = Path(__file__).with_name("bending.py")
 # Of the pixels with hair: rounding flips single samples at the edges of strands.
 FLIPPED = 0.002
 
+SIZE = (800, 500)  # of the window [pixels]: software drivers take their time for each
+
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
 def bending(request, desktop, extension, new_profile):
@@ -25,7 +27,8 @@ def bending(request, desktop, extension, new_profile):
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     log = folder / "bending.log"
-    desktop.run(SCRIPT, [extension, folder], backend=request.param, profile=new_profile(), log=log, limit=300)
+    profile = new_profile()
+    desktop.run(SCRIPT, [extension, folder], backend=request.param, profile=profile, log=log, limit=300, size=SIZE)
     text = log.read_text(errors="replace")
     facts = folder / "bending.json"
     assert facts.exists(), text[-4000:]
