@@ -17,7 +17,7 @@ SCRIPT = Path(__file__).with_name("bending.py")
 # Of the pixels with hair: rounding flips single samples at the edges of strands.
 FLIPPED = 0.002
 
-SIZE = (800, 500)  # of the window [pixels]: software drivers take their time for each
+SIZE = (640, 400)  # of the window [pixels]: software drivers take their time for each
 
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
@@ -45,7 +45,7 @@ def test_it_comes_to_its_end(bending):
 def test_hair_is_at_rest_for_blender_while_the_surface_moves(bending):
     facts, _log = bending
     assert facts["playing"] == [True, 0.0] and facts["dragged"] == [True, 0.0]
-    for moment in ("stopped", "beside EEVEE", "rested"):
+    for moment in ("stopped", "beside Workbench", "rested"):
         is_paused, moved = facts[moment]
         assert not is_paused and moved > 0.01, moment
 
