@@ -20,8 +20,10 @@ help: ## list the targets
 demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and tables in out/demo
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
 
+# All tests load kernels that are compiled once, in place of each process compiling them.
 test: $(installed) ## all tests except long benchmarks and tests in a window, in up to four processes
-	$(python) -m pytest -m "not long and not desktop and not farm" --numprocesses auto --maxprocesses 4 --dist loadfile $(ARGS)
+	$(if $(ARGS),,$(python) tools/build_extension.py --kernels)
+	$(python) -m pytest -m "not long and not desktop and not farm" --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 farm: $(installed) ## tests on a farm of this machine's own: Slurm, OpenJobDescription, Flamenco in VELLUS_FLAMENCO
 	$(python) -m pytest -m farm tests/command_line $(ARGS)

@@ -8,12 +8,20 @@ from hair_addon.core.kernels import compiled_kernels
 from tests.support.devices import DEVICE
 from tools import build_extension, compile_kernels
 
+# Files of few tests that take long. Processes take files one after another: begun last, these would hold up the end.
+LONG_FILES = {"test_install.py", "test_any_operation.py", "test_kernel_cache.py", "test_compiled_kernels.py"}
+
 
 def pytest_configure():
     """Load the kernels that `make build` has compiled of these sources, if it has, instead of compiling them again."""
     folder = build_extension.kernel_folder()
     if compile_kernels.are_up_to_date(folder):
         compiled_kernels.FOLDER = folder
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the files that take longest."""
+    items.sort(key=lambda item: item.path.name not in LONG_FILES)
 
 
 @pytest.fixture

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The extension's zip, one per platform: `python tools/build_extension.py [linux-x64|windows-x64|macos-arm64|all]`.
 
+With `--kernels` it only compiles the kernels, which `make test` does before all tests.
+
 Blender's own builder (blender_ext.py, inside the bpy wheel) builds and validates. It needs all wheels of all
 platforms, so it gets a staged copy whose manifest lists one platform and the wheels of that platform.
 """
@@ -14,12 +16,14 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from hair_addon.core.files import file_lock  # noqa: E402
 from tools import compile_kernels, manual_pages  # noqa: E402
 
 # How a wheel's file name ends → which Blender runs it.
@@ -101,20 +105,32 @@ def kernel_folder() -> Path:
 
 
 def compiled_kernels() -> Path:
-    """Return the folder of this platform's compiled kernels, compiled in 20 s if the sources have changed."""
-    folder = kernel_folder()  # which appears whole: two processes may build at once
-    if not compile_kernels.are_up_to_date(folder):
-        print("compiling kernels", flush=True)
-        partial = folder.with_name(f"{folder.name}-{os.getpid()}")
-        if subprocess.run([sys.executable, compile_kernels.__file__, partial]).returncode != 0:
-            raise BuildError("The kernels could not be compiled; see Warp's message above.")
-        try:
-            partial.rename(folder)
-        except OSError:
-            if not compile_kernels.are_up_to_date(folder):
-                raise
-            shutil.rmtree(partial)  # another process was first
+    """Return the folder of this platform's compiled kernels, compiled in a minute if the sources have changed.
+
+    Of several processes that ask for them at once, one compiles and the others wait.
+    """
+    folder = kernel_folder()
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    while not compile_kernels.are_up_to_date(folder):
+        with file_lock.claim(folder) as is_ours:
+            if not is_ours:
+                time.sleep(0.2)
+            elif not compile_kernels.are_up_to_date(folder):
+                _compile_kernels(folder)
     return folder
+
+
+def _compile_kernels(folder: Path) -> None:
+    print("compiling kernels", flush=True)
+    partial = folder.with_name(f"{folder.name}-{os.getpid()}")  # the folder appears whole
+    if subprocess.run([sys.executable, compile_kernels.__file__, partial]).returncode != 0:
+        raise BuildError("The kernels could not be compiled; see Warp's message above.")
+    try:
+        partial.rename(folder)
+    except OSError:
+        if not compile_kernels.are_up_to_date(folder):
+            raise
+        shutil.rmtree(partial)  # another process was first, on a file system without locks
 
 
 def stage(target: str) -> Path:
@@ -167,8 +183,14 @@ def main() -> None:
     platforms = manifest()["platforms"]
     parser = argparse.ArgumentParser(description="Build the extension's zip.")
     parser.add_argument("platform", nargs="?", default=compile_kernels.this_platform(), choices=[*platforms, "all"])
-    chosen = parser.parse_args().platform
+    parser.add_argument("--kernels", action="store_true", help="only compile this platform's kernels, if it has any")
+    arguments = parser.parse_args()
+    chosen = arguments.platform
     try:
+        if arguments.kernels:
+            if compile_kernels.this_platform() in compile_kernels.PROCESSORS:
+                compiled_kernels()
+            return
         for target in platforms if chosen == "all" else [chosen]:
             output = build(target)
             print(f"{output.relative_to(ROOT)}  {output.stat().st_size / 1e6:.0f} MB")

@@ -17,7 +17,7 @@ WIDTH, HEIGHT = 96, 112
 @pytest.fixture(scope="module")
 def pictures():
     """{preset: (HEIGHT, WIDTH, 4) linear pixels} of the hair alone, with the light and camera of the gallery."""
-    hair = styles.build(strand_count=4000)
+    hair = styles.build(strand_count=2000)
     bpy.data.objects["Head"].hide_render = True
     with pytest.MonkeyPatch.context() as patch:
         shrink_shadows(patch)

@@ -6,6 +6,8 @@ import os
 import shutil
 import subprocess
 import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 import warp as wp
@@ -74,6 +76,25 @@ def change_index(folder, change):
     index = json.loads(path.read_text(encoding="utf-8"))
     change(index)
     path.write_text(json.dumps(index), encoding="utf-8")
+
+
+def test_of_several_that_ask_for_kernels_one_compiles_them(tmp_path, monkeypatch):
+    compiling, asked = [], threading.Barrier(3)
+
+    def compile_kernels_once(folder):
+        compiling.append(folder)
+        folder.mkdir()
+
+    def ask(_turn):
+        asked.wait()
+        return build_extension.compiled_kernels()
+
+    monkeypatch.setattr(build_extension, "kernel_folder", lambda: tmp_path / "kernels" / "here")
+    monkeypatch.setattr(compile_kernels, "are_up_to_date", lambda folder: folder.exists())
+    monkeypatch.setattr(build_extension, "_compile_kernels", compile_kernels_once)
+    with ThreadPoolExecutor(3) as pool:
+        assert set(pool.map(ask, range(3))) == set(compiling) == {tmp_path / "kernels" / "here"}
+    assert len(compiling) == 1
 
 
 def test_the_same_hair_and_nothing_is_compiled(made, tmp_path):
