@@ -61,6 +61,9 @@ def main():
         if options.references_only:
             print(f"{seed:4}  reference", flush=True)
             continue
+        if not reference[..., 3].any():
+            print(f"{seed:4}  no hair is in view", flush=True)
+            continue
         started = time.process_time()
         picture = kept_or_drawn(seed, options)
         row = {
