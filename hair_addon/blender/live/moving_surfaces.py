@@ -15,15 +15,13 @@ from ..host.caches import Cache
 from ..render import hair_cache
 
 _REST = 0.2  # seconds without a move, twice in turn, after which a surface is at rest
-_TOGETHER = (
-    4.0  # seconds between two moves that may be of one interaction: where a processor draws, a picture takes long
-)
+# Seconds between two moves that may be of one interaction: where a processor draws, a picture takes long.
+_TOGETHER = 4.0
 
 # Name prefix of operators that move objects and bones while a mouse button is held.
 _TRANSFORMS = "TRANSFORM_OT_"
 
 moved_cache = Cache()  # session_uid of a surface → when it moved, by `time.monotonic`
-
 
 # session_uid of a surface → True: its mesh was reported while hair was paused, and may have other weights.
 unchecked_cache = Cache()

@@ -44,11 +44,12 @@ def write(curves, name, data_type, domain, values):
 def write_positions(curves, points, name="position"):
     """Write float32 points (..., 3) of all curves, those of linked and overridden Curves too, which no file keeps.
 
-    name: of the attribute, which is there. Returns the fingerprint of the points, which are read once for both.
+    name: of the attribute, which is there. Returns the fingerprint of the points, which are read once for both. Raises
+    `ValueError` where it has another type, or other points are given than the curves have: memory would be overrun.
     """
     data, points = curves.attributes[name].data, np.asarray(points, np.float32)
-    if points.size != 3 * len(data):
-        raise ValueError("points are not as many as those of the curves")
+    if not has(curves, name, "FLOAT_VECTOR", "POINT") or points.size != 3 * len(data):
+        raise ValueError("points are not as many as those of the curves, or are no vectors")
     if not len(data):
         return geometry.fingerprint.fingerprint(points)
     # Into Blender's own memory: `foreach_set` takes one thread, and where Blender's interface lets nobody edit it does

@@ -23,6 +23,9 @@ def keep(datablock, points):
         attributes.write(datablock, _SHAPE, "FLOAT_VECTOR", "POINT", points)
         return
     if not attributes.has(datablock, _SHAPE, "FLOAT_VECTOR", "POINT"):
+        other = datablock.attributes.get(_SHAPE)
+        if other is not None:
+            datablock.attributes.remove(other)
         datablock.attributes.new(_SHAPE, "FLOAT_VECTOR", "POINT")
     if not np.array_equal(read(datablock), points):
         attributes.write_positions(datablock, points, _SHAPE)
@@ -37,8 +40,7 @@ def forget(datablock):
 
 def write_strands(hair, points):
     """Write (N, 3) points of kept strands where guides have moved them."""
-    attributes.write_positions(hair, points)
-    hair.vellus.kept_written = geometry.fingerprint.fingerprint(points)
+    hair.vellus.kept_written = attributes.write_positions(hair, points)
     hair.update_tag()
 
 

@@ -7,7 +7,7 @@ import pytest
 from mathutils import Matrix
 
 from hair_addon.blender.data import scene
-from hair_addon.blender.data.strands import curves
+from hair_addon.blender.data.strands import attributes, curves
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import mesh as mesh_math
 from hair_addon.core.geometry.mesh import SurfacePoints
@@ -55,6 +55,13 @@ def test_written_points_reach_what_is_evaluated_and_no_copy(hair):
     assert np.array_equal(curves.read_points(copy), before.reshape(-1, 3))
     with pytest.raises((ValueError, HairError)):
         curves.write_moved(hair.data, before[1:])
+
+
+@pytest.mark.parametrize(("data_type", "domain"), [("FLOAT", "POINT"), ("FLOAT_VECTOR", "CURVE")])
+def test_points_are_only_written_where_there_is_memory_for_them(hair, data_type, domain):
+    hair.data.attributes.new("shape", data_type, domain)
+    with pytest.raises(ValueError, match="points"):
+        attributes.write_positions(hair.data, points(hair), "shape")
 
 
 def test_roots_lie_on_the_surface_with_its_normal_and_uv(hair, sphere):
