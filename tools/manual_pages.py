@@ -52,5 +52,5 @@ def write(folder):
         (folder / page.with_suffix(".html").name).write_text(
             to_html(page.read_text(encoding="utf-8")), encoding="utf-8"
         )
-    for picture in SOURCE.glob("*.png"):
+    for picture in (*SOURCE.glob("*.png"), *SOURCE.glob("*.jpg")):
         shutil.copy2(picture, folder)

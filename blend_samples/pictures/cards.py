@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Strands beside the cards that stand for them: `python blend_samples/pictures/cards.py` draws docs/manual/cards.png.
+"""Strands beside the cards that stand for them: `python blend_samples/pictures/cards.py` draws docs/manual/cards.jpg.
 
 Two rows, strands and cards, from three sides in the same light and once with the light behind, rendered by Cycles,
 which takes many minutes on two cores.
@@ -32,7 +32,7 @@ BOUNCES = 64  # of rays through transparent parts of cards: more than cards lie 
 def main():
     """Render both rows."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "manual" / "cards.png")
+    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "manual" / "cards.jpg")
     parser.add_argument("--style", default="WAVY")
     parser.add_argument("--strands", type=int, default=12_000)
     parser.add_argument("--cards", type=int, default=1200)
@@ -49,7 +49,7 @@ def main():
         for other in shown:
             other.hide_render = other != one
         rows.append(np.concatenate([rendered(sides, options.samples) for sides in SIDES], axis=1))
-    picture_files.write(np.concatenate(rows), options.out.resolve(), kept_bits=picture_files.FEW_BITS)
+    picture_files.write(np.concatenate(rows), options.out.resolve())
 
 
 def build(strand_count, style):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Pictures as arrays: drawn, read from files, laid side by side with words, and written as small PNGs.
+"""Pictures as arrays: drawn, read from files, laid side by side with words, and written as small files.
 
 All are (H, W, 3) uint8 as displayed, the top row first.
 """
@@ -19,6 +19,12 @@ CAPTION = 24  # pixels: the height of a line of words
 BASELINE = 17  # pixels of a caption's words from its top
 PAGE_BITS = 0xFC  # of a color that is kept in the pictures of the documentation
 FEW_BITS = 0xF8  # the same of small pictures
+
+# Settings of files, as small as they get without a difference to the eye.
+_FORMATS = {
+    ".png": {"file_format": "PNG", "color_depth": "8", "compression": 100},
+    ".jpg": {"file_format": "JPEG", "quality": 90},
+}
 
 
 def read(path):
@@ -71,7 +77,10 @@ def rows(pictures, columns):
 
 
 def write(pixels, path, words=(), kept_bits=0xFF):
-    """Write a picture with words [(text, left, base from the top)]; kept_bits: of each color, fewer for small files."""
+    """Write a picture with words [(text, left, base from the top)] as .png or .jpg.
+
+    kept_bits: of each color, fewer for smaller PNGs.
+    """
     picture = imbuf.new(pixels.shape[1::-1])
     opaque = np.full(pixels.shape[:2], 255, np.uint8)
     with picture.with_buffer(write=True) as buffer:
@@ -88,9 +97,10 @@ def write(pixels, path, words=(), kept_bits=0xFF):
 
 
 def _compress(path):
-    """Write a PNG again as small as it gets."""
+    """Write a picture again, small, in the format of its name."""
     settings, view = bpy.context.scene.render.image_settings, bpy.context.scene.view_settings
-    wanted = {"media_type": "IMAGE", "file_format": "PNG", "color_mode": "RGB", "color_depth": "8", "compression": 100}
+    # The color mode comes last: which there are depends on the format.
+    wanted = {"media_type": "IMAGE"} | _FORMATS[path.suffix] | {"color_mode": "RGB"}
     before = {name: getattr(settings, name) for name in wanted}
     shown = view.view_transform, view.look
     image = bpy.data.images.load(str(path), check_existing=False)
