@@ -26,8 +26,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import hair_addon
 from blend_samples.heads import head
 from hair_addon.blender.data.strands import curves
-from hair_addon.blender.gpu import maker_choice, strand_maker
 from hair_addon.blender.gpu.shadows import ShadowMaps
+from hair_addon.blender.gpu.strands import maker_choice, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair

@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import maker_choice
+from hair_addon.blender.gpu.strands import maker_choice
 from hair_addon.blender.groom import pipeline
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair

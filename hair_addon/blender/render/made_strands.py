@@ -12,7 +12,8 @@ import numpy as np
 
 from ...core.errors import HairError
 from ..data.strands.posed_strands import Pose
-from ..gpu import maker_choice, shaders, strand_carrier, strand_maker, strand_textures, style_maker
+from ..gpu import shaders, strand_textures
+from ..gpu.strands import maker_choice, strand_carrier, strand_maker, style_maker
 from ..groom.bindings import BoundHair
 from ..groom.styled_hair import StyledHair
 from ..host import running

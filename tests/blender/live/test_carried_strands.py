@@ -5,7 +5,8 @@ import bpy
 import numpy as np
 
 from hair_addon.blender.data.strands import posed_strands
-from hair_addon.blender.gpu import ambient_visibility, maker_choice
+from hair_addon.blender.gpu import ambient_visibility
+from hair_addon.blender.gpu.strands import maker_choice
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import curves
-from hair_addon.blender.gpu import ambient_visibility, drawing, maker_choice, shaders, strand_maker, strand_textures
+from hair_addon.blender.gpu import ambient_visibility, drawing, shaders, strand_textures
+from hair_addon.blender.gpu.strands import maker_choice, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair

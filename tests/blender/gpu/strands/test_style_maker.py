@@ -7,7 +7,8 @@ import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import shaders, strand_textures, style_maker, uniforms
+from hair_addon.blender.gpu import shaders, strand_textures, uniforms
+from hair_addon.blender.gpu.strands import style_maker
 from hair_addon.core.geometry.strands import from_numpy
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, lean, program_rows, smooth, trim, wet
 from hair_addon.core.styling.masks import Mask

@@ -12,19 +12,20 @@ from typing import TYPE_CHECKING
 import gpu
 import numpy as np
 
-from ...core.interpolation.hair_binding import HairBinding
-from ...core.kernels.checks import require_count
-from ...core.styling import frizz, program_rows
-from ...core.styling.program_rows import Program
-from ...core.styling.random_numbers import PURPOSES
-from . import shaders, strand_changes, strand_maker, uniforms
+from ....core.interpolation.hair_binding import HairBinding
+from ....core.kernels.checks import require_count
+from ....core.styling import frizz, program_rows
+from ....core.styling.program_rows import Program
+from ....core.styling.random_numbers import PURPOSES
+from .. import shaders, uniforms
+from ..strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU, row_strands_of
+from . import strand_changes, strand_maker
 from .strand_changes import StrandChanges
 from .strand_maker import StrandMaker
-from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU, row_strands_of
 
 if TYPE_CHECKING:
-    from ...core.styling.stack import Styling
-    from ...core.styling.steps import StrandData
+    from ....core.styling.stack import Styling
+    from ....core.styling.steps import StrandData
 
 MOST_POINTS = 128  # of a strand: what a thread keeps of it is 32 or 48 bytes a point
 

@@ -10,8 +10,8 @@ from itertools import pairwise
 import gpu
 import numpy as np
 
-from . import shaders
-from .strand_textures import TEXTURE_WIDTH
+from .. import shaders
+from ..strand_textures import TEXTURE_WIDTH
 
 _GROUP_SIZE = 64
 _PASSES = 3  # each joins as many boxes to one as the others: the cube root of their number

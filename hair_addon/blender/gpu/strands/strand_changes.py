@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 import gpu
 import numpy as np
 
-from ...core import geometry
+from ....core import geometry
+from ..strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, keep_strands, numbers_texture, row_strands_of
 from . import strand_bounds
-from .strand_textures import TEXTURE_WIDTH, Moved, StrandsOnGPU, keep_strands, numbers_texture, row_strands_of
 
 # Points of strands up to which it is kept where they were, for motion vectors: 64 MiB.
 MOST_MOVED = 8 << 20

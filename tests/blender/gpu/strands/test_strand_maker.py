@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import warp as wp
 
-from hair_addon.blender.gpu import maker_choice, shaders, strand_bounds, strand_changes, strand_maker, strand_textures
+from hair_addon.blender.gpu import shaders, strand_textures
+from hair_addon.blender.gpu.strands import maker_choice, strand_bounds, strand_changes, strand_maker
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import strands
 from hair_addon.core.geometry.mesh import SurfacePoints

@@ -10,8 +10,9 @@ import time
 import gpu
 import numpy as np
 
-from ...core.errors import HairError
-from . import shaders, strand_maker, strand_textures
+from ....core.errors import HairError
+from .. import shaders, strand_textures
+from . import strand_maker
 
 _STRANDS, _GUIDES, _POINTS, _SLOTS = 4096, 64, 41, 8
 _RUNS = 3

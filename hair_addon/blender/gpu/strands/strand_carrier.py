@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 import gpu
 import numpy as np
 
-from ...core.kernels.checks import require_count, require_indices
-from . import shaders
+from ....core.kernels.checks import require_count, require_indices
+from .. import shaders
+from ..strand_textures import MOST_GROUPS, StrandsOnGPU
 from .strand_changes import StrandChanges, declare_put, new_changes, rows_texture
-from .strand_textures import MOST_GROUPS, StrandsOnGPU
 
 if TYPE_CHECKING:
-    from ...core.geometry.surface_deform import SurfaceMotion
+    from ....core.geometry.surface_deform import SurfaceMotion
 
 _GROUP_SIZE = 64
 _NOT_TURNED = np.eye(3, dtype=np.float32)[:2]

@@ -7,7 +7,8 @@ import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import strand_carrier, strand_textures
+from hair_addon.blender.gpu import strand_textures
+from hair_addon.blender.gpu.strands import strand_carrier
 from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import surface_deform
 from hair_addon.core.geometry.mesh import Faces

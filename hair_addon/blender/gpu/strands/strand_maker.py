@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 import gpu
 import numpy as np
 
-from ...core.interpolation.hair_binding import HairBinding
-from ...core.kernels.checks import require_count, require_indices
-from . import shaders, uniforms
+from ....core.interpolation.hair_binding import HairBinding
+from ....core.kernels.checks import require_count, require_indices
+from .. import shaders, uniforms
+from ..strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU, row_strands_of
 from .strand_changes import StrandChanges, declare_put, empty_rows, new_changes, rows_texture
-from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU, row_strands_of
 
 _GROUP_SIZE = 64
 
