@@ -28,7 +28,7 @@ CURLY_HAIR = (
     *("bare_head", "hair_system", "combed", "shoulder_length", "fringe"),
     *("locks", "curls", "smooth_curls", "painted", "look"),
 )
-CURLY_SEEN = ROOT / "out" / "desktop" / "curly_opengl"
+CURLY_SEEN = ROOT / "out" / "desktop" / "curly_hair_opengl"
 CURLY_SIZE = (560, 373)
 
 # (left, top, right, bottom) pixels of its window: the 3D view with the top of its sidebar; and the size it is shown in.
@@ -81,8 +81,8 @@ def take_five_minutes(blender, extension, folder):
     profile = folder / "profile"
     shutil.rmtree(folder, ignore_errors=True)
     profile.mkdir(parents=True)
-    script, head = ROOT / "tests" / "desktop" / "first_minutes.py", ROOT / "blend_samples" / "head.obj"
-    arguments = [extension, head, folder, FIVE_MINUTES_SAMPLES]
+    script = ROOT / "tests" / "desktop" / "first_minutes.py"
+    arguments = ["all", extension, folder, FIVE_MINUTES_SAMPLES]
     log = folder / "log.txt"
     status = blender.run(script, arguments, profile=profile, limit=1200, size=WINDOW_SIZE, log=log)
     if status:

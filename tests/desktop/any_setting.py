@@ -1,15 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Every setting in random order in a real window, on surfaces that are deformed, animated, emptied and linked.
 
-Run by a desktop Blender: any_setting.py -- SEED END OUT ZIP. Installs the extension from ZIP unless it is there.
-Takes the steps before number END, and saves the scene to OUT with any_setting_SEED.json: the steps taken, the state of
-the random numbers and whether END was reached. Where these are there already, it goes on with them: so each part of a
-long walk has a Blender of its own, as a hundred redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or
-without add-on. In background hair is written at once; in a window the picture is ahead of the Curves, and what is drawn
-then comes from both.
+Run by a desktop Blender as steps.py says; PART is the number of the step before which it ends, MORE the seed. The next
+part goes on with the scene and the state of the random numbers. In background hair is written at once; in a window the
+picture is ahead of the Curves, and what is drawn then comes from both.
 """
 
-import json
 import math
 import random
 import sys
@@ -25,6 +21,7 @@ sys.path.insert(0, str(ROOT))
 from tests.desktop import any_scene  # noqa: E402
 from tests.desktop.any_exchange import Exchanges  # noqa: E402
 from tests.desktop.any_operation import Operations  # noqa: E402
+from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import MODULE, in_viewport, install, viewport, wait  # noqa: E402
 
 
@@ -33,7 +30,7 @@ class Artist(Operations, Exchanges):
 
     def __init__(self, seed, folder):
         self.random = random.Random(seed)
-        self.folder, self.report = folder, folder / f"any_setting_{seed}.json"
+        self.folder = folder
         self.scene = str(folder / "any_setting.blend")
         self.step_count, self.taken, self.redraw_count = 0, [], 0
         self.blender = sys.modules[f"{MODULE}.hair_addon.blender"]
@@ -49,23 +46,21 @@ class Artist(Operations, Exchanges):
     def begin(self):
         """The scene as the part before left it, or a new one."""
         self.add_asset_library()
-        if not self.report.exists():
+        if "random" not in facts:
             yield from any_scene.build(self.folder)
             self._save()  # frames are baked beside the file
             return
-        report = json.loads(self.report.read_text())
-        version, numbers, gauss = report["random"]
+        version, numbers, gauss = facts["random"]
         self.random.setstate((version, tuple(numbers), gauss))
-        self.step_count, self.taken = report["step_count"], report["steps"]
+        self.step_count, self.taken = facts["step_count"], facts["steps"]
         bpy.ops.wm.open_mainfile(filepath=self.scene)
         yield
 
-    def end(self, is_done):
-        """Write what the next part goes on with."""
-        if is_done:
+    def end(self):
+        """Keep what the next part goes on with."""
+        with in_viewport():
             self._save()
-        kept = {"step_count": self.step_count, "random": self.random.getstate(), "steps": self.taken}
-        self.report.write_text(json.dumps({"is_done": is_done} | kept, indent=1))
+        facts.update(step_count=self.step_count, random=self.random.getstate(), steps=self.taken)
 
     # ------------------------------------------------------------------------------------------------- the steps
 
@@ -360,32 +355,14 @@ class Artist(Operations, Exchanges):
         return thing.select_get()
 
 
-def walk(seed, end, folder):
-    """The steps before number `end`, as a generator between whose parts Blender lives."""
-    artist = Artist(seed, folder)
+def steps():
+    """The steps before the part's number, once the extension is there."""
+    install(ZIP)
+    artist = Artist(int(MORE[0]), OUT)
     yield from artist.begin()
-    artist.end(is_done=False)
-    yield from artist.take(end)
-    with in_viewport():
-        artist.end(is_done=True)
-
-
-def advance(steps):
-    """Called by Blender between redraws; ends Blender after the last step."""
-    try:
-        next(steps)
-        return 0.02
-    except StopIteration:
-        print("any_setting: done", flush=True)
-    except Exception:
-        traceback.print_exc()
-    bpy.ops.wm.quit_blender()
-    return None
+    yield from artist.take(int(PART))
+    artist.end()
 
 
 if __name__ == "__main__":
-    SEED, END, OUT = sys.argv[sys.argv.index("--") + 1 :][:3]
-    bpy.context.preferences.view.show_splash = False
-    install(sys.argv[sys.argv.index("--") + 4])
-    walking = walk(int(SEED), int(END), Path(OUT))
-    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
+    take([steps], pause=0.02)

@@ -1,13 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair on a surface that bends while the timeline plays, and by a slider, in a window.
 
-Run by a desktop Blender: bending.py -- ZIP OUT. Writes pictures of the screen to OUT, and bending.json with what the
-tests want to know.
+Run by a desktop Blender as steps.py says. Writes pictures of the screen.
 """
 
-import json
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
@@ -15,6 +12,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
     in_viewport,
@@ -26,11 +24,7 @@ from tests.desktop.window import (  # noqa: E402
     wait_for,
 )
 
-ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
-OUT = Path(OUT)
-
 LAST = 6  # frame that is played to
-facts = {"is_done": False}
 
 
 def addon():
@@ -142,28 +136,5 @@ def dragged():
     take_picture(OUT / "rested.png", redraws=1)
 
 
-def walk():
-    """All steps; between them Blender handles its events and redraws."""
-    for step in (hair_on_a_ball_that_bends, played, played_beside_workbench, dragged):
-        print(f"bending: {step.__name__}", flush=True)
-        yield from step()
-
-
-def advance(steps):
-    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
-    try:
-        next(steps)
-        return 0.05
-    except StopIteration:
-        facts["is_done"] = True
-    except Exception:
-        traceback.print_exc()
-    (OUT / "bending.json").write_text(json.dumps(facts, indent=1))
-    bpy.ops.wm.quit_blender()
-    return None
-
-
 if __name__ == "__main__":
-    bpy.context.preferences.view.show_splash = False
-    walking = walk()
-    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
+    take((hair_on_a_ball_that_bends, played, played_beside_workbench, dragged))

@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Composite Hair, depth of field and Export Groom in a window, on surfaces that are deformed, keyed and linked.
 
-Run by a desktop Blender: composite.py -- ZIP OUT. Writes pictures to OUT, and composite.json with what the tests want
-to know. Pictures by Cycles have one sample: with the same seed they are equal where the scene is.
+Run by a desktop Blender as steps.py says. Writes pictures. Those by Cycles have one sample: with the same seed they are
+equal where the scene is.
 """
 
-import json
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
@@ -16,6 +14,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop import any_scene  # noqa: E402
+from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
     in_viewport,
@@ -29,11 +28,7 @@ from tests.desktop.window import (  # noqa: E402
     window,
 )
 
-ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
-OUT = Path(OUT)
 SCENE = str(OUT / "composited.blend")
-
-facts = {}
 
 
 def scene():
@@ -83,7 +78,6 @@ def render(name):
     """F12, into a file."""
     begin_render(f"{name}.png", write_still=True)
     yield from rendering()
-    print(f"composite: {name}", flush=True)
 
 
 def toggle():
@@ -237,29 +231,5 @@ def export():
     facts["frame"] = scene().frame_current
 
 
-def walk():
-    """All steps; between them Blender handles its events and redraws."""
-    for step in (build, turn_on, animate, reload_while_it_renders, copy, disable, focus, export):
-        print(f"composite: {step.__name__}", flush=True)
-        yield from step()
-    facts["is done"] = True
-
-
-def advance(steps):
-    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
-    try:
-        next(steps)
-        return 0.05
-    except StopIteration:
-        pass
-    except Exception:
-        traceback.print_exc()
-    (OUT / "composite.json").write_text(json.dumps(facts, indent=1))
-    bpy.ops.wm.quit_blender()
-    return None
-
-
 if __name__ == "__main__":
-    bpy.context.preferences.view.show_splash = False
-    walking = walk()
-    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
+    take((build, turn_on, animate, reload_while_it_renders, copy, disable, focus, export))

@@ -1,17 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The manual's page Curly Hair in ten steps, in a window: from a bare head to curly hair with a fringe.
 
-Run by a desktop Blender: curly_hair.py -- PART ZIP HEAD OUT. Writes a picture of the screen for each step to OUT, and
-curly_hair.json with what the tests want to know. The page's pictures are made of them by
-`tools/manual_pictures.py curly_hair`. After the ten steps a style is keyed, moved and undone, and hair is combed with
-its styles on. Each of the `PARTS` runs in a Blender of its own and goes on with the file of the one before: a hundred
-redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or without add-on.
+Run by a desktop Blender as steps.py says, with one of `PARTS`. Writes a picture of the screen for each step, of which
+`tools/manual_pictures.py curly_hair` makes those of the page. After the ten steps a style is keyed, moved and undone, and
+hair is combed with its styles on.
 """
 
-import json
 import math
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
@@ -20,11 +16,26 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
-from tests.desktop import window as desktop  # noqa: E402
-from tests.desktop.window import drag, import_head, in_viewport, places, take_picture, viewport, wait, wait_for  # noqa: E402
-
-PART, ZIP, HEAD, OUT = sys.argv[sys.argv.index("--") + 1 :]
-OUT = Path(OUT)
+from tests.desktop.steps import OUT, PART, ZIP, facts, take  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    HAIRLINE,
+    MODULE,
+    activate,
+    click,
+    curve_points,
+    drag,
+    import_head,
+    in_viewport,
+    install,
+    key,
+    of_kind,
+    places,
+    sidebar,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+)
 
 STRAND_COUNT = 16_000  # software drivers take their time for each
 
@@ -32,42 +43,28 @@ STRAND_COUNT = 16_000  # software drivers take their time for each
 _ADD_FIRST = (120, 46)  # the button of a hair without styles
 _ADD = (241, 46)  # beside the list
 
-# The hairline of the sample's head from the side, (y, z) [m], from the forehead to the nape; the face looks to -Y.
-_HAIRLINE = np.array([(-0.17, 0.82), (-0.105, 0.787), (-0.068, 0.74), (-0.03, 0.744), (0.0, 0.69), (0.04, 0.68)])
-
-FACTS, SCENE = OUT / "curly_hair.json", OUT / "curly_hair.blend"
-facts = json.loads(FACTS.read_text()) if FACTS.exists() else {"steps": [], "done": []}
+SCENE = OUT / "curly_hair.blend"
 hidden = []  # panels that the sidebar does not show
 
 
 def picture(name):
     take_picture(OUT / f"{name}.png")
-    facts["steps"].append(name)
-    print(f"curly_hair: {name}", flush=True)
 
 
 def hair_object():
-    return next((o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"), None)
+    return of_kind("HAIR")
 
 
 def guides_object():
-    return next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "GUIDES")
-
-
-def points(curves_object):
-    """(N, 3) positions, which have the world's coordinates."""
-    curves = curves_object.data
-    values = np.empty((len(curves.points), 3), np.float32)
-    curves.attributes["position"].data.foreach_get("vector", values.ravel())
-    return values
+    return of_kind("GUIDES")
 
 
 def strands():
     """(S, P, 3) positions of the hair as it is drawn, which may not be written yet."""
-    bound = sys.modules[f"{desktop.MODULE}.hair_addon.blender"].groom.bindings.of(hair_object().data)
+    bound = sys.modules[f"{MODULE}.hair_addon.blender"].groom.bindings.of(hair_object().data)
     if bound is not None:
         return bound.points.copy()
-    return points(hair_object()).reshape(len(hair_object().data.curves), -1, 3)
+    return curve_points(hair_object()).reshape(len(hair_object().data.curves), -1, 3)
 
 
 def moved(before):
@@ -76,40 +73,9 @@ def moved(before):
     return float(np.linalg.norm(after - before, axis=2).max()) if after.shape == before.shape else math.inf
 
 
-def sidebar():
-    area, _region = viewport()
-    return next(region for region in area.regions if region.type == "UI")
-
-
-def activate(chosen):
-    with in_viewport():
-        bpy.ops.object.select_all(action="DESELECT")
-    chosen.select_set(True)
-    bpy.context.view_layer.objects.active = chosen
-
-
-def key(name):
-    """A key, pressed and let go where the mouse is."""
-    window = bpy.context.window_manager.windows[0]
-    window.event_simulate(type=name, value="PRESS", x=_mouse[0], y=_mouse[1])
-    yield
-    window.event_simulate(type=name, value="RELEASE", x=_mouse[0], y=_mouse[1])
-    yield from wait(0.2)
-
-
-_mouse = [0, 0]
-
-
-def click(x, y):
-    """The left mouse button, pressed and let go at a place of the window."""
-    _mouse[:] = int(x), int(y)
-    yield from drag(np.array([x, y]), np.array([x, y]), steps=1)
-    yield from wait(0.5)
-
-
 def show_styles_alone():
     """Of the tab's panels, the sidebar shows Styles and no other."""
-    classes = sys.modules[f"{desktop.MODULE}.hair_addon.blender"].panels.CLASSES
+    classes = sys.modules[f"{MODULE}.hair_addon.blender"].panels.CLASSES
     for panel in reversed(classes):
         is_shown = panel.bl_idname.startswith(("VELLUS_PT_style", "VELLUS_UL"))
         if not is_shown and panel.is_registered and getattr(panel, "bl_category", "") == "Hair":
@@ -128,17 +94,19 @@ def add_style(offer):
     state = hair_object().data.vellus
     panel = sidebar()
     x, y = _ADD if len(state.styles) else _ADD_FIRST
-    yield from click(panel.x + x, panel.y + panel.height - y)
+    place = panel.x + x, panel.y + panel.height - y
+    yield from click(*place)
+    yield from wait(0.2)
     count = len(state.styles)
     for _entry in range(1 + list(offers()).index(offer)):
-        yield from key("DOWN_ARROW")
-    yield from key("RET")
+        yield from key("DOWN_ARROW", place)
+    yield from key("RET", place)
     yield from wait_for(lambda: len(state.styles) > count, 10.0)
     yield from wait(1.0)
 
 
 def offers():
-    return sys.modules[f"{desktop.MODULE}.hair_addon.core"].styling.kinds.OFFERS
+    return sys.modules[f"{MODULE}.hair_addon.core"].styling.kinds.OFFERS
 
 
 # The ten steps.
@@ -146,18 +114,18 @@ def offers():
 
 def bare_head():
     """1. A head with a vertex group where hair grows."""
-    desktop.install(ZIP)
+    install(ZIP)
     bpy.context.preferences.system.use_region_overlap = False
     for thing in list(bpy.data.objects):
         if thing.type == "MESH":
             bpy.data.objects.remove(thing)
-    head = import_head(HEAD)
+    head = import_head()
     with in_viewport():
         bpy.ops.object.shade_smooth()
     positions = np.empty((len(head.data.vertices), 3), np.float32)
     head.data.vertices.foreach_get("co", positions.ravel())
     scalp = head.vertex_groups.new(name="scalp")
-    above = positions[:, 2] > np.interp(positions[:, 1], *_HAIRLINE.T)
+    above = positions[:, 2] > np.interp(positions[:, 1], *HAIRLINE.T)
     scalp.add(np.flatnonzero(above).tolist(), 1.0, "REPLACE")
     fringe = head.vertex_groups.new(name="fringe")
     is_front = above & (positions[:, 1] < -0.085) & (np.abs(positions[:, 0]) < 0.075)
@@ -194,7 +162,7 @@ def comb():
     yield from wait(0.5)
     before = strands()
     bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 130
-    middle = places(points(guides_object())[20::41]).mean(axis=0)
+    middle = places(curve_points(guides_object())[20::41]).mean(axis=0)
     for start, end in (((-60, 60), (160, 40)), ((-60, 0), (170, -20)), ((-90, 60), (-220, 20))):
         yield from drag(middle + np.array(start), middle + np.array(end))
     yield from wait(1.5)
@@ -342,7 +310,7 @@ def comb_styled():
     yield from wait(0.5)
     bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 130
     before = strands()
-    middle = places(points(guides_object())[20::41]).mean(axis=0)
+    middle = places(curve_points(guides_object())[20::41]).mean(axis=0)
     followed = []
     stroke = drag(middle + np.array([-60, 60]), middle + np.array([160, 40]), steps=16)
     for number, _pause in enumerate(stroke):
@@ -371,30 +339,12 @@ def go_on():
     yield from wait(1.0)
 
 
-def walk():
-    """All steps of a part; between them Blender handles its events and redraws."""
-    parts = PARTS[PART] if PART == next(iter(PARTS)) else (go_on, *PARTS[PART])
-    for part in parts:
-        yield from part()
+def save():
+    """For the next part."""
     bpy.ops.wm.save_as_mainfile(filepath=str(SCENE))
-
-
-def advance(steps):
-    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
-    try:
-        next(steps)
-        return 0.05
-    except StopIteration:
-        facts["done"].append(PART)
-    except Exception:
-        traceback.print_exc()
-    show_all_panels()
-    FACTS.write_text(json.dumps(facts, indent=1))
-    bpy.ops.wm.quit_blender()
-    return None
+    yield
 
 
 if __name__ == "__main__":
-    bpy.context.preferences.view.show_splash = False  # before it is shown: it would take the first click
-    walking = walk()
-    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
+    begun = () if PART == next(iter(PARTS)) else (go_on,)
+    take((*begun, *PARTS[PART], save), at_the_end=show_all_panels)

@@ -1,16 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair that is simulated in a window: played, undone, baked, stopped, and taken away while it plays.
 
-Run by a desktop Blender: dynamics.py -- PART ZIP OUT. Writes pictures of the screen to OUT, and dynamics.json with what
-the tests want to know. Each of the `PARTS` runs in a Blender of its own and goes on with the file of the one before:
-a hundred redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or without add-on.
+Run by a desktop Blender as steps.py says, with one of `PARTS`. Writes pictures of the screen.
 """
 
 import itertools
-import json
 import math
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
@@ -19,10 +15,15 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+from tests.desktop.steps import OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
+    activate,
+    curve_points,
     in_viewport,
     install,
+    key,
+    of_kind,
     offscreen_light,
     take_picture,
     viewport,
@@ -31,24 +32,16 @@ from tests.desktop.window import (  # noqa: E402
     window,
 )
 
-PART, ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
-OUT = Path(OUT)
-
 LAST = 20  # frame that is played to
 COMPARED = 12  # frame whose light is compared, played and baked
 
-FACTS, SCENE, LIGHT = OUT / "dynamics.json", OUT / "dynamics.blend", OUT / "played.npy"
+SCENE, LIGHT = OUT / "dynamics.blend", OUT / "played.npy"
 STRANDS = OUT / "strands.npy"
-facts = json.loads(FACTS.read_text()) if FACTS.exists() else {"done": []}
 seen = {}  # frame → strands as they were drawn when it was played
 
 
 def addon():
     return sys.modules[f"{MODULE}.hair_addon.blender"]
-
-
-def of_kind(kind):
-    return next((o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind), None)
 
 
 def scene():
@@ -61,9 +54,7 @@ def strands():
     bound = addon().groom.bindings.of(hair)
     if bound is not None:
         return bound.points.copy()
-    values = np.empty((len(hair.points), 3), np.float32)
-    hair.attributes["position"].data.foreach_get("vector", values.ravel())
-    return values.reshape(len(hair.curves), -1, 3)
+    return curve_points(of_kind("HAIR")).reshape(len(hair.curves), -1, 3)
 
 
 def moved(before, after=None):
@@ -86,25 +77,6 @@ def differ(before, after):
 def state():
     sentence, values = addon().live.dynamics_state.state_of(of_kind("GUIDES").data)
     return sentence.format(**values)
-
-
-def key(name, **modifiers):
-    """A key, pressed and let go in the middle of the 3D view."""
-    area, _region = viewport()
-    at = {"x": area.x + area.width // 2, "y": area.y + area.height // 2}
-    window().event_simulate(type="MOUSEMOVE", value="NOTHING", **at)
-    yield
-    window().event_simulate(type=name, value="PRESS", **at, **modifiers)
-    yield
-    window().event_simulate(type=name, value="RELEASE", **at, **modifiers)
-    yield from wait(0.5)
-
-
-def activate(chosen):
-    with in_viewport():
-        bpy.ops.object.select_all(action="DESELECT")
-    chosen.select_set(True)
-    bpy.context.view_layer.objects.active = chosen
 
 
 def is_playing():
@@ -197,7 +169,7 @@ def undone():
         guides.data.vellus.dynamics.damping = 0.123
         bpy.ops.ed.undo_push(message="Damping")
     yield from key("Z", ctrl=True)
-    yield from wait(1.0)
+    yield from wait(1.5)
     damping = of_kind("GUIDES").data.vellus.dynamics.damping
     facts["undo"] = {"is_undone": damping == before, "frame": scene().frame_current, "moved": moved(shown)}
     facts["undo"]["picture"] = differ(np.load(LIGHT), light())
@@ -273,7 +245,7 @@ def deleted():
     }
     stop()
     yield from key("Z", ctrl=True)
-    yield from wait(0.5)
+    yield from wait(1.0)
     facts["delete"]["are back"] = of_kind("GUIDES") is not None
 
 
@@ -372,28 +344,5 @@ def go_on():
     activate(of_kind("GUIDES"))
 
 
-def walk():
-    """All steps of a part; between them Blender handles its events and redraws."""
-    for step in PARTS[PART] if PART == next(iter(PARTS)) else (go_on, *PARTS[PART]):
-        print(f"dynamics: {step.__name__}", flush=True)
-        yield from step()
-
-
-def advance(steps):
-    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
-    try:
-        next(steps)
-        return 0.05
-    except StopIteration:
-        facts["done"].append(PART)
-    except Exception:
-        traceback.print_exc()
-    FACTS.write_text(json.dumps(facts, indent=1))
-    bpy.ops.wm.quit_blender()
-    return None
-
-
 if __name__ == "__main__":
-    bpy.context.preferences.view.show_splash = False
-    walking = walk()
-    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
+    take(PARTS[PART] if PART == next(iter(PARTS)) else (go_on, *PARTS[PART]))

@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first ten minutes of a new artist, in a window: three clicks to hair, then README's five minutes.
 
-Run by a desktop Blender with a clean profile: first_minutes.py -- ZIP HEAD OUT [SAMPLES]. Writes a picture of the
-screen for each step to OUT, and first_minutes.json with what the tests want to know. README's pictures are made of them
-by `tools/manual_pictures.py five_minutes`, of as many samples per pixel as an artist sees.
+Run by a desktop Blender as steps.py says, with a clean profile; MORE is how many samples a pixel has. Writes a picture
+of the screen for each step, of which `tools/manual_pictures.py five_minutes` makes README's, with as many samples as an
+artist sees.
 """
 
-import json
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
@@ -17,12 +15,26 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
-from tests.desktop.window import drag, import_head, in_viewport, places, take_picture, viewport, wait, wait_for  # noqa: E402
+from tests.desktop.steps import MORE, OUT, ZIP, facts, take  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    HAIRLINE,
+    MODULE,
+    click,
+    curve_points,
+    drag,
+    import_head,
+    in_viewport,
+    install,
+    of_kind,
+    places,
+    sidebar,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+)
 
-MODULE = "bl_ext.user_default.vellus"
-ZIP, HEAD, OUT, *more = sys.argv[sys.argv.index("--") + 1 :]
-OUT = Path(OUT)
-SAMPLES = int(more[0]) if more else 8  # few, for drivers without a GPU, which take one with each redraw
+SAMPLES = int(MORE[0]) if MORE else 8  # few, for drivers without a GPU, which take one with each redraw
 
 # Pixels from the upper right corner of the 3D view: the arrow that opens its sidebar.
 _ARROW = (8, 86)
@@ -31,33 +43,10 @@ _ARROW = (8, 86)
 _HAIR_TAB = (277, 237)
 _NEW_HAIR_SYSTEM = (120, 46)
 
-# The hairline of the sample's head from the side, (y, z) [m], from the forehead to the nape; the face looks to -Y.
-_HAIRLINE = np.array([(-0.17, 0.82), (-0.105, 0.787), (-0.068, 0.74), (-0.03, 0.744), (0.0, 0.69), (0.04, 0.68)])
-
-facts = {"steps": []}
-
 
 def step(name):
     """A picture of the screen after a step."""
     take_picture(OUT / f"first_{name}.png", SAMPLES)
-    facts["steps"].append(name)
-    print(f"first_minutes: {name}", flush=True)
-
-
-def click(x, y):
-    """The left mouse button, pressed and let go at a place of the window."""
-    place = np.array([x, y])
-    yield from drag(place, place, steps=1)
-    yield from wait(0.3)
-
-
-def sidebar():
-    area, _region = viewport()
-    return next(region for region in area.regions if region.type == "UI")
-
-
-def of_kind(kind):
-    return next((o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind), None)
 
 
 def covered(hair):
@@ -93,7 +82,7 @@ def look_at(thing, direction, distance):
 
 def three_clicks():
     """From the installed extension to hair on the default cube: the sidebar, the tab, the button."""
-    bpy.ops.extensions.package_install_files(filepath=ZIP, repo="user_default", enable_on_install=True)
+    install(ZIP)
     bpy.context.preferences.system.use_region_overlap = False
     sys.modules[f"{MODULE}.hair_addon.blender"].render.hair_picture.SAMPLE_COUNT = SAMPLES
     area, _region = viewport()
@@ -123,13 +112,13 @@ def open_head():
     for thing in list(bpy.data.objects):
         if thing.type in {"MESH", "CURVES"}:
             bpy.data.objects.remove(thing)
-    head = import_head(HEAD)
+    head = import_head()
     with in_viewport():
         bpy.ops.object.shade_smooth()
     positions = np.empty((len(head.data.vertices), 3), np.float32)
     head.data.vertices.foreach_get("co", positions.ravel())
     scalp = head.vertex_groups.new(name="scalp")
-    above = positions[:, 2] > np.interp(positions[:, 1], *_HAIRLINE.T)
+    above = positions[:, 2] > np.interp(positions[:, 1], *HAIRLINE.T)
     scalp.add(np.flatnonzero(above).tolist(), 1.0, "REPLACE")
     look_at(head, (1.0, -0.7, 0.3), 0.55)
     yield
@@ -163,7 +152,7 @@ def comb():
         bpy.ops.vellus.comb_guides()
     yield from wait(1.0)
     guides, hair = of_kind("GUIDES"), of_kind("HAIR")
-    before = _points(guides), _points(hair)
+    before = curve_points(guides), curve_points(hair)
     facts["mode"] = bpy.context.mode
     bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 120
     middle = places(before[0][40::41]).mean(axis=0)
@@ -171,17 +160,10 @@ def comb():
         yield from drag(middle + np.array([-130, 20 - below]), middle + np.array([90, 80 - below]))
     yield from wait(2.0)
     step("combed")
-    facts["combed"] = [float(np.abs(_points(o) - b).max()) for o, b in zip((guides, hair), before, strict=True)]
+    facts["combed"] = [float(np.abs(curve_points(o) - b).max()) for o, b in zip((guides, hair), before, strict=True)]
     with in_viewport():
         bpy.ops.object.mode_set(mode="OBJECT")
     yield
-
-
-def _points(curves_object):
-    curves = curves_object.data
-    values = np.empty((len(curves.points), 3), np.float32)
-    curves.attributes["position"].data.foreach_get("vector", values.ravel())
-    return values
 
 
 def shade():
@@ -221,27 +203,5 @@ def write_and_export():
     facts["files"] = {name: (OUT / name).stat().st_size if (OUT / name).exists() else 0 for name in names}
 
 
-def walk():
-    """All steps; between them Blender handles its events and redraws."""
-    for part in (three_clicks, open_head, grow_on_the_head, comb, shade, write_and_export):
-        yield from part()
-
-
-def advance(steps):
-    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
-    try:
-        next(steps)
-        return 0.05
-    except StopIteration:
-        facts["is_done"] = True
-    except Exception:
-        traceback.print_exc()
-    (OUT / "first_minutes.json").write_text(json.dumps(facts, indent=1))
-    bpy.ops.wm.quit_blender()
-    return None
-
-
 if __name__ == "__main__":
-    bpy.context.preferences.view.show_splash = False  # before it is shown: it would take the first click
-    walking = walk()
-    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
+    take((three_clicks, open_head, grow_on_the_head, comb, shade, write_and_export))

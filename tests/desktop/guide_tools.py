@@ -1,13 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Each guide tool in Sculpt Mode in a window: run from its menu, redone with another value, undone, redone and undone.
 
-Run by a desktop Blender: guide_tools.py -- ZIP OUT. Writes guide_tools.json with what the tests want to know, and a
-picture of the menu. Afterwards the hair is combed without its styles, made tubes, saved as an asset and applied.
+Run by a desktop Blender as steps.py says. Writes a picture of the menu. Afterwards the hair is combed without its
+styles, made tubes, saved as an asset and applied.
 """
 
-import json
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
@@ -16,21 +14,21 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop import grooms  # noqa: E402
+from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
+    curve_points,
     drag,
     in_viewport,
     install,
+    key,
+    of_kind,
     places,
     take_picture,
     viewport,
     wait,
     wait_for,
-    window,
 )
-
-ZIP, OUT = sys.argv[sys.argv.index("--") + 1 :]
-OUT = Path(OUT)
 
 # In the order of the menu: what the redo panel changes.
 TOOLS = {
@@ -45,19 +43,12 @@ TOOLS = {
     "copy_guide_shape": {"amount": 0.5},
 }
 
-facts = {"tools": {}, "tubes": {}, "shelf": {}}
-
-
-def of_kind(kind):
-    return next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind)
+facts |= {"tools": {}, "tubes": {}, "shelf": {}}
 
 
 def guides():
     """(G, 41, 3) positions."""
-    curves = of_kind("GUIDES").data
-    values = np.empty((len(curves.points), 3), np.float32)
-    curves.attributes["position"].data.foreach_get("vector", values.ravel())
-    return values.reshape(len(curves.curves), -1, 3)
+    return curve_points(of_kind("GUIDES")).reshape(len(of_kind("GUIDES").data.curves), -1, 3)
 
 
 def bound():
@@ -68,22 +59,7 @@ def strands():
     """(S, P, 3) positions as viewports show them, which may not be written yet."""
     if bound() is not None:
         return bound().shown.points.copy()
-    curves = of_kind("HAIR").data
-    values = np.empty((len(curves.points), 3), np.float32)
-    curves.attributes["position"].data.foreach_get("vector", values.ravel())
-    return values.reshape(len(curves.curves), -1, 3)
-
-
-def key(name, **held):
-    """A key over the middle of the viewport, pressed and let go."""
-    _area, region = viewport()
-    at = {"x": region.x + region.width // 2, "y": region.y + region.height // 2}
-    window().event_simulate(type="MOUSEMOVE", value="NOTHING", **at)
-    yield
-    window().event_simulate(type=name, value="PRESS", **at, **held)
-    yield
-    window().event_simulate(type=name, value="RELEASE", **at, **held)
-    yield
+    return curve_points(of_kind("HAIR")).reshape(len(of_kind("HAIR").data.curves), -1, 3)
 
 
 def are_in(rows, others):
@@ -167,7 +143,6 @@ def use(name):
     done["hair after redo"] = float(np.abs(strands() - hair_after).max())
     yield from key("Z", ctrl=True)
     yield from wait(0.2)
-    print(f"guide_tools: {name}", flush=True)
 
 
 def comb_straight():
@@ -211,32 +186,15 @@ def comb_straight():
     facts["status"] = of_kind("HAIR").data.vellus.status
 
 
-def walk():
-    """All of it; between its steps Blender handles its events and redraws."""
-    yield from groom()
+def tools():
     for name in TOOLS:
         yield from use(name)
-    yield from comb_straight()
+
+
+def made_of_it():
     yield from grooms.tubes(of_kind("HAIR"), facts["tubes"])
     yield from grooms.shelf(of_kind("HAIR"), OUT / "library", facts["shelf"])
-    facts["is done"] = True
-
-
-def advance(steps):
-    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
-    try:
-        next(steps)
-        return 0.02
-    except StopIteration:
-        pass
-    except Exception:
-        traceback.print_exc()
-    (OUT / "guide_tools.json").write_text(json.dumps(facts, indent=1))
-    bpy.ops.wm.quit_blender()
-    return None
 
 
 if __name__ == "__main__":
-    bpy.context.preferences.view.show_splash = False
-    walking = walk()
-    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
+    take((groom, tools, comb_straight, made_of_it), pause=0.02)

@@ -1,17 +1,12 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Settings in random order in a window with a clean profile: Blender comes to the end, and nothing raises."""
 
-import json
-import shutil
-from pathlib import Path
-
 import pytest
 
-from tools import build_extension, desktop_blender
+from tests.desktop import walks
+from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
-
-SCRIPT = Path(__file__).with_name("any_setting.py")
 
 # Steps that one Blender takes, with one or two redraws each; the next goes on with the file that it saved.
 PARTS = {"opengl": 50, "vulkan": 25}
@@ -22,29 +17,20 @@ def check(desktop, extension, profile, seed, step_count, limit, backend="opengl"
 
     limit: of a part [s]. The steps are the same with either backend.
     """
-    folder = build_extension.ROOT / "out" / "desktop" / f"any_setting_{seed}_{step_count}_{backend}"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    told = []
-    for end in [*range(PARTS[backend], step_count, PARTS[backend]), step_count]:
-        path = folder / f"any_setting_{end}.log"
-        status = desktop.run(
-            SCRIPT,
-            [str(seed), str(end), folder, extension],
-            backend=backend,
-            profile=profile,
-            log=path,
-            limit=limit,
-            size=(640, 400),
-        )
-        log = path.read_text(errors="replace")
-        report = json.loads((folder / f"any_setting_{seed}.json").read_text())
-        assert status == 0 and report["is_done"] and report["step_count"] == end, log[-4000:]
-        told.append(log)
+    walk = walks.take(
+        *(desktop, "any_setting", extension, profile, backend),
+        parts=[str(end) for end in [*range(PARTS[backend], step_count, PARTS[backend]), step_count]],
+        more=[str(seed)],
+        folder=f"any_setting_{seed}_{step_count}_{backend}",
+        limit=limit,
+        size=(640, 400),
+    )
+    walk.assert_done()
+    assert walk.facts["step_count"] == step_count
     # What raises is in the console alone, and the walk goes on after it.
-    told = "".join(told)
-    assert "Traceback" not in told, told[max(told.index("Traceback") - 1000, 0) :][:8000]
-    assert "Not freed memory blocks" not in told, told[-4000:]
+    log = walk.log
+    assert "Traceback" not in log, log[max(log.index("Traceback") - 1000, 0) :][:8000]
+    assert "Not freed memory blocks" not in log, log[-4000:]
 
 
 def test_a_few_random_settings(desktop, extension, new_profile):

@@ -2,32 +2,17 @@
 """The guide tools in a window: each from its menu, redone, undone; hair that is combed without its styles; and then
 tubes of it, and the groom in a library."""
 
-import json
-import re
-import shutil
-
 import pytest
 
-from tests.desktop.conftest import ROOT
+from tests.desktop import walks
 from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
-SCRIPT = ROOT / "tests" / "desktop" / "guide_tools.py"
 TOOLS = (
     *("guide_length", "trim_guides", "smooth_guides", "lift_guides", "attract_guides", "drape_guides"),
     *("change_guide_count", "mirror_guides", "copy_guide_shape"),
 )
-
-
-class Walk:
-    """What came of it: `facts`, and the `log`."""
-
-    def __init__(self, folder, status):
-        self.status = status
-        self.log = (folder / "guide_tools.log").read_text(errors="replace")
-        facts = folder / "guide_tools.json"
-        self.facts = json.loads(facts.read_text()) if facts.exists() else {}
 
 
 # Tools draw nothing of their own: Vulkan, by software, takes as long again and is for the long run.
@@ -38,29 +23,13 @@ class Walk:
     ],
 )
 def walk(request, desktop, extension, new_profile):
-    """The `Walk` with one backend; its pictures are in out/desktop."""
-    folder = ROOT / "out" / "desktop" / f"guide_tools_{request.param}"
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True)
-    status = desktop.run(
-        SCRIPT,
-        [extension, folder],
-        backend=request.param,
-        profile=new_profile(),
-        log=folder / "guide_tools.log",
-        limit=300,
-        size=(760, 540),
-    )
-    return Walk(folder, status)
+    """The `Walk` with one backend."""
+    return walks.take(desktop, "guide_tools", extension, new_profile(), request.param, size=(760, 540))
 
 
 def test_it_comes_to_its_end(walk):
-    assert walk.status == 0 and walk.facts.get("is done") and walk.facts["status"] == "", walk.log[-4000:]
-
-
-def test_the_console_tells_of_no_error(walk):
-    told = r"Vellus:|Traceback|\w*(Error|Exception)\b(?! \(0x)|<\w+>: \(EXR_ERR"
-    assert [line for line in walk.log.splitlines() if re.match(told, line)] == []
+    walk.assert_done()
+    assert walk.facts["status"] == "" and walk.complaints() == []
 
 
 @pytest.mark.parametrize("name", TOOLS)

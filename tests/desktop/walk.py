@@ -1,25 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """What an artist does in a window: installs the extension, grows hair on the head, combs it, saves and loads.
 
-Run by a desktop Blender: walk.py -- PART ZIP HEAD OUT SITE_PACKAGES. Writes to OUT a picture of the screen for each
-step, what the tests need (facts.json) and the outcome of the shaders' tests (twins.xml). Each of the `PARTS` runs in a
-Blender of its own: a hundred redraws in a row crash Blender 5.2.2 on Mesa's software Vulkan, with or without add-on.
+Run by a desktop Blender as steps.py says, with one of `PARTS`; MORE is the folder of this Python's packages. Writes a
+picture of the screen for each step, and the outcome of the shaders' tests (twins.xml).
 """
 
-import json
 import os
 import sys
-import traceback
 from pathlib import Path
 
 import bpy
 import numpy as np
 from mathutils import Vector
 
-MODULE = "bl_ext.user_default.vellus"
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
+from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
+    MODULE,
+    curve_points,
     drag,
     import_head,
     in_viewport,
@@ -34,9 +33,6 @@ from tests.desktop.window import (  # noqa: E402
     wait_for,
 )
 
-PART, ZIP, HEAD, OUT, SITE_PACKAGES = sys.argv[sys.argv.index("--") + 1 :]
-OUT = Path(OUT)
-
 # Enough to cover the head; software drivers take their time for each.
 STRAND_COUNT = 3000
 RADIUS = 4e-4
@@ -44,8 +40,7 @@ RADIUS = 4e-4
 # Seconds after which hair that follows a stroke has been written.
 _WRITTEN = 1.0
 
-FACTS = OUT / "facts.json"
-facts = json.loads(FACTS.read_text()) if FACTS.exists() else {"steps": {}, "done": []}
+facts.setdefault("steps", {})
 
 
 def screen(name):
@@ -54,11 +49,8 @@ def screen(name):
 
 
 def points(name):
-    """(N, 3) positions of an object's curves, which has the world's coordinates."""
-    curves = bpy.data.objects[name].data
-    values = np.empty((len(curves.points), 3), np.float32)
-    curves.attributes["position"].data.foreach_get("vector", values.ravel())
-    return values
+    """(N, 3) positions of an object's curves."""
+    return curve_points(bpy.data.objects[name])
 
 
 def show(step, **more):
@@ -92,7 +84,7 @@ def head():
     """The sample's head alone, in the middle of the view, lit by a sun over the viewer's shoulder."""
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
-    head_object = import_head(HEAD)
+    head_object = import_head()
     sun = bpy.data.objects.new("Sun", bpy.data.lights.new("Sun", "SUN"))
     sun.data.energy, sun.rotation_euler = 4.0, (0.9, 0.2, 0.4)
     bpy.context.scene.collection.objects.link(sun)
@@ -318,7 +310,7 @@ def switch_off():
 
 def twins():
     """The tests of the shaders' functions, on this window's backend."""
-    sys.path += [str(ROOT), SITE_PACKAGES]  # behind what this Blender has of its own
+    sys.path += [str(ROOT), *MORE]  # behind what this Blender has of its own
     os.chdir(ROOT)  # where pytest finds its settings
     os.environ["PYTEST_DISABLE_PLUGIN_AUTOLOAD"] = "1"  # those that are there are built for another Python
     import pytest
@@ -367,28 +359,5 @@ PARTS = {
 }
 
 
-def walk():
-    """The steps of a part; between them Blender handles its events and redraws."""
-    for step in PARTS[PART]:
-        print(f"walk: {step.__name__}", flush=True)
-        yield from step()
-
-
-def advance(steps):
-    """Called by Blender between redraws; ends Blender after the last step, or the first that fails."""
-    try:
-        next(steps)
-        return 0.05
-    except StopIteration:
-        facts["done"].append(PART)
-    except Exception:
-        traceback.print_exc()
-    FACTS.write_text(json.dumps(facts, indent=1, default=int))
-    bpy.ops.wm.quit_blender()
-    return None
-
-
 if __name__ == "__main__":
-    bpy.context.preferences.view.show_splash = False
-    walking = walk()
-    bpy.app.timers.register(lambda: advance(walking), first_interval=1.0, persistent=True)
+    take(PARTS[PART])

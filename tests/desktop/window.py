@@ -4,6 +4,7 @@
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -11,8 +12,12 @@ import numpy as np
 # Seconds after which a window that was drawn is seen.
 _SHOWN = 0.5
 
-
 MODULE = "bl_ext.user_default.vellus"
+
+_HEAD = Path(__file__).resolve().parents[2] / "blend_samples" / "head.obj"
+
+# The hairline of the sample's head from the side, (y, z) [m], from the forehead to the nape; the face looks to -Y.
+HAIRLINE = np.array([(-0.17, 0.82), (-0.105, 0.787), (-0.068, 0.74), (-0.03, 0.744), (0.0, 0.69), (0.04, 0.68)])
 
 
 def install(path):
@@ -38,10 +43,37 @@ def in_viewport():
     return bpy.context.temp_override(window=window(), area=area, region=region)
 
 
-def import_head(path):
+def sidebar():
+    """The 3D view's region of panels."""
+    area, _region = viewport()
+    return next(region for region in area.regions if region.type == "UI")
+
+
+def activate(chosen):
+    """Make an object active, and the only one that is selected."""
+    with in_viewport():
+        bpy.ops.object.select_all(action="DESELECT")
+    chosen.select_set(True)
+    bpy.context.view_layer.objects.active = chosen
+
+
+def of_kind(kind):
+    """The first object of hair ("HAIR") or guides ("GUIDES"), None where there is none."""
+    return next((o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == kind), None)
+
+
+def curve_points(curves_object):
+    """(N, 3) positions of an object's curves, in its own coordinates."""
+    curves = curves_object.data
+    values = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", values.ravel())
+    return values
+
+
+def import_head():
     """The sample's head, from its OBJ file."""
     with in_viewport():
-        bpy.ops.wm.obj_import(filepath=path)
+        bpy.ops.wm.obj_import(filepath=str(_HEAD))
         head = bpy.context.object
         bpy.ops.object.transform_apply(rotation=True)
     head.name = "Head"
@@ -95,6 +127,28 @@ def drag(start, end, steps=12):
             yield
     window().event_simulate(type="LEFTMOUSE", value="RELEASE", x=x, y=y)
     yield
+
+
+def click(x, y):
+    """The left mouse button, pressed and let go at a place of the window."""
+    place = np.array([x, y])
+    yield from drag(place, place, steps=1)
+    yield from wait(0.3)
+
+
+def key(name, place=None, **held):
+    """A key, pressed and let go while the mouse is at a place, by default in the middle of the 3D view.
+
+    held: `ctrl`, `shift`.
+    """
+    _area, region = viewport()
+    x, y = place or (region.x + region.width // 2, region.y + region.height // 2)
+    at = {"x": int(x), "y": int(y)}
+    window().event_simulate(type="MOUSEMOVE", value="NOTHING", **at)
+    yield
+    for value in ("PRESS", "RELEASE"):
+        window().event_simulate(type=name, value=value, **at, **held)
+        yield
 
 
 def press(key, in_window, area):

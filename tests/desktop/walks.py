@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A walk through the add-on in a window of Blender: a script of this folder that is run there, and what came of it."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+from tools import build_extension
+
+SCRIPTS = Path(__file__).parent
+
+# Lines of the console by which the add-on, Python and OpenEXR complain.
+_COMPLAINT = re.compile(r"Vellus:|Traceback|\w*(Error|Exception)\b(?! \(0x)|<\w+>: \(EXR_ERR")
+
+
+class Walk:
+    """What came of a walk: `facts` that its script noted, the `log` of all it printed, its pictures in `folder`."""
+
+    def __init__(self, folder, parts):
+        self.folder, self.parts = folder, list(parts)
+        self.facts, self.log, self.statuses = {"done": []}, "", []
+
+    def read(self, log, status):
+        """Add what a part printed and noted, and Blender's exit status."""
+        self.log += log.read_text(errors="replace")
+        self.statuses.append(status)
+        facts = self.folder / "facts.json"
+        if facts.exists():
+            self.facts = json.loads(facts.read_text())
+
+    def is_done(self, part):
+        """Whether a part came to its end, and Blender ended as it does when nothing is wrong."""
+        return part in self.facts["done"] and not any(self.statuses)
+
+    def complaints(self):
+        """Lines of the console that tell of an error, or of what the add-on refused."""
+        return [line for line in self.log.splitlines() if _COMPLAINT.match(line)]
+
+    def assert_done(self):
+        """Every part is done."""
+        assert all(map(self.is_done, self.parts)), self.log[-4000:]
+
+
+def take(desktop, name, extension, profile, backend, *, parts=("all",), more=(), folder=None, **details):
+    """Run the parts of a script of this folder, each in a Blender of its own, up to one that fails; returns the `Walk`.
+
+    desktop: the `DesktopBlender`; extension: the zip; more: words of the script after those that all have; folder: its
+    name in out/desktop, by default that of the script and the backend; details: of `DesktopBlender.run`.
+    """
+    made = build_extension.ROOT / "out" / "desktop" / (folder or f"{name}_{backend}")
+    shutil.rmtree(made, ignore_errors=True)
+    made.mkdir(parents=True)
+    script, walk = SCRIPTS / f"{name}.py", Walk(made, parts)
+    for part in parts:
+        log = made / f"{part}.log"
+        status = desktop.run(
+            script, [part, extension, made, *more], backend=backend, profile=profile, log=log, **details
+        )
+        walk.read(log, status)
+        if not walk.is_done(part):
+            break
+    return walk
