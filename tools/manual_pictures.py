@@ -5,7 +5,7 @@ Grows hair on the sample's head, opens it in a window of a desktop Blender with 
 of each panel in a sidebar of `SIDEBAR_WIDTH`. With the name `windows`, also build/manual/window_*.png of the whole
 window for each kind of active object, to look for labels that are cut. With the name `five_minutes`, README's pictures
 of its five minutes alone: docs/five_minutes/*.png, cut out of what `tests/desktop/first_minutes.py` sees in a window;
-with `curly_hair` those of the page Curly Hair, of what `tests/desktop/test_curly_hair.py` saw when it ran last.
+with `curly_hair` those of the page Curly Hair, of what `tests/desktop/curly_hair.py` sees.
 """
 
 import shutil
@@ -28,7 +28,7 @@ CURLY_HAIR = (
     *("bare_head", "hair_system", "combed", "shoulder_length", "fringe"),
     *("locks", "curls", "smooth_curls", "painted", "look"),
 )
-CURLY_SEEN = ROOT / "out" / "desktop" / "curly_hair_opengl"
+CURLY_PARTS = ("cut", "curl")
 CURLY_SIZE = (560, 373)
 
 # (left, top, right, bottom) pixels of its window: the 3D view with the top of its sidebar; and the size it is shown in.
@@ -57,14 +57,14 @@ def start():
     sys.path.insert(0, str(ROOT))
     from tools import build_extension, compile_kernels, desktop_blender
 
-    if sys.argv[1:] == ["curly_hair"]:
-        return cut_curly_hair()
     folder = ROOT / "build" / "manual"
     folder.mkdir(parents=True, exist_ok=True)
     extension = build_extension.build(compile_kernels.this_platform())
     blender = desktop_blender.find_or_install()
     if sys.argv[1:] == ["five_minutes"]:
         return take_five_minutes(blender, extension, folder / "five_minutes")
+    if sys.argv[1:] == ["curly_hair"]:
+        return take_curly_hair(blender, extension, folder / "curly_hair")
     if len(sys.argv) == 1 or not (folder / "head.blend").exists():
         save_sample(folder / "head.blend")
     arguments = [extension, folder / "head.blend", *sys.argv[1:]]
@@ -78,15 +78,8 @@ def take_five_minutes(blender, extension, folder):
     """Write README's pictures of the five minutes; returns the exit status."""
     import bpy
 
-    profile = folder / "profile"
-    shutil.rmtree(folder, ignore_errors=True)
-    profile.mkdir(parents=True)
-    script = ROOT / "tests" / "desktop" / "first_minutes.py"
-    arguments = ["all", extension, folder, FIVE_MINUTES_SAMPLES]
-    log = folder / "log.txt"
-    status = blender.run(script, arguments, profile=profile, limit=1200, size=WINDOW_SIZE, log=log)
-    if status:
-        return f"first_minutes.py ended with status {status}, see {log}"
+    if error := take_walk(blender, "first_minutes", ["all"], extension, folder, FIVE_MINUTES_SAMPLES):
+        return error
     left, top, right, bottom = SEEN_PART
     for step, name in FIVE_MINUTES.items():
         seen = read(folder / f"first_{step}.png")[top:bottom, left:right]
@@ -96,12 +89,28 @@ def take_five_minutes(blender, extension, folder):
     return 0
 
 
-def cut_curly_hair():
+def take_curly_hair(blender, extension, folder):
     """Write the pictures of the page Curly Hair; returns the exit status."""
+    if error := take_walk(blender, "curly_hair", CURLY_PARTS, extension, folder):
+        return error
     left, top, right, bottom = SEEN_PART
     for step in CURLY_HAIR:
-        write(MANUAL / f"curly_{step}.png", read(CURLY_SEEN / f"{step}.png")[top:bottom, left:right], CURLY_SIZE)
+        write(MANUAL / f"curly_{step}.png", read(folder / f"{step}.png")[top:bottom, left:right], CURLY_SIZE)
     return 0
+
+
+def take_walk(blender, name, parts, extension, folder, *more):
+    """Run parts of a script of tests/desktop in a window as large as pictures need; returns what went wrong, or ""."""
+    profile = folder / "profile"
+    shutil.rmtree(folder, ignore_errors=True)
+    profile.mkdir(parents=True)
+    script, log = ROOT / "tests" / "desktop" / f"{name}.py", folder / "log.txt"
+    for part in parts:
+        words = [part, extension, folder, *more]
+        status = blender.run(script, words, profile=profile, limit=1200, size=WINDOW_SIZE, log=log)
+        if status:
+            return f"{name}.py ended with status {status}, see {log}"
+    return ""
 
 
 def read(path):

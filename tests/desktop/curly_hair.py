@@ -2,8 +2,8 @@
 """The manual's page Curly Hair in ten steps, in a window: from a bare head to curly hair with a fringe.
 
 Run by a desktop Blender as steps.py says, with one of `PARTS`. Writes a picture of the screen for each step, of which
-`tools/manual_pictures.py curly_hair` makes those of the page. After the ten steps a style is keyed, moved and undone, and
-hair is combed with its styles on.
+`tools/manual_pictures.py curly_hair` makes those of the page. After the ten steps a style is keyed, moved and undone,
+and hair is combed with its styles on.
 """
 
 import math

@@ -8,15 +8,14 @@ from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
-# Pictures of the manual are taken with OpenGL.
-SIZES = {"opengl": (1600, 1000), "vulkan": (1100, 700)}
+SIZE = (1100, 700)  # of the window [pixels]: software drivers take their time for each
 
 
 @pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
 def walk(request, desktop, extension, new_profile):
     """The `Walk` with one backend."""
-    parts, size = ("cut", "curl", "beyond"), SIZES[request.param]
-    return walks.take(desktop, "curly_hair", extension, new_profile(), request.param, parts=parts, limit=600, size=size)
+    parts = ("cut", "curl", "beyond")
+    return walks.take(desktop, "curly_hair", extension, new_profile(), request.param, parts=parts, limit=600, size=SIZE)
 
 
 def test_it_comes_to_its_end(walk):

@@ -11,6 +11,8 @@ pytestmark = pytest.mark.desktop
 # Strands in single precision that are bound anew to the same guides, in an object of 0.2 m.
 ROUNDING = 1e-6
 
+SIZE = (800, 500)  # of the window [pixels]: software drivers take their time for each
+
 # Of the pixels with hair: rounding flips single samples at the edges of strands.
 FLIPPED = 0.002
 
@@ -19,7 +21,7 @@ FLIPPED = 0.002
 def walk(request, desktop, extension, new_profile):
     """The `Walk` with one backend."""
     parts = ("play", "bake", "end")
-    return walks.take(desktop, "dynamics", extension, new_profile(), request.param, parts=parts, limit=400)
+    return walks.take(desktop, "dynamics", extension, new_profile(), request.param, parts=parts, limit=400, size=SIZE)
 
 
 def test_it_comes_to_its_end(walk):

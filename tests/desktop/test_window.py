@@ -18,6 +18,8 @@ from tools import desktop_blender
 
 pytestmark = pytest.mark.desktop
 
+SIZE = (960, 640)  # of the window [pixels]: software drivers take their time for each
+
 # Steps with a picture without hair beside the one with it; and what Blender itself draws of hair then.
 STEPS = {
     "grown": "BOUNDS",
@@ -41,6 +43,7 @@ def walk(request, desktop, extension, tmp_path_factory):
         folder=request.param,
         folders=[packages],
         limit=600,
+        size=SIZE,
     )
 
 

@@ -27,6 +27,7 @@ from tests.desktop.window import (  # noqa: E402
     places,
     press,
     rectangle,
+    shaders_compiled,
     take_picture,
     viewport,
     wait,
@@ -132,7 +133,7 @@ def shading_modes():
     area, _region = viewport()
     for mode in ("WIREFRAME", "SOLID", "MATERIAL", "RENDERED"):
         area.spaces.active.shading.type = mode
-        yield from wait(12.0 if mode in {"MATERIAL", "RENDERED"} else 0.0)  # EEVEE compiles beside
+        yield from shaders_compiled()
         screen(f"mode_{mode.lower()}")
     area.spaces.active.shading.type = "SOLID"
     area.spaces.active.overlay.show_overlays = False

@@ -104,6 +104,13 @@ def wait_for(happened, seconds=60.0):
         yield
 
 
+def shaders_compiled():
+    """Leave Blender to itself until EEVEE has no shader left to compile: another pass may ask for the next."""
+    yield from wait(1.0)
+    while bpy.app.is_job_running("SHADER_COMPILATION"):
+        yield from wait(1.0)
+
+
 def rectangle(region):
     """(left, bottom, width, height) of a region [pixels]."""
     return [region.x, region.y, region.width, region.height]

@@ -72,8 +72,8 @@ def nodes(nodes_file, scene):
 
 @pytest.fixture
 def guides(sphere, nodes):
-    """60 guides on the sphere; their object is active."""
-    bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5)
+    """60 guides on the sphere, at random: to relax them takes most of the time. Their object is active."""
+    bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5, relax_iterations=0)
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     return bpy.data.objects["Guides"]
 
