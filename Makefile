@@ -23,7 +23,7 @@ demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and 
 # All tests load kernels that are compiled once, in place of each process compiling them.
 test: $(installed) ## all tests except long benchmarks and tests in a window, in up to four processes
 	$(if $(ARGS),,$(python) tools/build_extension.py --kernels)
-	$(python) -m pytest -m "not long and not desktop and not farm" --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
+	$(python) -m pytest -m "not long and not desktop and not farm" --ignore tests/desktop --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder $(ARGS)
 
 farm: $(installed) ## tests on a farm of this machine's own: Slurm, OpenJobDescription, Flamenco in VELLUS_FLAMENCO
 	$(python) -m pytest -m farm tests/command_line $(ARGS)

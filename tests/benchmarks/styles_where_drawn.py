@@ -24,7 +24,7 @@ from hair_addon.blender.gpu.strand_textures import upload_strands
 from hair_addon.blender.gpu.strands import style_maker
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, smooth, trim, wet
 from tests.support import drawn_strands
-from tests.support.styled import head
+from tests.support.strands.styled import head
 
 STACKS = {
     "none": (),

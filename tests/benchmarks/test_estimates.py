@@ -15,8 +15,8 @@ from hair_addon.core.geometry import hash_grid
 from hair_addon.core.geometry.mesh import TriMesh
 from hair_addon.core.grooming import cost, groom
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
-from tests.support.hair import generate_hair
 from tests.support.meshes import flat_grid
+from tests.support.strands.hair import generate_hair
 
 FACTOR = 3.0  # that a ratio between two sizes may be off by
 
@@ -71,7 +71,7 @@ from pathlib import Path
 sys.path.insert(0, ".")
 from hair_addon.core.grooming import groom
 from tests.benchmarks.test_estimates import hills, place
-from tests.support.hair import generate_hair
+from tests.support.strands.hair import generate_hair
 
 def most():  # not ru_maxrss, which a process inherits from the one that started it
     lines = Path("/proc/self/status").read_text().splitlines()

@@ -11,7 +11,7 @@ from hair_addon.core.grooming import following
 from hair_addon.core.styling import clump, curl, frizz, kinds, steps
 from tests.benchmarks import hair_peers
 from tests.benchmarks.test_hair_speed import best_times, report
-from tests.support.styled import head
+from tests.support.strands.styled import head
 
 STRAND_COUNT = 100_000
 THREE = (clump.Settings(levels=1), curl.Settings(), frizz.Settings())

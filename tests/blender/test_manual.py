@@ -11,7 +11,7 @@ import pytest
 from bl_operators import wm
 
 from hair_addon.blender import manual
-from tests.support import spoken
+from tests.support.interface import spoken
 from tools import manual_pages
 
 LARGEST_PICTURE = 150_000  # bytes

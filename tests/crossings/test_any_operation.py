@@ -10,11 +10,11 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 
-@pytest.mark.parametrize("seed", [1, pytest.param(3, marks=pytest.mark.long)])
-def test_random_operations_raise_no_exception(seed):
+@pytest.mark.parametrize("run_count, seed", [(3, 1), pytest.param(10, 3, marks=pytest.mark.long)])
+def test_random_operations_raise_no_exception(run_count, seed):
     """200 operations a run; the seed fixes the way."""
     walked = subprocess.run(
-        [sys.executable, "-u", "-m", "tests.support.walk.walk_operations", "5", "200", str(seed)],
+        [sys.executable, "-u", "-m", "tests.support.walk.walk_operations", str(run_count), "200", str(seed)],
         cwd=ROOT,
         capture_output=True,
         text=True,

@@ -14,7 +14,7 @@ from hair_addon.blender.render import hair_cache
 from hair_addon.blender.ui import panels
 from tests.support.dynamics.following import update
 from tests.support.exchange.imported import curves_object, lines_on, select, stored, use, world
-from tests.support.layout import draw_all
+from tests.support.interface.layout import draw_all
 from tests.support.reading import write_points
 
 

@@ -14,6 +14,7 @@ import tests.support.examples  # noqa: F401 (for what it sets)
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, scene_lights
 from hair_addon.blender.host import running
+from hair_addon.core.grooming.groom import GuideSettings
 from tests.support.exchange.imported import curves_object, lines_on
 from tests.support.guide_tools import wave
 from tests.support.reading import vertex_positions
@@ -71,9 +72,19 @@ def nodes(nodes_file, scene):
 
 
 @pytest.fixture
-def guides(sphere, nodes):
-    """60 guides on the sphere, at random: to relax them takes most of the time. Their object is active."""
-    bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5, relax_iterations=0)
+def relax_iterations():
+    """How often the roots of `guides` are relaxed: never, as it would be half of the time of most tests."""
+    return 0
+
+
+# For tests of what guides that are spread evenly do.
+even_guides = pytest.mark.parametrize("relax_iterations", [GuideSettings().relax_iterations])
+
+
+@pytest.fixture
+def guides(sphere, nodes, relax_iterations):
+    """60 guides on the sphere; their object is active."""
+    bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5, relax_iterations=relax_iterations)
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     return bpy.data.objects["Guides"]
 

@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.core.errors import HairError
-from tests.support.layout import draw
+from tests.support.interface.layout import draw
 from tests.support.reading import points, write_points
 
 

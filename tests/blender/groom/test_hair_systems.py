@@ -8,7 +8,7 @@ from hair_addon.blender.groom.hair_systems import systems_of
 from hair_addon.blender.groom.selection import object_of, surface_of
 from hair_addon.blender.materials import looks
 from tests.blender.groom.test_edits import activate
-from tests.support.layout import draw, draw_all
+from tests.support.interface.layout import draw, draw_all
 
 
 def add_system(name, strand_count=30):

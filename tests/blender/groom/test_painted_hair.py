@@ -7,7 +7,7 @@ import pytest
 from hair_addon.blender.groom import selection
 from hair_addon.blender.settings import style_items
 from hair_addon.core.styling import curl, frizz, trim
-from tests.support.layout import draw
+from tests.support.interface.layout import draw
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ from hair_addon.core.long_work import Stopped, run_now
 from tests.support.dynamics.following import grow
 from tests.support.dynamics.swung import simulate
 from tests.support.exchange.delivered import without_addon
-from tests.support.modal import Operator, drive
+from tests.support.interface.modal import Operator, drive
 from tests.support.reading import evaluated_points, everything, read_picture
 from tests.support.rendering import light_up
 

@@ -19,7 +19,7 @@ from hair_addon.blender.live import (
 from hair_addon.core.long_work import run_now
 from tests.blender.data.strands.test_partings import draw_line
 from tests.support.dynamics.swung import simulate, swing
-from tests.support.layout import draw
+from tests.support.interface.layout import draw
 from tests.support.reading import points, write_points
 
 

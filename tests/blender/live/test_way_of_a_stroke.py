@@ -8,8 +8,8 @@ import pytest
 from hair_addon.blender.host import running
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import hair_cache
+from tests.support.interface.ways import Way
 from tests.support.reading import points, write_points
-from tests.support.ways import Way
 
 # Data that goes along has its own methods: whoever is handed strands asks them.
 ALONG = "core/geometry/strands.py"

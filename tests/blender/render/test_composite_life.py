@@ -8,7 +8,7 @@ import pytest
 import hair_addon
 from hair_addon.blender.live import handlers, refused_hair
 from hair_addon.blender.ui import menus
-from tests.support.layout import draw
+from tests.support.interface.layout import draw
 from tests.support.rendering import configure
 
 

@@ -9,7 +9,7 @@ from hair_addon import api
 from hair_addon.blender.groom.dynamics import guide_baking
 from hair_addon.blender.settings import properties, shared_wetness, style_items
 from hair_addon.blender.ui import panels
-from tests.support.layout import draw_all
+from tests.support.interface.layout import draw_all
 from tests.support.reading import points
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from hair_addon.blender.settings import translations
 from hair_addon.core.errors import HairError
-from tests.support import spoken
+from tests.support.interface import spoken
 
 LANGUAGES = translations.dictionaries()
 

@@ -10,8 +10,8 @@ import pytest
 
 from hair_addon.blender.settings import translations
 from hair_addon.blender.ui import panels, setting_rows
-from tests.support import spoken
-from tests.support.layout import draw
+from tests.support.interface import spoken
+from tests.support.interface.layout import draw
 from tools import manual_pages
 
 BRITISH = re.compile(

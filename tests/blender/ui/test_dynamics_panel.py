@@ -10,7 +10,7 @@ from hair_addon.core.dynamics.collision.collider_settings import ColliderSetting
 from hair_addon.core.dynamics.rod.settings import DynamicsSettings
 from hair_addon.core.dynamics.rod.stiffness_advice import bend_under_weight
 from hair_addon.core.params import declared
-from tests.support.layout import draw, draw_all
+from tests.support.interface.layout import draw, draw_all
 
 OURS = [panel for panel in panels.CLASSES if panel.bl_idname.startswith("VELLUS_PT_dynamics")]
 

@@ -17,7 +17,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.long_work import Job, Stage, run_now
-from tests.support.modal import ESC, TIMER, Operator, drive
+from tests.support.interface.modal import ESC, TIMER, Operator, drive
 from tests.support.reading import points, snapshot
 
 pytestmark = pytest.mark.usefixtures("coarse_shadows")

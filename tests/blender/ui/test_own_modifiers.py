@@ -4,7 +4,7 @@
 import bpy
 import pytest
 
-from tests.support.layout import draw
+from tests.support.interface.layout import draw
 
 NODE_ASSETS = bpy.utils.system_resource("DATAFILES", path="assets/nodes") + "/procedural_hair_node_assets.blend"
 

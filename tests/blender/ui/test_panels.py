@@ -22,7 +22,7 @@ from hair_addon.core.shading import appearance
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.presets import PRESETS
 from hair_addon.core.shading.tables import lookup_tables
-from tests.support.layout import Context, Layout, draw, draw_all
+from tests.support.interface.layout import Context, Layout, draw, draw_all
 
 TAB = [panel for panel in panels.CLASSES if panel.bl_region_type == "UI"]
 

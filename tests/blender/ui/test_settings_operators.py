@@ -16,7 +16,7 @@ from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.shading.appearance import Appearance
 from hair_addon.core.shading.tables import lookup_tables
 from hair_addon.core.styling import clump, curl
-from tests.support.layout import draw_all
+from tests.support.interface.layout import draw_all
 from tests.support.reading import points, snapshot
 
 WANTED = GroomSettings(
@@ -47,7 +47,9 @@ def test_settings_are_saved_as_they_are(hair, tmp_path, active):
     assert bpy.ops.vellus.save_groom_settings(filepath=str(tmp_path / "groom")) == {"FINISHED"}
     saved = settings_file.read(tmp_path / "groom.json")
     assert saved == settings_of()
-    assert saved.guides == GuideSettings(guide_count=60, length=0.5, gravity=groom_defaults.FUR_GRAVITY)
+    assert saved.guides == GuideSettings(
+        guide_count=60, length=0.5, gravity=groom_defaults.FUR_GRAVITY, relax_iterations=0
+    )
     assert saved.hair == HairSettings(strand_count=500, radius=0.004, influence_distance=0.03)
     assert saved.appearance == Appearance(mode="classic")
     assert saved.tables == lookup_tables.Settings()

@@ -21,7 +21,7 @@ from hair_addon.core.styling import clump, clump_trees, curl, frizz, lean, trim,
 from hair_addon.core.styling.base import ProfiledSettings, scaled
 from hair_addon.core.styling.kinds import KINDS, OFFERS, kind_of
 from tests.support.always import operate
-from tests.support.layout import draw, draw_all
+from tests.support.interface.layout import draw, draw_all
 from tests.support.reading import points, write_points
 
 SPHERE_FACTOR = groom_defaults.FUR_LENGTH * math.sqrt(4.0 * math.pi) / 0.12  # of the sphere's default hair length

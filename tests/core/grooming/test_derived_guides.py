@@ -10,8 +10,8 @@ from hair_addon.core.grooming.derived_guides import derive
 from hair_addon.core.grooming.groom import HairSettings
 from hair_addon.core.grooming.strand_clusters import representatives
 from hair_addon.core.interpolation import guide_fitting, interpolation
-from tests.support.combed import lengths, standing
 from tests.support.meshes import subdivided_sphere
+from tests.support.strands.combed import lengths, standing
 
 STRANDS = 400
 

@@ -17,9 +17,9 @@ from hair_addon.core.geometry.strands import Strands
 from hair_addon.core.grooming import following, groom
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.kernels import kernel_setup
-from tests.support import hair as hair_of_arrays
 from tests.support.devices import DEVICE
-from tests.support.evenness import measure
+from tests.support.strands import hair as hair_of_arrays
+from tests.support.strands.evenness import measure
 
 bind_hair = partial(groom.bind_hair, device=DEVICE)
 distribute_guides = partial(groom.distribute_guides, device=DEVICE)

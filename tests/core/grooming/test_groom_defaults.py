@@ -12,7 +12,7 @@ from hair_addon.core.geometry.texture import Texture
 from hair_addon.core.grooming import groom, groom_defaults
 from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.params import from_surface, given
-from tests.support.hair import generate_hair
+from tests.support.strands.hair import generate_hair
 
 BOTH = (GuideSettings, HairSettings)
 

@@ -8,8 +8,8 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.landmark_warp import Warp, between_boxes, through_landmarks
 from hair_addon.core.geometry.mesh import TriMesh, positions
 from hair_addon.core.grooming.groom_transfer import Ground, carried, places_by_uv, places_by_warp
-from tests.support.combed import lengths, standing
 from tests.support.meshes import flat_grid, subdivided_sphere
+from tests.support.strands.combed import lengths, standing
 
 TURN = np.linalg.qr(np.array([[0.4, -0.8, 0.3], [0.9, 0.2, -0.1], [0.1, 0.5, 0.9]]))[0]
 TURN *= np.sign(np.linalg.det(TURN))

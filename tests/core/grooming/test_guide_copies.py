@@ -7,7 +7,7 @@ import pytest
 from hair_addon.core.grooming.guide_copies import Places, copied, matched, upright_rotations
 from hair_addon.core.grooming.guide_segments import unit
 from hair_addon.core.grooming.guide_tool_settings import CopySettings
-from tests.support.combed import lengths, segment_lengths, wavy
+from tests.support.strands.combed import lengths, segment_lengths, wavy
 
 ACROSS_X = np.array([1.0, 0.0, 0.0])
 

@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon.core.grooming.guide_lengths import cut, resized
 from hair_addon.core.grooming.guide_tool_settings import LengthSettings
-from tests.support.combed import distance_to_polylines, lengths, wavy
+from tests.support.strands.combed import distance_to_polylines, lengths, wavy
 
 SHORTEN = ("CUT", "SCALE")
 

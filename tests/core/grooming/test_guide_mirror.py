@@ -8,8 +8,8 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.mesh import TriMesh, positions
 from hair_addon.core.grooming.guide_mirror import images, mirroring
 from hair_addon.core.placement.domain import Mirror
-from tests.support.combed import lengths, standing
 from tests.support.meshes import flat_grid
+from tests.support.strands.combed import lengths, standing
 
 ACROSS_X = Mirror(np.array([1.0, 0.0, 0.0]))
 

@@ -11,8 +11,8 @@ from hair_addon.core.grooming.guide_attraction import attracted
 from hair_addon.core.grooming.guide_lift import lifted
 from hair_addon.core.grooming.guide_smoothing import smoothed
 from hair_addon.core.grooming.guide_tool_settings import AttractSettings, LiftSettings, SmoothSettings
-from tests.support.combed import lengths, segment_lengths, standing, wavy
 from tests.support.meshes import flat_grid, subdivided_sphere
+from tests.support.strands.combed import lengths, segment_lengths, standing, wavy
 
 
 def smooth(_mesh, points, _normals, weights):

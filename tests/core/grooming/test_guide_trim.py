@@ -8,8 +8,8 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.mesh import TriMesh, positions
 from hair_addon.core.grooming.guide_trim import SHORTEST, mesh_crossings, plane_crossings, trimmed
-from tests.support.combed import distance_to_polylines, lengths, standing, wavy
 from tests.support.meshes import flat_grid, subdivided_sphere
+from tests.support.strands.combed import distance_to_polylines, lengths, standing, wavy
 
 
 def a_plane(rng):

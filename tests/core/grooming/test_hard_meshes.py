@@ -18,9 +18,9 @@ from hair_addon.core.grooming.groom import GuideSettings, HairSettings
 from hair_addon.core.placement import cvt
 from hair_addon.core.placement.domain import Domain
 from tests.support.devices import DEVICE
-from tests.support.evenness import measure
-from tests.support.hair import generate_hair
 from tests.support.meshes import flat_grid
+from tests.support.strands.evenness import measure
+from tests.support.strands.hair import generate_hair
 
 SCALES = (1e-6, 2.0**-7, 1.0, 3.7, 1e6)
 

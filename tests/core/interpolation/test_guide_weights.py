@@ -10,7 +10,7 @@ import warp as wp
 from hair_addon.core.interpolation import guide_weights
 from hair_addon.core.interpolation.guide_weights import Limits
 from tests.support.devices import DEVICE
-from tests.support.finding import find_guides
+from tests.support.strands.finding import find_guides
 
 
 def vectors(array):

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from hair_addon.core.geometry.strands import offsets, segment_lengths
 from hair_addon.core.interpolation import interpolation
 from tests.support.devices import DEVICE
-from tests.support.finding import find_guides
+from tests.support.strands.finding import find_guides
 
 
 def vectors(array, device=DEVICE):

@@ -12,8 +12,8 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.interpolation import part_lines
 from tests.core.interpolation.test_guide_weights import dense, flat, steepest, up, vectors
 from tests.support.devices import DEVICE
-from tests.support.finding import find_guides
 from tests.support.meshes import flat_grid, subdivided_sphere
+from tests.support.strands.finding import find_guides
 
 
 @pytest.fixture(scope="module")

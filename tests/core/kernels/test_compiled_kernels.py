@@ -33,7 +33,7 @@ import warp as wp
 from hair_addon.core.kernels import compiled_kernels, kernel_cache
 from hair_addon.core.grooming import groom
 from tests.support.meshes import HEAD, read_obj
-from tests.support.hair import generate_hair
+from tests.support.strands.hair import generate_hair
 
 def digest(*values):
     return hashlib.sha256(b"".join(np.ascontiguousarray(value).tobytes() for value in values)).hexdigest()

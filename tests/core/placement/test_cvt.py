@@ -18,9 +18,9 @@ from hair_addon.core.placement import cvt, voronoi
 from hair_addon.core.placement.domain import Domain, Mirror
 from hair_addon.core.placement.exact_cells import CutCells
 from hair_addon.core.placement.voronoi import sites_on
-from tests.support import evenness
 from tests.support.devices import DEVICE
 from tests.support.meshes import subdivided_sphere
+from tests.support.strands import evenness
 
 relax = partial(evenness.relax, device=DEVICE)
 measure = partial(evenness.measure, device=DEVICE)

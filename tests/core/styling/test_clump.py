@@ -9,7 +9,7 @@ import pytest
 
 from hair_addon.core.styling import clump, clump_trees, program
 from tests.support.dynamics.stepped import curved_strands, largest_move, stepped, straight_strands
-from tests.support.styled import head
+from tests.support.strands.styled import head
 
 FULL = clump.Settings(thickness=0.0, stray=0.0, root=1.0, tip=1.0, levels=1)
 

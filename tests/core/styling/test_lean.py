@@ -11,7 +11,7 @@ from hair_addon.core.geometry.closest_point import SurfaceQuery
 from hair_addon.core.geometry.strands import from_numpy, segment_lengths
 from hair_addon.core.styling import guide_lean, lean, wet
 from hair_addon.core.styling.style_inputs import Inputs
-from tests.support.styled import ball, head, straight
+from tests.support.strands.styled import ball, head, straight
 
 ALL = {"root": 1.0, "tip": 1.0}
 DOWN = np.array([0.0, 0.0, -1.0])

@@ -8,7 +8,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.geometry import mesh as mesh_math
 from hair_addon.core.geometry.texture import Texture
 from hair_addon.core.styling.masks import Mask
-from tests.support.styled import straight
+from tests.support.strands.styled import straight
 
 
 @pytest.fixture(scope="module")

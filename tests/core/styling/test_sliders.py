@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import bend, braid, clump, curl, frizz, kinds, lean, smooth, trim, wet
-from tests.support import styled
 from tests.support.dynamics.slid import Slid, steepest_moves
+from tests.support.strands import styled
 
 PLACES = 32  # along the slider, at first
 FEWEST_HALVINGS, MOST_HALVINGS = 5, 14

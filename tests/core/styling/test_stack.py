@@ -20,7 +20,7 @@ from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.stack import HAIR
 from tests.support.devices import DEVICE
 from tests.support.meshes import flat_grid
-from tests.support.styled import Groom, head
+from tests.support.strands.styled import Groom, head
 
 STACK = (clump.Settings(size=0.03, levels=3), curl.Settings(seed=1), frizz.Settings(seed=2))
 STACKS = {

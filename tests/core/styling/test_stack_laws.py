@@ -14,7 +14,7 @@ from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.style_inputs import Inputs
 from tests.support.devices import DEVICE
 from tests.support.dynamics.stepped import UP, curved_strands, largest_move, rotation, stepped
-from tests.support.styled import head
+from tests.support.strands.styled import head
 
 STYLES = {name: offer.settings for name, offer in kinds.OFFERS.items()}
 STYLES["TRIM"] = trim.Settings(factor=0.6, random=0.2)

@@ -6,7 +6,7 @@ import pytest
 
 from hair_addon.core.styling import bend, curl
 from tests.support.dynamics.stepped import UP, curved_strands, rotation, stepped, straight_strands
-from tests.support.styled import straight
+from tests.support.strands.styled import straight
 
 SMALL = 1e-3  # [rad], of the bends by which frames are read
 

@@ -9,7 +9,7 @@ import pytest
 from hair_addon.core.styling import program, random_numbers, strand_wetness, wet
 from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.style_inputs import Inputs
-from tests.support.styled import straight
+from tests.support.strands.styled import straight
 
 WET = wet.Settings(lock=0.03, seed=3)
 PLACES = replace(WET, mask="places")

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.styling import curl, frizz, program, program_rows, wet
-from tests.support.styled import head
+from tests.support.strands.styled import head
 
 LOCK = wet.Settings(lock=0.03)
 

@@ -14,7 +14,7 @@ import hair_addon
 from hair_addon import api
 from hair_addon.blender.io import inspection
 from hair_addon.blender.ui import panels
-from tests.support import layout
+from tests.support.interface import layout
 
 SMALL = {"width": 16, "height": 12}
 

@@ -15,7 +15,7 @@ from hair_addon.core.styling.masks import Mask
 from hair_addon.core.styling.program import Cutter
 from hair_addon.core.styling.style_inputs import Inputs
 from tests.support import drawn_strands
-from tests.support.styled import head
+from tests.support.strands.styled import head
 
 # Of a strand's length, by which it may differ: sums in single precision, in another order.
 CLOSE = 1e-5

@@ -12,7 +12,7 @@ from hair_addon.blender.host import running
 from hair_addon.core.errors import HairError
 from hair_addon.core.long_work import run_now
 from tests.support.dynamics.swung import simulate, swing
-from tests.support.modal import TIMER, Operator
+from tests.support.interface.modal import TIMER, Operator
 from tests.support.reading import points
 
 LAST, PRESENT = 8, 3

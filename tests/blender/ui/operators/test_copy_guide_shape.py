@@ -8,6 +8,7 @@ import pytest
 from tests.support.dynamics.following import update
 from tests.support.guide_tools import grown_from_nothing, lengths_of, select_guides
 from tests.support.reading import points, vertex_positions, write_points
+from tests.support.scenes import even_guides
 
 
 @pytest.fixture
@@ -32,6 +33,7 @@ def sides(strands):
     return strands[:, 0, 0] > 0.55, strands[:, 0, 0] < -0.55
 
 
+@even_guides
 @pytest.mark.parametrize("mapping", ["FITTED", "MIRRORED", "NEAREST"])
 def test_the_left_hangs_down_like_the_right(groom, mapping):
     guides = bpy.data.objects["Guides"]

@@ -11,6 +11,7 @@ from hair_addon.core.geometry import mesh
 from tests.support.dynamics.following import surface_points, update
 from tests.support.guide_tools import grown_from_nothing, select_guides, wave
 from tests.support.reading import attribute, points
+from tests.support.scenes import even_guides
 
 
 @pytest.fixture
@@ -69,6 +70,7 @@ def test_new_guides_are_rooted_and_known(combed, groom):
     assert np.array_equal(points(groom), grown_from_nothing(groom))
 
 
+@even_guides
 def test_new_guides_are_shaped_like_those_around(combed):
     """On a groom that leans one way, so do new combed, as long as the others."""
     straight = points(combed)

@@ -11,7 +11,7 @@ from hair_addon.blender.live import invalidation, live_hair
 from tests.support.counting import counts_of
 from tests.support.dynamics.following import update
 from tests.support.guide_tools import CHOSEN, SHAPING, TOOLS, grown_from_nothing, lengths_of, select_guides, use_tool
-from tests.support.layout import draw_all, redo_panel
+from tests.support.interface.layout import draw_all, redo_panel
 from tests.support.reading import points, snapshot
 
 

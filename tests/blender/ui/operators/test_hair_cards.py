@@ -7,7 +7,7 @@ import pytest
 from hair_addon.blender.host import running
 from hair_addon.blender.ui.operators.base.asked import AskedOperator
 from hair_addon.blender.ui.operators.base.modal import LongOperator
-from tests.support.layout import redo_panel
+from tests.support.interface.layout import redo_panel
 
 
 def test_polygons_are_named_before_they_are_made(hair):

@@ -10,7 +10,7 @@ from hair_addon.blender.settings import properties
 from hair_addon.blender.ui import panels
 from hair_addon.core.dynamics.rod.sag_free import GREENHILL
 from hair_addon.core.dynamics.rod.stiffness_advice import weight_ratio
-from tests.support.layout import draw_all
+from tests.support.interface.layout import draw_all
 from tests.support.reading import points
 
 

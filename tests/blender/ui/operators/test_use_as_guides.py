@@ -4,7 +4,7 @@
 import bpy
 import pytest
 
-from tests.support.layout import redo_panel
+from tests.support.interface.layout import redo_panel
 from tests.support.reading import snapshot
 
 

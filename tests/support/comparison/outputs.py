@@ -11,7 +11,7 @@ import bpy
 import numpy as np
 
 from hair_addon import api
-from tests.support.grooms import HEAD, ROOT, activate, film, grown, update
+from tests.support.comparison.grooms import HEAD, ROOT, activate, film, grown, update
 
 
 def plain_arrays(found, _folder):

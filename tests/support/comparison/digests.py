@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Digests of the results of many grooms, to detect whether a code change alters a single bit.
 
-    .venv/bin/python tests/support/digests.py --out before.json
-    .venv/bin/python tests/support/digests.py --compare before.json     prints what differs, and exits with 1
+    .venv/bin/python tests/support/comparison/digests.py --out before.json
+    .venv/bin/python tests/support/comparison/digests.py --compare before.json     prints what differs, and exits with 1
 
 Strands, attributes, settings, materials, tables, pictures and files are SHA-256 each, under a name such as
 `head/strands/attribute/radius`. The first part of it is a groom of grooms.py or of outputs.py, or `commands`; those
@@ -24,7 +24,7 @@ import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[3]))
 
 import bpy
 import gpu
@@ -34,7 +34,7 @@ import warp
 
 import hair_addon
 from hair_addon import api
-from tests.support import grooms, outputs
+from tests.support.comparison import grooms, outputs
 
 # Member, NumPy type and width of an attribute's values.
 _VALUES = {

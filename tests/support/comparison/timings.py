@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How long users wait, of one checkout or of several in turns: so a change of the code is timed beside what it changed.
 
-    .venv/bin/python tests/support/timings.py
-    .venv/bin/python tests/support/timings.py --checkouts ../before . --rounds 7
+    .venv/bin/python tests/support/comparison/timings.py
+    .venv/bin/python tests/support/comparison/timings.py --checkouts ../before . --rounds 7
 
 start         importing the add-on and registering it, Blender being there: what its start takes longer
 stroke        a few of 200 guides move, and Blender updates: 30,000 strands follow, and their Curves are written
@@ -148,7 +148,7 @@ def report(checkouts, rounds):
 def main():
     """Time checkouts in turns."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    own = Path(__file__).resolve().parents[2]
+    own = Path(__file__).resolve().parents[3]
     parser.add_argument("--checkouts", type=Path, nargs="+", default=[own], metavar="FOLDER", help="[this one]")
     parser.add_argument("--rounds", type=int, default=4, metavar="N", help="[4]")
     parser.add_argument("--measure", type=Path, metavar="FOLDER", help=argparse.SUPPRESS)
