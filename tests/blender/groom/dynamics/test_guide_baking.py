@@ -18,6 +18,7 @@ from hair_addon.core.long_work import Stopped, run_now
 from tests.blender.data.strands.test_partings import draw_line
 from tests.support.dynamics.swung import simulate, swing
 from tests.support.reading import evaluated_points, points
+from tests.support.scenes import even_guides
 
 LAST = 28
 
@@ -131,6 +132,7 @@ def test_roots_stay_on_a_surface_that_bends(arm, tmp_path):
 
 
 @pytest.mark.gate(id="V22")
+@even_guides
 def test_hair_follows_between_frames(swung):
     guides, hair = swung
     bake(guides)
@@ -228,6 +230,7 @@ def test_a_part_line_that_the_deformed_surface_leaves_behind_outdates_nothing(sw
 
 
 @pytest.mark.gate(id="V20")
+@even_guides
 @pytest.mark.parametrize("is_parted", [True, False])
 def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
     """Where these are combed does not matter, but for the rounding of sums in mean masses."""
