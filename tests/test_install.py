@@ -88,7 +88,7 @@ def test_zip_holds_what_blender_runs_and_nothing_else(extension):
         assert {path.relative_to(ROOT).as_posix() for path in sources} <= set(names)
     # The manual as a browser shows it.
     pages = {f"manual/{path.stem}.html" for path in manual_pages.SOURCE.glob("*.md")}
-    pictures = {f"manual/{path.name}" for path in manual_pages.SOURCE.glob("*.png")}
+    pictures = {f"manual/{path.name}" for path in manual_pages.SOURCE.iterdir() if path.suffix in {".png", ".jpg"}}
     assert {name for name in names if name.startswith("manual/") and not name.endswith("/")} == pages | pictures
     assert manifest["platforms"] == [platform]
     assert {Path(wheel).name for wheel in manifest["wheels"]} == {

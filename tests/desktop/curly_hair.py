@@ -18,7 +18,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.steps import OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
-    HAIRLINE,
     MODULE,
     activate,
     click,
@@ -28,6 +27,7 @@ from tests.desktop.window import (  # noqa: E402
     in_viewport,
     install,
     key,
+    mask_scalp,
     of_kind,
     places,
     sidebar,
@@ -122,11 +122,7 @@ def bare_head():
     head = import_head()
     with in_viewport():
         bpy.ops.object.shade_smooth()
-    positions = np.empty((len(head.data.vertices), 3), np.float32)
-    head.data.vertices.foreach_get("co", positions.ravel())
-    scalp = head.vertex_groups.new(name="scalp")
-    above = positions[:, 2] > np.interp(positions[:, 1], *HAIRLINE.T)
-    scalp.add(np.flatnonzero(above).tolist(), 1.0, "REPLACE")
+    above, positions = mask_scalp(head)
     fringe = head.vertex_groups.new(name="fringe")
     is_front = above & (positions[:, 1] < -0.085) & (np.abs(positions[:, 0]) < 0.075)
     fringe.add(np.flatnonzero(is_front).tolist(), 1.0, "REPLACE")

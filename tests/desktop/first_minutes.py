@@ -17,7 +17,6 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.steps import MORE, OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
-    HAIRLINE,
     MODULE,
     click,
     curve_points,
@@ -25,6 +24,7 @@ from tests.desktop.window import (  # noqa: E402
     import_head,
     in_viewport,
     install,
+    mask_scalp,
     of_kind,
     places,
     sidebar,
@@ -115,11 +115,7 @@ def open_head():
     head = import_head()
     with in_viewport():
         bpy.ops.object.shade_smooth()
-    positions = np.empty((len(head.data.vertices), 3), np.float32)
-    head.data.vertices.foreach_get("co", positions.ravel())
-    scalp = head.vertex_groups.new(name="scalp")
-    above = positions[:, 2] > np.interp(positions[:, 1], *HAIRLINE.T)
-    scalp.add(np.flatnonzero(above).tolist(), 1.0, "REPLACE")
+    mask_scalp(head)
     look_at(head, (1.0, -0.7, 0.3), 0.55)
     yield
 

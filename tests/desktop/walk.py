@@ -44,9 +44,9 @@ _WRITTEN = 1.0
 facts.setdefault("steps", {})
 
 
-def screen(name):
+def screen(name, redraws=7):
     """A picture of the whole screen."""
-    take_picture(OUT / f"{name}.png")
+    take_picture(OUT / f"{name}.png", redraws)
 
 
 def points(name):
@@ -134,7 +134,7 @@ def shading_modes():
     for mode in ("WIREFRAME", "SOLID", "MATERIAL", "RENDERED"):
         area.spaces.active.shading.type = mode
         yield from shaders_compiled()
-        screen(f"mode_{mode.lower()}")
+        screen(f"mode_{mode.lower()}", redraws=2)
     area.spaces.active.shading.type = "SOLID"
     area.spaces.active.overlay.show_overlays = False
     yield
@@ -153,7 +153,7 @@ def shading_modes():
     with in_viewport():
         bpy.ops.screen.region_quadview()
     yield
-    screen("quad")
+    screen("quad", redraws=2)
     with in_viewport():
         bpy.ops.screen.region_quadview()
     yield

@@ -17,7 +17,7 @@ MODULE = "bl_ext.user_default.vellus"
 _HEAD = Path(__file__).resolve().parents[2] / "blend_samples" / "head.obj"
 
 # The hairline of the sample's head from the side, (y, z) [m], from the forehead to the nape; the face looks to -Y.
-HAIRLINE = np.array([(-0.17, 0.82), (-0.105, 0.787), (-0.068, 0.74), (-0.03, 0.744), (0.0, 0.69), (0.04, 0.68)])
+_HAIRLINE = np.array([(-0.17, 0.82), (-0.105, 0.787), (-0.068, 0.74), (-0.03, 0.744), (0.0, 0.69), (0.04, 0.68)])
 
 
 def install(path):
@@ -90,6 +90,15 @@ def take_picture(path, redraws=7):
     subprocess.run(["import", "-window", "root", path], check=True)
 
 
+def mask_scalp(head):
+    """Give the head the group `scalp` of what is above its hairline; returns (V,) whether, and (V, 3) positions."""
+    positions = np.empty((len(head.data.vertices), 3), np.float32)
+    head.data.vertices.foreach_get("co", positions.ravel())
+    above = positions[:, 2] > np.interp(positions[:, 1], *_HAIRLINE.T)
+    head.vertex_groups.new(name="scalp").add(np.flatnonzero(above).tolist(), 1.0, "REPLACE")
+    return above, positions
+
+
 def wait(seconds):
     """Leave Blender to itself for a while."""
     end = time.monotonic() + seconds
@@ -105,10 +114,9 @@ def wait_for(happened, seconds=60.0):
 
 
 def shaders_compiled():
-    """Leave Blender to itself until EEVEE has no shader left to compile: another pass may ask for the next."""
+    """Leave Blender to itself until EEVEE has no shader left to compile, which it does beside."""
     yield from wait(1.0)
-    while bpy.app.is_job_running("SHADER_COMPILATION"):
-        yield from wait(1.0)
+    yield from wait_for(lambda: not bpy.app.is_job_running("SHADER_COMPILATION"), 12.0)
 
 
 def rectangle(region):

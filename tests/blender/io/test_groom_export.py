@@ -13,22 +13,10 @@ from hair_addon.blender.groom.dynamics import frame_folders
 from hair_addon.core.errors import HairError
 from tests.support.dynamics.following import update
 from tests.support.exchange import alembic_reader
-from tests.support.exchange.exported import LAST, bake, export, shape, twist, widths, world
+from tests.support.exchange.exported import LAST, export, shape, widths, world
 from tests.support.reading import attribute, points, write_points
 
 NAMES = ("P", "nVertices", "curveBasisAndType", "width", ".selfBnds")  # of curves in any Alembic file
-
-
-@pytest.fixture
-def twisted(hair):
-    """Hair of a sphere that is turned, moved, scaled and twisted, and its guides."""
-    return twist(hair)
-
-
-@pytest.fixture
-def baked(hair, tmp_path):
-    """Guides that simulate on a sphere that swings, with their frames baked."""
-    return bake(tmp_path)
 
 
 # What is written.

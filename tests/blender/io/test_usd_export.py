@@ -9,22 +9,10 @@ from mathutils import Matrix
 from hair_addon.blender.data.strands import curves
 from tests.support.dynamics.following import update
 from tests.support.exchange import alembic_reader
-from tests.support.exchange.exported import LAST, bake, export, shape, twist, widths, world
+from tests.support.exchange.exported import LAST, export, shape, widths, world
 from tests.support.reading import evaluated_points
 
 PLACES = {"Hair": "/groom/Hair/strands", "Hair_guides": "/groom/Hair/guides"}  # in Alembic → in USD
-
-
-@pytest.fixture
-def twisted(hair):
-    """Hair of a sphere that is turned, moved, scaled and twisted, and its guides."""
-    return twist(hair)
-
-
-@pytest.fixture
-def baked(hair, tmp_path):
-    """Guides that simulate on a sphere that swings, with their frames baked."""
-    return bake(tmp_path)
 
 
 def stage_of(path):

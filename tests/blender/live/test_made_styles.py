@@ -16,6 +16,7 @@ from tests.support import drawn_strands
 from tests.support.counting import counts_of
 from tests.support.made_strands import CLOSE, comb, drawn, grown
 from tests.support.reading import points
+from tests.support.scenes import even_guides
 
 
 def test_styles_that_the_gpu_cannot_apply_are_made_as_before(watched, monkeypatch):
@@ -114,6 +115,7 @@ def test_a_slider_of_a_style_computes_no_strands_here(watched, monkeypatch):
     np.testing.assert_array_equal(drawn(watched), shown)
 
 
+@even_guides
 @pytest.mark.parametrize("settings", [{"keep_length": 0.2}, {"neighbour_limit": 3, "radius": 3e-3}])
 def test_settings_of_weights_are_followed_with_all_styles(watched, settings, monkeypatch):
     add_styles(watched, clump.Settings(size=0.3, levels=1), lean.Settings(amount=0.2), curl.Settings(radius=0.02))

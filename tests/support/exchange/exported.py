@@ -3,6 +3,7 @@
 
 import bpy
 import numpy as np
+import pytest
 
 from hair_addon.blender.groom.dynamics import guide_baking
 from hair_addon.blender.io import groom_export, groom_sources
@@ -60,3 +61,15 @@ def bake(folder):
     run_now(guide_baking.baking([guides.data], LAST, bpy.context.scene))
     update()
     return guides
+
+
+@pytest.fixture
+def twisted(hair):
+    """Hair of a sphere that is turned, moved, scaled and twisted, and its guides."""
+    return twist(hair)
+
+
+@pytest.fixture
+def baked(hair, tmp_path):
+    """Guides that simulate on a sphere that swings, with their frames baked."""
+    return bake(tmp_path)

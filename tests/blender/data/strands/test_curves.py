@@ -27,7 +27,7 @@ def read_surface(surface_object):
 
 
 @pytest.mark.parametrize("kind", ["guides", "hair"])
-def test_curves_carry_what_blender_expects(kind, request, nodes, sphere):
+def test_curves_carry_what_blender_expects(kind, request, sphere):
     made = request.getfixturevalue(kind)
     found = {a.name: (a.data_type, a.domain) for a in made.data.attributes}
     assert EXPECTED_ATTRIBUTES.items() <= found.items()

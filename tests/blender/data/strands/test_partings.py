@@ -25,7 +25,7 @@ def ground(scene):
 
 
 @pytest.fixture
-def guides(ground, nodes):
+def guides(ground):
     """200 guides that lean by 60 degrees to their own side of the plane x = 0; active."""
     bpy.ops.vellus.distribute_guides(guide_count=200, length=0.2, length_variation=0.0, tilt=0.0, gravity=0.0)
     guides = bpy.data.objects["Guides"]
