@@ -10,6 +10,7 @@ import pytest
 from hair_addon.blender.gpu import drawing, level_of_detail, strand_textures, uniforms
 from hair_addon.blender.render import drawn_scene, hair_picture
 from tests.support import glsl
+from tests.support.scenes import even_guides
 
 SIZE = 96
 
@@ -115,6 +116,7 @@ def test_hair_from_afar_is_as_bright_as_all_of_it(thin, monkeypatch, distance):
     np.testing.assert_allclose(some, picture(), rtol=0.06)
 
 
+@even_guides
 def test_hair_covers_as_much_from_afar(lit):
     """A ball of hair four samples wide is not half a sample larger on each side."""
     lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006

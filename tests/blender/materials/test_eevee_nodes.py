@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tests.support.rendering import configure, light_up
+from tests.support.scenes import even_guides
 
 SIZE = 40
 
@@ -26,6 +27,7 @@ def rendered_hair(engine, folder):
     return pixels[:, :3].sum(axis=0) / pixels[:, 3].sum(), pixels[:, 3].mean()
 
 
+@even_guides
 def test_it_is_lit_about_as_by_cycles(lit, tmp_path):
     """And covers as much: Blender's default draws strands a pixel wide or wider, five times as much of this picture."""
     scene = bpy.context.scene

@@ -45,7 +45,7 @@ class Slid:
         return wp.clone(self._plain[id(binding)])
 
 
-def steepest_moves(points_at, values, chosen=6):
+def steepest_moves(points_at, values, chosen=4):
     """Largest moves [m] between values, then of ever shorter steps: the steepest ones are halved again and again.
 
     points_at(value): strands; values: rising; chosen: how many steps are halved each time.
