@@ -11,6 +11,7 @@ from hair_addon.blender.gpu import drawing, strand_textures
 from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
 from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture, motion_vectors, scene_drawing, view_film
 from tests.support.reading import points, write_points
+from tests.support.scenes import even_guides
 
 SIZE = 80
 FRAMES, WARM_UP = 4, 2
@@ -109,6 +110,7 @@ def test_a_picture_that_comes_to_rest_is_the_mean_of_its_own_passes(lit, kind):
     np.testing.assert_allclose(last.mean(axis=(0, 1)), rest(new_picture(kind), drawn, camera()).mean(axis=(0, 1)), 0.02)
 
 
+@even_guides
 @pytest.mark.parametrize("kind", ["HAIR", "FILM"])
 def test_nothing_remains_where_something_has_been(lit, kind):
     """Hair that moves by a tenth of the picture's width a frame leaves no trail, also where it moved away."""
@@ -232,6 +234,7 @@ def test_hair_is_carried_where_it_moves(lit, push):
     assert abs(middles[0] - middles[1]) < 0.5
 
 
+@even_guides
 def test_the_first_pass_is_as_bright_as_the_last(thin):
     """With one sample a pixel of strands that are thinner: the mean, and as far as noise allows each part's."""
     picture, drawn, view = new_picture("HAIR", 3 * SIZE), read_drawn(), camera()

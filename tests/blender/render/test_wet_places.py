@@ -12,6 +12,7 @@ from hair_addon.blender.settings import style_items
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from hair_addon.core.styling import wet
 from tests.support.rendering import light_up, rendered
+from tests.support.scenes import even_guides
 
 AMOUNT = 0.8
 SIZE = 64
@@ -79,6 +80,7 @@ def test_a_mask_of_one_is_wet_and_of_zero_is_dry(small):
     assert "wetness" not in small.data.attributes
 
 
+@even_guides
 @pytest.mark.parametrize("model, mode, random_color", MODELS)
 def test_half_of_the_hair_is_wet(small, model, mode, random_color):
     """Away from the border each half is as in the picture of all dry and of all wet hair."""
