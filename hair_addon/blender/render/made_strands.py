@@ -83,7 +83,7 @@ class Making:
             if self.due is not None:
                 self._make(kept)
             if self.carrier is not None:
-                kept.on_gpu = self.carrier.carry(kept.on_gpu, None if pose is None else pose.motion)
+                kept.on_gpu = self.carrier.carry(kept.on_gpu, pose.surface.posed if _is_deformed(pose) else None)
         except HairError:
             self._refuse()
             return False
@@ -131,7 +131,9 @@ class Making:
             rest = strand_textures.packed_texture(kept.points, drawn.row_strands)
         else:
             rest, kept.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
-        self.carrier = strand_carrier.new_carrier(rest, drawn.point_count, places, surface.rest)
+        self.carrier = strand_carrier.new_carrier(
+            rest, drawn.point_count, places, surface.rest, surface.turning(places[0])
+        )
         self._triangles = surface.mesh.triangles
         return True
 
@@ -141,7 +143,7 @@ class Making:
 
 
 def _is_deformed(pose):
-    return pose is not None and pose.motion is not None
+    return pose is not None and pose.is_deformed
 
 
 def are_equal(values: np.ndarray | None, others: np.ndarray | None) -> bool:
