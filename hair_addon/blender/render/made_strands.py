@@ -139,7 +139,7 @@ class Making:
 
     def _is_carried_on(self, surface):
         mine, its = (self._triangles, self.carrier.vertices), (surface.mesh.triangles, surface.rest)
-        return all(map(np.array_equal, mine, its))
+        return all(a is b or np.array_equal(a, b) for a, b in zip(mine, its, strict=True))
 
 
 def _is_deformed(pose):
