@@ -4,12 +4,14 @@
 import bpy
 import numpy as np
 
+from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import posed_strands
-from hair_addon.blender.gpu import ambient_visibility, maker_choice
+from hair_addon.blender.gpu import ambient_visibility, maker_choice, strand_textures, vertex_turner
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.settings import style_items
+from hair_addon.core.geometry import vertex_turns
 from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.styling import curl, lean
 from tests.support.counting import counts_of
@@ -129,6 +131,30 @@ def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_sh
         for name in found:
             np.testing.assert_allclose(found[name].read(), texture[name].read(), rtol=0.0, atol=0.02)
     assert np.abs(np.array(at_rest.hair_visibility[0]["visibility_z"].read()) - np.array(first.read())).max() > 0.02
+
+
+def test_a_surface_that_turns_as_an_object_passes_a_matrix(hair, window, coarse_shadows, monkeypatch):
+    """Nothing turns vertices, carries strands or uploads them, and light follows by a direction a frame."""
+    bpy.ops.object.light_add(type="SUN")
+    surface = hair.data.surface
+    frame, called = read(), []
+    strands = frame.hair[0][0]
+    for owner, name in (
+        (ambient_visibility, "measure"),
+        (vertex_turns, "turning"),
+        (vertex_turner.VertexTurner, "turn"),
+        (scene, "read_surface"),
+        (strand_textures, "upload_strands"),
+    ):
+        monkeypatch.setattr(owner, name, lambda *given, name=name: called.append(name))
+    for angle in (0.2, 0.4, 0.6):
+        surface.rotation_euler.z = angle
+        bpy.context.view_layer.update()
+        frame = read(former=frame)
+        assert frame.hair[0][0] is strands
+        np.testing.assert_allclose(frame.hair[0][2], np.array(hair.matrix_world), atol=1e-6)
+        assert abs(np.array(hair.matrix_world)[0, 0] - np.cos(angle)) < 1e-6
+    assert not called
 
 
 def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, coarse_shadows, monkeypatch):
