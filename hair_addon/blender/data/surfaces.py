@@ -12,7 +12,7 @@ from ...core.geometry.mesh import Faces, TriMesh
 from ...core.kernels.checks import require_indices
 
 # What does not follow from where vertices are posed, and is kept in another pose.
-_AT_REST = ("to_local_axes", "shape", "extent", "topology", "_turnings")
+_AT_REST = ("to_local_axes", "shape", "extent", "topology")
 
 _MOST_TURNINGS = 8  # of a surface: of the hair and the guides on it
 
@@ -64,8 +64,8 @@ class Surface:
     def posed_at(self, posed):
         """The same surface with its vertices at (V, 3) float32 local positions."""
         other = replace(self, posed=posed)
-        self._turnings  # there from now on, for all poses
-        other.__dict__.update({name: self.__dict__[name] for name in _AT_REST if name in self.__dict__})
+        known = {name: self.__dict__[name] for name in _AT_REST if name in self.__dict__}
+        other.__dict__.update(known, _turnings=self._turnings)  # which is one for all poses
         return other
 
     @cached_property

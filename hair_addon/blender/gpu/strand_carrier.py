@@ -6,15 +6,18 @@ vertices around roots.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import gpu
 import numpy as np
 
-from ...core.geometry.vertex_turns import Turning
 from ...core.kernels.checks import require_count, require_indices
 from . import shaders, vertex_turner
 from .strand_changes import StrandChanges, declare_put, new_changes, rows_texture
 from .strand_textures import MOST_GROUPS, StrandsOnGPU
+
+if TYPE_CHECKING:
+    from ...core.geometry.vertex_turns import Turning
 
 _GROUP_SIZE = 64
 
@@ -66,7 +69,7 @@ def new_carrier(
     point_count: int,
     places: tuple[np.ndarray, np.ndarray],
     vertices: np.ndarray,
-    turning: Turning,
+    turning: "Turning",
 ) -> StrandCarrier:
     """The `StrandCarrier` of S strands.
 

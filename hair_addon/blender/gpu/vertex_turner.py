@@ -5,16 +5,19 @@ A pose uploads the places of vertices around roots, twelve bytes each, and nothi
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from ...core.geometry.vertex_turns import Turning
 from ...core.kernels.checks import require_count
 from . import shaders
 from .strand_changes import empty_rows, rows_texture
 from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH
+
+if TYPE_CHECKING:
+    from ...core.geometry.vertex_turns import Turning
 
 _GROUP_SIZE = 64
 _VERTEX_TEXELS = 3
@@ -64,7 +67,7 @@ class VertexTurner:
         return self.turned
 
 
-def new_turner(turning: Turning, rest: np.ndarray) -> VertexTurner:
+def new_turner(turning: "Turning", rest: np.ndarray) -> VertexTurner:
     """The `VertexTurner` of a `Turning`; rest: (V, 3) float32, all vertices where strands are at rest.
 
     They are those of the `Turning` unless that is of a smooth surface. Raises `HairError` where counts do not match, a

@@ -76,7 +76,7 @@ def test_strands_are_where_warp_carries_them(blender, rooted):
 
 
 def test_at_rest_strands_are_the_same_bits(blender, rooted):
-    vertices, faces, _places, points = rooted
+    vertices, _faces, _places, points = rooted
     carrier = carrier_of(rooted)
     strands = carrier.carry(uploaded(points), bent(vertices, 3.0))
     before = drawn_strands.places(strands)

@@ -93,7 +93,8 @@ class CombedGuides:
         if not pose.is_deformed:
             return self.points
         places = self.surface.places(self.roots)
-        return self.surface.from_local(posed_strands.carried(self.local, pose.motion_at(places[0]), places, self.counts))
+        motion = pose.motion_at(places[0])
+        return self.surface.from_local(posed_strands.carried(self.local, motion, places, self.counts))
 
 
 def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
