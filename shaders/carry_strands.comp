@@ -6,7 +6,8 @@
 #include "include/surface_turn.glsl"
 
 // Texels of a strand in `roots`: the vertices around it, its barycentric coordinates, and its place at rest; of a vertex
-// in `vertices`: where it is now and whether it has moved, and where its turn takes the x and the y axis.
+// in `vertices`, which turn_vertices.comp has written: where it is now and whether it has moved, and where its turn takes
+// the x and the y axis.
 const int ROOT_TEXELS = 3;
 const int VERTEX_TEXELS = 3;
 

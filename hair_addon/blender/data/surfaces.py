@@ -9,9 +9,12 @@ import numpy as np
 
 from ...core import geometry
 from ...core.geometry.mesh import Faces, TriMesh
+from ...core.kernels.checks import require_indices
 
 # What does not follow from where vertices are posed, and is kept in another pose.
 _AT_REST = ("to_local_axes", "shape", "extent", "topology")
+
+_MOST_TURNINGS = 8  # of a surface: of the hair and the guides on it
 
 
 @dataclass(frozen=True)
@@ -61,8 +64,27 @@ class Surface:
     def posed_at(self, posed):
         """The same surface with its vertices at (V, 3) float32 local positions."""
         other = replace(self, posed=posed)
-        other.__dict__.update({name: self.__dict__[name] for name in _AT_REST if name in self.__dict__})
+        known = {name: self.__dict__[name] for name in _AT_REST if name in self.__dict__}
+        other.__dict__.update(known, _turnings=self._turnings)  # which is one for all poses
         return other
+
+    @cached_property
+    def _turnings(self):
+        """{bits of the vertices that are asked for: `Turning`}."""
+        return {}
+
+    def turning(self, vertices):
+        """The `Turning` of vertices, indices in any shape: found once for all poses. Raises `HairError`."""
+        require_indices("vertices", vertices, len(self.rest))
+        is_asked = np.zeros(len(self.rest), bool)
+        is_asked[vertices] = True
+        asked = np.packbits(is_asked).tobytes()
+        if asked not in self._turnings:
+            while len(self._turnings) >= _MOST_TURNINGS:
+                self._turnings.pop(next(iter(self._turnings)))
+            chosen = np.flatnonzero(is_asked)
+            self._turnings[asked] = geometry.vertex_turns.turning(self.smooth_rest, self.faces, chosen)
+        return self._turnings[asked]
 
     def is_at_rest_as(self, other):
         """Whether strands generated on one also fit the other."""

@@ -26,8 +26,12 @@ class SurfaceOnGPU:
     places: gpu.types.GPUTexture
     row_corners: int
     corner_count: int
-    fingerprint: str  # of the corners
     corners: dict  # {attribute: (3 F, N) values} of `batch`
+
+    @cached_property
+    def fingerprint(self) -> str:
+        """Of the corners' places, for motion vectors."""
+        return geometry.fingerprint.fingerprint(self.corners["position"])
 
     @cached_property
     def batch(self) -> gpu.types.GPUBatch:
@@ -300,17 +304,19 @@ def upload_surface(positions, normals, uvs=None):
     """
     row_corners = min(len(positions), TEXTURE_WIDTH)
     places = _places_texture(positions, row_corners)
-    normals = np.zeros_like(positions) if normals is None else normals
-    uvs = np.zeros((len(positions), 2), np.float32) if uvs is None else uvs
+    # Those that are missing are as many, without their memory.
+    normals = np.broadcast_to(np.float32(0.0), positions.shape) if normals is None else normals
+    uvs = np.broadcast_to(np.float32(0.0), (len(positions), 2)) if uvs is None else uvs
     corners = {"position": positions, "normal": normals, "uv": uvs}
-    return SurfaceOnGPU(places, row_corners, len(positions), geometry.fingerprint.fingerprint(positions), corners)
+    return SurfaceOnGPU(places, row_corners, len(positions), corners)
 
 
 def _places_texture(positions, row_corners):
     """(N, 3) places in a texture, `row_corners` a row."""
     row_count = -(-len(positions) // row_corners)
-    texels = np.zeros((row_count * row_corners, 4), np.float32)
+    texels = np.empty((row_count * row_corners, 4), np.float32)
     texels[: len(positions), :3] = positions
+    texels[:, 3] = texels[len(positions) :] = 0.0
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     texture = gpu.types.GPUTexture((row_corners, row_count), format="RGBA32F", data=data)
     texture.filter_mode(False)

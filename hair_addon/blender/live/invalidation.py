@@ -39,6 +39,7 @@ COPIES = (
 # Values keyed by everything they depend on, or that check by themselves whether they are up to date.
 OTHERS = (
     hair_cache.shading_cache,
+    scene.faces_cache,
     scene.surface_cache,
     drawn_meshes.layout_cache,
     subdivided_surfaces.smooth_cache,

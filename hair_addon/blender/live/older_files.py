@@ -44,11 +44,11 @@ def _seen(datablock):
         return unchanged
     at_rest, counts = curves.read_points(datablock), curves.point_counts(datablock)
     pose = posed_strands.pose_of(surface)
-    if pose.motion is None:
+    if not pose.is_deformed:
         return surface, at_rest
     before = geometry.surface_deform.motion(surface.rest, surface.posed, surface.faces)
     seen = posed_strands.carried(at_rest, before, places, counts)
-    points = posed_strands.carried(seen, pose.motion, places, counts, is_back=True)
+    points = posed_strands.carried(seen, pose.motion_at(places[0]), places, counts, is_back=True)
     is_rooted = np.repeat(places[1].any(axis=1), counts)
     return surface, np.where(is_rooted[:, None], points, at_rest)
 

@@ -17,7 +17,7 @@ from ..gpu import (
 from ..gpu import lights as light_door
 from ..gpu.shadows import ShadowMaps
 from ..host.notices import can_be_drawn
-from . import hair_cache, hair_places
+from . import hair_cache, hair_places, made_strands
 
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke of the
 # comb.
@@ -95,15 +95,18 @@ def read(
     if lamps is None:
         found = light_door.read_lights(depsgraph, for_render=viewport is None)
         lamps = scene_lights.gather(*found, world, hair_receivers)
-    # Where Warp computes hair that plays, each frame is as at rest.
-    last = before or (former if _are_made(hair) else None)
-    is_draft = is_draft or (former is not None and _are_made(hair))
+    # Where no graphics card makes hair that plays, each frame is as at rest. Hair that only its object moves is as if
+    # it was made, and stays so when it comes to rest.
+    has_played = former is not None or (before is not None and before.renewal is not None)
+    are_made = _are_made(hair) or (has_played and bool(hair) and made_strands.are_wanted())
+    last = before or (former if are_made else None)
+    is_draft = is_draft or (former is not None and are_made)
     if before is None and last is not None and _fit(last.shadow_maps, lamps):
         maps = last.shadow_maps
     renewal = None
     if is_draft and last is not None and _have_same_places(last, hair, (*surfaces, *clear)):
         seen = last.hair_visibility, last.surface_visibility
-        if _are_made(hair):
+        if are_made:
             renewal = last.renewal or ambient_visibility.Renewal()
             seen = _renewed(renewal, seen, hair, surfaces, clear)
     else:
@@ -125,7 +128,7 @@ def read(
         receivers=receivers,
         renewal=renewal,
     )
-    return _lit(drawn, lamps, maps, hair_receivers, is_draft)
+    return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
 
 
 def _are_made(hair):
@@ -137,16 +140,19 @@ def _fit(maps, lamps):
     return maps is not None and maps.layer_count == max(1, int(lamps.record["count"]))
 
 
-def _lit(drawn, lamps, maps, hair_receivers, is_draft=False):
-    """A `DrawnScene` with `SceneLights`: as all that is in it is lit by them, with their shadow maps."""
+def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
+    """A `DrawnScene` with `SceneLights`: as all that is in it is lit by them, with their shadow maps.
+
+    are_made: whether a graphics card makes or carries hair, or would.
+    """
     maps = maps or scene_lights.new_maps(lamps.record)
     placed, solid = _placed(drawn.hair), [surface for surface, _parts in drawn.surfaces]
     hair_owners = [receiver.owner for receiver in hair_receivers]
     surface_owners = [receiver.owner for receiver in drawn.receivers[: len(solid)]]
-    steps = _DRAFT_STEPS if is_draft and not _are_made(drawn.hair) else _SHADOW_STEPS
+    steps = _DRAFT_STEPS if is_draft and not are_made else _SHADOW_STEPS
     casters = lamps.casters(placed, hair_owners, solid, surface_owners)
     # Where strands are made, what is drawn at rest is what was drawn while they moved.
-    maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or _are_made(drawn.hair))
+    maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or are_made)
     own = {}
     if not lamps.are_alike:
         own = {"hair_lights": lamps.lit(hair_receivers), "surface_lights": lamps.lit(drawn.receivers)}

@@ -84,7 +84,7 @@ class Making:
             if self.due is not None:
                 self._make(kept)
             if self.carrier is not None:
-                kept.on_gpu = self.carrier.carry(kept.on_gpu, None if pose is None else pose.motion)
+                kept.on_gpu = self.carrier.carry(kept.on_gpu, pose.surface.posed if _is_deformed(pose) else None)
         except HairError:
             self._refuse()
             return False
@@ -132,17 +132,19 @@ class Making:
             rest = strand_textures.packed_texture(kept.points, drawn.row_strands)
         else:
             rest, kept.on_gpu = drawn.texture, replace(drawn, texture=strand_textures.like(drawn.texture))
-        self.carrier = strand_carrier.new_carrier(rest, drawn.point_count, places, surface.rest)
+        self.carrier = strand_carrier.new_carrier(
+            rest, drawn.point_count, places, surface.rest, surface.turning(places[0])
+        )
         self._triangles = surface.mesh.triangles
         return True
 
     def _is_carried_on(self, surface):
         mine, its = (self._triangles, self.carrier.vertices), (surface.mesh.triangles, surface.rest)
-        return all(map(np.array_equal, mine, its))
+        return all(a is b or np.array_equal(a, b) for a, b in zip(mine, its, strict=True))
 
 
 def _is_deformed(pose):
-    return pose is not None and pose.motion is not None
+    return pose is not None and pose.is_deformed
 
 
 def are_equal(values: np.ndarray | None, others: np.ndarray | None) -> bool:

@@ -3,14 +3,15 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 import warp as wp
 
 from ..errors import HairError
 from ..geometry import mesh as mesh_math
-from ..geometry import surface_deform
-from ..geometry.mesh import Faces, TriMesh
+from ..geometry import surface_deform, vertex_turns
+from ..geometry.mesh import Faces, TriMesh, require_finite
 from ..geometry.strands import Strands
 from .rod import rotations
 from .rod.settings import DynamicsSettings
@@ -90,11 +91,17 @@ class _Surface:
         # Each root, and a point along each axis from it.
         self._crosses = roots[:, None] + self._reach * np.concatenate([np.zeros((1, 3)), np.eye(3)])
 
+    @cached_property
+    def _turning(self):
+        """The `Turning` of the vertices around roots, for all poses."""
+        require_finite(self._mesh.vertices)
+        return vertex_turns.turning(self._mesh.vertices, self._faces, self._places[0])
+
     def pose(self, vertices):
         """The `RootPose` of guides where the mesh has these vertices."""
         corners, weights = self._places
         positions = np.einsum("nc,ncx->nx", weights.astype(np.float64), vertices.astype(np.float64)[corners])
-        motion = surface_deform.motion(self._mesh.vertices, vertices, self._faces, corners)
+        motion = surface_deform.turned(self._mesh.vertices, vertices, self._turning)
         posed = surface_deform.carry(self._crosses.astype(np.float32), motion, *self._places).astype(np.float64)
         left, _sizes, right = np.linalg.svd(np.swapaxes(posed[:, 1:] - posed[:, :1], 1, 2))
         return RootPose(self._size * positions, rotations.from_matrices(left @ right))

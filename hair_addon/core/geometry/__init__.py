@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         texture,
         transform,
         uv_check,
+        vertex_turns,
     )
 else:
     __getattr__ = submodules(__name__)

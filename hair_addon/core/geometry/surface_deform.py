@@ -2,10 +2,11 @@
 """Deformation of strands with their surface, by rotations that are continuous over the surface.
 
 A face's deformation gradient takes two of its edges and its unit normal to where they are now. The mean over the faces
-around a vertex has a nearest rotation, its polar factor U V^T of the singular value decomposition [Higham86]; between
-vertices two of its columns are interpolated and made orthonormal again. So rigid motion is reproduced exactly, shear
-and stretch rotate no more than necessary, and neighbouring roots do not separate, as they do with the frames of single
-triangles or of a UV map. blender/data/strands/follow_nodes.py implements the same in geometry nodes.
+around a vertex (vertex_turns.py) has a nearest rotation, its polar factor U V^T of the singular value decomposition
+[Higham86]; between vertices two of its columns are interpolated and made orthonormal again. So rigid motion is
+reproduced exactly, shear and stretch rotate no more than necessary, and neighbouring roots do not separate, as they do
+with the frames of single triangles or of a UV map. blender/data/strands/follow_nodes.py implements the same in geometry
+nodes.
 
 A subdivided surface is smooth where it is now, and flat on the faces of its cage before: from there, neighbouring roots
 would turn apart. Its rotation is that from the cage's smooth surface (smooth_surface.py).
@@ -16,18 +17,14 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from ..kernels import kernel_cache, parallel
+from ..kernels import kernel_cache
 from ..kernels.checks import require_count, require_indices
-from ..kernels.parallel import Rows
-from . import nearest_rotation
+from . import vertex_turns
 from .mesh import Faces, require_finite
+from .vertex_turns import Turning
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
-
-
-# Gradients take a tenth of a microsecond each: fewer are not worth a thread.
-_LEAST_FACES = 32_768
 
 
 @dataclass(frozen=True)
@@ -57,116 +54,21 @@ def motion(
     """
     require_finite(before)
     require_finite(after)
-    faces = faces if vertices is None else _around(faces, vertices, len(before))
-    return SurfaceMotion(before, after, vertex_axes(before if smooth_before is None else smooth_before, after, faces))
+    at_rest = before if smooth_before is None else smooth_before
+    return turned(before, after, vertex_turns.turning(at_rest, faces, vertices))
 
 
-def _around(faces, vertices, vertex_count):
-    """The `Faces` that some vertices are corners of."""
-    is_asked = np.zeros(vertex_count, bool)
-    is_asked[vertices] = True
-    chosen = np.logical_or.reduceat(is_asked[faces.corner_vertices], faces.starts[:-1])
-    sizes = np.diff(faces.starts)
-    starts = np.append(0, np.cumsum(sizes[chosen]))
-    return Faces(faces.corner_vertices[np.repeat(chosen, sizes)], starts)
-
-
-def vertex_axes(before: np.ndarray, after: np.ndarray, faces: Faces) -> np.ndarray:
-    """(V, 2, 3) float32: where the rotation at each vertex takes the x and the y axis; unturned where no face is."""
-    vertex_count = len(before)
-    require_count("vertices", len(after), vertex_count)
-    starts, around = faces.around(vertex_count)
-    before, after = _shared(before, np.float32, wp.vec3), _shared(after, np.float32, wp.vec3)
-    face_count = len(faces.starts) - 1
-    gradients = wp.empty(face_count, dtype=wp.mat33d, device="cpu")
-    moves = wp.empty(face_count, dtype=wp.int32, device="cpu")
-    corners = _shared(faces.corner_vertices, np.int32, wp.int32)
-    of_face = [Rows(_shared(part, np.int32, wp.int32)) for part in (faces.starts[:-1], faces.starts[1:])]
-    given = [*of_face, corners, before, after]
-    parallel.launch(_face_gradients, face_count, given, [gradients, moves], "cpu", least_rows=_LEAST_FACES)
-    axes = wp.empty((vertex_count, 2), dtype=wp.vec3, device="cpu")
-    is_found = wp.empty(vertex_count, dtype=wp.int32, device="cpu")
-    of_vertex = [Rows(_shared(part, np.int32, wp.int32)) for part in (starts[:-1], starts[1:])]
-    shared = [_shared(around, np.int32, wp.int32), gradients, moves]
-    parallel.launch(_vertex_axes, vertex_count, [*of_vertex, *shared], [axes, is_found], "cpu")
-    found = axes.numpy()
-    for vertex in np.flatnonzero(is_found.numpy() == 0):  # flattened: few
-        total = gradients.numpy()[around[starts[vertex] : starts[vertex + 1]]].sum(axis=0)
-        found[vertex] = nearest_rotation.nearest_rotations(total[None])[0].T[:2]
-    return found
-
-
-def _shared(array, scalar, kind):
-    return wp.array(np.ascontiguousarray(array, scalar), dtype=kind, device="cpu", copy=False)
-
-
-@wp.func
-def _basis(vertices: wp.array[wp.vec3], corners: wp.vec3i):
-    """Columns are the edges from a face's first corner to the next and to the last, and its normal."""
-    first = wp.vec3d(vertices[corners[0]])
-    along = wp.vec3d(vertices[corners[1]]) - first
-    across = wp.vec3d(vertices[corners[2]]) - first
-    normal = wp.cross(along, across)
-    size = wp.length(normal)
-    return wp.matrix_from_cols(along, across, normal / wp.where(size > wp.float64(0.0), size, wp.float64(1.0)))
-
-
-@wp.kernel
-def _face_gradients(
-    firsts: wp.array[wp.int32],
-    ends: wp.array[wp.int32],
-    corner_vertices: wp.array[wp.int32],
-    before: wp.array[wp.vec3],
-    after: wp.array[wp.vec3],
-    # outputs
-    out_gradients: wp.array[wp.mat33d],
-    out_moves: wp.array[wp.int32],
-):
-    """Of each face's deformation the gradient, zero of faces without area, and whether any of its corners moves."""
-    face = wp.tid()
-    first, end = firsts[face], ends[face]
-    corners = wp.vec3i(corner_vertices[first], corner_vertices[first + 1], corner_vertices[end - 1])
-    was = _basis(before, corners)
-    gradient = wp.mat33d()
-    if wp.abs(wp.determinant(was)) > wp.float64(1e-30):
-        gradient = _basis(after, corners) * wp.inverse(was)
-    out_gradients[face] = gradient
-    moves = int(0)
-    for corner in range(first, end):
-        vertex = corner_vertices[corner]
-        if not before[vertex] == after[vertex]:
-            moves = 1
-    out_moves[face] = moves
-
-
-@wp.kernel
-def _vertex_axes(
-    firsts: wp.array[wp.int32],
-    ends: wp.array[wp.int32],
-    around: wp.array[wp.int32],
-    gradients: wp.array[wp.mat33d],
-    moves: wp.array[wp.int32],
-    # outputs
-    out_axes: wp.array2d[wp.vec3],
-    out_is_found: wp.array[wp.int32],
-):
-    """Rotations nearest to the mean around each vertex, without normalisation, which they ignore."""
-    vertex = wp.tid()
-    total = wp.mat33d()
-    is_moved = int(0)
-    for index in range(firsts[vertex], ends[vertex]):
-        face = around[index]
-        total += gradients[face]
-        is_moved += moves[face]
-    out_axes[vertex, 0] = wp.vec3(1.0, 0.0, 0.0)
-    out_axes[vertex, 1] = wp.vec3(0.0, 1.0, 0.0)
-    out_is_found[vertex] = 1
-    if is_moved > 0 and wp.ddot(total, total) > wp.float64(0.0):
-        rotation, is_found = nearest_rotation.polar_factor(total)
-        out_is_found[vertex] = is_found
-        for axis in range(2):
-            x, y, z = rotation[0, axis], rotation[1, axis], rotation[2, axis]
-            out_axes[vertex, axis] = wp.vec3(float(x), float(y), float(z))
+def turned(before: np.ndarray, after: np.ndarray, turning: Turning) -> SurfaceMotion:
+    """The same by a `Turning`, which many poses share: rotations are right at its vertices, and missing elsewhere."""
+    require_finite(after)
+    require_count("vertices", len(after), len(before))
+    found = turning.axes(after)
+    if len(found) == len(before):
+        return SurfaceMotion(before, after, found)
+    axes = np.empty((len(before), 2, 3), np.float32)
+    axes[:] = vertex_turns.UNTURNED
+    axes[turning.vertices] = found
+    return SurfaceMotion(before, after, axes)
 
 
 def carry(

@@ -3,14 +3,18 @@
 
 import bpy
 import numpy as np
+import pytest
 
-from hair_addon.blender.data.strands import posed_strands
-from hair_addon.blender.gpu import ambient_visibility
-from hair_addon.blender.gpu.strands import maker_choice
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.strands import curves, posed_strands
+from hair_addon.blender.gpu import ambient_visibility, strand_textures
+from hair_addon.blender.gpu.strands import maker_choice, vertex_turner
 from hair_addon.blender.groom import bindings, pipeline
 from hair_addon.blender.live import live_hair
 from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.settings import style_items
+from hair_addon.core.errors import HairError
+from hair_addon.core.geometry import vertex_turns
 from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.styling import curl, lean
 from tests.support.counting import counts_of
@@ -102,6 +106,68 @@ def test_styled_hair_is_carried_too(watched, monkeypatch):
     np.testing.assert_allclose(drawn(watched), carried(watched, watched.data), rtol=0.0, atol=CLOSE)
 
 
+def test_another_topology_while_the_surface_bends_is_carried_anew(watched, monkeypatch):
+    """By an upload, and from the next pose on where strands are drawn."""
+    surface = watched.data.surface
+    bend(surface, 0.5)
+    drawn(watched)
+    modifier = surface.modifiers.new("Cut", "TRIANGULATE")
+    calls = counts_of(monkeypatch)
+    for is_cut in (True, False):
+        modifier.show_viewport = is_cut
+        for amount in (0.6, 0.7, 0.8):
+            bend(surface, amount)
+            np.testing.assert_allclose(drawn(watched), carried_as_stored(watched), rtol=0.0, atol=CLOSE)
+    assert calls["uploads"] <= 2
+
+
+def carried_as_stored(hair):
+    """(S, P, 3): the points of Curves where Warp carries them from the roots that are stored."""
+    pose = posed_strands.read_pose(hair.data.surface, bpy.context.evaluated_depsgraph_get())
+    return pose.carry(points(hair), hair.data.vellus.topology, curves.read_root_places(hair.data, np.inf))
+
+
+def test_non_finite_vertices_are_refused_until_they_are_mended(watched, monkeypatch):
+    surface = watched.data.surface
+    bend(surface, 0.5)
+    drawn(watched)
+    point = surface.data.shape_keys.key_blocks["Bent"].data[0]
+    was, point.co.x = point.co.x, np.nan
+    bend(surface, 0.6)
+    with pytest.raises(HairError, match="non-finite"):
+        drawn(watched)
+    point.co.x = was
+    calls = counts_of(monkeypatch)
+    bend(surface, 0.7)
+    np.testing.assert_allclose(drawn(watched), carried_as_stored(watched), rtol=0.0, atol=CLOSE)
+    assert calls["uploads"] == 0
+
+
+def test_systems_on_one_surface_read_its_pose_once(watched, monkeypatch):
+    surface = watched.data.surface
+    with bpy.context.temp_override(object=surface, active_object=surface, selected_objects=[surface]):
+        bpy.context.view_layer.objects.active = surface
+        bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=20, length=0.2, strand_count=70)
+    live_hair.write_all()
+    systems = [o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]
+    assert len(systems) == 2
+    for amount in (0.3, 0.5):
+        bend(surface, amount)
+        for hair in systems:
+            drawn(hair)
+    poses, found, read_surface, turning = [], [], scene.read_surface, vertex_turns.turning
+    monkeypatch.setattr(scene, "read_surface", lambda *given: poses.append(1) or read_surface(*given))
+    monkeypatch.setattr(vertex_turns, "turning", lambda *given: found.append(1) or turning(*given))
+    for amount in (0.6, 0.7):
+        bend(surface, amount)
+        poses.clear()
+        shown = [drawn(hair) for hair in systems]
+        assert len(poses) == 1 and not found
+        for hair, places in zip(systems, shown, strict=True):
+            np.testing.assert_allclose(places, carried_as_stored(hair), rtol=0.0, atol=CLOSE)
+        found.clear()
+
+
 def read(**details):
     context = bpy.context
     return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), **details)
@@ -130,6 +196,30 @@ def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_sh
         for name in found:
             np.testing.assert_allclose(found[name].read(), texture[name].read(), rtol=0.0, atol=0.02)
     assert np.abs(np.array(at_rest.hair_visibility[0]["visibility_z"].read()) - np.array(first.read())).max() > 0.02
+
+
+def test_a_surface_that_turns_as_an_object_passes_a_matrix(hair, window, coarse_shadows, monkeypatch):
+    """Nothing turns vertices, carries strands or uploads them, and light follows by a direction a frame."""
+    bpy.ops.object.light_add(type="SUN")
+    surface = hair.data.surface
+    frame, called = read(), []
+    strands = frame.hair[0][0]
+    for owner, name in (
+        (ambient_visibility, "measure"),
+        (vertex_turns, "turning"),
+        (vertex_turner.VertexTurner, "turn"),
+        (scene, "read_surface"),
+        (strand_textures, "upload_strands"),
+    ):
+        monkeypatch.setattr(owner, name, lambda *given, name=name: called.append(name))
+    for angle in (0.2, 0.4, 0.6):
+        surface.rotation_euler.z = angle
+        bpy.context.view_layer.update()
+        frame = read(former=frame)
+        assert frame.hair[0][0] is strands
+        np.testing.assert_allclose(frame.hair[0][2], np.array(hair.matrix_world), atol=1e-6)
+        assert abs(np.array(hair.matrix_world)[0, 0] - np.cos(angle)) < 1e-6
+    assert not called
 
 
 def test_hair_that_warp_computes_is_lit_as_at_rest_while_it_plays(hair, coarse_shadows, monkeypatch):

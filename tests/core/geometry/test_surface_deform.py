@@ -158,5 +158,5 @@ def test_a_polygon_moves_like_its_triangles(rng):
     vertices = np.float32([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)])
     turn = rotation(rng)
     faces = Faces(np.int32([2, 3, 0, 1]), np.int32([0, 4]))
-    axes = surface_deform.vertex_axes(vertices, (vertices @ turn.T).astype(np.float32), faces)
+    axes = surface_deform.motion(vertices, (vertices @ turn.T).astype(np.float32), faces).axes
     np.testing.assert_allclose(axes, np.broadcast_to(turn.T[:2], (4, 2, 3)), atol=1e-6)

@@ -2,6 +2,7 @@
 """Meshes as they are drawn around hair: triangles, normals and materials of all that a viewport or a render shows."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -42,9 +43,17 @@ class _Layout:
     loops: np.ndarray  # (3 F',) corners of its triangles
     runs: tuple  # (material slot, number of its triangles)
 
+    @cached_property
+    def vertices(self):
+        """(3 F',) vertices of its triangles, of the type that NumPy gathers by without a copy."""
+        return self.faces.corner_vertices[self.loops].astype(np.intp)
+
     def fits(self, faces, slots):
-        mine, its = ((f.corner_vertices, f.starts, s) for f, s in ((self.faces, self.slots), (faces, slots)))
-        return all(map(np.array_equal, mine, its))
+        if faces is not self.faces:
+            mine, its = ((f.corner_vertices, f.starts) for f in (self.faces, faces))
+            if not all(map(np.array_equal, mine, its)):
+                return False
+        return np.array_equal(self.slots, slots)
 
 
 layout_cache = Cache(capacity=64)  # session_uid of a mesh object → `_Layout`
@@ -96,8 +105,9 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
         uvs = _read_uvs(mesh, layout.loops, parts)
     finally:
         mesh_object.to_mesh_clear()
-    positions = (vertices @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
-    positions = positions.take(layout.faces.corner_vertices[layout.loops], axis=0)
+    placed = vertices @ to_world[:3, :3].T.astype(np.float32)
+    placed += to_world[:3, 3].astype(np.float32)
+    positions = placed.take(layout.vertices, axis=0)
     return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, color=surface_color(mesh_object))
 
 
@@ -112,7 +122,7 @@ def _corner_normals(mesh, to_world):
 
 def _layout(mesh_object, mesh, is_holdout, is_moving):
     """The `_Layout` of an evaluated mesh: with `is_moving` the one before, if it fits."""
-    faces, slots = scene.faces_of(mesh), np.zeros(0, np.int32)
+    faces, slots = scene.faces_read_again(mesh_object.original, mesh), np.zeros(0, np.int32)
     if len(mesh_object.material_slots) > 1 and not is_holdout:
         slots = np.zeros(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("material_index", slots)
@@ -145,10 +155,12 @@ def _parts(mesh_object, runs):
 
 def _read_uvs(mesh, loops, parts):
     """(3 F, 2) float32 UVs of drawn corners, of each part by the UV map of its images: zero without."""
+    names = [material.uv_map for _first, _count, material in parts]
+    layers = [None if name is None else (mesh.uv_layers.get(name) or _active_uvs(mesh)) for name in names]
+    if all(layer is None for layer in layers):
+        return np.broadcast_to(np.float32(0.0), (len(loops), 2))  # as many, without their memory
     uvs = np.zeros((len(loops), 2), np.float32)
-    for first, count, material in parts:
-        name = material.uv_map
-        layer = None if name is None else (mesh.uv_layers.get(name) or _active_uvs(mesh))
+    for (first, count, _material), layer in zip(parts, layers, strict=True):
         if layer is not None:
             found = np.empty((len(mesh.loops), 2), np.float32)
             layer.uv.foreach_get("vector", found.ravel())

@@ -82,9 +82,9 @@ class GuidePose:
         return self.pose.surface.rest.astype(np.float64)
 
     def _carried(self, points, is_back=False):
-        if self.pose.motion is None:
+        if not self.pose.is_deformed:
             return points
-        return posed_strands.carried(points, self.pose.motion, self.places, is_back=is_back)
+        return posed_strands.carried(points, self.pose.motion_at(self.places[0]), self.places, is_back=is_back)
 
     def _to_world(self, points):
         return points @ self.matrix[:, :3].T + self.matrix[:, 3]

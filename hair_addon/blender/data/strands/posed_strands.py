@@ -6,10 +6,12 @@ which the geometry nodes of follow_nodes.py move in the same way.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from ....core import geometry
+from ....core.geometry.mesh import require_finite
 from .. import scene
 from ..scene import Surface
 from . import curves
@@ -17,10 +19,28 @@ from . import curves
 
 @dataclass(frozen=True)
 class Pose:
-    """A surface at one time, and its `SurfaceMotion` from the rest shape: None if it is not deformed."""
+    """A surface at one time."""
 
     surface: Surface | None  # None of strands that grow on no mesh
-    motion: "surface_deform.SurfaceMotion | None"  # noqa: F821 (Warp is imported late)
+    is_deformed: bool = False  # whether shape keys or modifiers have moved it from its rest shape
+
+    @cached_property
+    def _motions(self):
+        """{id of a `Turning`: (it, its `SurfaceMotion`)}."""
+        return {}
+
+    def motion_at(self, vertices):
+        """The `SurfaceMotion` from the rest shape as it is at some vertices, indices in any shape; None at rest.
+
+        Rotations elsewhere are missing: there are fewer roots than vertices on many a surface.
+        """
+        if not self.is_deformed:
+            return None
+        turning = self.surface.turning(vertices)
+        if id(turning) not in self._motions:
+            moved = geometry.surface_deform.turned(self.surface.rest, self.surface.posed, turning)
+            self._motions[id(turning)] = turning, moved
+        return self._motions[id(turning)][1]
 
     def carry(self, points, topology, places, chosen=slice(None)):
         """Return (M, P, 3) float32: the chosen strands on the deformed surface; unchanged if it is not deformed.
@@ -29,20 +49,20 @@ class Pose:
         rooted on; places: their roots there, as `Surface.places` or `curves.read_root_places` returns them, or None.
         Strands are rooted at the nearest place where the surface has other triangles now, or what is stored is damaged.
         """
-        if self.motion is None:
+        if not self.is_deformed:
             return points[chosen]
         return self.carry_rooted(points, self.rooted(topology, places, points[:, 0]), chosen)
 
     def carry_rooted(self, points, places, chosen):
         """The same of strands whose places `rooted` gave: for parts of many strands."""
-        if self.motion is None:
+        if not self.is_deformed:
             return points[chosen]
-        return carried(points[chosen], self.motion, (places[0][chosen], places[1][chosen]))
+        return carried(points[chosen], self.motion_at(places[0]), (places[0][chosen], places[1][chosen]))
 
     def rooted(self, topology, places, firsts):
         """Root places on this surface, as `carry` takes them; firsts: (S, 3) local first points."""
         surface = self.surface
-        if self.motion is None:
+        if not self.is_deformed:
             return places
         if places is None or topology != surface.topology or len(places[0]) != len(firsts):
             places = np.zeros((len(firsts), 3), np.int32), np.zeros((len(firsts), 3), np.float32)
@@ -59,18 +79,16 @@ class Pose:
 def read_pose(surface_object, depsgraph):
     """The `Pose` of what strands grow on, as a depsgraph has evaluated it; at rest of what is no mesh."""
     if surface_object is None or surface_object.type != "MESH":
-        return Pose(None, None)
+        return Pose(None)
     return pose_of(scene.read_surface(surface_object, depsgraph))
 
 
 def pose_of(surface):
-    """The `Pose` of a `Surface` as it was read."""
-    if not surface.is_deformed:
-        return Pose(surface, None)
-    motion = geometry.surface_deform.motion(
-        surface.rest, surface.posed, surface.faces, smooth_before=surface.smooth_rest
-    )
-    return Pose(surface, motion)
+    """The `Pose` of a `Surface` as it was read. Raises `HairError` where it is deformed to non-finite vertices."""
+    if surface.is_deformed:
+        require_finite(surface.rest)
+        require_finite(surface.posed)
+    return Pose(surface, surface.is_deformed)
 
 
 def carried(points, motion, places, counts=None, is_back=False):

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands carried with their surface where they are drawn: core/geometry/surface_deform.py as a compute program.
 
-Strands at rest and their roots are uploaded once, or made there; a pose of the surface uploads its vertices alone.
+Strands at rest and their roots are uploaded once, or made there; a pose of the surface uploads the places of the
+vertices around roots.
 """
 
 from dataclasses import dataclass
@@ -13,13 +14,13 @@ import numpy as np
 from ....core.kernels.checks import require_count, require_indices
 from .. import shaders
 from ..strand_textures import MOST_GROUPS, StrandsOnGPU
+from . import vertex_turner
 from .strand_changes import StrandChanges, declare_put, new_changes, rows_texture
 
 if TYPE_CHECKING:
-    from ....core.geometry.surface_deform import SurfaceMotion
+    from ....core.geometry.vertex_turns import Turning
 
 _GROUP_SIZE = 64
-_NOT_TURNED = np.eye(3, dtype=np.float32)[:2]
 
 
 @dataclass(frozen=True)
@@ -29,33 +30,25 @@ class StrandCarrier:
     rest: gpu.types.GPUTexture  # as `StrandsOnGPU.texture`
     roots: gpu.types.GPUTexture  # shaders/carry_strands.comp
     vertices: np.ndarray  # (V, 3) of the surface at rest
+    turner: vertex_turner.VertexTurner  # of the vertices around roots
     changes: StrandChanges
 
     @property
     def textures(self) -> list[gpu.types.GPUTexture]:
         """All that it holds."""
-        return [self.rest, self.roots, *self.changes.textures]
+        return [self.rest, self.roots, *self.turner.textures, *self.changes.textures]
 
-    def carry(self, strands: StrandsOnGPU, motion: "SurfaceMotion | None") -> StrandsOnGPU:
+    def carry(self, strands: StrandsOnGPU, posed: np.ndarray | None) -> StrandsOnGPU:
         """Carry all strands from their rest; the `StrandsOnGPU` after it.
 
-        strands: of the same roots, whose texture is changed: another one than `rest`; motion: from the same vertices,
-        None for none. Raises `HairError` where counts do not match.
+        strands: of the same roots, whose texture is changed: another one than `rest`; posed: (V, 3) float32, finite,
+        where the surface's vertices are now, None: at rest. Raises `HairError` where counts do not match.
         """
-        vertices = np.zeros((len(self.vertices), 3, 4), np.float32)
-        if motion is None:
-            vertices[:, 0, :3], vertices[:, 1:, :3] = self.vertices, _NOT_TURNED
-        else:
-            require_count("vertices", len(motion.after), len(self.vertices))
-            require_count("vertices", len(motion.axes), len(self.vertices))
-            vertices[:, 0, :3], vertices[:, 1:, :3] = motion.after, motion.axes
-            is_moved = (motion.after != self.vertices).any(axis=1)
-            vertices[:, 0, 3] = is_moved | (motion.axes != _NOT_TURNED).any(axis=(1, 2))
+        turned = self.turner.turn(posed)
         self.changes.keep(strands)
-        texture, _row = rows_texture(vertices.reshape(len(vertices), -1), 4)
         program = _carry_program()
         program.bind()
-        for name, sampled in (("rest", self.rest), ("roots", self.roots), ("vertices", texture)):
+        for name, sampled in (("rest", self.rest), ("roots", self.roots), ("vertices", turned)):
             program.uniform_sampler(name, sampled)
         program.image("strands", strands.texture)
         self.changes.bind(program)
@@ -73,23 +66,31 @@ class StrandCarrier:
 
 
 def new_carrier(
-    rest: gpu.types.GPUTexture, point_count: int, places: tuple[np.ndarray, np.ndarray], vertices: np.ndarray
+    rest: gpu.types.GPUTexture,
+    point_count: int,
+    places: tuple[np.ndarray, np.ndarray],
+    vertices: np.ndarray,
+    turning: "Turning",
 ) -> StrandCarrier:
     """The `StrandCarrier` of S strands.
 
     rest: their texture; places: (S, 3) int32 vertices around each root and (S, 3) float32 barycentric coordinates;
-    vertices: (V, 3) float32 of the surface at rest. Raises `HairError` where counts or indices do not match, or the
-    driver lacks something.
+    vertices: (V, 3) float32 of the surface at rest; turning: of the vertices around roots. Raises `HairError` where
+    counts or indices do not match, or the driver lacks something.
     """
     corners, barycentric = places
     require_count("barycentric coordinates", len(barycentric), len(corners))
     require_indices("vertices", corners, len(vertices))
     _carry_program()  # first: where there is none, nothing is uploaded
+    turner = vertex_turner.new_turner(turning, vertices)
+    found = np.searchsorted(turning.vertices, corners)
+    require_indices("vertices", found, len(turning.vertices))
+    require_count("vertices around roots", np.count_nonzero(turning.vertices[found] == corners), corners.size)
     rows = np.zeros((len(corners), 3, 4), np.float32)
-    rows[:, 0, :3], rows[:, 1, :3] = corners, barycentric  # indices are exact in single precision up to 16 million
+    rows[:, 0, :3], rows[:, 1, :3] = found, barycentric  # indices are exact in single precision up to 16 million
     rows[:, 2, :3] = (barycentric[:, :, None] * vertices[corners]).sum(axis=1)
     roots, _row = rows_texture(rows.reshape(len(rows), -1), 4)
-    return StrandCarrier(rest, roots, vertices, new_changes(len(corners), point_count))
+    return StrandCarrier(rest, roots, vertices, turner, new_changes(len(corners), point_count))
 
 
 @shaders.kept

@@ -191,8 +191,9 @@ def on_surface(surface: Surface, seen: SeenCurves, to_surface: np.ndarray, every
     points = points[rooted.point_order(seen.starts)]
     counts = np.diff(seen.starts)[rooted.kept]
     if surface.is_deformed:
-        motion = posed_strands.pose_of(surface).motion
-        points = posed_strands.carried(points, motion, surface.places(rooted.roots), counts, is_back=True)
+        places = surface.places(rooted.roots)
+        motion = posed_strands.pose_of(surface).motion_at(places[0])
+        points = posed_strands.carried(points, motion, places, counts, is_back=True)
     return PlacedCurves(points, counts, seen.is_smooth[rooted.kept], rooted)
 
 

@@ -80,19 +80,21 @@ class CombedGuides:
     def carried_back(self, posed: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """Points (M, P, 3) float32 [m] of chosen guides on the deformed surface → the same on the surface at rest."""
         pose = posed_strands.pose_of(self.surface)
-        if pose.motion is None:
+        if not pose.is_deformed:
             return posed
-        places = tuple(part[chosen] for part in self.surface.places(self.roots))
-        local = self.surface.to_local(posed)
-        return self.surface.from_local(posed_strands.carried(local, pose.motion, places, is_back=True))
+        places = self.surface.places(self.roots)
+        motion = pose.motion_at(places[0])
+        some = tuple(part[chosen] for part in places)
+        return self.surface.from_local(posed_strands.carried(self.surface.to_local(posed), motion, some, is_back=True))
 
     def posed(self) -> np.ndarray:
         """(N, 3) float32 [m]: the points on the surface as shape keys and modifiers deform it now."""
         pose = posed_strands.pose_of(self.surface)
-        if pose.motion is None:
+        if not pose.is_deformed:
             return self.points
         places = self.surface.places(self.roots)
-        return self.surface.from_local(posed_strands.carried(self.local, pose.motion, places, self.counts))
+        motion = pose.motion_at(places[0])
+        return self.surface.from_local(posed_strands.carried(self.local, motion, places, self.counts))
 
 
 def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:

@@ -49,16 +49,18 @@ def test_some_strands_are_carried_as_all_are(bent):
 
 def test_the_way_back_ends_where_strands_rest(bent):
     pose, (points, _topology, places) = pose_of(bent[0]), at_rest(bent[0])
-    there = posed_strands.carried(points, pose.motion, places)
-    np.testing.assert_allclose(posed_strands.carried(there, pose.motion, places, is_back=True), points, atol=1e-5)
+    motion = pose.motion_at(places[0])
+    there = posed_strands.carried(points, motion, places)
+    np.testing.assert_allclose(posed_strands.carried(there, motion, places, is_back=True), points, atol=1e-5)
 
 
 def test_strands_of_several_point_counts_are_carried_as_their_points_would_be(bent):
     pose, (points, _topology, places) = pose_of(bent[0]), at_rest(bent[0])
     counts = np.arange(len(points)) % 5 + 2
     kept = np.arange(points.shape[1]) < counts[:, None]
-    whole = posed_strands.carried(points, pose.motion, places)
-    np.testing.assert_array_equal(posed_strands.carried(points[kept], pose.motion, places, counts), whole[kept])
+    motion = pose.motion_at(places[0])
+    whole = posed_strands.carried(points, motion, places)
+    np.testing.assert_array_equal(posed_strands.carried(points[kept], motion, places, counts), whole[kept])
 
 
 def test_strands_whose_roots_are_lost_are_rooted_where_it_is_nearest(bent):

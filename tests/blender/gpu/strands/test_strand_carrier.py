@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Strands that the GPU carries with their surface are where Warp carries them, and a pose uploads vertices alone."""
 
-from dataclasses import replace
-
 import gpu
 import numpy as np
 import pytest
@@ -10,7 +8,7 @@ import pytest
 from hair_addon.blender.gpu import strand_textures
 from hair_addon.blender.gpu.strands import strand_carrier
 from hair_addon.core.errors import HairError
-from hair_addon.core.geometry import surface_deform
+from hair_addon.core.geometry import surface_deform, vertex_turns
 from hair_addon.core.geometry.mesh import Faces
 from tests.support import drawn_strands
 
@@ -56,8 +54,9 @@ def uploaded(points):
 
 
 def carrier_of(rooted):
-    vertices, _faces, places, points = rooted
-    return strand_carrier.new_carrier(uploaded(points).texture, POINTS, places, vertices)
+    vertices, faces, places, points = rooted
+    turning = vertex_turns.turning(vertices, faces, places[0])
+    return strand_carrier.new_carrier(uploaded(points).texture, POINTS, places, vertices, turning)
 
 
 def test_strands_are_where_warp_carries_them(blender, rooted):
@@ -65,7 +64,7 @@ def test_strands_are_where_warp_carries_them(blender, rooted):
     carrier, strands = carrier_of(rooted), uploaded(np.zeros_like(points))
     for amount in (2.0, 5.0):
         motion = surface_deform.motion(vertices, bent(vertices, amount), faces)
-        strands = carrier.carry(strands, motion)
+        strands = carrier.carry(strands, motion.after)
         wanted = surface_deform.carry(points, motion, *places)
         found = drawn_strands.places(strands)
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=CLOSE)
@@ -78,9 +77,9 @@ def test_strands_are_where_warp_carries_them(blender, rooted):
 
 
 def test_at_rest_strands_are_the_same_bits(blender, rooted):
-    vertices, faces, _places, points = rooted
+    vertices, _faces, _places, points = rooted
     carrier = carrier_of(rooted)
-    strands = carrier.carry(uploaded(points), surface_deform.motion(vertices, bent(vertices, 3.0), faces))
+    strands = carrier.carry(uploaded(points), bent(vertices, 3.0))
     before = drawn_strands.places(strands)
     strands = carrier.carry(strands, None)
     np.testing.assert_array_equal(drawn_strands.places(strands), drawn_strands.places(uploaded(points)))
@@ -88,22 +87,28 @@ def test_at_rest_strands_are_the_same_bits(blender, rooted):
     assert strands.moved.turn == 2
 
 
-def test_a_pose_uploads_vertices_and_nothing_else(blender, rooted, monkeypatch):
-    vertices, faces, _places, points = rooted
-    carrier, strands = carrier_of(rooted), uploaded(points)
-    motion = surface_deform.motion(vertices, bent(vertices, 3.0), faces)
-    strands, sent = carrier.carry(strands, motion), []
+def test_a_pose_uploads_places_around_roots_and_nothing_else(blender, rooted, monkeypatch):
+    vertices, faces, places, points = rooted
+    near = points[:, 0, 0] < 0.4
+    some, moved = tuple(part[near] for part in places), bent(vertices, 3.0)
+    turning = vertex_turns.turning(vertices, faces, some[0])
+    carrier = strand_carrier.new_carrier(uploaded(points[near]).texture, POINTS, some, vertices, turning)
+    strands, sent = carrier.carry(uploaded(points[near]), moved), []
     buffer = gpu.types.Buffer
     monkeypatch.setattr(gpu.types, "Buffer", lambda kind, size, values: sent.append(size) or buffer(kind, size, values))
     for _ in range(3):
-        strands = carrier.carry(strands, motion)
-    assert sent == [12 * len(vertices)] * 3
+        strands = carrier.carry(strands, moved)
+    assert vertices[turning.needed, 0].max() <= 0.4 + 2.0 / (SIDE - 1)  # those of the faces around corners of roots
+    assert sent == [3 * len(turning.needed)] * 3
 
 
 def test_another_surface_is_refused(blender, rooted):
     vertices, faces, places, points = rooted
-    motion = surface_deform.motion(vertices, bent(vertices, 3.0), faces)
+    carrier, turning = carrier_of(rooted), vertex_turns.turning(vertices, faces)
     with pytest.raises(HairError, match="vertices"):
-        replace(carrier_of(rooted), vertices=vertices[1:]).carry(uploaded(points), motion)
+        carrier.carry(uploaded(points), vertices[1:])
     with pytest.raises(HairError, match="vertices"):
-        strand_carrier.new_carrier(uploaded(points).texture, POINTS, places, vertices[:-1])
+        strand_carrier.new_carrier(uploaded(points).texture, POINTS, places, vertices[:-1], turning)
+    few = vertex_turns.turning(vertices, faces, places[0][:5])
+    with pytest.raises(HairError, match="vertices"):
+        strand_carrier.new_carrier(uploaded(points).texture, POINTS, places, vertices, few)
