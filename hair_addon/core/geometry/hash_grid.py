@@ -19,7 +19,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 GRID_SIZE = 32  # cells along each axis; farther ones wrap around and share a bucket, which costs time, never truth
 CELLS_PER_RADIUS = 2.0  # cell width / first search radius: fewer cells to visit beats fewer points to compare
-CELL_WIDTH = 0.6  # of the cells that queries are sorted by / first search radius
+CELL_WIDTH = 0.8  # of the cells that queries are sorted by / first search radius
 CELLS_ALONG = 1024  # of those cells, at most, along each axis
 CANDIDATE_LIMIT = 128  # points that the queries of one cell share
 candidate_indices = wp.types.vector(length=CANDIDATE_LIMIT, dtype=int)
