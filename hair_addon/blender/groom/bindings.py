@@ -224,7 +224,9 @@ def grow_in_place_of(datablock: Curves | None, bound: BoundHair) -> None:
         binding_cache.invalidate(datablock.session_uid)
         bound.written_radii = before.written_radii
         if before.free is None and before.growing is not None and before.growing.exception() is None:
-            bound.growing = before.growing
+            # An array of its own, by which what is drawn is known.
+            bound.growing = Future()
+            bound.growing.set_result(before.points.view())
     bound.grow()
 
 
