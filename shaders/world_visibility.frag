@@ -3,6 +3,7 @@
 
 #include "include/shadow.glsl"
 #include "include/packed_strand.glsl"
+#include "include/seen_bytes.glsl"
 
 // A place of a strand whose first texel is given, or of a surface.
 vec3 place_of(ivec2 first, int point)
@@ -31,10 +32,11 @@ void main()
   bool is_shared = view.radius_strands == 1;
   ivec2 texel = is_shared ? ivec2(point, 0) : ivec2(strand * view.point_count + point, cell.y);
   float radius = is_strand ? texelFetch(strand_radii, texel, 0).r * view.radius_unit * view.object_scale : 0.0;
-  seen_x_y = vec4(0.0);
-  seen_z = vec4(0.0);
-  seen_surface = vec4(0.0);
-  seen_channels = vec4(0.0);
+  Seen sums;
+  sums.x_y = vec4(0.0);
+  sums.z = vec4(0.0);
+  sums.surface = vec4(0.0);
+  sums.channels = vec4(0.0);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 at;
@@ -57,18 +59,25 @@ void main()
       past_hair_channels = transmitted(crossed, view.hair_forward.rgb);
       left = exp(-view.seen_opacity * behind);
       // Through the hair to the surface, and back.
-      seen_surface += beyond * left * left * vec4(light.axis.xyz, 1.0);
+      sums.surface += beyond * left * left * vec4(light.axis.xyz, 1.0);
     }
     float seen = open * past_hair;
     vec3 share = seen * light.axis.xyz * light.axis.xyz;
     vec3 plus = share * vec3(lessThan(light.axis.xyz, vec3(0.0)));  // lights shine along their axis
     vec3 minus = share * vec3(greaterThan(light.axis.xyz, vec3(0.0)));
-    seen_x_y += vec4(plus.x, minus.x, plus.y, minus.y);
+    sums.x_y += vec4(plus.x, minus.x, plus.y, minus.y);
     // Strands: through the hair behind them, and by P2 of sin(theta_i). Points of surfaces: over all directions without
     // hair, and with it.
     vec2 others = is_strand ? seen * vec2(left, legendre_2(dot(T, light.axis.xyz))) : open * vec2(1.0, past_hair);
     // Surfaces stop all channels alike, strands do not. And the surfaces, without the hair before them.
-    seen_channels += vec4(open * past_hair_channels, beyond);
-    seen_z += vec4(plus.z, minus.z, others);
+    sums.channels += vec4(open * past_hair_channels, beyond);
+    sums.z += vec4(plus.z, minus.z, others);
   }
+  if (view.seen_in_bytes != 0) {
+    sums = seen_to_bytes(sums);
+  }
+  seen_x_y = sums.x_y;
+  seen_z = sums.z;
+  seen_surface = sums.surface;
+  seen_channels = sums.channels;
 }

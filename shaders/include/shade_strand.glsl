@@ -15,6 +15,7 @@
 #include "include/drawn_light.glsl"
 #include "include/fibre.glsl"
 #include "include/light_grid.glsl"
+#include "include/seen_bytes.glsl"
 #include "include/this_place.glsl"
 #include "include/world.glsl"
 
@@ -70,18 +71,24 @@ vec3 strand_light(SeenStrand strand)
   vec3 V = strand.V;
   vec2 seen_at = seen_texel(strand_index, strand_position, view.point_count, view.seen_points, view.row_strands) /
                  vec2(textureSize(visibility_x_y, 0));
-  vec4 seen_x_y = textureLod(visibility_x_y, seen_at, 0.0);
-  vec4 seen_z = textureLod(visibility_z, seen_at, 0.0);
+  Seen bytes;
+  bytes.x_y = textureLod(visibility_x_y, seen_at, 0.0);
+  bytes.z = textureLod(visibility_z, seen_at, 0.0);
+  bytes.surface = textureLod(visibility_surface, seen_at, 0.0);
+  bytes.channels = textureLod(visibility_channels, seen_at, 0.0);
+  Seen seen = seen_from_bytes(bytes);
+  vec4 seen_x_y = seen.x_y;
+  vec4 seen_z = seen.z;
   float strands_behind = mean_strands_behind(seen_x_y, seen_z, view.seen_opacity);
   vec3 back = returned_from_behind(dot(T, V), strands_behind);
   mat3 plus;
   mat3 minus;
-  vec4 seen_channels = textureLod(visibility_channels, seen_at, 0.0);
+  vec4 seen_channels = seen.channels;
   strand_sides(seen_x_y, seen_z.xy, view.seen_opacity, view.hair_forward.rgb, seen_channels.rgb, plus, minus);
   vec3 world = strand_radiance(plus, minus, T, V, strand.returned + back, with_back(strand.towards, back));
   vec3 all = max(strand.returned, vec3(1e-6));
   world *= cone_visibility(seen_x_y, seen_z, seen_channels.rgb, T, strand.zonal_1 / all, strand.zonal_2 / all);
-  vec4 hidden = textureLod(visibility_surface, seen_at, 0.0) / 6.0;
+  vec4 hidden = seen.surface / 6.0;
   vec3 N = surface_normal_of(hidden.xyz);
   float surface_part = seen_channels.a / 6.0;
   vec3 from_surfaces = surface_light(plus, minus, N, surface_part, hidden.w, view.seen_opacity, view.hair_forward.rgb);

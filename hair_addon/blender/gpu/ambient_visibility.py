@@ -17,7 +17,10 @@ from .strand_textures import seen_points
 _SIZE = 256
 _POINT_COUNT, _LEAST_STRANDS = 11, 10_000
 _FULL_WIDTH = 0.5  # texels that a strand may be wide that is drawn for several
-_DIRECTIONS_AT_ONCE = 7
+_BYTES, _SUMS = (
+    "RGBA8",
+    "RGBA16F",
+)  # of a texture that strands' visibility is kept in, and one that sums are added up in
 
 
 def measure(hair, surfaces, opacities, clear=(), forwards=None):
@@ -30,15 +33,12 @@ def measure(hair, surfaces, opacities, clear=(), forwards=None):
     if forwards is None:
         forwards = [np.full(3, 1.0 - opacity) for opacity in opacities]
     of_strands = list(zip(opacities, forwards, strict=True))
-    maps = shadows.ShadowMaps(_SIZE, _DIRECTIONS_AT_ONCE)
-    targets = [_Target(place) for place in _places(hair, [*surfaces, *clear], of_strands)]
-    steps = _steps(hair)
-    for first in range(0, len(ambient_cube.DIRECTIONS), _DIRECTIONS_AT_ONCE):
-        chosen = slice(first, first + _DIRECTIONS_AT_ONCE)
-        lights = _suns(ambient_cube.DIRECTIONS[chosen], ambient_cube.WEIGHTS[chosen])
-        maps.draw(lights, hair, surfaces, steps)
-        for target in targets:
-            target.add(lights, maps.samplers)
+    lights = _suns(ambient_cube.DIRECTIONS, ambient_cube.WEIGHTS)
+    maps = shadows.ShadowMaps(_SIZE, len(ambient_cube.DIRECTIONS))
+    maps.draw(lights, hair, surfaces, _steps(hair))
+    targets = [_Target(place, not _is_surface(place)) for place in _places(hair, [*surfaces, *clear], of_strands)]
+    for target in targets:
+        target.add(lights, maps.samplers)
     return _split([target.textures for target in targets], len(hair))
 
 
@@ -74,9 +74,9 @@ class Renewal:
         if self._turn < len(ambient_cube.DIRECTIONS):
             return seen
         self._turn = 0
-        complete = [target.textures for target in self._targets]
-        for target, textures in zip(self._targets, [*seen[0], *seen[1]], strict=True):
-            target.take(textures)
+        complete = [
+            target.completed(textures) for target, textures in zip(self._targets, [*seen[0], *seen[1]], strict=True)
+        ]
         return _split(complete, len(hair))
 
 
@@ -144,19 +144,38 @@ def _view_of_surface(surface):
 
 
 class _Target:
-    """Textures that visibility is added up in, a texel for each place."""
+    """Textures that visibility is added up in, a texel for each place.
 
-    def __init__(self, place):
+    is_in_bytes: whether all lights are added at once, and what strands see is kept as shaders/include/seen_bytes.glsl
+    has it.
+    """
+
+    def __init__(self, place, is_in_bytes=False):
         self.view, self.places = place
+        self.view["seen_in_bytes"] = is_in_bytes
         self.size = _size_of(*place)
-        self.take({name: _texture(self.size) for name in shaders.VISIBILITY_SAMPLERS})
+        kind = _BYTES if is_in_bytes else _SUMS
+        self.take({name: _texture(self.size, kind) for name in shaders.VISIBILITY_SAMPLERS})
 
     def take(self, textures):
         """Add up in these textures {sampler: texture}, from zero."""
-        self.textures = textures
-        self.framebuffer = gpu.types.GPUFrameBuffer(color_slots=tuple(self.textures.values()))
+        self.textures, self.framebuffer = textures, _framebuffer(textures)
         with self.framebuffer.bind():
             self.framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0))
+
+    def completed(self, before):
+        """Textures {sampler: texture} of what was added up; it begins again from zero.
+
+        before: those that were shown so far. What strands see is put into these; surfaces' take turns.
+        """
+        found = self.textures
+        if _is_surface((self.view, self.places)):
+            self.take(before)
+            return found
+        with _framebuffer(before).bind(), drawing.gpu_state("NONE", depth_writes=False):
+            drawing.draw_cover(shaders.visibility_bytes_program(), {}, found)
+        self.take(found)
+        return before
 
     def add(self, lights, maps):
         with self.framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"):
@@ -168,8 +187,17 @@ def _size_of(view, places):
     return int(view["row_strands"] * view["seen_points"]), places["places"].height
 
 
-def _texture(size):
-    texture = gpu.types.GPUTexture(size, format="RGBA16F")
+def _is_surface(place):
+    """Whether a place of `_places` is a surface."""
+    return int(place[0]["point_count"]) == 1
+
+
+def _framebuffer(textures):
+    return gpu.types.GPUFrameBuffer(color_slots=tuple(textures.values()))
+
+
+def _texture(size, kind):
+    texture = gpu.types.GPUTexture(size, format=kind)
     texture.filter_mode(True)
     texture.extend_mode("EXTEND")
     return texture

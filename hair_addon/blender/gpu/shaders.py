@@ -259,6 +259,15 @@ def visibility_program():
 
 
 @kept
+def visibility_bytes_program():
+    """The program that keeps what strands see in fewer bytes."""
+    info = gpu.types.GPUShaderCreateInfo()
+    for slot, name in enumerate(VISIBILITY_SAMPLERS):
+        info.sampler(slot, "FLOAT_2D", name)
+    return compile_drawing(info, "cover.vert", "visibility_bytes.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
+
+
+@kept
 def environment_program(fragment):
     """The program that draws a picture of the surroundings."""
     info = gpu.types.GPUShaderCreateInfo()

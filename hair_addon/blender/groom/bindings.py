@@ -144,7 +144,7 @@ class BoundHair:
             weights = following.weights_now(binding, guides)
             self.is_behind = False
             out = None if self.growing is None else self.points
-            out = out if out is not None and out.shape[1] == guides.point_count else None
+            out = out if out is not None and out.shape == (len(binding.positions), guides.point_count, 3) else None
             self.growing = following.growing_points(binding, guides, weights, axes, out, styling)
             self._take_shares(weights.weights.numpy())
         else:
@@ -212,6 +212,22 @@ def keep(datablock: Curves, bound: BoundHair) -> None:
     if before is not None:
         bound.written_radii = before.written_radii
     binding_cache.keep(datablock.session_uid, bound)
+
+
+def grow_in_place_of(datablock: Curves | None, bound: BoundHair) -> None:
+    """Begin to grow strands that a hair Curves datablock is about to be bound to, None for a new one.
+
+    What it was bound to is dropped: strands take the memory of its points where they are as many, of which a new one
+    would have to be cleared by the system first.
+    """
+    if datablock is not None and (before := of(datablock)) is not None:
+        binding_cache.invalidate(datablock.session_uid)
+        bound.written_radii = before.written_radii
+        if before.free is None and before.growing is not None and before.growing.exception() is None:
+            # An array of its own, by which what is drawn is known.
+            bound.growing = Future()
+            bound.growing.set_result(before.points.view())
+    bound.grow()
 
 
 def of(datablock: Curves) -> BoundHair | None:

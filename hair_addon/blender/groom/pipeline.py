@@ -84,6 +84,8 @@ def interpolating_hair(
     """`interpolate_hair` as work in steps; styles: of new hair, whose Curves then keep them (`writing.keep_styles`)."""
     place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
     bound = yield from _binding_hair(guide_curves, settings, depsgraph, target, styles)
+    # Only now, as nothing comes between it and the writing.
+    bindings.grow_in_place_of(its_target.find(), bound)
     return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
 
 
@@ -91,10 +93,13 @@ def bind_hair(
     guide_curves: Curves, settings: HairSettings, depsgraph: Depsgraph, target: Curves | None = None
 ) -> BoundHair:
     """The `BoundHair` that grows between guides, written nowhere. Strands of `target` keep their roots if they may."""
-    return run_now(_binding_hair(guide_curves, settings, depsgraph, target))
+    bound = run_now(_binding_hair(guide_curves, settings, depsgraph, target))
+    bound.grow()
+    return bound
 
 
 def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
+    """The `BoundHair` that is to grow between guides, as work in steps."""
     surface = _read_surface(guide_curves.surface, depsgraph, target)
     guides = curves.read_guides(guide_curves, surface, preferences.device())
     mask = masks.of_strands(settings, guide_curves.vellus.guides)
@@ -118,7 +123,7 @@ def _binding_hair(guide_curves, settings, depsgraph, target, new_styles=()):
             binding = hair_binding.weigh_again(known.binding, settings)
             make_trees = styled_hair.trees_again(known.styles, settings)
         styles = styled_hair.bind(read, binding, guides, settings, surface, make_trees)
-        return _growing(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles), progress)
+        return _known_by(BoundHair(binding, settings, key, parting.key, guides, guide_uid, surface, styles), progress)
 
     return (yield compute)
 
@@ -273,9 +278,15 @@ def _styled(read, binding, guides, settings, surface, ground):
 
 def _growing(bound, progress):
     """The `BoundHair` when all about its strands is known but where their points are: these grow on other threads."""
+    _known_by(bound, progress)
+    bound.grow()
+    return bound
+
+
+def _known_by(bound, progress):
+    """The `BoundHair` when all about its strands is known but where their points are."""
     progress("Growing strands", 0.8)
     _ = bound.binding.leaders, bound.binding.identities  # now, and not while other threads need the CPU
-    bound.grow()
     return bound
 
 

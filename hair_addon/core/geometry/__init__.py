@@ -11,6 +11,7 @@ if TYPE_CHECKING:
         closest_point,
         clusters,
         connected_components,
+        counting_sort,
         curvature,
         fingerprint,
         hash_grid,

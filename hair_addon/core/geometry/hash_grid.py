@@ -12,13 +12,14 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import kernel_cache, native_code, parallel
 from ..kernels.parallel import Rows
+from . import counting_sort
 
 # Nothing differentiates these kernels, and every device rounds as the processor does: no fused multiply-add.
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 GRID_SIZE = 32  # cells along each axis; farther ones wrap around and share a bucket, which costs time, never truth
 CELLS_PER_RADIUS = 2.0  # cell width / first search radius: fewer cells to visit beats fewer points to compare
-CELL_WIDTH = 0.6  # of the cells that queries are sorted by / first search radius
+CELL_WIDTH = 0.8  # of the cells that queries are sorted by / first search radius
 CELLS_ALONG = 1024  # of those cells, at most, along each axis
 CANDIDATE_LIMIT = 128  # points that the queries of one cell share
 candidate_indices = wp.types.vector(length=CANDIDATE_LIMIT, dtype=int)
@@ -113,14 +114,15 @@ def _cells(
     queries: wp.array[wp.vec3],
     low: wp.vec3,
     per_width: float,
+    counts: wp.vec3i,
     # outputs
     out_cells: wp.array[int],
 ):
     query = wp.tid()
     cell = int(0)
     for axis in range(3):
-        along = wp.clamp(per_width * (queries[query][axis] - low[axis]), 0.0, float(CELLS_ALONG - 1))
-        cell = CELLS_ALONG * cell + int(along)
+        along = wp.clamp(per_width * (queries[query][axis] - low[axis]), 0.0, float(counts[axis] - 1))
+        cell = counts[axis] * cell + int(along)
     out_cells[query] = cell
 
 
@@ -327,19 +329,16 @@ def _sorted_by_cell(points, queries, width):
     """
     low, high = points.min(axis=0), points.max(axis=0)
     width = max(width, float((high - low).max()) / CELLS_ALONG)
+    counts = np.minimum((high - low) / width, CELLS_ALONG - 1).astype(int) + 1
     cells = wp.empty(len(queries), dtype=int, device=queries.device)
     parallel.launch(
         _cells,
         len(queries),
-        inputs=[Rows(queries), wp.vec3(*low.tolist()), 1.0 / width],
+        inputs=[Rows(queries), wp.vec3(*low.tolist()), 1.0 / width, wp.vec3i(*counts.tolist())],
         outputs=[cells],
         device=queries.device,
     )
-    # Sorted as one number each, cell and then query: faster than an order of indices, and what reads along them.
-    pairs = (cells.numpy().astype(np.int64) << 32) | np.arange(len(queries))
-    pairs.sort()
-    changes = np.flatnonzero(np.diff(pairs >> 32)) + 1
-    return pairs.astype(np.int32), np.concatenate([[0], changes, [len(queries)]]).astype(np.int32)
+    return counting_sort.grouped(cells.numpy(), int(counts.prod()))
 
 
 def _first_radius(points, distance, limit):

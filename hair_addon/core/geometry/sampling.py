@@ -7,6 +7,7 @@ import warp as wp
 from ..errors import HairError
 from ..kernels import parallel
 from ..kernels.parallel import Rows
+from . import counting_sort
 from .mesh import SurfacePoints, TriMesh
 
 wp.set_module_options({"enable_backward": False})
@@ -50,7 +51,7 @@ def sample_surface(mesh: TriMesh, count: int, seed: int, density: np.ndarray | N
     random = np.random.Generator(np.random.PCG64(seed)).random((count, 4))
     # Eq. 6 draws and rejects; the running sum takes every draw, and takes it to a corner of a triangle.
     running = np.cumsum(masses)
-    order = _rising(random[:, 0])
+    order = counting_sort.rising(random[:, 0])
     ends = np.searchsorted(random[order, 0] * running[-1], running)
     ends[np.flatnonzero(masses)[-1] :] = count  # rounding must not step past the last that has mass
     corner = np.repeat(np.arange(len(masses), dtype=np.int32), np.diff(ends, prepend=0))
@@ -95,15 +96,6 @@ def _cut(
 
 def _there(array, dtype):
     return wp.array(array, dtype=dtype, device="cpu", copy=False)
-
-
-def _rising(numbers):
-    """The order in which numbers (N,) in [0, 1) rise; sorted with their indices as one number each, which is faster."""
-    index_bits = len(numbers).bit_length()
-    keys = (numbers * 2.0 ** (64 - index_bits)).astype(np.uint64) << np.uint64(index_bits)
-    keys |= np.arange(len(numbers), dtype=np.uint64)
-    keys.sort()
-    return (keys & np.uint64((1 << index_bits) - 1)).astype(np.int32)
 
 
 def _runs(ends, order):

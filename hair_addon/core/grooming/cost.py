@@ -13,9 +13,9 @@ from .groom import POINT_COUNT, GuideSettings, HairSettings
 _POINT_BYTES, _CURVE_BYTES = 16, 65
 _SLOT_BYTES = 8  # which guide, and its weight
 # Bytes on the GPU. A point, and what a strand has beside its points: its root, its range, a random number; and where
-# every fourth point of it sees the world, in four textures of half precision.
+# every fourth point of it sees the world, in four textures of four bytes each.
 _TEXEL_BYTES, _HEAD_BYTES = 8, 12
-_SEEN_STEP, _SEEN_BYTES = 4, 32
+_SEEN_STEP, _SEEN_BYTES = 4, 16
 
 # While it is worked on. A triangle of the surface, a guide, a strand.
 _FACE_WORK_BYTES, _GUIDE_WORK_BYTES, _STRAND_WORK_BYTES = 760, 3300, 680

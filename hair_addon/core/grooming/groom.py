@@ -367,6 +367,7 @@ def load_kernels(device: str, progress: Progress = no_progress, most_threads: in
         placement.farthest,
         geometry.fingerprint,
         geometry.connected_components,
+        geometry.counting_sort,
         interpolation.clump_centers,
         geometry.sampling,
     ]

@@ -321,10 +321,11 @@ def _weigh(
     distance = influence_distance
     if distance == 0.0:
         distance = left_out
-        for slot in range(limit):
+        if left_out == wp.inf:
             # There are at most k: none is excluded, and the farthest is well within range.
-            if left_out == wp.inf and ways[strand, slot] < wp.inf:
-                distance = STRETCH * ways[strand, slot]
+            for slot in range(limit):
+                if ways[strand, slot] < wp.inf:
+                    distance = STRETCH * ways[strand, slot]
     distance = wp.max(distance, STRETCH * nearest)
     reach = wp.min(distance, left_out)
     sigma = wp.max(0.5 * distance, 1.0e-15)  # Eq. 9

@@ -36,12 +36,9 @@ for (int first = 0; first < slot_count; first += LANES) {
   const int count = slot_count - first < LANES ? slot_count - first : LANES;
   ints guides = -1;
   lanes share = 0.0f, cosine = 1.0f, sine = 0.0f;
-  for (int lane = 0; lane < count; ++lane) {
-    set_lane(guides, lane, index[first + lane]);
-    set_lane(share, lane, before[first + lane]);
-    set_lane(cosine, lane, turn[2 * (first + lane)]);
-    set_lane(sine, lane, turn[2 * (first + lane) + 1]);
-  }
+  read_lanes(guides, index + first, count);
+  read_lanes(share, before + first, count);
+  read_pairs(cosine, sine, turn + 2 * first, count);
   lanes row[8];
   read_columns(row, guides, shapes.data);
   const lanes lower_x = cosine * row[0] - sine * row[1], lower_y = sine * row[0] + cosine * row[1];
@@ -59,6 +56,6 @@ for (int first = 0; first < slot_count; first += LANES) {
   const lanes length_fade = fade(0.5f * length_limit, per_length, apart);
   lanes left = guides >= 0 ? share * facing_fade * (1.0f - length_fade) : lanes(0.0f);
   if (first == 0) set_lane(left, 0, get_lane(share, 0));
-  for (int lane = 0; lane < count; ++lane) weight[first + lane] = get_lane(left, lane);
+  write_lanes(left, weight + first, count);
 }
 normalize(weight, slot_count);

