@@ -8,9 +8,9 @@ const int OFFSET_TILE_BITS = 2;
 // Random number in [0, 1) of two integers.
 float random_of_tile(ivec2 tile)
 {
-  uint bits = (uint(tile.x) * 1597334677u ^ uint(tile.y) * 3812015801u) * 747796405u + 2891336453u;
-  bits = ((bits >> ((bits >> 28u) + 4u)) ^ bits) * 277803737u;
-  return float(((bits >> 22u) ^ bits) >> 8u) / 16777216.0;
+  uint bits = uint(tile.x) * 1597334677u ^ uint(tile.y) * 3812015801u;
+  bits = (bits ^ (bits >> 15u)) * 747796405u;
+  return float(bits >> 8u) / 16777216.0;
 }
 
 // Offset in [-0.5, 0.5) of a sample from its center, the same for all strands: what they cover together is then that of

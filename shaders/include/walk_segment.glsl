@@ -68,13 +68,10 @@ void walk(Segment segment, ivec2 size)
       int last_row = min(int(ceil(clamp(middle + most, -1.0, 1e6) - 0.5)) - 1, last_place.y);
       for (int row = first_row; row <= last_row; row++) {
         ivec2 place = is_steep ? ivec2(row, column) : ivec2(column, row);
-        if (offset_part > 0.0) {
-          float at = float(row) + 0.5 + offset_part * sample_offset(place + first_place, view.coverage_turn);
-          if (at < middle - reach || at >= middle + reach) {
-            continue;
-          }
+        float offset = (offset_part > 0.0) ? offset_part * sample_offset(place + first_place, view.coverage_turn) : 0.0;
+        if (offset_part == 0.0 || abs(float(row) + 0.5 + offset - middle) < reach) {
+          meet(place, along, true_half_width / half_width);
         }
-        meet(place, along, true_half_width / half_width);
       }
     }
   }

@@ -42,7 +42,11 @@ class Detail:
         return tuple(length * self.per_side for length in self.tile[2:])
 
     def pass_record(self, camera, size, turn):
-        """`drawing.pass_record` of its samples; camera: (world to view, view to clip); size: of the picture [pixels]."""
+        """Return `drawing.pass_record` of its samples.
+
+        camera: (world to view, view to clip), each (4, 4); size: (width, height) of the picture [pixels]; turn: of the
+        pass.
+        """
         whole = tuple(length * self.per_side for length in size)
         return drawing.pass_record(*camera, whole, turn, (*self.corner, *self.buffer_size))
 

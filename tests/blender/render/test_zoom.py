@@ -7,7 +7,7 @@ import pytest
 
 from hair_addon import api
 from hair_addon.blender.data import scene
-from hair_addon.blender.render import drawn_scene, hair_picture
+from hair_addon.blender.render import drawn_scene, hair_picture, picture_detail
 
 SIZE = (320, 240)
 
@@ -23,7 +23,7 @@ def locks(lit):
 
 
 def seen_from(distances):
-    """(world to view, view to clip) of a camera without perspective, that sees hair as small as from so many distances."""
+    """(world to view, view to clip) of a camera without perspective; hair is as small as from so many distances."""
     camera = bpy.context.scene.camera
     camera.data.type, camera.data.ortho_scale = "ORTHO", 4.0 * distances
     bpy.context.view_layer.update()
@@ -60,7 +60,7 @@ def test_a_finer_part_of_a_picture_shows_what_the_whole_does(locks, monkeypatch)
     camera = seen_from(10.0)
     finer = hair_picture.HairPicture(SIZE, 1)
     fine(finer, locks, camera)
-    monkeypatch.setattr(hair_picture.picture_detail, "of_hair", lambda *given: hair_picture.picture_detail.whole(*given[2:]))
+    monkeypatch.setattr(picture_detail, "of_hair", lambda *given: picture_detail.whole(*given[2:]))
     plain = hair_picture.HairPicture(SIZE, 1)
     fine(plain, locks, camera)
     places = [np.argwhere(picture.read()[..., 3] > 0.5)[:, ::-1] for picture in (finer, plain)]
