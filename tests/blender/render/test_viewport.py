@@ -170,7 +170,7 @@ def test_thin_hair_keeps_its_brightness_and_does_not_sparkle(thin, per_side):
     fine = hair_picture.SAMPLE_COUNT // per_side**2
     first, last = (pictured(thin, passes, per_side, size).read() for passes in (1, fine))
     for light in (first, last):
-        np.testing.assert_allclose(light.mean(axis=(0, 1)), reference.mean(axis=(0, 1)), rtol=0.03)
+        np.testing.assert_allclose(light.mean(axis=(0, 1)), reference.mean(axis=(0, 1)), rtol=0.04)
     assert sparkles(last) <= sparkles(reference) + 0.002 * size**2
 
 

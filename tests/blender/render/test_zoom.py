@@ -9,7 +9,7 @@ from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.render import drawn_scene, hair_picture, picture_detail
 
-SIZE = (320, 240)
+SIZE = (640, 480)
 
 
 @pytest.fixture
@@ -36,19 +36,22 @@ def summed(light):
 
 
 def fine(picture, drawn, camera):
-    """Sums of all passes of a picture, and of its first one."""
+    """Sums of all passes of a picture, and of its first one: the mean of four, as one is a matter of chance."""
     picture.restart()
-    picture.add_pass(drawn, *camera)
-    first = summed(picture.read())
+    firsts = []
+    for _ in range(4):
+        picture.add_pass(drawn, *camera)
+        firsts.append(summed(picture.read()))
+        picture.restart(is_moved=True)  # the next one has other samples
     while not picture.is_fine:
         picture.add_pass(drawn, *camera)
-    return summed(picture.read()), first
+    return summed(picture.read()), np.mean(firsts, axis=0)
 
 
 def test_small_hair_is_as_bright_and_covers_as_much(locks):
     """With one sample a pixel, near by and far away, in the first pass and in the last."""
     picture, near = hair_picture.HairPicture(SIZE, 1), None
-    for distances in (1.0, 4.0, 10.0, 15.0):
+    for distances in (1.0, 4.0, 15.0):
         last, first = fine(picture, locks, seen_from(distances))
         near = last if near is None else near
         np.testing.assert_allclose(first, last, rtol=0.02)
@@ -63,8 +66,11 @@ def test_a_finer_part_of_a_picture_shows_what_the_whole_does(locks, monkeypatch)
     monkeypatch.setattr(picture_detail, "of_hair", lambda *given: picture_detail.whole(*given[2:]))
     plain = hair_picture.HairPicture(SIZE, 1)
     fine(plain, locks, camera)
-    places = [np.argwhere(picture.read()[..., 3] > 0.5)[:, ::-1] for picture in (finer, plain)]
-    assert len(places[0]) > 20
-    np.testing.assert_allclose(places[0].mean(axis=0), places[1].mean(axis=0), atol=0.5)
-    assert finer.hair_at(*map(int, places[0].mean(axis=0))) == 0
+    covered = [picture.read()[..., 3] for picture in (finer, plain)]
+    assert covered[0].sum() > 20.0
+    for axis in (0, 1):
+        middles = [np.average(np.arange(SIZE[1 - axis]), weights=of.sum(axis=1 - axis)) for of in covered]
+        assert middles[0] == pytest.approx(middles[1], abs=0.5)
+    y, x = np.unravel_index(np.argmax(covered[0]), covered[0].shape)
+    assert finer.hair_at(int(x), int(y)) == 0
     assert finer.hair_at(3, 3) is None and finer.hair_at(SIZE[0] - 1, SIZE[1] - 1) is None
