@@ -118,6 +118,8 @@ def _strip(info, shadow_samplers):
     varying = gpu.types.GPUStageInterfaceInfo("strand_varying")
     varying.smooth("VEC3", "drawn_position")
     varying.smooth("FLOAT", "strand_coverage")
+    varying.smooth("FLOAT", "strand_offset_part")
+    varying.smooth("FLOAT", "strand_side_place")  # across the strip, from -1 to 1
     varying.smooth("FLOAT", "strand_place")  # in points that are drawn
     varying.flat("INT", "strand_index")
     info.vertex_out(varying)
@@ -291,6 +293,7 @@ def accumulate_program():
     """The program that adds a pass to the picture of a viewport: see accumulate.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("INT", "samples_per_side")
+    info.push_constant("IVEC2", "first_place")  # [samples] of the textures in the picture
     info.push_constant("FLOAT", "weight")
     info.sampler(0, "FLOAT_2D", "picture")
     info.sampler(1, "UINT_2D", "depths")
