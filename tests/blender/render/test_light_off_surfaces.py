@@ -83,7 +83,7 @@ def light_from_below(tangent, towards):
     return lookup_tables.sample_radiance(tables, fibre_angles(T, lights, V)).mean(axis=0) * 2.0 * np.pi
 
 
-@pytest.mark.parametrize("tilt", [0.0, 0.5, 1.2])  # of the strands, above the plane
+@pytest.mark.parametrize("tilt", [0.0, 1.2])  # of the strands, above the plane
 @pytest.mark.parametrize("source", ["sun", "world"])
 def test_a_plane_lights_a_strand_as_much_as_its_directions_say(scene, tilt, source):
     tangent, towards = (np.cos(tilt), 0.0, np.sin(tilt)), (0.0, -0.6, 0.8)
