@@ -11,9 +11,11 @@ void main()
   seen.z = texelFetch(visibility_z, cell, 0);
   seen.surface = texelFetch(visibility_surface, cell, 0);
   seen.channels = texelFetch(visibility_channels, cell, 0);
+  seen.color = texelFetch(visibility_color, cell, 0);
   Seen bytes = seen_to_bytes(seen);
   seen_x_y = bytes.x_y;
   seen_z = bytes.z;
   seen_surface = bytes.surface;
   seen_channels = bytes.channels;
+  seen_color = bytes.color;
 }

@@ -37,6 +37,7 @@ void main()
   sums.z = vec4(0.0);
   sums.surface = vec4(0.0);
   sums.channels = vec4(0.0);
+  sums.color = vec4(0.0);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 at;
@@ -50,7 +51,8 @@ void main()
     if (shadow_place(light, position, at, depth)) {
       float bias = is_strand ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
       vec3 normal;
-      beyond = weight * surface_beyond(light, at, depth, -light.axis.xyz, normal);
+      vec4 color;
+      beyond = weight * surface_beyond(light, at, depth, -light.axis.xyz, normal, color);
       float behind;
       float front = crossed_strands(at, depth, own_count(light, position, radius), behind);
       open *= lit_part(at, depth, bias);
@@ -60,6 +62,7 @@ void main()
       left = exp(-view.seen_opacity * behind);
       // Through the hair to the surface, and back.
       sums.surface += beyond * left * left * vec4(light.axis.xyz, 1.0);
+      sums.color += beyond * left * left * color / max(color.a, 1e-6);
     }
     float seen = open * past_hair;
     vec3 share = seen * light.axis.xyz * light.axis.xyz;
@@ -80,4 +83,5 @@ void main()
   seen_z = sums.z;
   seen_surface = sums.surface;
   seen_channels = sums.channels;
+  seen_color = sums.color;
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// What a point of a strand sees of the world, in the sixteen bytes that visibility textures have for it: its sums over the
+// What a point of a strand sees of the world, in the twenty bytes that visibility textures have for it: its sums over the
 // directions (world_visibility.frag) from zero to one, so that a step is as little seen in shade as in light.
 
 struct Seen {
@@ -7,6 +7,7 @@ struct Seen {
   vec4 z;
   vec4 surface;
   vec4 channels;
+  vec4 color;  // of what is seen through hair of surfaces
 };
 
 const float ZERO_BYTE = 128.0;  // of numbers that may be negative: exactly zero
@@ -24,6 +25,7 @@ Seen seen_to_bytes(Seen seen)
   float through_hair = clamp(seen.surface.w / max(seen.channels.a, 1e-6), 0.0, 1.0);
   bytes.surface = vec4((direction * (255.0 - ZERO_BYTE) + ZERO_BYTE) / 255.0, sqrt(through_hair));
   bytes.channels = sqrt(clamp(seen.channels / 6.0, 0.0, 1.0));
+  bytes.color = vec4(sqrt(clamp(seen.color.rgb / max(seen.surface.w, 1e-6), 0.0, 1.0)), 1.0);
   return bytes;
 }
 
@@ -38,5 +40,6 @@ Seen seen_from_bytes(Seen bytes)
   seen.channels = 6.0 * bytes.channels * bytes.channels;
   vec3 direction = (bytes.surface.xyz * 255.0 - ZERO_BYTE) / (255.0 - ZERO_BYTE);
   seen.surface = vec4(direction, bytes.surface.w * bytes.surface.w * seen.channels.a);
+  seen.color = vec4(bytes.color.rgb * bytes.color.rgb * seen.surface.w, seen.surface.w);
   return seen;
 }

@@ -172,7 +172,7 @@ def packed_texture(points, row_strands):
 
 _TEXEL_BYTES = {"RG32F": 8, "R32F": 4, "R16": 2, "RGBA32F": 16}
 _MOST_OF_R16 = 65535  # steps from 0 to 1
-_SEEN_BYTES = 16  # of a point in the visibility textures
+_SEEN_BYTES = 20  # of a point in the visibility textures
 
 
 def bytes_of(textures):

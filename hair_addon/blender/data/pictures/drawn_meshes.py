@@ -26,7 +26,13 @@ class DrawnMesh:
     uvs: np.ndarray
     parts: tuple | None
     owner: tuple = ()
-    color: tuple = (0.0, 0.0, 0.0)  # `surface_color` of its object
+    colors: tuple = ()  # (number of corners, linear RGB) of each material, in the corners' order
+
+    @property
+    def triangle_colors(self):
+        """(F, 3) float32: linear RGB of each triangle's material."""
+        colors = np.array([color for _count, color in self.colors], np.float32)
+        return colors.repeat([count // 3 for count, _color in self.colors], axis=0)
 
     @property
     def is_clear(self):
@@ -99,16 +105,17 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
     mesh = mesh_object.to_mesh()
     try:
         vertices = scene.vertex_positions(mesh)
-        layout = _layout(mesh_object, mesh, is_holdout, is_moving)
+        layout = _layout(mesh_object, mesh, is_moving)
         normals = _corner_normals(mesh, to_world).take(layout.loops, axis=0) if has_normals else None
-        parts = () if is_holdout else _parts(mesh_object, layout.runs)
-        uvs = _read_uvs(mesh, layout.loops, parts)
+        parts = _parts(mesh_object, layout.runs)
+        uvs = _read_uvs(mesh, layout.loops, () if is_holdout else parts)
     finally:
         mesh_object.to_mesh_clear()
     placed = vertices @ to_world[:3, :3].T.astype(np.float32)
     placed += to_world[:3, 3].astype(np.float32)
     positions = placed.take(layout.vertices, axis=0)
-    return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, color=surface_color(mesh_object))
+    colors = tuple((count, material.color) for _first, count, material in parts)
+    return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, colors=colors)
 
 
 def _corner_normals(mesh, to_world):
@@ -120,10 +127,10 @@ def _corner_normals(mesh, to_world):
     return normals.astype(np.float32)
 
 
-def _layout(mesh_object, mesh, is_holdout, is_moving):
+def _layout(mesh_object, mesh, is_moving):
     """The `_Layout` of an evaluated mesh: with `is_moving` the one before, if it fits."""
     faces, slots = scene.faces_read_again(mesh_object.original, mesh), np.zeros(0, np.int32)
-    if len(mesh_object.material_slots) > 1 and not is_holdout:
+    if len(mesh_object.material_slots) > 1:
         slots = np.zeros(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("material_index", slots)
         slots = np.clip(slots, 0, len(mesh_object.material_slots) - 1)
@@ -171,11 +178,3 @@ def _read_uvs(mesh, loops, parts):
 def _active_uvs(mesh):
     """The UV map that renders use, None where there is none."""
     return next((layer for layer in mesh.uv_layers if layer.active_render), None)
-
-
-def surface_color(mesh_object):
-    """Linear RGB: base colour of the first material's Principled BSDF, or its colour in the viewport; black of None."""
-    if mesh_object is None:
-        return (0.0, 0.0, 0.0)
-    material = next((slot.material for slot in mesh_object.material_slots if slot.material), None)
-    return surface_materials.read_material(material).color

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-_PRIOR = 16.0  # paths that the ratio of the voxels around stands for
+_PRIOR = 64.0  # paths that the ratio of the voxels around stands for
 
 
 def smooth_ratios(sums: np.ndarray, path_count: int) -> np.ndarray:
