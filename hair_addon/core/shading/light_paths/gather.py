@@ -26,7 +26,8 @@ _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _LAMPS_AT_ONCE = wp.constant(8)  # that light a seen strand
-_OFFSETS_AT_ONCE = wp.constant(16)  # over its width
+_OFFSETS_AT_ONCE = wp.constant(4)  # over the part of its width around the one that is seen
+_AROUND = wp.constant(0.25)  # half that part, of the radius
 _LEAST_PATHS = 4096  # fewer are not worth a thread
 
 
@@ -91,9 +92,16 @@ def _arriving(medium: Medium, lit: Lit, position: wp.vec3, own: int):
 
 @wp.func
 def _light_at_once(
-    medium: Medium, sources: Sources, fibre: Fibre, viewer: wp.vec3, position: wp.vec3, own: int, random: wp.uint32
+    medium: Medium,
+    sources: Sources,
+    fibre: Fibre,
+    viewer: wp.vec3,
+    position: wp.vec3,
+    offset: float,
+    own: int,
+    random: wp.uint32,
 ):
-    """(radiance of lamps' light that a seen strand sends to the viewer, random state): the mean over its width."""
+    """(radiance of lamps' light that a seen strand sends to the viewer, random state): the mean around an offset."""
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)
     turns = wp.min(sources.count, _LAMPS_AT_ONCE)
@@ -112,6 +120,7 @@ def _light_at_once(
             shift = wp.randf(state)
             for step in range(_OFFSETS_AT_ONCE):
                 h = 2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0
+                h = wp.clamp(offset, _AROUND - 1.0, 1.0 - _AROUND) + _AROUND * h
                 scattered = value(fibre, viewer, lit.direction, h) * (share / float(_OFFSETS_AT_ONCE))
                 light += wp.cw_mul(arriving, scattered)
     return light, state
@@ -186,7 +195,7 @@ def _gather(
                 h = -met.offset
                 if event == 0:
                     out_even[path] = even_return(fibre, viewer)
-                    at_once, after = _light_at_once(medium, sources, fibre, viewer, position, own, state)
+                    at_once, after = _light_at_once(medium, sources, fibre, viewer, position, h, own, state)
                     state = after
                     light += at_once
                 elif sources.count > 0:
