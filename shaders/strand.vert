@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // One vertex of a strand's strip, fetched from the strand texture by index.
 
+#include "include/coverage.glsl"
 #include "include/segment.glsl"
 
 void main()
@@ -20,13 +21,16 @@ void main()
 
   strand_index = strand;
   strand_place = float(drawn_point);
+  strand_side_place = side;
   vec3 tangent = (view.object_to_world * vec4(along, 0.0)).xyz;
   drawn_position = (view.object_to_world * vec4(here.xyz, 1.0)).xyz;
   vec3 to_view = view.is_perspective != 0 ? view.eye.xyz - drawn_position : view.eye.xyz;
   // The picture's minimum half width at this depth.
   float depth = view.is_perspective != 0 ? (view.world_to_clip * vec4(drawn_position, 1.0)).w : 1.0;
   float true_half_width = here.w * view.object_scale * view.thickness;
-  float half_width = max(true_half_width, view.least_half_width * abs(depth));
+  float half_sample = 0.5 * abs(depth) / view.pixels_per_unit;
+  strand_offset_part = view.sample_offset * offset_share(0.5 * true_half_width / max(half_sample, 1e-20));
+  float half_width = max(true_half_width, view.least_half_width * abs(depth)) + strand_offset_part * half_sample;
   strand_coverage = true_half_width / max(half_width, 1e-20);
   vec3 offset = strip_side(normalize(tangent), normalize(to_view)) * (side * half_width);
   gl_Position = view.world_to_clip * vec4(drawn_position + offset, 1.0);

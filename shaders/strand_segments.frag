@@ -6,7 +6,11 @@
 void main()
 {
   ivec2 place = ivec2(gl_FragCoord.xy) + ivec2(view.first_column, view.first_row);
-  if (!is_covered(strand_offset(strand_index) + view.coverage_turn, place, strand_coverage)) {
+  // As in walk_segment.glsl: a sample lies off its center along the axis on which the strand is shorter.
+  vec2 across = vec2(dFdx(strand_side_place), dFdy(strand_side_place));
+  float offset = strand_offset_part * sample_offset(place, view.coverage_turn);
+  float side = strand_side_place + offset * (abs(across.x) > abs(across.y) ? across.x : across.y);
+  if (strand_offset_part > 0.0 && abs(side) >= strand_coverage) {
     discard;
   }
   int pieces = view.drawn_points - 1;

@@ -2,6 +2,7 @@
 // Rasterisation of strands, a thread for each run of segments. Hair consists of lines one sample wide, for which this is
 // faster than triangles: graphics hardware draws those four samples at a time, software drivers at an even greater cost.
 
+#include "include/coverage.glsl"
 #include "include/segment.glsl"
 #include "include/tile.glsl"
 
@@ -23,7 +24,8 @@ const float LEAST_BEND = 1.0;
 // void meet(ivec2 place, float along, float coverage)
 //     a covered sample: its parameter along the segment, and the coverage of the drawn width by the strand
 
-// Samples whose centres lie in the segment, column by column along the axis on which it is longer.
+// Samples that lie in the segment, column by column along the axis on which it is longer. Across the columns, samples may
+// lie off their centers.
 void walk(Segment segment, ivec2 size)
 {
   vec2 extent = abs(segment.end.xy - segment.start.xy);
@@ -38,6 +40,7 @@ void walk(Segment segment, ivec2 size)
   float widening = (way.x == 0.0) ? 1.0 : length(way) / abs(way.x);
   float least_half_width = view.least_half_width * view.pixels_per_unit;
   float most_reach = max(max(segment.half_width.x, segment.half_width.y), least_half_width) * widening;
+  ivec2 first_place = ivec2(view.first_column, view.first_row);
   int column = first_column;
   while (column <= last_column) {
     // As far as the end of the tile.
@@ -59,10 +62,19 @@ void walk(Segment segment, ivec2 size)
       float half_width = max(true_half_width, least_half_width);
       float middle = start.y + along * way.y;
       float reach = half_width * widening;
-      int first_row = max(int(ceil(clamp(middle - reach, -1.0, 1e6) - 0.5)), 0);
-      int last_row = min(int(ceil(clamp(middle + reach, -1.0, 1e6) - 0.5)) - 1, last_place.y);
+      float offset_part = view.sample_offset * offset_share(true_half_width);
+      float most = reach + 0.5 * offset_part;
+      int first_row = max(int(ceil(clamp(middle - most, -1.0, 1e6) - 0.5)), 0);
+      int last_row = min(int(ceil(clamp(middle + most, -1.0, 1e6) - 0.5)) - 1, last_place.y);
       for (int row = first_row; row <= last_row; row++) {
-        meet(is_steep ? ivec2(row, column) : ivec2(column, row), along, true_half_width / half_width);
+        ivec2 place = is_steep ? ivec2(row, column) : ivec2(column, row);
+        if (offset_part > 0.0) {
+          float at = float(row) + 0.5 + offset_part * sample_offset(place + first_place, view.coverage_turn);
+          if (at < middle - reach || at >= middle + reach) {
+            continue;
+          }
+        }
+        meet(place, along, true_half_width / half_width);
       }
     }
   }

@@ -101,8 +101,8 @@ def pass_record(world_to_view, view_to_clip, size, turn=0, tile=None):
     window[0, 0], window[1, 1] = size[0] / width, size[1] / height
     window[0, 3] = (size[0] - 2.0 * left) / width - 1.0
     window[1, 3] = (size[1] - 2.0 * bottom) / height - 1.0
-    # No strand is thinner than a sample: it would break into dots.
-    record = view_record(world_to_view, window @ shift @ view_to_clip, height, least_width=1.0)
+    record = view_record(world_to_view, window @ shift @ view_to_clip, height)
+    record["sample_offset"] = 1.0
     record["coverage_turn"] = turn * 0.61803399 % 1.0
     record["first_column"], record["first_row"] = left, bottom
     return record
@@ -158,19 +158,6 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     return record
 
 
-# Samples across hair from which its thinnest strands are drawn a sample wide. That makes hair half a sample larger on
-# each side: twice as large where it is seen in one.
-_FULL_EXTENT = 48.0
-
-
-def least_width_of(strands, record):
-    """The least half width of `StrandsOnGPU` as the view of their `strand_record` has it, less where all are small."""
-    centre = record["object_to_clip"].T.astype(np.float64) @ np.append(strands.bounds.mean(axis=0), 1.0)
-    diameter = float(np.linalg.norm(np.ptp(strands.bounds, axis=0)) * record["object_scale"])
-    extent = diameter * float(record["pixels_per_unit"]) / max(float(centre[3]), 1e-9)
-    return float(record["least_half_width"]) * min(extent / _FULL_EXTENT, 1.0)
-
-
 def window_of(strands, record, size):
     """(left, bottom, width, height) [samples] of the part of a picture that `StrandsOnGPU` may cover.
 
@@ -183,8 +170,8 @@ def window_of(strands, record, size):
         return 0, 0, *size  # in part behind the viewer
     half_width = max(float(record["object_scale"] * record["thickness"]) * strands.greatest_radius / w, 0.0)
     half_width = max(half_width, float(record["least_half_width"])) * float(record["pixels_per_unit"])
-    # A strip is up to the root of two wider across its columns than across its axis.
-    margin = 1.5 * half_width + 1.0
+    # A strip is up to the root of two wider across its columns than across its axis; samples lie off their centers.
+    margin = 1.5 * half_width + 1.0 + 0.5 * float(record["sample_offset"])
     places = (0.5 * clip[:2] / clip[3] + 0.5) * np.array(size)[:, None]
     low = np.clip(np.floor(places.min(axis=1) - margin), 0, size).astype(int)
     high = np.clip(np.ceil(places.max(axis=1) + margin), 0, size).astype(int)

@@ -118,6 +118,8 @@ def _strip(info, shadow_samplers):
     varying = gpu.types.GPUStageInterfaceInfo("strand_varying")
     varying.smooth("VEC3", "drawn_position")
     varying.smooth("FLOAT", "strand_coverage")
+    varying.smooth("FLOAT", "strand_offset_part")
+    varying.smooth("FLOAT", "strand_side_place")  # across the strip, from -1 to 1
     varying.smooth("FLOAT", "strand_place")  # in points that are drawn
     varying.flat("INT", "strand_index")
     info.vertex_out(varying)

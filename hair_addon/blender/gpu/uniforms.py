@@ -84,6 +84,7 @@ VIEW = Block(
         "pixels_per_unit": "float",  # at distance one, in a perspective
         "least_half_width": "float",  # there as well
         "light_index": "int",  # the light that a shadow pass looks from
+        "sample_offset": "float",  # how far samples of thin strands lie off their centers, as a part of it
         "coverage_turn": "float",  # by which a pass takes other samples of thin strands
         "first_column": "int",  # of the picture's samples, where what is drawn is a tile of it
         "first_row": "int",

@@ -110,7 +110,6 @@ class VisibilityBuffer:
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
         for index, (strands, shading, to_world, surface_color, samplers, steps) in enumerate(hair):
             record = drawing.strand_record(strands, view, to_world, steps)
-            record["least_half_width"] = drawing.least_width_of(strands, record)
             record["seen_points"] = seen_points(strands.point_count)
             record["seen_opacity"] = shading.opacity
             record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance

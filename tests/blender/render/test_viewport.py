@@ -118,26 +118,31 @@ def test_hair_is_laid_over_a_viewport_in_its_colours(lit):
 # ------------------------------------------------------------------------------------------------- thin strands
 
 
-@pytest.mark.parametrize("coverage", [0.03, 0.25, 0.7, 1.0])
-def test_of_a_thin_strand_just_its_part_is_drawn(coverage):
-    """Over a picture for each strand, and nearly so over sixteen samples of a row or column."""
-    size = 64
-    strand, x, y = (grid.ravel() for grid in np.indices((20, size, size)))
+def sample_offsets(turn, size=64):
+    """(size, size) offsets of samples from their centers."""
+    y, x = (grid.ravel() for grid in np.indices((size, size)))
     text = glsl.source("include/coverage.glsl")
-    expression = f"is_covered(strand_offset(strand) + 0.25, ivec2(x, y), {coverage}) ? 1.0 : 0.0"
-    drawn = glsl.evaluate(text, "float", expression, strand=strand, x=x, y=y).reshape(20, size, size)
-    np.testing.assert_allclose(drawn.mean(axis=(1, 2)), coverage, atol=0.01)
-    for rows in (drawn, drawn.swapaxes(1, 2)):
-        runs = rows.reshape(20, size, size // 16, 16).sum(axis=-1)
-        assert np.abs(runs - 16 * coverage).max() <= 4.0  # by chance it would be eight
+    found = glsl.evaluate(text, "float", f"sample_offset(ivec2(x, y), {turn:.4f})", x=x, y=y)
+    return found.reshape(size, size)
 
 
-def test_strands_that_cross_are_left_out_of_different_samples():
-    text = glsl.source("include/coverage.glsl")
-    strand = np.arange(4000)
-    offsets = glsl.evaluate(text, "float", "strand_offset(strand)", strand=strand)
-    np.testing.assert_allclose(np.histogram(offsets, bins=10, range=(0.0, 1.0))[0], 400, atol=80)
-    assert abs(np.corrcoef(offsets[:-1], offsets[1:])[0, 1]) < 0.05
+@pytest.mark.parametrize("width", [0.03, 0.25, 0.7])
+def test_samples_hit_just_the_part_that_a_thin_strand_covers(width):
+    """Along lines of any slope, in one pass; along sixteen samples about as evenly as by chance."""
+    along, squares = np.arange(48) + 0.5, []
+    for offsets in (sample_offsets(0.3), sample_offsets(0.3).T):
+        for slope in (-1.0, -0.6, -0.25, 0.0, 0.15, 0.31, 0.75, 1.0):
+            lines = 32.0 + slope * (along - 24.0) + np.arange(-7.0, 7.0, 0.37)[:, None]
+            at = np.arange(64)[:, None] + 0.5 + offsets[:, :48]
+            hits = (np.abs(at - lines[:, None]) < 0.5 * width).sum(axis=1)
+            assert hits.mean() == pytest.approx(width, rel=0.1, abs=0.015)
+            squares.append(((hits.reshape(-1, 16).sum(axis=1) - 16.0 * width) ** 2).mean())
+    assert np.mean(squares) < 1.4 * 16.0 * width * (1.0 - width)
+
+
+def test_samples_lie_anywhere_in_their_squares():
+    offsets, part = sample_offsets(0.25, 256), 1.0 / 16.0
+    np.testing.assert_allclose(np.histogram(offsets, 16, (-0.5, 0.5))[0] / offsets.size, part, atol=0.05 * part)
 
 
 def pictured(hair, passes, per_side, size=SIZE):
