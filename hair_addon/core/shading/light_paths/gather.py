@@ -119,8 +119,10 @@ def _light_at_once(
         if wp.max(arriving) > 0.0:
             shift = wp.randf(state)
             for step in range(_OFFSETS_AT_ONCE):
-                h = 2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0
-                h = wp.clamp(offset, _AROUND - 1.0, 1.0 - _AROUND) + _AROUND * h
+                h = offset + _AROUND * (2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0)
+                # Back from beyond the edge: the mean over all offsets stays that over the width.
+                if wp.abs(h) > 1.0:
+                    h = wp.sign(h) * 2.0 - h
                 scattered = value(fibre, viewer, lit.direction, h) * (share / float(_OFFSETS_AT_ONCE))
                 light += wp.cw_mul(arriving, scattered)
     return light, state
