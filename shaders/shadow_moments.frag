@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Means around a texel, along one axis, of the depth of surfaces, warped, its variance [Donnelly06], and the mean of the
-// depth itself: the wider, the softer the shadow. The slope of a surface is no variance: it would let light through.
+// depth itself: the wider, the softer the shadow. The slope of a surface is no variance: it would let light through. Beside
+// them is the texel's own color, packed, of which there is no mean.
 
 #include "include/opacity.glsl"
 
@@ -57,5 +58,7 @@ void main()
   vec3 mean = total / weights;
   float variance = max(squares / weights - mean.x * mean.x, 0.0);
   float beside_slope = max(variance - slope * slope / (reach * weights), 0.0);
-  color = vec4(mean.x + middle.x - curve / weights, mean.y + min(variance, STEP * beside_slope), mean.z, 1.0);
+  vec4 own = texelFetch(surface_depth, here, 0);
+  float own_color = (is_depth != 0) ? own.g : own.a;
+  color = vec4(mean.x + middle.x - curve / weights, mean.y + min(variance, STEP * beside_slope), mean.z, own_color);
 }

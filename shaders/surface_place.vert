@@ -7,6 +7,8 @@
 void main()
 {
   ivec2 corner = strand_texel(gl_VertexID, 0, 1, textureSize(places, 0).x);
-  drawn_position = texelFetch(places, corner, 0).xyz;
+  vec4 place = texelFetch(places, corner, 0);
+  drawn_position = place.xyz;
+  packed_color = place.w;
   gl_Position = view.world_to_clip * vec4(drawn_position, 1.0);
 }

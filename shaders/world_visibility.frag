@@ -35,6 +35,7 @@ void main()
   seen_z = vec4(0.0);
   seen_surface = vec4(0.0);
   seen_channels = vec4(0.0);
+  seen_color = vec4(0.0);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 at;
@@ -48,7 +49,8 @@ void main()
     if (shadow_place(light, position, at, depth)) {
       float bias = is_strand ? strand_bias(R, -light.axis.xyz) : SURFACE_BIAS;
       vec3 normal;
-      beyond = weight * surface_beyond(light, at, depth, -light.axis.xyz, normal);
+      vec4 color;
+      beyond = weight * surface_beyond(light, at, depth, -light.axis.xyz, normal, color);
       float behind;
       float front = crossed_strands(at, depth, own_count(light, position, radius), behind);
       open *= lit_part(at, depth, bias);
@@ -58,6 +60,7 @@ void main()
       left = exp(-view.seen_opacity * behind);
       // Through the hair to the surface, and back.
       seen_surface += beyond * left * left * vec4(light.axis.xyz, 1.0);
+      seen_color += beyond * left * left * color / max(color.a, 1e-6);
     }
     float seen = open * past_hair;
     vec3 share = seen * light.axis.xyz * light.axis.xyz;

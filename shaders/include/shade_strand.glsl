@@ -85,7 +85,8 @@ vec3 strand_light(SeenStrand strand)
   vec3 N = surface_normal_of(hidden.xyz);
   float surface_part = seen_channels.a / 6.0;
   vec3 from_surfaces = surface_light(plus, minus, N, surface_part, hidden.w, view.seen_opacity, view.hair_forward.rgb);
-  from_surfaces *= view.surface_color.rgb * between_hair_and_surface(strands_behind);
+  vec3 surface_color = textureLod(visibility_color, seen_at, 0.0).rgb / max(6.0 * hidden.w, 1e-4);
+  from_surfaces *= surface_color * between_hair_and_surface(surface_color, strands_behind);
   vec2 below = light_from_below(T, V, N);
   vec3 of_surfaces = max(below.x * strand.returned + below.y * strand.towards, vec3(0.0));
   world += from_surfaces * of_surfaces;
@@ -98,12 +99,15 @@ vec3 strand_light(SeenStrand strand)
     if (is_visible(irradiance * transmitted(lamp.front, view.hair_forward.rgb))) {
       // Where the light passes beside the surface, that which the strand sees.
       vec3 lit_normal = N;
+      vec3 lit_color = surface_color;
       if (lamp.is_in_map) {
         vec3 normal;
-        float found = surface_beyond(light, lamp.at, lamp.depth, lamp.L, normal);
+        vec4 color;
+        float found = surface_beyond(light, lamp.at, lamp.depth, lamp.L, normal, color);
         lit_normal = normalize(mix(N, normal, found) + 1e-4 * lamp.L);
+        lit_color = mix(surface_color, color.rgb / max(color.a, 1e-6), found * step(0.1, color.a));
       }
-      vec3 bounce = surface_bounce(lit_normal, surface_part, lamp.L, T, lamp.front, lamp.behind);
+      vec3 bounce = surface_bounce(lit_normal, lit_color, surface_part, lamp.L, T, lamp.front, lamp.behind);
       radiance += drawn_lobes.w * irradiance * bounce * of_surfaces;
       float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
       radiance += irradiance * hair_radiance(T, lamp.L, V, lamp.front, lamp.behind, blur);

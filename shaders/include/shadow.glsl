@@ -71,16 +71,30 @@ float crossed_before_surface(vec3 at, float depth)
   return front * (1.0 - smoothstep(1.0, 1.5, ends.x));
 }
 
-// Part of the places around a strand along a light with a surface behind the strand, and that surface's normal. L: towards
-// the light.
-float surface_beyond(Light light, vec3 at, float depth, vec3 L, out vec3 normal)
+// A color that `drawing.packed_colors` has packed.
+vec3 unpacked_color(float packed_value)
 {
+  vec3 root = mod(floor(packed_value / vec3(65536.0, 256.0, 1.0)), 256.0) / 255.0;
+  return root * root;
+}
+
+// Part of the places around a strand along a light with a surface behind the strand, and that surface's normal and color.
+// L: towards the light; color: times its fourth component, the part of the places where there is any.
+float surface_beyond(Light light, vec3 at, float depth, vec3 L, out vec3 normal, out vec4 color)
+{
+  color = vec4(0.0);
+  ivec2 size = textureSize(surface_moments, 0).xy;
   vec2 slope = vec2(0.0);
   float found = 0.0;
   float total = 0.0;
   for (int corner = 0; corner < 4; corner++) {
     vec2 towards = 2.0 * vec2(float(corner & 1), float(corner >> 1)) - 1.0;
-    float surface = textureLod(surface_moments, at + vec3(BEYOND_REACH * towards, 0.0), 0.0).b;
+    vec3 place = at + vec3(BEYOND_REACH * towards, 0.0);
+    float surface = textureLod(surface_moments, place, 0.0).b;
+    ivec3 texel = ivec3(clamp(ivec2(place.xy * vec2(size)), ivec2(0), size - 1), int(place.z));
+    float packed_value = texelFetch(surface_moments, texel, 0).a;
+    // Below zero where there is no surface.
+    color += (packed_value >= 0.0) ? 0.25 * vec4(unpacked_color(packed_value), 1.0) : vec4(0.0);
     float is_found = step(surface, 0.75 * FAR);
     found += 0.25 * is_found;
     total += 0.25 * is_found * surface;
@@ -95,25 +109,25 @@ float surface_beyond(Light light, vec3 at, float depth, vec3 L, out vec3 normal)
   return found * step(depth, total / max(found, 0.25) + SURFACE_BIAS);
 }
 
-// Light of a surface, relative to that which it reflects at once: hair above it, of `count` strands, sends a part of it
-// back to the surface, again and again.
-vec3 between_hair_and_surface(float count)
+// Light of a surface of a color, relative to that which it reflects at once: hair above it, of `count` strands, sends a
+// part of it back to the surface, again and again.
+vec3 between_hair_and_surface(vec3 color, float count)
 {
   vec3 reflectance = view.hair_reflectance.rgb;
   vec3 left = transmitted(2.0 * count, view.hair_forward.rgb);
   vec3 reflected = reflectance * (vec3(1.0) - left) / (vec3(1.0) - reflectance * reflectance * left);
-  return vec3(1.0) / (vec3(1.0) - view.surface_color.rgb * reflected);
+  return vec3(1.0) / (vec3(1.0) - color * reflected);
 }
 
 // Light that surfaces reflect to a strand, as a part of even light around it, for unit irradiance of the light: through the
 // rest of the hair, off diffuse surfaces, and through the hair again, along 1.66 times the shortest way [Elsasser42]. N: their
-// normal; part: of all directions, in which they are.
-vec3 surface_bounce(vec3 N, float part, vec3 L, vec3 T, float front, float behind)
+// normal; color: theirs; part: of all directions, in which they are.
+vec3 surface_bounce(vec3 N, vec3 color, float part, vec3 L, vec3 T, float front, float behind)
 {
   float cosine = max(dot(N, L), 0.0);
   // Strands are as wide as the sine between tangent and direction, pi / 4 in the mean over all directions.
   float back = 1.66 * cosine * 0.25 * PI / max(sin_from_cos(dot(T, L)), 0.1);
   vec3 way = transmitted(front + behind * (1.0 + back), view.hair_forward.rgb);
-  way *= between_hair_and_surface(front + behind);
-  return view.surface_color.rgb * way * (min(2.0 * part, 1.0) * cosine / PI);
+  way *= between_hair_and_surface(color, front + behind);
+  return color * way * (min(2.0 * part, 1.0) * cosine / PI);
 }

@@ -64,9 +64,15 @@ def compile_one(makers):
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
 # See shaders/world_visibility.frag.
-VISIBILITY_SAMPLERS = ("visibility_x_y", "visibility_z", "visibility_surface", "visibility_channels")
+VISIBILITY_SAMPLERS = (
+    "visibility_x_y",
+    "visibility_z",
+    "visibility_surface",
+    "visibility_channels",
+    "visibility_color",
+)
 STRAND_SAMPLERS = ("strands", "strand_radii")  # see shaders/include/segment.glsl
-VISIBILITY_TARGETS = ("seen_x_y", "seen_z", "seen_surface", "seen_channels")
+VISIBILITY_TARGETS = ("seen_x_y", "seen_z", "seen_surface", "seen_channels", "seen_color")
 
 
 def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
@@ -235,6 +241,7 @@ def surface_depth_program(fragment="shadow_surface.frag"):
     declare_scene(info, shadow_samplers=(), is_lit=False)
     info.sampler(0, "FLOAT_2D", "places")
     varying.smooth("VEC3", "drawn_position")
+    varying.flat("FLOAT", "packed_color")
     info.vertex_out(varying)
     return compile_drawing(info, "surface_place.vert", fragment)
 

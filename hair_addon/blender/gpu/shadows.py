@@ -11,6 +11,7 @@ SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 _NEAREST = 0.01  # minimum distance of a light, as a part of the hair's diameter
 _WIDEST = np.radians(80.0)  # between the axis of a map and its border
 _FAR = 2.0  # FAR of shaders/include/opacity.glsl
+_NO_SURFACE = (_FAR, -1.0, 0.0, 0.0)  # its depth, and a color that there is none of
 _NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it; of a back that is nowhere, 0
 
 # Texels by which shadows of surfaces are blurred, at least and as a part of a map at most; and how far, as a part of
@@ -44,7 +45,7 @@ class ShadowMaps:
         self._views = {}  # index of a light not near hair → (what it was aimed by, view, what `_aim` wrote)
         self._surfaces = {}  # layer → (what its surfaces were drawn with, texture of the depth that they hide behind)
         # Target of the drawing before it is filtered into a map.
-        self._surface_depth = gpu.types.GPUTexture((size, size), format="R32F")
+        self._surface_depth = gpu.types.GPUTexture((size, size), format="RG32F")  # and their color
         self._half_blurred = gpu.types.GPUTexture((size, size), format="RGBA32F")
         self._fronts, self._backs = (gpu.types.GPUTexture((size, size), format="R32UI") for _ in range(2))
         self._row_ends = gpu.types.GPUTexture((size, size), format="RG32F")
@@ -120,7 +121,7 @@ class ShadowMaps:
             return hidden
         if hidden is None:
             hidden = gpu.types.GPUTexture((self._size, self._size), format="R32F")
-        with self._target(self._surface_depth), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        with self._target(self._surface_depth, value=_NO_SURFACE), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             for surface in surfaces:
                 drawing.draw_surface_depth(surface, view, lights)
         self._blur(layer, _blur_of(lights["light"][layer], self._size))
@@ -154,7 +155,7 @@ class ShadowMaps:
                     drawing.draw_strip(strands, end, record, lights, hidden)
         self._fill_fronts(layer)
         with (
-            self._target(self._hair_layers, layer, value=0.0),
+            self._target(self._hair_layers, layer),
             drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"),
         ):
             for strands, record in placed:
@@ -187,9 +188,9 @@ class ShadowMaps:
         with self._targets[target, layer].bind(), drawing.gpu_state("NONE", depth_writes=False):
             drawing.draw_cover(program, {}, sources)
 
-    def _target(self, texture, layer=None, value=_FAR):
+    def _target(self, texture, layer=None, value=(0.0,) * 4):
         framebuffer = gpu.types.GPUFrameBuffer(color_slots=_slot(texture, layer), depth_slot=self._depth)
-        return drawing.cleared(framebuffer, (value,) * 4)
+        return drawing.cleared(framebuffer, value)
 
 
 def _steady(sphere, before):

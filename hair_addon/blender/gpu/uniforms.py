@@ -65,7 +65,6 @@ VIEW = Block(
         "eye": "vec4",  # the viewer's place, or in a parallel projection the unit direction towards the viewer
         "hair_forward": "vec4",  # what one strand passes on of the light that meets it
         "hair_reflectance": "vec4",  # of infinitely many strands
-        "surface_color": "vec4",  # of what the hair grows on
         "is_perspective": "int",
         "point_count": "int",
         "drawn_points": "int",  # of each strand's points, evenly chosen: at least two

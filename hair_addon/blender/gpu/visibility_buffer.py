@@ -83,7 +83,7 @@ class VisibilityBuffer:
     def find_hair(self, hair, lights, view, in_compute=None):
         """Fill `segments` and `depths` with the hair that is nearest, in front of the surfaces. Raises `HairError`.
 
-        hair: [(StrandsOnGPU, Shading, object to world, surface colour, {sampler: texture} of the scene, Steps), ...];
+        hair: [(StrandsOnGPU, Shading, object to world, {sampler: texture} of the scene, Steps), ...];
         lights, view: records of `uniforms`, lights one of all hair or (H,) of each; in_compute: whether a compute
         program finds the nearest strands, None: where it can.
         """
@@ -108,12 +108,11 @@ class VisibilityBuffer:
         """[_Placed] of arguments of `find_hair`."""
         found, first = [], 0
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
-        for index, (strands, shading, to_world, surface_color, samplers, steps) in enumerate(hair):
+        for index, (strands, shading, to_world, samplers, steps) in enumerate(hair):
             record = drawing.strand_record(strands, view, to_world, steps)
             record["seen_points"] = seen_points(strands.point_count)
             record["seen_opacity"] = shading.opacity
             record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
-            record["surface_color"][:3] = surface_color
             light_block = light_blocks[index if lights.shape else 0]
             window = drawing.window_of(strands, record, self.size)
             found.append(_Placed(strands, shading, record, samplers, first, light_block, window))

@@ -51,7 +51,7 @@ class CardPicture:
             with buffer.surfaces():
                 pass
             view = drawing.pass_record(np.eye(4), self._view_to_clip, (self._side, self._side), turn, tile)
-            hair = [(self._strands, _Opaque(), np.eye(4), np.zeros(3), {}, drawing.Steps())]
+            hair = [(self._strands, _Opaque(), np.eye(4), {}, drawing.Steps())]
             buffer.find_hair(hair, uniforms.LIGHTS.record(), view)
             found = np.asarray(buffer.segments.read()).astype(np.int32).reshape(tile[3], tile[2])
         found[found == NO_SEGMENT] = NO_STRAND

@@ -29,7 +29,7 @@ _DRAFT_STEPS = drawing.Steps(point_count=21, strand_count=10_000)
 class DrawnScene:
     """Read once by `read`, drawn from any number of views until something moves."""
 
-    hair: list  # (StrandsOnGPU, Shading, object to world, linear RGB of the surface it grows on, part in viewports)
+    hair: list  # (StrandsOnGPU, Shading, object to world, part in viewports)
     surfaces: list  # (SurfaceOnGPU, parts of a `DrawnMesh`, None of a holdout)
     lights: np.ndarray  # uniforms.LIGHTS: of all, as far as they are drawn one by one
     world: light_door.World
@@ -41,7 +41,7 @@ class DrawnScene:
     selected: tuple = ()  # whether that object is selected
     instances: tuple = ()  # of hair, as `hair_places.read_instances` found them
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
-    meshes: tuple = ()  # (corner positions, linear RGB) of each of `surfaces`, of a render
+    meshes: tuple = ()  # (corner positions, (F, 3) linear RGB of triangles) of each of `surfaces`, of a render
     clear: tuple = ()  # as `surfaces`, of those that hide nothing
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
@@ -200,14 +200,14 @@ def read_unlit(depsgraph, known, refused):
 
 def _corners_of(meshes):
     """`DrawnScene.meshes`."""
-    return tuple((mesh.positions, mesh.color) for mesh in meshes if not mesh.is_clear)
+    return tuple((mesh.positions, mesh.colors) for mesh in meshes if not mesh.is_clear)
 
 
 def _upload(meshes, is_shaded):
     """(surfaces, those that are clear, receivers) of a `DrawnScene`; is_shaded: whether they are seen as we shade."""
     uploaded = {False: [], True: []}
     for mesh in meshes:
-        surface = drawing.upload_surface(mesh.positions, mesh.normals, mesh.uvs), mesh.parts
+        surface = drawing.upload_surface(mesh.positions, mesh.normals, mesh.uvs, mesh.colors), mesh.parts
         receiver = scene_lights.Receiver(mesh.owner[1::-1], scene_lights.places_on_surface(mesh.positions))
         uploaded[is_shaded and mesh.is_clear].append((surface, receiver))
     solid, clear = ([surface for surface, _receiver in uploaded[is_clear]] for is_clear in (False, True))
@@ -253,8 +253,7 @@ def _read_rendered_hair(depsgraph, known, refused):
         except HairError as error:
             refused(original, error)
             continue
-        color = drawn_meshes.surface_color(original.surface)
-        yield (strands, shading, to_world, color, 1.0), drawn_meshes.owner_of(instance)
+        yield (strands, shading, to_world, 1.0), drawn_meshes.owner_of(instance)
 
 
 def _read_hair(places, viewport, refused):
@@ -275,7 +274,7 @@ def _read_hair(places, viewport, refused):
             continue
         if strands is not None:
             part = 0.01 * datablock.vellus.viewport_percentage
-            hair.append((strands, shading, place.to_world, drawn_meshes.surface_color(datablock.surface), part))
+            hair.append((strands, shading, place.to_world, part))
             drawn_places.append(place)
     return hair, drawn_places
 

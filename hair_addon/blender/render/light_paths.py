@@ -110,8 +110,7 @@ def _surroundings(drawn):
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in drawn.hair])
     places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     importance = lamps.irradiance(found, places).mean(axis=(1, 2)) if len(found) else np.zeros(0)
-    corners = [corners for corners, _color in drawn.meshes]
-    colors = [np.tile(color, (len(corners) // 3, 1)) for corners, color in drawn.meshes]
+    corners, colors = ([mesh[index] for mesh in drawn.meshes] for index in range(2))
     return light_paths.gather.Surroundings(
         np.concatenate([np.zeros((0, 3), np.float32), *corners]),
         np.concatenate([np.zeros((0, 3)), *colors]),

@@ -66,9 +66,9 @@ def find_hair(drawn, view, buffer, chosen=None):
 
 def _hair_in_view(drawn, view, is_viewport):
     hair = []
-    for (strands, shading, to_world, color, part), seen in zip(drawn.hair, drawn.hair_visibility, strict=True):
+    for (strands, shading, to_world, part), seen in zip(drawn.hair, drawn.hair_visibility, strict=True):
         steps = level_of_detail.steps_of(strands, view, to_world, part) if is_viewport else drawing.Steps()
-        hair.append((strands, shading, to_world, color, drawn.shadow_maps.samplers | seen, steps))
+        hair.append((strands, shading, to_world, drawn.shadow_maps.samplers | seen, steps))
     return hair
 
 

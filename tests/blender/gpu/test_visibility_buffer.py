@@ -39,7 +39,7 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
             surface = drawing.upload_surface(corners, corners)
             drawing.draw_surface_depth(surface, view, lights, "surface_hides.frag")
     hair = [
-        (strand_textures.upload_strands(points, radii), shading, to_world, np.zeros(3), none, steps)
+        (strand_textures.upload_strands(points, radii), shading, to_world, none, steps)
         for points, radii, to_world in placed
     ]
     buffer.add_hair(hair, lights, view, in_compute)

@@ -49,6 +49,23 @@ def look(scene, towards):
     scene.collection.objects.link(scene.camera)
 
 
+def set_light(scene, source):
+    """A sun straight above, or a white world."""
+    if source == "sun":
+        light = bpy.data.lights.new("Sun", "SUN")
+        light.energy, light.angle = SUN, 0.0
+        scene.collection.objects.link(bpy.data.objects.new("Sun", light))
+    else:
+        scene.world = bpy.data.worlds.new("World")
+        background = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
+        background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+
+
+def received(source):
+    """Radiance of a white plane in that light."""
+    return SUN / np.pi if source == "sun" else 1.0
+
+
 def mean_color():
     bpy.context.view_layer.update()
     picture = api.draw(width=96, height=96, samples_per_side=3, is_transparent=True)
@@ -70,21 +87,13 @@ def light_from_below(tangent, towards):
 @pytest.mark.parametrize("source", ["sun", "world"])
 def test_a_plane_lights_a_strand_as_much_as_its_directions_say(scene, tilt, source):
     tangent, towards = (np.cos(tilt), 0.0, np.sin(tilt)), (0.0, -0.6, 0.8)
-    light = bpy.data.lights.new("Sun", "SUN")
-    if source == "sun":
-        light.energy, light.angle = SUN, 0.0
-        scene.collection.objects.link(bpy.data.objects.new("Sun", light))
-    else:
-        scene.world = bpy.data.worlds.new("World")
-        background = next(node for node in scene.world.node_tree.nodes if node.type == "BACKGROUND")
-        background.inputs["Color"].default_value = (1.0, 1.0, 1.0, 1.0)
+    set_light(scene, source)
     look(scene, towards)
     curves = strands_over_a_plane(scene, tangent, (0.0, 0.0, 0.0))
     without = mean_color()
     curves.surface.data.materials[0].diffuse_color = (0.5, 0.5, 0.5, 1.0)
     found = mean_color() - without
-    received = SUN / np.pi if source == "sun" else 1.0
-    expected = 0.5 * received * light_from_below(tangent, towards)
+    expected = 0.5 * received(source) * light_from_below(tangent, towards)
     np.testing.assert_allclose(found, expected, rtol=0.2)
 
 
@@ -116,6 +125,29 @@ def test_a_wide_plane_lights_strands_at_any_height(scene):
     without = mean_color()
     curves.surface.data.materials[0].diffuse_color = (0.5, 0.5, 0.5, 1.0)
     expected = 0.5 * SUN / np.pi * light_from_below(tangent, towards)
+    np.testing.assert_allclose(mean_color() - without, expected, rtol=0.2)
+
+
+@pytest.mark.parametrize("source", ["sun", "world"])
+def test_light_off_a_surface_has_the_color_that_is_there(scene, source):
+    """Strands that grow on a black surface elsewhere, above a plane whose faces have two materials of another color."""
+    tangent, towards = (1.0, 0.0, 0.0), (0.0, -0.6, 0.8)
+    set_light(scene, source)
+    look(scene, towards)
+    curves = strands_over_a_plane(scene, tangent, (0.0, 0.0, 0.0))
+    plane = curves.surface
+    bpy.ops.mesh.primitive_grid_add(size=0.1, location=(0.0, 0.0, -50.0))
+    curves.surface = bpy.context.object
+    curves.surface.data.materials.append(plane.data.materials[0])
+    without = mean_color()
+    color = (0.6, 0.3, 0.1)
+    for value in ((0.0, 1.0, 0.0), color):
+        plane.data.materials.append(bpy.data.materials.new("Plane"))
+        plane.data.materials[-1].node_tree.nodes.clear()
+        plane.data.materials[-1].diffuse_color = (*value, 1.0)
+    for polygon in plane.data.polygons:
+        polygon.material_index = 2
+    expected = np.array(color) * received(source) * light_from_below(tangent, towards)
     np.testing.assert_allclose(mean_color() - without, expected, rtol=0.2)
 
 

@@ -25,7 +25,7 @@ class DrawnMesh:
     uvs: np.ndarray
     parts: tuple | None
     owner: tuple = ()
-    color: tuple = (0.0, 0.0, 0.0)  # `surface_color` of its object
+    colors: np.ndarray | None = None  # (F, 3) float32: linear RGB of each triangle's material
 
     @property
     def is_clear(self):
@@ -90,15 +90,15 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
     mesh = mesh_object.to_mesh()
     try:
         vertices = scene.vertex_positions(mesh)
-        layout = _layout(mesh_object, mesh, is_holdout, is_moving)
+        layout = _layout(mesh_object, mesh, is_moving)
         normals = _corner_normals(mesh, to_world).take(layout.loops, axis=0) if has_normals else None
-        parts = () if is_holdout else _parts(mesh_object, layout.runs)
-        uvs = _read_uvs(mesh, layout.loops, parts)
+        parts = _parts(mesh_object, layout.runs)
+        uvs = _read_uvs(mesh, layout.loops, () if is_holdout else parts)
     finally:
         mesh_object.to_mesh_clear()
     positions = (vertices @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
     positions = positions.take(layout.faces.corner_vertices[layout.loops], axis=0)
-    return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, color=surface_color(mesh_object))
+    return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, colors=_colors(parts))
 
 
 def _corner_normals(mesh, to_world):
@@ -110,10 +110,10 @@ def _corner_normals(mesh, to_world):
     return normals.astype(np.float32)
 
 
-def _layout(mesh_object, mesh, is_holdout, is_moving):
+def _layout(mesh_object, mesh, is_moving):
     """The `_Layout` of an evaluated mesh: with `is_moving` the one before, if it fits."""
     faces, slots = scene.faces_of(mesh), np.zeros(0, np.int32)
-    if len(mesh_object.material_slots) > 1 and not is_holdout:
+    if len(mesh_object.material_slots) > 1:
         slots = np.zeros(len(mesh.polygons), np.int32)
         mesh.polygons.foreach_get("material_index", slots)
         slots = np.clip(slots, 0, len(mesh_object.material_slots) - 1)
@@ -161,9 +161,7 @@ def _active_uvs(mesh):
     return next((layer for layer in mesh.uv_layers if layer.active_render), None)
 
 
-def surface_color(mesh_object):
-    """Linear RGB: base colour of the first material's Principled BSDF, or its colour in the viewport; black of None."""
-    if mesh_object is None:
-        return (0.0, 0.0, 0.0)
-    material = next((slot.material for slot in mesh_object.material_slots if slot.material), None)
-    return surface_materials.read_material(material).color
+def _colors(parts):
+    """`DrawnMesh.colors` of its parts."""
+    colors = np.array([material.color for _first, _count, material in parts], np.float32)
+    return colors.repeat([count // 3 for _first, count, _material in parts], axis=0)
