@@ -16,7 +16,10 @@ float depth_of(ivec2 sample_place, float alpha)
 
 void main()
 {
-  ivec2 corner = ivec2(gl_FragCoord.xy) * samples_per_side;
+  ivec2 corner = ivec2(gl_FragCoord.xy) * samples_per_side - first_place;
+  if (any(lessThan(corner, ivec2(0))) || any(greaterThanEqual(corner, textureSize(picture, 0)))) {
+    discard;
+  }
   vec4 total = vec4(0.0);
   float nearest = 1.0;
   for (int y = 0; y < samples_per_side; y++) {

@@ -15,9 +15,15 @@ const float TOLERANCE = 2.0;
 const float MOST_GAIN = 8.0;  // of what is lit: more light comes to all strands alike, also to dark ones
 const float TOLERANCE_OF_LIGHT = 3.0;  // where nothing but lights has moved
 
+// Where the textures of samples begin in the picture. Beside them there is no hair.
+ivec2 first_place()
+{
+  return ivec2(history.first_column, history.first_row);
+}
+
 void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
 {
-  place = clamp(place, ivec2(0), ivec2(history.size.xy) * history.samples_per_side - 1);
+  place = clamp(place, ivec2(0), textureSize(depths, 0) - 1);
   float depth = uintBitsToFloat(texelFetch(depths, place, 0).r);
   if (depth < nearest) {
     nearest = depth;
@@ -30,7 +36,7 @@ void look(ivec2 place, inout ivec2 nearest_place, inout float nearest)
 vec2 place_before(ivec2 pixel, out bool is_background)
 {
   int side = history.samples_per_side;
-  ivec2 corner = pixel * side;
+  ivec2 corner = pixel * side - first_place();
   ivec2 nearest_place = corner;
   float nearest = 2.0;
   for (int y = 0; y < side; y++) {
@@ -90,7 +96,7 @@ vec4 previous_at(vec2 place)
 void light_around(vec2 place, out vec4 earlier, out vec3 later)
 {
   ivec2 blocks = textureSize(light_now, 0);
-  vec2 at = block_place(place * float(history.samples_per_side), blocks);
+  vec2 at = block_place(place * float(history.samples_per_side) - vec2(first_place()), blocks);
   earlier = vec4(0.0);
   later = vec3(0.0);
   for (int turn = 0; turn < 4; turn++) {
@@ -104,10 +110,11 @@ void light_around(vec2 place, out vec4 earlier, out vec3 later)
 bool is_near_hair(ivec2 pixel)
 {
   int side = history.samples_per_side;
-  ivec2 last = ivec2(history.size.xy) * side - 1;
+  ivec2 last = textureSize(segments, 0) - 1;
   bool is_found = false;
   for (int turn = 0; turn < 25 && !is_found; turn++) {
-    ivec2 place = clamp((pixel + 2 * ivec2(turn % 5, turn / 5) - 4) * side, ivec2(0), last);
+    ivec2 place = (pixel + 2 * ivec2(turn % 5, turn / 5) - 4) * side - first_place();
+    place = clamp(place, ivec2(0), last);
     is_found = texelFetch(segments, place, 0).r < NO_SEGMENT;
   }
   return is_found;

@@ -3,7 +3,10 @@
 
 void main()
 {
-  ivec2 corner = ivec2(gl_FragCoord.xy) * samples_per_side;
+  ivec2 corner = ivec2(gl_FragCoord.xy) * samples_per_side - first_place;
+  if (any(lessThan(corner, ivec2(0))) || any(greaterThanEqual(corner, textureSize(segments, 0)))) {
+    discard;
+  }
   int covered = 0;
   for (int y = 0; y < samples_per_side; y++) {
     for (int x = 0; x < samples_per_side; x++) {

@@ -48,7 +48,7 @@ class Frame:
         width, height = width * samples_per_side, height * samples_per_side
         depsgraph = bpy.context.evaluated_depsgraph_get()
         camera = scene.read_camera(bpy.context.scene, depsgraph, width, height)
-        self.view = drawing.view_record(*camera, height, least_width=1.0)
+        self.view = drawing.pass_record(*camera, (width, height))
         self._buffer = visibility_buffer.VisibilityBuffer(width, height)
         self._pixel = gpu.types.GPUTexture((1, 1), format="RGBA16F")
         self._end = gpu.types.GPUFrameBuffer(color_slots=self._pixel)

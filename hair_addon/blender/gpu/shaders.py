@@ -291,6 +291,7 @@ def accumulate_program():
     """The program that adds a pass to the picture of a viewport: see accumulate.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     info.push_constant("INT", "samples_per_side")
+    info.push_constant("IVEC2", "first_place")  # [samples] of the textures in the picture
     info.push_constant("FLOAT", "weight")
     info.sampler(0, "FLOAT_2D", "picture")
     info.sampler(1, "UINT_2D", "depths")

@@ -206,6 +206,8 @@ HISTORY = Block(
         "now_to_before": "mat4",  # clip space of a view → that of the view before
         "size": "vec4",  # width and height of the picture [pixels]
         "samples_per_side": "int",
+        "first_column": "int",  # of the picture's samples, where those that were drawn are a tile of it
+        "first_row": "int",
         "has_hair_motion": "int",  # whether it has moved, and not only the view: by the texture of motion vectors
         "has_surface_motion": "int",
         "is_still": "int",  # whether nothing has moved but lights: what is in a pixel was there before

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..gpu import drawing, shaders
 from ..gpu.visibility_buffer import VisibilityBuffer
-from . import scene_drawing
+from . import picture_detail, scene_drawing
 from .history import History
 
 SAMPLE_COUNT = 32  # of a pixel, in all passes of a picture
@@ -22,18 +22,18 @@ def samples_per_side():
 class HairPicture:
     """The mean of passes, each of which samples other places of the pixels and takes other samples of thin strands.
 
-    Light is premultiplied with the part of a pixel that hair covers.
+    Light is premultiplied with the part of a pixel that hair covers. per_side: samples along each side of a pixel in a
+    pass, by default as many as the machine is fit for; small hair has more.
     """
 
     def __init__(self, size, per_side=None):
-        self.size = width, height = size  # [pixels]
+        self.size = size  # [pixels]
         self.per_side = per_side or samples_per_side()
-        samples = (width * self.per_side, height * self.per_side)
-        self._sides = range(self.per_side)
         self.pass_count = self._first_turn = 0
-        self._history = History(self.size, self.per_side)
+        self._detail = picture_detail.whole(size, self.per_side)
+        self._history = History(self.size)
         self._view = None  # record of the last pass
-        self._pass = VisibilityBuffer(*samples)
+        self._pass = VisibilityBuffer(*self._detail.buffer_size)
         self._color = gpu.types.GPUTexture(self.size, format="RGBA16F")
         self._depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._sum = gpu.types.GPUFrameBuffer(color_slots=self._color, depth_slot=self._depth)
@@ -45,7 +45,7 @@ class HairPicture:
 
     @property
     def _pass_total(self):
-        return -(-SAMPLE_COUNT // self.per_side**2)
+        return -(-SAMPLE_COUNT // self._detail.per_side**2)
 
     def restart(self, is_moved=False):
         """Start another picture; is_moved: of the same things from elsewhere, or elsewhere."""
@@ -68,10 +68,11 @@ class HairPicture:
             view, is_lit = self._view, is_shadowed and not is_see_through
             relight = functools.partial(scene_drawing.relight_viewport, drawn, view, self._pass, is_lit)
             self._history.follow_light(drawn, camera, self._pass, relight)
-        self._view = view = drawing.pass_record(world_to_view, view_to_clip, self._pass.size, turn)
+            self._choose_detail(drawn, camera, is_shadowed)
+        self._view = view = self._detail.pass_record(camera, self.size, turn)
         is_outlined = outline is not None and not outline.is_fine
         if is_outlined:
-            outline.add_pass(drawn, view, self._pass)
+            outline.add_pass(drawn, view, self._pass, self._detail)
         has_shadow = is_shadowed and not is_see_through
         with self._pass.surfaces() if has_shadow else self._pass.hiding():
             if has_shadow:
@@ -80,7 +81,7 @@ class HairPicture:
                 scene_drawing.draw_hiding(drawn, view)
         scene_drawing.draw_hair(drawn, view, self._pass, is_viewport=True)
         if is_outlined:
-            outline.add_seen(self._pass)
+            outline.add_seen(self._pass, self._detail)
         with self._sum.bind():
             if self.pass_count == 0:
                 self._sum.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
@@ -88,12 +89,23 @@ class HairPicture:
         self.pass_count += 1
         part_left = 1.0 - self.pass_count / self._pass_total
         light = self._color, self.pass_count
-        self._history.add(drawn, camera, view, self._pass, light, self.pass_count, part_left, is_shadowed)
+        samples = self._pass, self._detail
+        self._history.add(drawn, camera, view, samples, light, self.pass_count, part_left, is_shadowed)
+
+    def _choose_detail(self, drawn, camera, is_shadowed):
+        """Sample small hair finely, unless shadows on surfaces, which may be anywhere, are in the picture."""
+        detail = picture_detail.whole(self.size, self.per_side)
+        if not is_shadowed:
+            detail = picture_detail.of_hair(drawn, camera, self.size, self.per_side)
+        self._detail = detail
+        if self._pass.size != detail.buffer_size:
+            self._pass = VisibilityBuffer(*detail.buffer_size)
 
     def _accumulate(self):
         program = shaders.accumulate_program()
         program.bind()
-        program.uniform_int("samples_per_side", self.per_side)
+        program.uniform_int("samples_per_side", self._detail.per_side)
+        program.uniform_int("first_place", self._detail.corner)
         program.uniform_sampler("picture", self._pass.color)
         program.uniform_sampler("depths", self._pass.depths)
         program.uniform_sampler("surface_depth", self._pass.surface_depth)
@@ -126,7 +138,11 @@ class HairPicture:
 
     def hair_at(self, x, y):
         """Which of the hair is seen at a pixel, counted from 0; None where there is none within the pixel."""
-        places = [(self.per_side * x + i, self.per_side * y + j) for j in self._sides for i in self._sides]
+        left, bottom, width, height = self._detail.tile
+        if not (left <= x < left + width and bottom <= y < bottom + height):
+            return None
+        side = self._detail.per_side
+        places = [(side * (x - left) + i, side * (y - bottom) + j) for j in range(side) for i in range(side)]
         return next((found for place in places if (found := self._pass.hair_at(*place)) is not None), None)
 
     def read(self):

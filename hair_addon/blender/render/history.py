@@ -25,6 +25,7 @@ class _Targets:
     """Textures and their framebuffer, which does not own them."""
 
     def __init__(self, size, formats, is_smooth):
+        self.size = size
         self.textures = [gpu.types.GPUTexture(size, format=one) for one in formats]
         for texture in self.textures:
             texture.filter_mode(is_smooth)
@@ -75,10 +76,10 @@ def _seen(drawn, camera):
 
 
 class History:
-    """What a picture of size (width, height) [pixels] showed before, with per_side² samples of a pixel in a pass."""
+    """What a picture of size (width, height) [pixels] showed before."""
 
-    def __init__(self, size, per_side):
-        self.size, self._per_side = size, per_side
+    def __init__(self, size):
+        self.size = size
         self._shown = self._before = None  # _Targets: the picture, and how many passes it is worth
         self._carried = self._blocks = self._block_batch = None
         self._seen = None
@@ -125,39 +126,40 @@ class History:
         self._is_relit = self._seen is not None and self._seen.is_still(_seen(drawn, camera))
         if not self._is_relit:
             return
-        if self._relit is None:
-            size = tuple(-(-length // history_programs.BLOCK_SIDE) for length in buffer.size)
+        size = tuple(-(-length // history_programs.BLOCK_SIDE) for length in buffer.size)
+        if self._relit is None or self._relit[0].size != size:
             self._relit = [_Targets(size, (_COLOR, _COLOR), True) for _ in range(2)]
         program = history_programs.blocks_program()
         self._relit[0].fill(program, {"picture": buffer.color}, weight=1.0)
         self._relit[1].fill(program, {"picture": relight()}, weight=1.0)
 
-    def add(self, drawn, camera, view, buffer, light, pass_count, part_left, has_lit_surfaces=False):
+    def add(self, drawn, camera, view, samples, light, pass_count, part_left, has_lit_surfaces=False):
         """Take note of a pass, the pass_count-th of a picture.
 
-        drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; buffer: its
-        `VisibilityBuffer`; light: (texture, weight) of the passes so far, their sum and what to divide it by;
-        part_left: of all passes, those that are still to come; has_lit_surfaces: whether surfaces, or
-        shadows on them, are in it.
+        drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; samples: its
+        `VisibilityBuffer`, and the `picture_detail.Detail` that this has; light: (texture, weight) of the passes so
+        far, their sum and what to divide it by; part_left: of all passes, those that are still to come;
+        has_lit_surfaces: whether surfaces, or shadows on them, are in it.
         """
         if pass_count == 1:
-            self._turn_to(drawn, camera, view, buffer, light, has_lit_surfaces)
+            self._turn_to(drawn, camera, view, samples, light, has_lit_surfaces)
         if self._is_carried:
             self._is_carried = part_left > 0.0
         if self._is_carried:
             self._mix(light, pass_count, part_left)
 
-    def _turn_to(self, drawn, camera, view, buffer, light, has_lit_surfaces):
+    def _turn_to(self, drawn, camera, view, samples, light, has_lit_surfaces):
         before, self._seen = self._seen, _seen(drawn, camera)
         self._is_carried = before is not None and _are_same(before.looks, self._seen.looks)
         if self._is_carried:
-            self._carry(before, drawn, view, buffer, light, has_lit_surfaces)
+            self._carry(before, drawn, view, samples, light, has_lit_surfaces)
 
-    def _carry(self, before, drawn, view, buffer, light, has_lit_surfaces):
-        now = self._seen
+    def _carry(self, before, drawn, view, samples, light, has_lit_surfaces):
+        now, (buffer, detail) = self._seen, samples
         record = uniforms.HISTORY.record()
         record["now_to_before"] = (before.world_to_clip @ np.linalg.inv(now.world_to_clip)).T
-        record["size"][:2], record["samples_per_side"] = self.size, self._per_side
+        record["size"][:2], record["samples_per_side"] = self.size, detail.per_side
+        record["first_column"], record["first_row"] = detail.corner
         record["has_surface_motion"] = has_surfaces = not now.places.has_still_surfaces(before.places)
         record["has_hair_motion"] = has_hair = not now.places.has_still_hair(before.places)
         has_same_strands = now.places.has_same_strands(before.places)

@@ -49,14 +49,10 @@ class OutlineStyle:
 
 
 class HairOutline:
-    """The outline of some of the hair of a `DrawnScene`, for a picture of size (width, height) [pixels].
+    """The outline of some of the hair of a `DrawnScene`, for a picture of size (width, height) [pixels]."""
 
-    per_side: samples along each side of a pixel of the `VisibilityBuffer` that it is found in.
-    """
-
-    def __init__(self, size, per_side):
+    def __init__(self, size):
         self.size = size
-        self._per_side = per_side
         self._style, self._channels = None, {}
         self._pass_count = 0
         self._is_changed = True
@@ -80,26 +76,30 @@ class HairOutline:
         """Whether another pass would change nothing that is seen."""
         return self._pass_count >= _PASS_COUNT
 
-    def add_pass(self, drawn, view, buffer):
-        """Find the hair where nothing hides it in a `VisibilityBuffer`; view: a `uniforms.VIEW` record."""
+    def add_pass(self, drawn, view, buffer, detail):
+        """Find the hair where nothing hides it in a `VisibilityBuffer`.
+
+        view: a `uniforms.VIEW` record; detail: `picture_detail.Detail` of the buffer.
+        """
         with buffer.hiding():
             pass
         scene_drawing.find_hair(drawn, view, buffer, self._channels)
-        self._add(buffer, zip(self._channels.values(), buffer.segment_ranges, strict=True))
+        self._add(buffer, detail, zip(self._channels.values(), buffer.segment_ranges, strict=True))
         self._pass_count += 1
 
-    def add_seen(self, buffer):
+    def add_seen(self, buffer, detail):
         """Add the visible hair of a `VisibilityBuffer`, in which all hair in front of the surfaces was found."""
         ranges = buffer.segment_ranges
-        self._add(buffer, ((channel + 2, ranges[index]) for index, channel in self._channels.items()))
+        self._add(buffer, detail, ((channel + 2, ranges[index]) for index, channel in self._channels.items()))
 
-    def _add(self, buffer, found):
+    def _add(self, buffer, detail, found):
         program = _mask_program()
         with self._mask_target.bind(), drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"):
             for channel, (first, count) in found:
                 program.bind()
                 program.uniform_float("channel", np.eye(4)[channel])
-                program.uniform_int("samples_per_side", self._per_side)
+                program.uniform_int("samples_per_side", detail.per_side)
+                program.uniform_int("first_place", detail.corner)
                 program.uniform_int("first_segment", first)
                 program.uniform_int("segment_count", count)
                 program.uniform_sampler("segments", buffer.segments)
@@ -161,7 +161,8 @@ def _program(fragment, constants, samplers):
 
 @shaders.kept
 def _mask_program():
-    constants = {"channel": "VEC4", "samples_per_side": "INT", "first_segment": "INT", "segment_count": "INT"}
+    constants = {"channel": "VEC4", "first_place": "IVEC2"}
+    constants |= dict.fromkeys(("samples_per_side", "first_segment", "segment_count"), "INT")
     return _program("outline_mask.frag", constants, {"segments": "UINT_2D"})
 
 

@@ -1,9 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Selection and style of outlined hair in a viewport; outlines over other render engines."""
 
-from ..gpu import drawing
 from ..gpu.visibility_buffer import VisibilityBuffer
-from . import hair_picture, scene_drawing
+from . import hair_picture, picture_detail, scene_drawing
 from .outline import HairOutline, OutlineStyle
 
 # Blender does not outline sculpted or edited objects, and strokes of the comb should be visible.
@@ -50,10 +49,10 @@ class LoneOutline:
     """The outline of hair in a region of size (width, height) whose picture another engine makes."""
 
     def __init__(self, size):
-        per_side = hair_picture.samples_per_side()
         self.size = size
-        self._buffer = VisibilityBuffer(size[0] * per_side, size[1] * per_side)
-        self._outline = HairOutline(size, per_side)
+        self._detail = picture_detail.whole(size, hair_picture.samples_per_side())
+        self._buffer = VisibilityBuffer(*self._detail.buffer_size)
+        self._outline = HairOutline(size)
         self._pass_count = 0
 
     @property
@@ -68,12 +67,12 @@ class LoneOutline:
 
     def add_pass(self, drawn, world_to_view, view_to_clip):
         """Find the hair of a `DrawnScene` once more; world_to_view, view_to_clip: (4, 4)."""
-        view = drawing.pass_record(world_to_view, view_to_clip, self._buffer.size, self._pass_count)
-        self._outline.add_pass(drawn, view, self._buffer)
+        view = self._detail.pass_record((world_to_view, view_to_clip), self.size, self._pass_count)
+        self._outline.add_pass(drawn, view, self._buffer, self._detail)
         with self._buffer.hiding():
             scene_drawing.draw_hiding(drawn, view)
         scene_drawing.find_hair(drawn, view, self._buffer)
-        self._outline.add_seen(self._buffer)
+        self._outline.add_seen(self._buffer, self._detail)
         self._pass_count += 1
 
     def show(self):

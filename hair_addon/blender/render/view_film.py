@@ -3,7 +3,7 @@
 
 import functools
 
-from . import scene_drawing
+from . import picture_detail, scene_drawing
 from .film import Film
 from .hair_picture import SAMPLE_COUNT
 from .history import History
@@ -17,7 +17,8 @@ class ViewFilm:
 
     def __init__(self, size, per_side, is_transparent):
         self._film = Film(size, per_side, ("Combined",), is_transparent)
-        self._history = History(size, per_side)
+        self._detail = picture_detail.whole(size, per_side)
+        self._history = History(size)
         self._pass_total = -(-SAMPLE_COUNT // per_side**2)
         self._first_turn = 0
         self._view = None  # record of the last pass
@@ -45,9 +46,8 @@ class ViewFilm:
             self._history.follow_light(drawn, camera, film.samples, relight)
         self._view = view = film.add_pass(drawn, *camera, film.size, self._first_turn + film.pass_count, lens=lens)
         part_left = 1.0 - film.pass_count / self._pass_total
-        self._history.add(
-            drawn, camera, view, film.samples, film.light, film.pass_count, part_left, has_lit_surfaces=True
-        )
+        samples = film.samples, self._detail
+        self._history.add(drawn, camera, view, samples, film.light, film.pass_count, part_left, has_lit_surfaces=True)
 
     def show(self):
         """Lay the picture over the viewport that is bound."""

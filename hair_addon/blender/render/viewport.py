@@ -212,7 +212,7 @@ def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=Fal
         if outlined is None:
             kept.outline = None
         else:
-            kept.outline = kept.outline or HairOutline(kept.picture.size, kept.picture.per_side)
+            kept.outline = kept.outline or HairOutline(kept.picture.size)
             kept.outline.restart(dict(outlined[0]), outlined[1])
     if not kept.picture.is_fine:
         kept.picture.add_pass(drawn, *matrices_of(view), is_see_through, kept.outline, is_shadowed)

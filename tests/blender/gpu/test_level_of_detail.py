@@ -113,17 +113,3 @@ def test_hair_from_afar_is_as_bright_as_all_of_it(thin, monkeypatch, distance):
     assert steps.strand_count < strands.strand_count
     monkeypatch.setattr(level_of_detail, "steps_of", lambda *_args: drawing.Steps())
     np.testing.assert_allclose(some, picture(), rtol=0.06)
-
-
-def test_hair_covers_as_much_from_afar(lit):
-    """A ball of hair four samples wide is not half a sample larger on each side."""
-    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
-    bpy.context.view_layer.update()
-    drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
-    covered = []
-    for distance in (8.0, 80.0):
-        picture = hair_picture.HairPicture((SIZE, SIZE), 1)
-        while not picture.is_fine:
-            picture.add_pass(drawn, *seen_from(distance))
-        covered.append(picture.read()[..., 3].sum() * distance**2)
-    assert covered[1] == pytest.approx(covered[0], rel=0.04)

@@ -28,7 +28,7 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
     A segment is negative where there is none. hiding_at: distance of a surface that fills the left half of the view.
     """
     buffer = visibility_buffer.VisibilityBuffer(*SIZE)
-    view = drawing.view_record(np.eye(4), view_to_clip, SIZE[1], least_width=1.0)
+    view = drawing.pass_record(np.eye(4), view_to_clip, SIZE)
     lights = uniforms.LIGHTS.record()
     none = {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in shaders.SHADOW_SAMPLERS}
     none |= {name: gpu.types.GPUTexture((1, 1), format="RGBA16F") for name in shaders.VISIBILITY_SAMPLERS}
@@ -95,7 +95,7 @@ def test_triangles_and_the_computed_show_the_same_strands(rng, shading, view_to_
         drawn(placed, view_to_clip, shading, in_compute, 0.7, steps) for in_compute in (False, True)
     )
     assert (triangles >= 0).sum() > 500
-    assert (computed >= 0).sum() == pytest.approx((triangles >= 0).sum(), rel=0.02)
+    assert (computed >= 0).sum() == pytest.approx((triangles >= 0).sum(), rel=0.03)
     both = (triangles >= 0) & (computed >= 0)
     assert both.sum() > 0.93 * (triangles >= 0).sum()
     assert (triangles == computed)[both].mean() > 0.93
@@ -119,6 +119,22 @@ def test_a_strand_behind_a_surface_is_hidden(shading):
         assert left.any() and right.any()
 
 
+@pytest.mark.parametrize("in_compute", [True, False])
+def test_thin_strands_in_one_line_cover_what_one_of_them_does(shading, in_compute):
+    """A fifth of a sample wide: neither widened nor counted one by one, in one picture of lines of many slopes."""
+    sample = 2.0 * HALF_WIDTH / SIZE[0]
+    hits = columns = 0
+    for slope in np.linspace(-0.4, 0.4, 9):
+        points = np.zeros((10, 3, 3), np.float32)
+        points[..., 0] = np.array([-1.0, 0.0, 1.0]) * HALF_WIDTH
+        points[..., 1] = 0.0037 + slope * points[..., 0]
+        points[..., 2] = -2.0
+        radii = np.full((10, 3), 0.1 * sample / np.hypot(1.0, slope), np.float32)  # so wide along a column
+        found, _depths = drawn([(points, radii, np.eye(4))], PARALLEL, shading, in_compute)
+        hits, columns = hits + (found >= 0).sum(), columns + SIZE[0]
+    assert hits / columns == pytest.approx(0.2, rel=0.1)
+
+
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
 def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
     """Small tufts in the picture, over its edges and beyond; `drawn` compares what is found with what is shaded."""
@@ -132,7 +148,7 @@ def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
         assert is_there.size or x == 2.0
         on_gpu, view = (
             strand_textures.upload_strands(points, radii),
-            drawing.view_record(np.eye(4), view_to_clip, SIZE[1], least_width=1.0),
+            drawing.pass_record(np.eye(4), view_to_clip, SIZE),
         )
         left, bottom, width, height = drawing.window_of(on_gpu, drawing.strand_record(on_gpu, view, to_world), SIZE)
         assert ((is_there >= (left, bottom)) & (is_there < (left + width, bottom + height))).all()

@@ -42,7 +42,7 @@ def shown(show):
 
 def outlined(drawn, channels, style=STYLE):
     """(picture of the outline, (SIZE, SIZE) whether any sample of a pixel shows hair) after enough passes."""
-    picture, outline = hair_picture.HairPicture((SIZE, SIZE), 2), HairOutline((SIZE, SIZE), 2)
+    picture, outline = hair_picture.HairPicture((SIZE, SIZE), 2), HairOutline((SIZE, SIZE))
     outline.restart(channels, style)
     while not outline.is_fine:
         picture.add_pass(drawn, *matrices(), outline=outline)
