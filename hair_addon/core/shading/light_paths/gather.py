@@ -35,12 +35,13 @@ _LEAST_PATHS = 4096  # fewer are not worth a thread
 class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
-    corners: (3 F, 3) of triangles [m]; albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light`
+    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit; albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light`
     in shaders/include/lights.glsl; importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without
     lamps, a picture of longitude and latitude as core/imaging/environment.py takes it apart.
     """
 
     corners: np.ndarray
+    normals: np.ndarray
     albedo: np.ndarray
     lamps: np.ndarray
     importance: np.ndarray
@@ -81,13 +82,41 @@ class _Rays:
 
 
 @wp.func
-def _arriving(medium: Medium, lit: Lit, position: wp.vec3, own: int):
-    """Irradiance of a lamp's light that arrives at a place on strand `own`, -1 for a surface."""
-    if lit.casts_shadow > 0 and wp.max(lit.irradiance) > 0.0:
-        met = walk(medium, position, lit.direction, lit.distance, own)
-        if met.kind != PASSED:
-            return wp.vec3(0.0, 0.0, 0.0)
-    return lit.irradiance
+def _is_shadowed(medium: Medium, lit: Lit, position: wp.vec3, own: int):
+    """Whether a lamp's light does not arrive at a place on strand `own`, -1 for a surface."""
+    if lit.casts_shadow == 0:
+        return False
+    met = walk(medium, position, lit.direction, lit.distance, own)
+    return met.kind != PASSED
+
+
+@wp.func
+def _lamp_at(sources: Sources, turn: int, turns: int, position: wp.vec3, least: float, random: wp.uint32):
+    """(`Lit` of the turn-th lamp, or where there are more than turns of any one, with its share; random state)."""
+    state = random
+    chosen = turn
+    share = float(1.0)
+    if sources.count > turns:
+        any_lamp, one_over_chance, after = choose(sources, state)
+        state = after
+        chosen = any_lamp
+        share = one_over_chance / float(turns)
+    lit, after = lit_by(sources, chosen, position, least, state)
+    lit.irradiance = lit.irradiance * share
+    return lit, after
+
+
+@wp.func
+def _scattered(fibre: Fibre, viewer: wp.vec3, lit: Lit, offset: float, shift: float):
+    """Radiance that a strand sends to the viewer of a lamp's light: the mean around an offset in its width."""
+    light = wp.vec3(0.0, 0.0, 0.0)
+    for step in range(_OFFSETS_AT_ONCE):
+        h = offset + _AROUND * (2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0)
+        # Back from beyond the edge: the mean over all offsets stays that over the width.
+        if wp.abs(h) > 1.0:
+            h = wp.sign(h) * 2.0 - h
+        light += value(fibre, viewer, lit.direction, h)
+    return wp.cw_mul(lit.irradiance, light / float(_OFFSETS_AT_ONCE))
 
 
 @wp.func
@@ -101,31 +130,55 @@ def _light_at_once(
     own: int,
     random: wp.uint32,
 ):
-    """(radiance of lamps' light that a seen strand sends to the viewer, random state): the mean around an offset."""
+    """(radiance of lamps' light that a seen strand sends to the viewer, random state): all lamps are traced."""
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)
     turns = wp.min(sources.count, _LAMPS_AT_ONCE)
-    for index in range(turns):
-        chosen = index
-        share = float(1.0)
-        if sources.count > _LAMPS_AT_ONCE:
-            any_lamp, one_over_chance, after = choose(sources, state)
-            state = after
-            chosen = any_lamp
-            share = one_over_chance / float(turns)
-        lit, after = lit_by(sources, chosen, position, 0.5 * medium.least_cell, state)
+    for turn in range(turns):
+        lit, after = _lamp_at(sources, turn, turns, position, 0.5 * medium.least_cell, state)
         state = after
-        arriving = _arriving(medium, lit, position, own)
-        if wp.max(arriving) > 0.0:
-            shift = wp.randf(state)
-            for step in range(_OFFSETS_AT_ONCE):
-                h = offset + _AROUND * (2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0)
-                # Back from beyond the edge: the mean over all offsets stays that over the width.
-                if wp.abs(h) > 1.0:
-                    h = wp.sign(h) * 2.0 - h
-                scattered = value(fibre, viewer, lit.direction, h) * (share / float(_OFFSETS_AT_ONCE))
-                light += wp.cw_mul(arriving, scattered)
+        if wp.max(lit.irradiance) > 0.0 and not _is_shadowed(medium, lit, position, own):
+            light += _scattered(fibre, viewer, lit, offset, wp.randf(state))
     return light, state
+
+
+@wp.func
+def _light_by_share(
+    medium: Medium,
+    sources: Sources,
+    fibre: Fibre,
+    viewer: wp.vec3,
+    position: wp.vec3,
+    offset: float,
+    own: int,
+    normal: wp.vec3,
+    random: wp.uint32,
+):
+    """(the same of a strand met later, or where `own` is below zero of a white surface, random state).
+
+    Of what all lamps would send without shadows one is drawn by its share, and traced [Talbot05].
+    """
+    state = random
+    total = float(0.0)
+    kept = wp.vec3(0.0, 0.0, 0.0)
+    kept_lit = Lit()
+    turns = wp.min(sources.count, _LAMPS_AT_ONCE)
+    for turn in range(turns):
+        lit, after = _lamp_at(sources, turn, turns, position, 0.5 * medium.least_cell, state)
+        state = after
+        light = lit.irradiance * (wp.max(wp.dot(normal, lit.direction), 0.0) / PI)
+        if own >= 0 and wp.max(lit.irradiance) > 0.0:
+            light = _scattered(fibre, viewer, lit, offset, wp.randf(state))
+        amount = light[0] + light[1] + light[2]
+        if amount > 0.0:
+            total += amount
+            if wp.randf(state) * total <= amount:
+                kept = light / amount
+                kept_lit = lit
+    if total > 0.0:
+        if _is_shadowed(medium, kept_lit, position, own):
+            total = 0.0
+    return kept * total, state
 
 
 @wp.func
@@ -200,27 +253,21 @@ def _gather(
                     at_once, after = _light_at_once(medium, sources, fibre, viewer, position, h, own, state)
                     state = after
                     light += at_once
-                elif sources.count > 0:
-                    chosen, share, after = choose(sources, state)
-                    lit, later = lit_by(sources, chosen, position, 0.5 * medium.least_cell, after)
-                    state = later
-                    arriving = _arriving(medium, lit, position, own)
-                    if wp.max(arriving) > 0.0:
-                        scattered = value(fibre, viewer, lit.direction, h) * share
-                        light += wp.cw_mul(wp.cw_mul(weight, arriving), scattered)
+                else:
+                    light_there, after = _light_by_share(
+                        medium, sources, fibre, viewer, position, h, own, viewer, state
+                    )
+                    state = after
+                    light += wp.cw_mul(weight, light_there)
                 direction, weight, after = turn(fibre, viewer, weight, h, state)
                 state = after
             else:
                 normal = met.normal
-                position = position + normal * (1e-4 * medium.least_cell)
+                position = position - direction * (1e-4 * medium.least_cell)
                 weight = wp.cw_mul(weight, medium.albedo[met.index])
-                if sources.count > 0:
-                    chosen, share, after = choose(sources, state)
-                    lit, later = lit_by(sources, chosen, position, 0.5 * medium.least_cell, after)
-                    state = later
-                    cosine = wp.dot(normal, lit.direction)
-                    if cosine > 0.0:
-                        light += wp.cw_mul(weight, _arriving(medium, lit, position, -1)) * (share * cosine / PI)
+                light_there, after = _light_by_share(medium, sources, Fibre(), normal, position, 0.0, -1, normal, state)
+                state = after
+                light += wp.cw_mul(weight, light_there)
                 direction, after = _off_surface(normal, state)
                 state = after
             event += 1
@@ -244,7 +291,7 @@ def seen_by(
     side = max(1, round(path_count**0.5))
     with wp.ScopedDevice(device):
         mesh = _mesh(corners)
-        medium = _medium(grid, np.zeros((len(corners) // 3, 3)), mesh)
+        medium = _medium(grid, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)), mesh)
         segments = wp.full(side * side, -1, dtype=int)
         positions, viewers = (wp.zeros(side * side, dtype=wp.vec3) for _ in range(2))
         lens = _Rays()
@@ -272,7 +319,7 @@ def gather(
         require_count(name, len(getattr(seen, name)), count)
     with wp.ScopedDevice(device):
         mesh = _mesh(surroundings.corners)
-        medium, sources = _medium(grid, surroundings.albedo, mesh), _sources(surroundings)
+        medium, sources = _medium(grid, surroundings.normals, surroundings.albedo, mesh), _sources(surroundings)
         places = [wp.array(seen.segments.astype(np.int32), dtype=int)]
         places += [_vectors(values) for values in (seen.positions, seen.directions)]
         found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
@@ -302,8 +349,10 @@ def _mesh(corners):
     return wp.Mesh(wp.array(corners, dtype=wp.vec3), wp.array(np.arange(len(corners), dtype=np.int32), dtype=int))
 
 
-def _medium(grid, albedo, mesh):
-    require_count("surface colors", len(albedo), 0 if mesh is None else len(mesh.indices) // 3)
+def _medium(grid, normals, albedo, mesh):
+    corner_count = 0 if mesh is None else len(mesh.indices)
+    require_count("surface normals", len(normals), corner_count)
+    require_count("surface colors", len(albedo), corner_count // 3)
     medium = Medium()
     medium.corner, medium.cell = wp.vec3(*grid.corner.tolist()), wp.vec3(*grid.cell.tolist())
     medium.shape, medium.least_cell = wp.vec3i(*grid.shape), float(grid.cell.min())
@@ -313,7 +362,7 @@ def _medium(grid, albedo, mesh):
     medium.strands, medium.fibres = wp.array(grid.strands, dtype=int), wp.array(grid.fibres, dtype=int)
     medium.fibre_rows = wp.array(grid.fibre_rows, dtype=float)
     medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
-    medium.albedo = _vectors(albedo)
+    medium.normals, medium.albedo = _vectors(normals), _vectors(albedo)
     return medium
 
 

@@ -37,6 +37,7 @@ class Medium:
     fibre_rows: wp.array2d[float]
     mesh: wp.uint64
     has_mesh: int
+    normals: wp.array[wp.vec3]  # of each triangle's corners
     albedo: wp.array[wp.vec3]  # of each triangle
 
 
@@ -123,6 +124,19 @@ def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3
 
 
 @wp.func
+def _shading_normal(medium: Medium, face: int, u: float, v: float, flat: wp.vec3):
+    """The normal between those of a triangle's corners, on the side of its own; its own where they have none."""
+    between = u * medium.normals[3 * face] + v * medium.normals[3 * face + 1]
+    between += (1.0 - u - v) * medium.normals[3 * face + 2]
+    normal = flat
+    if wp.dot(between, between) > 0.0:
+        normal = wp.normalize(between)
+        if wp.dot(normal, flat) < 0.0:
+            normal = -normal
+    return normal
+
+
+@wp.func
 def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
     """`Met` within a distance [m] of a ray; own: the strand that it leaves, -1: none."""
     met = Met()
@@ -134,9 +148,9 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
             end = found.t
             met.kind = SURFACE
             met.index = found.face
-            met.normal = found.normal
+            met.normal = _shading_normal(medium, found.face, found.u, found.v, found.normal)
             if wp.dot(found.normal, direction) > 0.0:
-                met.normal = -found.normal
+                met.normal = -met.normal
 
     # The part of the ray in the grid, and its first cell.
     here = float(0.0)
