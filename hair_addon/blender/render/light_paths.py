@@ -48,7 +48,7 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
     if not len(seen.segments):
         return drawn
     sums = light_paths.gather.gather(grid, _surroundings(drawn), seen, seed, device)
-    means = [light_paths.voxel_means.smooth_ratios(of_hair, len(seen.segments)) for of_hair in sums]
+    means = [light_paths.voxel_means.shares(of_hair, len(seen.segments)) for of_hair in sums]
     visibility = [
         {**textures, "light_grid": light_grid.upload(of_hair)}
         for textures, of_hair in zip(drawn.hair_visibility, means, strict=True)

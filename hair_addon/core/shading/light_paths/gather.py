@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light among strands: paths from seen strands through a grid of all, gathered by voxel.
 
-Each path finds all light that its strand sends to the viewer, after any number of events. Of lamps' light that has met
-nothing, which the picture draws with sharp shadows, only what is missing there is kept. Beside it is what the same
-strands would send back of even light: by the ratio of both each strand of a voxel is shaded as itself, and their mean
-is that of the paths.
+Each path finds all light that its strand sends to the viewer, after any number of events. Beside it is what the same
+strands would send back of even light, and what is drawn of them without paths: lamps' light that has met nothing, with
+sharp shadows. Of these three `voxel_means` tells how each strand of a voxel is shaded, so that their mean is that of
+the paths.
 """
 
 from dataclasses import dataclass
@@ -309,9 +309,8 @@ def seen_by(
 def gather(
     grid: StrandGrid, surroundings: Surroundings, seen: Seen, seed: int = 0, device: wp.DeviceLike = "cpu"
 ) -> np.ndarray:
-    """(systems, Z, Y, X, 6) float64 by voxel: sums over paths of their light RGB, and of what even light would give.
-
-    The light is less what is drawn without paths, and below zero where too much of it is.
+    """(systems, Z, Y, X, 9) float64 by voxel: sums over paths of RGB, their light, what even light would give, and what
+    is drawn without paths.
     """
     count = len(seen.segments)
     require_indices("segments", seen.segments, len(grid.points) - 1)
@@ -325,14 +324,13 @@ def gather(
         found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
         _launch(_gather, count, [medium, sources, *places, seed, *found], device)
         positions, light, even = (array.numpy() for array in found)
-    light = light - seen.drawn
     x, y, z = grid.voxels
     at = ((positions - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(int).clip(0, np.array([x, y, z]) - 1)
     system = grid.systems[grid.strands[seen.segments]]
     voxel = ((system * z + at[:, 2]) * y + at[:, 1]) * x + at[:, 0]
     most = len(grid.kept) * x * y * z
-    sums = [np.bincount(voxel, weights=values, minlength=most) for values in (*light.T, *even.T)]
-    return np.stack(sums, axis=-1).reshape(len(grid.kept), z, y, x, 6)
+    sums = [np.bincount(voxel, weights=values, minlength=most) for values in (*light.T, *even.T, *seen.drawn.T)]
+    return np.stack(sums, axis=-1).reshape(len(grid.kept), z, y, x, 9)
 
 
 def _launch(kernel, count, inputs, device):

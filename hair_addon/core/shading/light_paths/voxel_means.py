@@ -6,6 +6,18 @@ import numpy as np
 _PRIOR = 16.0  # paths that the ratio of the voxels around stands for
 
 
+def shares(sums: np.ndarray, path_count: int) -> np.ndarray:
+    """(Z, Y, X, 9) sums of `gather` over some paths → (Z, Y, X, 4): RGB in parts of what even light gives, and how much
+    of what is drawn is kept.
+
+    Both together are the paths' light. All that is drawn is kept, with its sharp shadows, but where that is more than
+    paths find in any channel.
+    """
+    light, drawn = (smooth_ratios(sums[..., [*own, 3, 4, 5]], path_count) for own in ((0, 1, 2), (6, 7, 8)))
+    kept = np.clip((light / np.maximum(drawn, 1e-12)).min(axis=-1, keepdims=True), 0.0, 1.0)
+    return np.concatenate([light - kept * drawn, kept], axis=-1)
+
+
 def smooth_ratios(sums: np.ndarray, path_count: int) -> np.ndarray:
     """(Z, Y, X, 6) sums of light RGB and of even light RGB over some paths → (Z, Y, X, 3) ratios of both.
 
