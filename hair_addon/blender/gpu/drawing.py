@@ -282,15 +282,16 @@ def bound(program, blocks, samplers):
     gpu.shader.unbind()
 
 
-def upload_surface(positions, normals, uvs=None, colors=None):
+def upload_surface(positions, normals, uvs=None, colors=()):
     """(3 F, 3) float32 corner positions and unit normals in world space, (3 F, 2) UVs → `SurfaceOnGPU`.
 
-    Normals, of what is drawn as depth alone, and UVs may be None. colors: (F, 3) linear RGB of triangles as they light
-    hair, None: black.
+    Normals, of what is drawn as depth alone, and UVs may be None. colors: (number of corners, linear RGB) of one part
+    after the other as they light hair; black without.
     """
     row_corners = min(len(positions), TEXTURE_WIDTH)
-    colors = np.zeros((len(positions) // 3, 3)) if colors is None else colors
-    places = _places_texture(positions, packed_colors(colors), row_corners)
+    colors = colors or ((len(positions), (0.0, 0.0, 0.0)),)
+    packed = packed_colors([color for _count, color in colors]).repeat([count for count, _color in colors])
+    places = _places_texture(positions, packed, row_corners)
     normals = np.zeros_like(positions) if normals is None else normals
     uvs = np.zeros((len(positions), 2), np.float32) if uvs is None else uvs
     corners = {"position": positions, "normal": normals, "uv": uvs}
@@ -298,16 +299,16 @@ def upload_surface(positions, normals, uvs=None, colors=None):
 
 
 def packed_colors(colors):
-    """(F, 3) linear RGB → (F,) float32: square roots in eight bits each, as whole numbers that floats hold exactly."""
+    """(N, 3) linear RGB → (N,) float32: square roots in eight bits each, as whole numbers that floats hold exactly."""
     roots = np.rint(255.0 * np.sqrt(np.clip(colors, 0.0, 1.0)))
     return (roots @ np.array([65536.0, 256.0, 1.0])).astype(np.float32)
 
 
-def _places_texture(positions, of_triangles, row_corners):
-    """(N, 3) places in a texture, `row_corners` a row, with values (N / 3,) of their triangles."""
+def _places_texture(positions, colors, row_corners):
+    """(N, 3) places with (N,) packed colors in a texture, `row_corners` a row."""
     row_count = -(-len(positions) // row_corners)
     texels = np.zeros((row_count * row_corners, 4), np.float32)
-    texels[: len(positions), :3], texels[: len(positions), 3] = positions, np.repeat(of_triangles, 3)
+    texels[: len(positions), :3], texels[: len(positions), 3] = positions, colors
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     texture = gpu.types.GPUTexture((row_corners, row_count), format="RGBA32F", data=data)
     texture.filter_mode(False)

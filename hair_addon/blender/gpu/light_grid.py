@@ -13,7 +13,7 @@ none_cache = Cache(capacity=1)
 
 def upload(means):
     """A texture of `voxel_means.shares` (Z, Y, X, 4), linear between voxels."""
-    texels = np.clip(means, 0.0, _GREATEST).astype(np.float32)
+    texels = np.clip(means, -_GREATEST, _GREATEST).astype(np.float32)
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     texture = gpu.types.GPUTexture(means.shape[2::-1], format="RGBA16F", data=data)
     texture.filter_mode(True)

@@ -200,7 +200,7 @@ def read_unlit(depsgraph, known, refused):
 
 def _corners_of(meshes):
     """`DrawnScene.meshes`."""
-    return tuple((mesh.positions, mesh.normals, mesh.colors) for mesh in meshes if not mesh.is_clear)
+    return tuple((mesh.positions, mesh.normals, mesh.triangle_colors) for mesh in meshes if not mesh.is_clear)
 
 
 def _upload(meshes, is_shaded):

@@ -25,7 +25,13 @@ class DrawnMesh:
     uvs: np.ndarray
     parts: tuple | None
     owner: tuple = ()
-    colors: np.ndarray | None = None  # (F, 3) float32: linear RGB of each triangle's material
+    colors: tuple = ()  # (number of corners, linear RGB) of each material, in the corners' order
+
+    @property
+    def triangle_colors(self):
+        """(F, 3) float32: linear RGB of each triangle's material."""
+        colors = np.array([color for _count, color in self.colors], np.float32)
+        return colors.repeat([count // 3 for count, _color in self.colors], axis=0)
 
     @property
     def is_clear(self):
@@ -98,7 +104,8 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
         mesh_object.to_mesh_clear()
     positions = (vertices @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
     positions = positions.take(layout.faces.corner_vertices[layout.loops], axis=0)
-    return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, colors=_colors(parts))
+    colors = tuple((count, material.color) for _first, count, material in parts)
+    return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, colors=colors)
 
 
 def _corner_normals(mesh, to_world):
@@ -159,9 +166,3 @@ def _read_uvs(mesh, loops, parts):
 def _active_uvs(mesh):
     """The UV map that renders use, None where there is none."""
     return next((layer for layer in mesh.uv_layers if layer.active_render), None)
-
-
-def _colors(parts):
-    """`DrawnMesh.colors` of its parts."""
-    colors = np.array([material.color for _first, _count, material in parts], np.float32)
-    return colors.repeat([count // 3 for _first, count, _material in parts], axis=0)
