@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Rasterisation of strands, a thread for each run of segments. Hair consists of lines one sample wide, for which this is
+// Rasterisation of strands, a thread for each run of segments. Hair consists of lines about a sample wide, for which this is
 // faster than triangles: graphics hardware draws those four samples at a time, software drivers at an even greater cost.
 
 #include "include/coverage.glsl"
