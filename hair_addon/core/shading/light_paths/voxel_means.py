@@ -3,7 +3,7 @@
 
 import numpy as np
 
-_PRIOR = 64.0  # paths that the ratio of the voxels around stands for
+_PRIOR = 16.0  # paths that the ratio of the voxels around stands for
 _WIDE_PRIOR = 1024.0  # the same for what is kept of the drawn
 
 
