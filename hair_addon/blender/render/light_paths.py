@@ -13,8 +13,8 @@ from ..gpu import drawing, light_grid, world_texture
 from ..settings import preferences
 from . import seen_strands
 
-_PATHS_A_PIXEL = 16
-_LEAST_PATHS, _MOST_PATHS = 50_000, 400_000  # over the part of the picture that holds the hair
+_PATHS_A_PIXEL = 8
+_LEAST_PATHS, _MOST_PATHS = 20_000, 200_000  # over the part of the picture that holds the hair
 
 
 def path_count(blender_scene, size):

@@ -35,9 +35,10 @@ _LEAST_PATHS = 4096  # fewer are not worth a thread
 class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
-    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit; albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light`
-    in shaders/include/lights.glsl; importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without
-    lamps, a picture of longitude and latitude as core/imaging/environment.py takes it apart.
+    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own; albedo:
+    (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl; importance:
+    (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude and latitude as
+    core/imaging/environment.py takes it apart.
     """
 
     corners: np.ndarray
@@ -91,10 +92,10 @@ def _is_shadowed(medium: Medium, lit: Lit, position: wp.vec3, own: int):
 
 
 @wp.func
-def _lamp_at(sources: Sources, turn: int, turns: int, position: wp.vec3, least: float, random: wp.uint32):
-    """(`Lit` of the turn-th lamp, or where there are more than turns of any one, with its share; random state)."""
+def _lamp_at(sources: Sources, index: int, turns: int, position: wp.vec3, least: float, random: wp.uint32):
+    """(`Lit` of a lamp by its index, or of any one with its share where there are more than turns; random state)."""
     state = random
-    chosen = turn
+    chosen = index
     share = float(1.0)
     if sources.count > turns:
         any_lamp, one_over_chance, after = choose(sources, state)
@@ -134,8 +135,8 @@ def _light_at_once(
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)
     turns = wp.min(sources.count, _LAMPS_AT_ONCE)
-    for turn in range(turns):
-        lit, after = _lamp_at(sources, turn, turns, position, 0.5 * medium.least_cell, state)
+    for index in range(turns):
+        lit, after = _lamp_at(sources, index, turns, position, 0.5 * medium.least_cell, state)
         state = after
         if wp.max(lit.irradiance) > 0.0 and not _is_shadowed(medium, lit, position, own):
             light += _scattered(fibre, viewer, lit, offset, wp.randf(state))
@@ -163,8 +164,8 @@ def _light_by_share(
     kept = wp.vec3(0.0, 0.0, 0.0)
     kept_lit = Lit()
     turns = wp.min(sources.count, _LAMPS_AT_ONCE)
-    for turn in range(turns):
-        lit, after = _lamp_at(sources, turn, turns, position, 0.5 * medium.least_cell, state)
+    for index in range(turns):
+        lit, after = _lamp_at(sources, index, turns, position, 0.5 * medium.least_cell, state)
         state = after
         light = lit.irradiance * (wp.max(wp.dot(normal, lit.direction), 0.0) / PI)
         if own >= 0 and wp.max(lit.irradiance) > 0.0:

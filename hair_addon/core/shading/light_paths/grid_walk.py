@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A path's way to the next strand or surface: through a grid of segments, cell by cell [Amanatides87].
 
-Strands are round, as Cycles takes hair of straight segments: a segment is a cylinder around its axis, and the wedge that
-two of them leave open on the outside of a bend is of a sphere around the point between them. A path meets the side of a
-strand that faces it, so not a strand that it begins inside of, as strands that overlap are [Embree26]; and it goes on
-from where it has met the strand, on that side. The strand that it leaves it does not meet next, wherever that bends.
+Strands are round, as Cycles takes hair of straight segments: a segment is a cylinder around its axis, and the wedge
+that two of them leave open on the outside of a bend is of a sphere around the point between them. A path meets the side
+of a strand that faces it, so not a strand that it begins inside of, as strands that overlap are [Embree26]; and it goes
+on from where it has met the strand, on that side. The strand that it leaves it does not meet next, even where that bends.
 """
 
 import warp as wp
@@ -87,7 +87,7 @@ def is_in_bend(medium: Medium, segment: int, place: wp.vec3):
 
 @wp.func
 def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3):
-    """(distance along a ray of unit direction, offset from the axis) where it enters a segment; `FAR` if it does not."""
+    """(distance along a ray of unit direction, offset from the axis) where it enters a segment; `FAR` without."""
     start = medium.points[segment] - position
     along = medium.points[segment + 1] - medium.points[segment]
     normal = wp.cross(direction, along)
