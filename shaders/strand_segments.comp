@@ -1,15 +1,18 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility buffer of strands: first the depth of the nearest segment, then its index.
+// Visibility buffer of strands: first the depth of the nearest segment, then its index. Strands are round: the depth is
+// that of the side which faces the viewer.
 
 #include "include/segment.glsl"
 #include "include/tile.glsl"
 
-vec2 end_depths;
+vec2 end_depths;  // of the axis
+vec2 end_rises;  // from there to the side that faces the viewer
 uint this_index;
 
 void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
 {
   end_depths = vec2(segment.start.z, segment.end.z);
+  end_rises = depth_rises(segment, distance(first.xyz, second.xyz));
   this_index = uint(first_segment + strand * (view.drawn_points - 1) + piece);
 }
 
@@ -20,7 +23,8 @@ bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
     return false;
   }
   vec2 ends = vec2(mix(end_depths.x, end_depths.y, first_along), mix(end_depths.x, end_depths.y, last_along));
-  uint nearest = floatBitsToUint(max(min(ends.x, ends.y) - 1e-6, 0.0));
+  float rise = max(end_rises.x, end_rises.y);
+  uint nearest = floatBitsToUint(max(min(ends.x, ends.y) - rise - 1e-6, 0.0));
   for (int y = low.y / TILE; y <= high.y / TILE; y++) {
     for (int x = low.x / TILE; x <= high.x / TILE; x++) {
       if (nearest <= texelFetch(farthest_depths, ivec2(x, y), 0).r) {
@@ -31,10 +35,11 @@ bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
   return true;
 }
 
-void meet(ivec2 place, float along, float coverage)
+void meet(ivec2 place, float along, float across, float coverage)
 {
   // The bits of non-negative floats sort like their values.
-  uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, along), 0.0));
+  float rise = mix(end_rises.x, end_rises.y, along) * sqrt(max(1.0 - across * across, 0.0));
+  uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, along) - rise, 0.0));
   uint nearest = imageLoad(depths, place).r;
   if (is_depth != 0) {
     // Most samples are occluded: reading first is cheaper than writing.

@@ -24,7 +24,7 @@ bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
   return false;
 }
 
-void meet(ivec2 place, float along, float coverage)
+void meet(ivec2 place, float along, float across, float coverage)
 {
   float depth = mix(end_depths.x, end_depths.y, along);
   float hidden = texelFetch(hidden_depth, place, 0).r;

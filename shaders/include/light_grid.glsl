@@ -6,8 +6,9 @@ bool has_light_grid()
   return lights.grid_scale.x > 0.0;
 }
 
-// Radiance that arrives at visible strands around a place, as even light that they would send to the viewer alike.
-vec3 light_among_strands(vec3 position)
+// Of visible strands around a place: RGB, radiance that arrives among strands, as even light that they would send to the
+// viewer alike; alpha, the part of lamps' light by shadow maps that is kept.
+vec4 light_among_strands(vec3 position)
 {
-  return textureLod(light_grid, (position - lights.grid_corner.xyz) * lights.grid_scale.xyz, 0.0).rgb;
+  return textureLod(light_grid, (position - lights.grid_corner.xyz) * lights.grid_scale.xyz, 0.0);
 }

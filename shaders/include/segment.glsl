@@ -72,6 +72,19 @@ bool segment_in_front(vec4 start, vec4 end, vec2 radii, vec2 size, out Segment s
   return true;
 }
 
+// Sine of a strand's inclination to the view below which the side that faces the viewer comes no nearer.
+const float LEAST_SINE = 0.25;
+
+// Difference of depth between the ends' axis and the side of the round strand that faces the viewer. way: length between
+// the two points.
+vec2 depth_rises(Segment segment, float way)
+{
+  float full = way * view.object_scale * (segment.part.y - segment.part.x) * view.pixels_per_unit;
+  float seen = distance(segment.start.xy, segment.end.xy) * 0.5 * (segment.w.x + segment.w.y);
+  float sine = clamp(seen / max(full, 1e-20), LEAST_SINE, 1.0);
+  return segment.half_width / segment.w * (view.depth_rise / sine);
+}
+
 // Parameter in [0, 1] of a point of the picture along the axis of a segment.
 float place_on_segment(Segment segment, vec2 place)
 {

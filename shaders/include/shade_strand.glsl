@@ -47,11 +47,12 @@ bool is_visible(vec3 irradiance)
   return max(irradiance.r, max(irradiance.g, irradiance.b)) > LEAST_IRRADIANCE;
 }
 
-// Radiance towards the viewer where paths through a grid have found all light but that which is drawn here: of lamps,
-// straight from them. There the grid has what the maps miss, which may be negative.
+// Radiance towards the viewer where paths through a grid have found all light: that of lamps, straight from them, is drawn
+// here as far as the grid keeps it, and the rest is the grid's.
 vec3 strand_light_on_grid(SeenStrand strand)
 {
-  vec3 radiance = drawn_lobes.w * light_among_strands(drawn_position) * strand.returned;
+  vec4 among = light_among_strands(drawn_position);
+  vec3 radiance = vec3(0.0);
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     LampLight lamp = lamp_on_strand(light, strand.root);
@@ -61,7 +62,7 @@ vec3 strand_light_on_grid(SeenStrand strand)
       radiance += arriving * hair_bsdf(strand.T, lamp.L, strand.V, blur);
     }
   }
-  return max(radiance, vec3(0.0));
+  return max(among.a * radiance + drawn_lobes.w * among.rgb * strand.returned, vec3(0.0));
 }
 
 // The same by dual scattering.

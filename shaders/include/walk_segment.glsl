@@ -21,8 +21,9 @@ const float LEAST_BEND = 1.0;
 //     the start of a segment
 // bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
 //     whether none of the samples from `low` to `high` need be met, of a part between two parameters along the segment
-// void meet(ivec2 place, float along, float coverage)
-//     a covered sample: its parameter along the segment, and the coverage of the drawn width by the strand
+// void meet(ivec2 place, float along, float across, float coverage)
+//     a covered sample: its parameter along the segment, its offset from the axis as a part of the drawn half width, and
+//     the coverage of the drawn width by the strand
 
 // Samples that lie in the segment, column by column along the axis on which it is longer. Across the columns, samples may
 // lie off their centers.
@@ -68,9 +69,10 @@ void walk(Segment segment, ivec2 size)
       int last_row = min(int(ceil(clamp(middle + most, -1.0, 1e6) - 0.5)) - 1, last_place.y);
       for (int row = first_row; row <= last_row; row++) {
         ivec2 place = is_steep ? ivec2(row, column) : ivec2(column, row);
-        float offset = (offset_part > 0.0) ? offset_part * sample_offset(place + first_place, view.coverage_turn) : 0.0;
-        if (offset_part == 0.0 || abs(float(row) + 0.5 + offset - middle) < reach) {
-          meet(place, along, true_half_width / half_width);
+        float at = float(row) + 0.5;
+        at += (offset_part > 0.0) ? offset_part * sample_offset(place + first_place, view.coverage_turn) : 0.0;
+        if (offset_part == 0.0 || abs(at - middle) < reach) {
+          meet(place, along, (at - middle) / reach, true_half_width / half_width);
         }
       }
     }
@@ -99,7 +101,7 @@ void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
       bool is_beyond = (was_steep ? way.y : way.x) * left > 0.0;
       bool is_ahead = (is_steep ? way.y : way.x) * right < 0.0;
       if (is_beyond && is_ahead && dot(way, way) < half_width * half_width) {
-        meet(ivec2(column, row), 1.0, 1.0);
+        meet(ivec2(column, row), 1.0, length(way) / half_width, 1.0);
       }
     }
   }

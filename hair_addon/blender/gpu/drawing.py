@@ -83,6 +83,8 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     backwards = view_to_world[:3, 2]
     record["eye"][:3] = view_to_world[:3, 3] if record["is_perspective"] else backwards / np.linalg.norm(backwards)
     record["pixels_per_unit"] = 0.5 * height * view_to_clip[1, 1]
+    a_unit = view_to_clip[2, 3] if record["is_perspective"] else view_to_clip[2, 2]
+    record["depth_rise"] = 0.5 * abs(a_unit) / record["pixels_per_unit"]
     record["least_half_width"] = 0.5 * least_width / record["pixels_per_unit"]
     record["seen_opacity"] = 1.0  # the visibility of the world is computed without hair
     return record

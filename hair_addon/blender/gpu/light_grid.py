@@ -12,9 +12,8 @@ none_cache = Cache(capacity=1)
 
 
 def upload(means):
-    """A texture of light (Z, Y, X, 3), linear between voxels."""
-    texels = np.ones((*means.shape[:3], 4), np.float32)
-    texels[..., :3] = np.clip(means, -_GREATEST, _GREATEST)
+    """A texture of `voxel_means.shares` (Z, Y, X, 4), linear between voxels."""
+    texels = np.clip(means, -_GREATEST, _GREATEST).astype(np.float32)
     data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
     texture = gpu.types.GPUTexture(means.shape[2::-1], format="RGBA16F", data=data)
     texture.filter_mode(True)
@@ -23,5 +22,5 @@ def upload(means):
 
 
 def none():
-    """A texture for pictures without a grid."""
-    return none_cache.get("none", lambda: upload(np.zeros((1, 1, 1, 3))))
+    """A texture for pictures without a grid: what is drawn is kept."""
+    return none_cache.get("none", lambda: upload(np.array([[[[0.0, 0.0, 0.0, 1.0]]]])))

@@ -41,7 +41,7 @@ class DrawnScene:
     selected: tuple = ()  # whether that object is selected
     instances: tuple = ()  # of hair, as `hair_places.read_instances` found them
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
-    meshes: tuple = ()  # (corner positions, (F, 3) linear RGB of triangles) of each of `surfaces`, of a render
+    meshes: tuple = ()  # (corner positions, normals, RGB of triangles) of each of `surfaces`, of a render
     clear: tuple = ()  # as `surfaces`, of those that hide nothing
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
@@ -206,7 +206,7 @@ def read_unlit(depsgraph, known, refused):
 
 def _corners_of(meshes):
     """`DrawnScene.meshes`."""
-    return tuple((mesh.positions, mesh.triangle_colors) for mesh in meshes if not mesh.is_clear)
+    return tuple((mesh.positions, mesh.normals, mesh.triangle_colors) for mesh in meshes if not mesh.is_clear)
 
 
 def _upload(meshes, is_shaded):

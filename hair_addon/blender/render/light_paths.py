@@ -13,8 +13,8 @@ from ..gpu import drawing, light_grid, world_texture
 from ..settings import preferences
 from . import seen_strands
 
-_PATHS_A_PIXEL = 16
-_LEAST_PATHS, _MOST_PATHS = 50_000, 400_000  # over the part of the picture that holds the hair
+_PATHS_A_PIXEL = 8
+_LEAST_PATHS, _MOST_PATHS = 20_000, 200_000  # over the part of the picture that holds the hair
 
 
 def path_count(blender_scene, size):
@@ -48,7 +48,7 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
     if not len(seen.segments):
         return drawn
     sums = light_paths.gather.gather(grid, _surroundings(drawn), seen, seed, device)
-    means = [light_paths.voxel_means.smooth_ratios(of_hair, len(seen.segments)) for of_hair in sums]
+    means = [light_paths.voxel_means.shares(of_hair, len(seen.segments)) for of_hair in sums]
     visibility = [
         {**textures, "light_grid": light_grid.upload(of_hair)}
         for textures, of_hair in zip(drawn.hair_visibility, means, strict=True)
@@ -110,9 +110,10 @@ def _surroundings(drawn):
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in drawn.hair])
     places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     importance = lamps.irradiance(found, places).mean(axis=(1, 2)) if len(found) else np.zeros(0)
-    corners, colors = ([mesh[index] for mesh in drawn.meshes] for index in range(2))
+    corners, normals, colors = ([mesh[index] for mesh in drawn.meshes] for index in range(3))
     return light_paths.gather.Surroundings(
         np.concatenate([np.zeros((0, 3), np.float32), *corners]),
+        np.concatenate([np.zeros((0, 3), np.float32), *normals]),
         np.concatenate([np.zeros((0, 3)), *colors]),
         found,
         importance,

@@ -21,6 +21,7 @@ def find(drawn, grid, camera, window, count, turn):
     """
     whole, tile = _samples(camera[1], window, count)
     view = drawing.pass_record(*camera, whole, turn, tile)
+    view["sample_offset"] = 0.0  # a path begins on the ray through a sample's center
     buffer = VisibilityBuffer(*tile[2:])
     lights = drawn.lights.copy()
     lights["grid_scale"][:3] = 1.0  # lamps alone: there is no grid of light yet

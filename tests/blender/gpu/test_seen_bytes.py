@@ -15,26 +15,32 @@ COUNT = 500
 STEP = 0.5 / 255.0 + 1e-5  # the largest error of a number between zero and one
 
 _ROUND_TRIP = """
-vec4 kept(vec4 x_y, vec4 z, vec4 surface, vec4 channels, int which)
+vec4 kept(vec4 x_y, vec4 z, vec4 surface, vec4 channels, vec4 color, int which)
 {
   Seen seen;
   seen.x_y = x_y;
   seen.z = z;
   seen.surface = surface;
   seen.channels = channels;
+  seen.color = color;
   Seen bytes = seen_to_bytes(seen);
   bytes.x_y = floor(255.0 * bytes.x_y + 0.5) / 255.0;
   bytes.z = floor(255.0 * bytes.z + 0.5) / 255.0;
   bytes.surface = floor(255.0 * bytes.surface + 0.5) / 255.0;
   bytes.channels = floor(255.0 * bytes.channels + 0.5) / 255.0;
+  bytes.color = floor(255.0 * bytes.color + 0.5) / 255.0;
   seen = seen_from_bytes(bytes);
-  return which == 0 ? seen.x_y : which == 1 ? seen.z : which == 2 ? seen.surface : seen.channels;
+  return which == 0   ? seen.x_y :
+         which == 1 ? seen.z :
+         which == 2 ? seen.surface :
+         which == 3 ? seen.channels :
+                      seen.color;
 }
 """
 
 
 def sums(rng):
-    """Four (N, 4) sums over directions as world_visibility.frag makes them, of dark and of open places."""
+    """Five (N, 4) sums over directions as world_visibility.frag makes them, of dark and of open places."""
     axes, weights = ambient_cube.DIRECTIONS, 6.0 * ambient_cube.WEIGHTS
 
     def parts(*more):
@@ -52,15 +58,16 @@ def sums(rng):
     channels = np.column_stack(
         [(weights[:, None] * (1.0 - is_hidden)[..., None] * parts(3)).sum(1), (weights * is_hidden).sum(1)]
     )
-    return sides[:, :4], z, surface, channels
+    color = rng.random((COUNT, 4)) * surface[:, 3:]
+    return sides[:, :4], z, surface, channels, color
 
 
 def test_bytes_keep_what_strands_see(scene, rng):
     """Every sum to half a step of its root, ratios too, the direction of surfaces to a third of a degree."""
     given = sums(rng)
-    names = dict(zip(("x_y", "z", "surface", "channels"), given, strict=True))
+    names = dict(zip(("x_y", "z", "surface", "channels", "color"), given, strict=True))
     text = shaders.expand("include/seen_bytes.glsl")[0] + _ROUND_TRIP
-    found = [glsl.evaluate(text, "vec4", f"kept(x_y, z, surface, channels, {i})", **names) for i in range(4)]
+    found = [glsl.evaluate(text, "vec4", f"kept(x_y, z, surface, channels, color, {i})", **names) for i in range(5)]
     np.testing.assert_allclose(np.sqrt(found[0]), np.sqrt(given[0]), rtol=0.0, atol=STEP)
     np.testing.assert_allclose(np.sqrt(found[1][:, :2]), np.sqrt(given[1][:, :2]), rtol=0.0, atol=STEP)
     np.testing.assert_allclose(np.sqrt(found[3] / 6.0), np.sqrt(given[3] / 6.0), rtol=0.0, atol=STEP)
@@ -74,6 +81,8 @@ def test_bytes_keep_what_strands_see(scene, rng):
     directions, wanted = (array / np.linalg.norm(array, axis=1)[:, None] for array in some)
     assert np.degrees(np.linalg.norm(directions - wanted, axis=1).max()) < 0.4
     np.testing.assert_array_equal(found[2][given[3][:, 3] == 0.0], 0.0)
+    colors, wanted = (one[4][has_surface, :3] / one[2][has_surface, 3:] for one in (found, given))
+    np.testing.assert_allclose(np.sqrt(colors), np.sqrt(wanted), rtol=0.0, atol=2.0 * STEP)
 
 
 def test_bytes_of_visibility_are_no_visible_step_in_pictures(thin, monkeypatch):
@@ -96,11 +105,11 @@ def test_bytes_of_visibility_are_no_visible_step_in_pictures(thin, monkeypatch):
 
 @pytest.mark.parametrize("point_count", [5, 41])
 def test_memory_of_visibility_is_as_it_is_counted(scene, rng, point_count):
-    """A byte for each of sixteen numbers, at every fourth point and the tip."""
+    """A byte for each of twenty numbers, at every fourth point and the tip."""
     points = rng.random((50, point_count, 3)).astype(np.float32)
     strands = strand_textures.upload_strands(points, np.full((50, point_count), 1e-4, np.float32))
     (seen,), _surfaces = ambient_visibility.measure([(strands, np.eye(4))], [], [0.5])
     bytes_each = {"RGBA8": 4}
     held = sum(texture.width * texture.height * bytes_each[texture.format] for texture in seen.values())
     assert held == strand_textures.seen_bytes(strands)
-    assert held == 16 * strands.texture.height * strands.row_strands * (-(-(point_count - 1) // 4) + 1)
+    assert held == 20 * strands.texture.height * strands.row_strands * (-(-(point_count - 1) // 4) + 1)

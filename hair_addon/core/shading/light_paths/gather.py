@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Light among strands: paths from seen strands through a grid of all, gathered by voxel.
 
-Each path finds all light that its strand sends to the viewer, after any number of events. Of lamps' light that has met
-nothing, which the picture draws with sharp shadows, only what is missing there is kept. Beside it is what the same
-strands would send back of even light: by the ratio of both each strand of a voxel is shaded as itself, and their mean
-is that of the paths.
+Each path finds all light that its strand sends to the viewer, after any number of events. Beside it is what the same
+strands would send back of even light, and what is drawn of them without paths: lamps' light that has met nothing, with
+sharp shadows. Of these three `voxel_means` tells how each strand of a voxel is shaded, so that their mean is that of
+the paths.
 """
 
 from dataclasses import dataclass
@@ -26,7 +26,8 @@ _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _LAMPS_AT_ONCE = wp.constant(8)  # that light a seen strand
-_OFFSETS_AT_ONCE = wp.constant(16)  # over its width
+_OFFSETS_AT_ONCE = wp.constant(4)  # over the part of its width around the one that is seen
+_AROUND = wp.constant(0.25)  # half that part, of the radius
 _LEAST_PATHS = 4096  # fewer are not worth a thread
 
 
@@ -34,12 +35,14 @@ _LEAST_PATHS = 4096  # fewer are not worth a thread
 class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
-    corners: (3 F, 3) of triangles [m]; albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light`
-    in shaders/include/lights.glsl; importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without
-    lamps, a picture of longitude and latitude as core/imaging/environment.py takes it apart.
+    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own; albedo:
+    (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl; importance:
+    (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude and latitude as
+    core/imaging/environment.py takes it apart.
     """
 
     corners: np.ndarray
+    normals: np.ndarray
     albedo: np.ndarray
     lamps: np.ndarray
     importance: np.ndarray
@@ -80,41 +83,103 @@ class _Rays:
 
 
 @wp.func
-def _arriving(medium: Medium, lit: Lit, position: wp.vec3, own: int):
-    """Irradiance of a lamp's light that arrives at a place on strand `own`, -1 for a surface."""
-    if lit.casts_shadow > 0 and wp.max(lit.irradiance) > 0.0:
-        met = walk(medium, position, lit.direction, lit.distance, own)
-        if met.kind != PASSED:
-            return wp.vec3(0.0, 0.0, 0.0)
-    return lit.irradiance
+def _is_shadowed(medium: Medium, lit: Lit, position: wp.vec3, own: int):
+    """Whether a lamp's light does not arrive at a place on strand `own`, -1 for a surface."""
+    if lit.casts_shadow == 0:
+        return False
+    met = walk(medium, position, lit.direction, lit.distance, own)
+    return met.kind != PASSED
+
+
+@wp.func
+def _lamp_at(sources: Sources, index: int, turns: int, position: wp.vec3, least: float, random: wp.uint32):
+    """(`Lit` of a lamp by its index, or of any one with its share where there are more than turns; random state)."""
+    state = random
+    chosen = index
+    share = float(1.0)
+    if sources.count > turns:
+        any_lamp, one_over_chance, after = choose(sources, state)
+        state = after
+        chosen = any_lamp
+        share = one_over_chance / float(turns)
+    lit, after = lit_by(sources, chosen, position, least, state)
+    lit.irradiance = lit.irradiance * share
+    return lit, after
+
+
+@wp.func
+def _scattered(fibre: Fibre, viewer: wp.vec3, lit: Lit, offset: float, shift: float):
+    """Radiance that a strand sends to the viewer of a lamp's light: the mean around an offset in its width."""
+    light = wp.vec3(0.0, 0.0, 0.0)
+    for step in range(_OFFSETS_AT_ONCE):
+        h = offset + _AROUND * (2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0)
+        # Back from beyond the edge: the mean over all offsets stays that over the width.
+        if wp.abs(h) > 1.0:
+            h = wp.sign(h) * 2.0 - h
+        light += value(fibre, viewer, lit.direction, h)
+    return wp.cw_mul(lit.irradiance, light / float(_OFFSETS_AT_ONCE))
 
 
 @wp.func
 def _light_at_once(
-    medium: Medium, sources: Sources, fibre: Fibre, viewer: wp.vec3, position: wp.vec3, own: int, random: wp.uint32
+    medium: Medium,
+    sources: Sources,
+    fibre: Fibre,
+    viewer: wp.vec3,
+    position: wp.vec3,
+    offset: float,
+    own: int,
+    random: wp.uint32,
 ):
-    """(radiance of lamps' light that a seen strand sends to the viewer, random state): the mean over its width."""
+    """(radiance of lamps' light that a seen strand sends to the viewer, random state): all lamps are traced."""
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)
     turns = wp.min(sources.count, _LAMPS_AT_ONCE)
     for index in range(turns):
-        chosen = index
-        share = float(1.0)
-        if sources.count > _LAMPS_AT_ONCE:
-            any_lamp, one_over_chance, after = choose(sources, state)
-            state = after
-            chosen = any_lamp
-            share = one_over_chance / float(turns)
-        lit, after = lit_by(sources, chosen, position, 0.5 * medium.least_cell, state)
+        lit, after = _lamp_at(sources, index, turns, position, 0.5 * medium.least_cell, state)
         state = after
-        arriving = _arriving(medium, lit, position, own)
-        if wp.max(arriving) > 0.0:
-            shift = wp.randf(state)
-            for step in range(_OFFSETS_AT_ONCE):
-                h = 2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0
-                scattered = value(fibre, viewer, lit.direction, h) * (share / float(_OFFSETS_AT_ONCE))
-                light += wp.cw_mul(arriving, scattered)
+        if wp.max(lit.irradiance) > 0.0 and not _is_shadowed(medium, lit, position, own):
+            light += _scattered(fibre, viewer, lit, offset, wp.randf(state))
     return light, state
+
+
+@wp.func
+def _light_by_share(
+    medium: Medium,
+    sources: Sources,
+    fibre: Fibre,
+    viewer: wp.vec3,
+    position: wp.vec3,
+    offset: float,
+    own: int,
+    normal: wp.vec3,
+    random: wp.uint32,
+):
+    """(the same of a strand met later, or where `own` is below zero of a white surface, random state).
+
+    Of what all lamps would send without shadows one is drawn by its share, and traced [Talbot05].
+    """
+    state = random
+    total = float(0.0)
+    kept = wp.vec3(0.0, 0.0, 0.0)
+    kept_lit = Lit()
+    turns = wp.min(sources.count, _LAMPS_AT_ONCE)
+    for index in range(turns):
+        lit, after = _lamp_at(sources, index, turns, position, 0.5 * medium.least_cell, state)
+        state = after
+        light = lit.irradiance * (wp.max(wp.dot(normal, lit.direction), 0.0) / PI)
+        if own >= 0 and wp.max(lit.irradiance) > 0.0:
+            light = _scattered(fibre, viewer, lit, offset, wp.randf(state))
+        amount = light[0] + light[1] + light[2]
+        if amount > 0.0:
+            total += amount
+            if wp.randf(state) * total <= amount:
+                kept = light / amount
+                kept_lit = lit
+    if total > 0.0:
+        if _is_shadowed(medium, kept_lit, position, own):
+            total = 0.0
+    return kept * total, state
 
 
 @wp.func
@@ -186,30 +251,24 @@ def _gather(
                 h = -met.offset
                 if event == 0:
                     out_even[path] = even_return(fibre, viewer)
-                    at_once, after = _light_at_once(medium, sources, fibre, viewer, position, own, state)
+                    at_once, after = _light_at_once(medium, sources, fibre, viewer, position, h, own, state)
                     state = after
                     light += at_once
-                elif sources.count > 0:
-                    chosen, share, after = choose(sources, state)
-                    lit, later = lit_by(sources, chosen, position, 0.5 * medium.least_cell, after)
-                    state = later
-                    arriving = _arriving(medium, lit, position, own)
-                    if wp.max(arriving) > 0.0:
-                        scattered = value(fibre, viewer, lit.direction, h) * share
-                        light += wp.cw_mul(wp.cw_mul(weight, arriving), scattered)
+                else:
+                    light_there, after = _light_by_share(
+                        medium, sources, fibre, viewer, position, h, own, viewer, state
+                    )
+                    state = after
+                    light += wp.cw_mul(weight, light_there)
                 direction, weight, after = turn(fibre, viewer, weight, h, state)
                 state = after
             else:
                 normal = met.normal
-                position = position + normal * (1e-4 * medium.least_cell)
+                position = position - direction * (1e-4 * medium.least_cell)
                 weight = wp.cw_mul(weight, medium.albedo[met.index])
-                if sources.count > 0:
-                    chosen, share, after = choose(sources, state)
-                    lit, later = lit_by(sources, chosen, position, 0.5 * medium.least_cell, after)
-                    state = later
-                    cosine = wp.dot(normal, lit.direction)
-                    if cosine > 0.0:
-                        light += wp.cw_mul(weight, _arriving(medium, lit, position, -1)) * (share * cosine / PI)
+                light_there, after = _light_by_share(medium, sources, Fibre(), normal, position, 0.0, -1, normal, state)
+                state = after
+                light += wp.cw_mul(weight, light_there)
                 direction, after = _off_surface(normal, state)
                 state = after
             event += 1
@@ -233,7 +292,7 @@ def seen_by(
     side = max(1, round(path_count**0.5))
     with wp.ScopedDevice(device):
         mesh = _mesh(corners)
-        medium = _medium(grid, np.zeros((len(corners) // 3, 3)), mesh)
+        medium = _medium(grid, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)), mesh)
         segments = wp.full(side * side, -1, dtype=int)
         positions, viewers = (wp.zeros(side * side, dtype=wp.vec3) for _ in range(2))
         lens = _Rays()
@@ -251,9 +310,8 @@ def seen_by(
 def gather(
     grid: StrandGrid, surroundings: Surroundings, seen: Seen, seed: int = 0, device: wp.DeviceLike = "cpu"
 ) -> np.ndarray:
-    """(systems, Z, Y, X, 6) float64 by voxel: sums over paths of their light RGB, and of what even light would give.
-
-    The light is less what is drawn without paths, and below zero where too much of it is.
+    """(systems, Z, Y, X, 9) float64 by voxel: sums over paths of RGB, their light, what even light would give, and what
+    is drawn without paths.
     """
     count = len(seen.segments)
     require_indices("segments", seen.segments, len(grid.points) - 1)
@@ -261,20 +319,19 @@ def gather(
         require_count(name, len(getattr(seen, name)), count)
     with wp.ScopedDevice(device):
         mesh = _mesh(surroundings.corners)
-        medium, sources = _medium(grid, surroundings.albedo, mesh), _sources(surroundings)
+        medium, sources = _medium(grid, surroundings.normals, surroundings.albedo, mesh), _sources(surroundings)
         places = [wp.array(seen.segments.astype(np.int32), dtype=int)]
         places += [_vectors(values) for values in (seen.positions, seen.directions)]
         found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
         _launch(_gather, count, [medium, sources, *places, seed, *found], device)
         positions, light, even = (array.numpy() for array in found)
-    light = light - seen.drawn
     x, y, z = grid.voxels
     at = ((positions - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(int).clip(0, np.array([x, y, z]) - 1)
     system = grid.systems[grid.strands[seen.segments]]
     voxel = ((system * z + at[:, 2]) * y + at[:, 1]) * x + at[:, 0]
     most = len(grid.kept) * x * y * z
-    sums = [np.bincount(voxel, weights=values, minlength=most) for values in (*light.T, *even.T)]
-    return np.stack(sums, axis=-1).reshape(len(grid.kept), z, y, x, 6)
+    sums = [np.bincount(voxel, weights=values, minlength=most) for values in (*light.T, *even.T, *seen.drawn.T)]
+    return np.stack(sums, axis=-1).reshape(len(grid.kept), z, y, x, 9)
 
 
 def _launch(kernel, count, inputs, device):
@@ -291,8 +348,10 @@ def _mesh(corners):
     return wp.Mesh(wp.array(corners, dtype=wp.vec3), wp.array(np.arange(len(corners), dtype=np.int32), dtype=int))
 
 
-def _medium(grid, albedo, mesh):
-    require_count("surface colors", len(albedo), 0 if mesh is None else len(mesh.indices) // 3)
+def _medium(grid, normals, albedo, mesh):
+    corner_count = 0 if mesh is None else len(mesh.indices)
+    require_count("surface normals", len(normals), corner_count)
+    require_count("surface colors", len(albedo), corner_count // 3)
     medium = Medium()
     medium.corner, medium.cell = wp.vec3(*grid.corner.tolist()), wp.vec3(*grid.cell.tolist())
     medium.shape, medium.least_cell = wp.vec3i(*grid.shape), float(grid.cell.min())
@@ -302,7 +361,7 @@ def _medium(grid, albedo, mesh):
     medium.strands, medium.fibres = wp.array(grid.strands, dtype=int), wp.array(grid.fibres, dtype=int)
     medium.fibre_rows = wp.array(grid.fibre_rows, dtype=float)
     medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
-    medium.albedo = _vectors(albedo)
+    medium.normals, medium.albedo = _vectors(normals), _vectors(albedo)
     return medium
 
 

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """A path's way to the next strand or surface: through a grid of segments, cell by cell [Amanatides87].
 
-A segment is a ribbon that faces the path: it is met where the path comes nearest to its axis, within its radius. So is
-the wedge that two segments leave open on the outside of a bend, where the path comes nearest to the point between them.
-A path meets no ribbon within its width of its start, as in [Embree26] and Cycles: strands there overlap. Of
-the strand that it leaves it meets none before it is as far across: a straight strand does not meet itself.
+Strands are round, as Cycles takes hair of straight segments: a segment is a cylinder around its axis, and the wedge
+that two of them leave open on the outside of a bend is of a sphere around the point between them. A path meets the side
+of a strand that faces it, so not a strand that it begins inside of, as strands that overlap are [Embree26]; and it goes
+on from where it has met the strand, on that side. The strand that it leaves it does not meet next, even where that bends.
 """
 
 import warp as wp
@@ -15,7 +15,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 FAR = wp.constant(1e9)
 _LEAST = wp.constant(1e-9)  # component of a direction
-_NEAREST = wp.constant(2.0)  # radii from a path's start, within which no ribbon is met [Embree26]
 PASSED, STRAND, SURFACE = (wp.constant(kind) for kind in range(3))  # what ends a path's way
 
 
@@ -38,6 +37,7 @@ class Medium:
     fibre_rows: wp.array2d[float]
     mesh: wp.uint64
     has_mesh: int
+    normals: wp.array[wp.vec3]  # of each triangle's corners
     albedo: wp.array[wp.vec3]  # of each triangle
 
 
@@ -73,54 +73,67 @@ def fibre_of(medium: Medium, segment: int):
 
 
 @wp.func
-def is_in_bend(medium: Medium, segment: int, end: wp.vec3, direction: wp.vec3):
-    """Whether a ray beyond a segment's end, which is at `end` from the ray's start, is before the strand's next one."""
+def is_in_bend(medium: Medium, segment: int, place: wp.vec3):
+    """Whether a place, from the segment's end, is beyond that end and before the strand's next segment."""
     if segment + 2 >= medium.points.shape[0]:
         return False
     if medium.strands[segment + 2] != medium.strands[segment]:
         return False
-    normal = wp.cross(direction, medium.points[segment + 2] - medium.points[segment + 1])
-    return wp.dot(wp.cross(end, direction), normal) < 0.0
+    end = medium.points[segment + 1]
+    if wp.dot(place, end - medium.points[segment]) < 0.0:
+        return False
+    return wp.dot(place, medium.points[segment + 2] - end) < 0.0
 
 
 @wp.func
-def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3, own: int):
-    """(distance along a ray of unit direction, offset from the axis) where a segment is met; `FAR` where it is not.
-
-    own: the strand that the ray leaves.
-    """
+def crossing(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3):
+    """(distance along a ray of unit direction, offset from the axis) where it enters a segment; `FAR` without."""
     start = medium.points[segment] - position
     along = medium.points[segment + 1] - medium.points[segment]
     normal = wp.cross(direction, along)
     squared = wp.dot(normal, normal)
+    length = wp.dot(along, along)
     distance = float(FAR)
     offset = float(0.0)
-    if squared > 1e-12 * wp.dot(along, along):
-        nearest = float(_NEAREST)  # radii along the ray
-        if medium.strands[segment] == own:
-            nearest = nearest * wp.sqrt(wp.dot(along, along) / squared)
-        # The closest points of two lines.
+    if squared > 1e-12 * length:
+        # The closest points of two lines, and from there back to the side of the cylinder.
         part = wp.dot(wp.cross(start, direction), normal) / squared
-        if part >= 0.0 and part < 1.0:
-            radius = medium.radii[segment] + part * (medium.radii[segment + 1] - medium.radii[segment])
-            beside = -wp.dot(start, normal) / wp.sqrt(squared)
-            way = wp.dot(wp.cross(start, along), normal) / squared
-            if wp.abs(beside) < radius and way > nearest * radius:
-                distance = way
-                offset = beside / radius
-        elif part >= 1.0:
-            end = start + along
-            way = wp.dot(end, direction)
-            aside = end - way * direction
-            radius = medium.radii[segment + 1]
-            if (
-                way > nearest * radius
-                and wp.dot(aside, aside) < radius * radius
-                and is_in_bend(medium, segment, end, direction)
-            ):
-                distance = way
-                offset = -wp.dot(aside, normal) / (wp.sqrt(squared) * radius)
+        beside = -wp.dot(start, normal) / wp.sqrt(squared)
+        first = medium.radii[segment]
+        last = medium.radii[segment + 1]
+        radius = first + wp.clamp(part, 0.0, 1.0) * (last - first)
+        if wp.abs(beside) < radius:
+            back = wp.sqrt((radius * radius - beside * beside) * length / squared)
+            part -= back * wp.dot(direction, along) / length
+            if part >= 0.0 and part < 1.0:
+                way = wp.dot(wp.cross(start, along), normal) / squared - back
+                if way > 0.0:
+                    distance = way
+                    offset = beside / radius
+            elif part >= 1.0:
+                end = start + along
+                nearest = wp.dot(end, direction)
+                aside = end - nearest * direction
+                inside = last * last - wp.dot(aside, aside)
+                if inside > 0.0:
+                    way = nearest - wp.sqrt(inside)
+                    if way > 0.0 and is_in_bend(medium, segment, way * direction - end):
+                        distance = way
+                        offset = -wp.dot(aside, normal) / (wp.sqrt(squared) * last)
     return distance, offset
+
+
+@wp.func
+def _shading_normal(medium: Medium, face: int, u: float, v: float, flat: wp.vec3):
+    """The normal between those of a triangle's corners, on the side of its own; its own where they have none."""
+    between = u * medium.normals[3 * face] + v * medium.normals[3 * face + 1]
+    between += (1.0 - u - v) * medium.normals[3 * face + 2]
+    normal = flat
+    if wp.dot(between, between) > 0.0:
+        normal = wp.normalize(between)
+        if wp.dot(normal, flat) < 0.0:
+            normal = -normal
+    return normal
 
 
 @wp.func
@@ -135,9 +148,9 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
             end = found.t
             met.kind = SURFACE
             met.index = found.face
-            met.normal = found.normal
+            met.normal = _shading_normal(medium, found.face, found.u, found.v, found.normal)
             if wp.dot(found.normal, direction) > 0.0:
-                met.normal = -found.normal
+                met.normal = -met.normal
 
     # The part of the ray in the grid, and its first cell.
     here = float(0.0)
@@ -176,12 +189,13 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
         index = (cell[2] * medium.shape[1] + cell[1]) * medium.shape[0] + cell[0]
         for turn in range(medium.starts[index], medium.starts[index + 1]):
             segment = medium.segments[turn]
-            distance, offset = crossing(medium, segment, position, direction, own)
-            if distance < end:
-                end = distance
-                met.kind = STRAND
-                met.index = segment
-                met.offset = offset
+            if medium.strands[segment] != own:
+                distance, offset = crossing(medium, segment, position, direction)
+                if distance < end:
+                    end = distance
+                    met.kind = STRAND
+                    met.index = segment
+                    met.offset = offset
         if to >= wp.min(end, last):
             going = 0
         for axis in range(3):
@@ -212,5 +226,9 @@ def seen_place(medium: Medium, segment: int, position: wp.vec3, direction: wp.ve
     met.offset = -wp.dot(start, normal) / (wp.sqrt(squared) * wp.max(radius, 1e-12))
     if wp.abs(met.offset) > 1.0:
         met.offset = spare
-    met.position = position + start + part * along + normal * (met.offset * radius / wp.sqrt(squared))
+    # From the axis to the side that faces the viewer, across: where a ray along a strand enters it cannot be told.
+    inwards = wp.normalize(wp.cross(along, normal))
+    rise = wp.sqrt(wp.max(0.0, 1.0 - met.offset * met.offset))
+    side = normal * (met.offset / wp.sqrt(squared))
+    met.position = position + start + part * along + radius * (side - rise * inwards)
     return met

@@ -119,7 +119,7 @@ def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, rando
         distance = wp.max(wp.length(offset), 1e-6)
         lit.direction = offset / distance
         lit.distance = distance
-        far = wp.max(distance, wp.max(least, 0.5 * shape[0]))
+        far = wp.max(distance, least)
         cosine = -wp.dot(lit.direction, axis)
         part = 1.0 / (4.0 * PI * far * far)
         if kind == SPOT:
