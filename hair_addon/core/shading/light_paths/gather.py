@@ -35,10 +35,10 @@ _LEAST_PATHS = 4096  # fewer are not worth a thread
 class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
-    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own; albedo:
-    (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl; importance:
-    (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude and latitude as
-    core/imaging/environment.py takes it apart.
+    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own;
+    albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
+    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude
+    and latitude as core/imaging/environment.py takes it apart.
     """
 
     corners: np.ndarray

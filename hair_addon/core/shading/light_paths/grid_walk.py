@@ -4,7 +4,7 @@
 Strands are round, as Cycles takes hair of straight segments: a segment is a cylinder around its axis, and the wedge
 that two of them leave open on the outside of a bend is of a sphere around the point between them. A path meets the side
 of a strand that faces it, so not a strand that it begins inside of, as strands that overlap are [Embree26]; and it goes
-on from where it has met the strand, on that side. The strand that it leaves it does not meet next, even where that bends.
+on from where it has met the strand, on that side. The strand that it leaves it does not meet next, even in bends.
 """
 
 import warp as wp
