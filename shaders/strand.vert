@@ -32,6 +32,9 @@ void main()
   strand_offset_part = view.sample_offset * offset_share(0.5 * true_half_width / max(half_sample, 1e-20));
   float half_width = max(true_half_width, view.least_half_width * abs(depth)) + strand_offset_part * half_sample;
   strand_coverage = true_half_width / max(half_width, 1e-20);
+  float sine = length(cross(normalize(tangent), normalize(to_view)));
+  strand_rise = true_half_width * view.pixels_per_unit * view.depth_rise / max(depth * depth, 1e-20);
+  strand_rise /= max(sine, LEAST_SINE);
   vec3 offset = strip_side(normalize(tangent), normalize(to_view)) * (side * half_width);
   gl_Position = view.world_to_clip * vec4(drawn_position + offset, 1.0);
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility buffer of strands drawn as strips: segment index and depth.
+// Visibility buffer of strands drawn as strips: segment index, and depth of the round side as in strand_segments.comp.
 
 #include "include/coverage.glsl"
 
@@ -16,5 +16,7 @@ void main()
   int pieces = view.drawn_points - 1;
   int piece = clamp(int(strand_place), 0, pieces - 1);
   segment = uint(first_segment + strand_index * pieces + piece);
-  depth = floatBitsToUint(gl_FragCoord.z);
+  float part = clamp(side / max(strand_coverage, 1e-6), -1.0, 1.0);
+  gl_FragDepth = max(gl_FragCoord.z - strand_rise * sqrt(1.0 - part * part), 0.0);
+  depth = floatBitsToUint(gl_FragDepth);
 }

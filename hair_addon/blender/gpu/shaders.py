@@ -114,6 +114,7 @@ def strip_segments_program():
     info = gpu.types.GPUShaderCreateInfo()
     _strip(info, ())
     info.push_constant("INT", "first_segment")
+    info.depth_write("ANY")
     return compile_drawing(info, "strand.vert", "strand_segments.frag", (("segment", "UINT"), ("depth", "UINT")))
 
 
@@ -125,6 +126,7 @@ def _strip(info, shadow_samplers):
     varying.smooth("VEC3", "drawn_position")
     varying.smooth("FLOAT", "strand_coverage")
     varying.smooth("FLOAT", "strand_offset_part")
+    varying.smooth("FLOAT", "strand_rise")  # of depth, from the axis to the side that faces the viewer
     varying.smooth("FLOAT", "strand_side_place")  # across the strip, from -1 to 1
     varying.smooth("FLOAT", "strand_place")  # in points that are drawn
     varying.flat("INT", "strand_index")

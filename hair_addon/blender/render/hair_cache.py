@@ -129,7 +129,7 @@ def _is_behind(datablock):
 
 def _carried(kept, pose, chosen=slice(None)):
     """Points (M, P, 3) of some kept strands where a pose carries them; at rest where nothing deforms the surface."""
-    if pose is None:
+    if pose is None or not pose.is_deformed:
         return kept.points[chosen]
     return pose.carry(kept.points, kept.rooted_on[1], kept.places, chosen)
 

@@ -52,7 +52,7 @@ def brightness(strand, shading, shadow_maps, to_light, to_view):
     buffer = visibility_buffer.VisibilityBuffer(SIZE, SIZE)
     with buffer.surfaces():
         pass
-    buffer.add_hair([(strand, shading, np.eye(4), np.zeros(3), shadow_maps, drawing.Steps())], lights, view)
+    buffer.add_hair([(strand, shading, np.eye(4), shadow_maps, drawing.Steps())], lights, view)
     middle = np.array(buffer.color.read(), np.float32).reshape(SIZE, SIZE, 4)[SIZE // 2, SIZE // 2]
     assert middle[3] == 1.0  # the strand is there
     return middle[:3]

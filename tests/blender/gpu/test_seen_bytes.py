@@ -65,9 +65,9 @@ def sums(rng):
 def test_bytes_keep_what_strands_see(scene, rng):
     """Every sum to half a step of its root, ratios too, the direction of surfaces to a third of a degree."""
     given = sums(rng)
-    names = dict(zip(("x_y", "z", "surface", "channels", "color"), given, strict=True))
+    names = dict(zip(("x_y", "z", "surface", "channels", "tint"), given, strict=True))
     text = shaders.expand("include/seen_bytes.glsl")[0] + _ROUND_TRIP
-    found = [glsl.evaluate(text, "vec4", f"kept(x_y, z, surface, channels, color, {i})", **names) for i in range(5)]
+    found = [glsl.evaluate(text, "vec4", f"kept(x_y, z, surface, channels, tint, {i})", **names) for i in range(5)]
     np.testing.assert_allclose(np.sqrt(found[0]), np.sqrt(given[0]), rtol=0.0, atol=STEP)
     np.testing.assert_allclose(np.sqrt(found[1][:, :2]), np.sqrt(given[1][:, :2]), rtol=0.0, atol=STEP)
     np.testing.assert_allclose(np.sqrt(found[3] / 6.0), np.sqrt(given[3] / 6.0), rtol=0.0, atol=STEP)

@@ -78,7 +78,9 @@ def test_a_sample_is_covered_if_its_centre_lies_in_the_strand(shading, in_comput
         distance = np.abs((centres - [0.012, 0.005]) @ [-along[1], along[0]])
         sure = np.abs(distance - radius) > 1e-4
         np.testing.assert_array_equal((found >= 0)[sure], (distance < radius)[sure])
-        np.testing.assert_allclose(depths[found >= 0], 0.5 * (0.2 * 2.0 - 1.0) + 0.5, rtol=1e-5)
+        # Of the side that faces the viewer.
+        rise = np.sqrt(np.maximum(radius**2 - distance**2, 0.0))[found >= 0]
+        np.testing.assert_allclose(depths[found >= 0], 0.2 - 0.5 * abs(PARALLEL[2, 2]) * rise, atol=2e-5)
         second = (centres - [0.012, 0.005]) @ along > 0.1
         away = np.abs((centres - [0.012, 0.005]) @ along - 0.1) > 0.03
         np.testing.assert_array_equal(found[(found >= 0) & away], second[(found >= 0) & away])

@@ -56,7 +56,7 @@ def test_tiles_join_without_a_seam(lit, tmp_path, monkeypatch, filter_size):
         assert differs.mean() < 0.003, name
         assert differs[:, 34:40].mean() < 0.01 and differs[34:40].mean() < 0.01, name
         mean = [np.mean(pixels[pixels < 1e9]) for pixels in (tiled, whole[name])]
-        assert mean[0] == pytest.approx(mean[1], rel=1e-4)
+        assert mean[0] == pytest.approx(mean[1], rel=1e-3)
 
 
 def test_a_picture_larger_than_any_texture_is_rendered(lit, tmp_path, monkeypatch):

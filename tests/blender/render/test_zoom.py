@@ -8,6 +8,7 @@ import pytest
 from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.render import drawn_scene, hair_picture, picture_detail
+from tests.support.scenes import even_guides
 
 SIZE = (640, 480)
 
@@ -48,6 +49,7 @@ def fine(picture, drawn, camera):
     return summed(picture.read()), np.mean(firsts, axis=0)
 
 
+@even_guides
 def test_small_hair_is_as_bright_and_covers_as_much(locks):
     """With one sample a pixel, near by and far away, in the first pass and in the last."""
     picture, near = hair_picture.HairPicture(SIZE, 1), None
