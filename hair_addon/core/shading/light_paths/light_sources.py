@@ -96,7 +96,7 @@ def choose(sources: Sources, random: wp.uint32):
 def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, random: wp.uint32):
     """(`Lit` by a lamp, random state); least: distance [m] below which no light grows.
 
-    Nor does it nearer than half the lamp's radius: few paths with very much light would be noise.
+    Nor does it nearer than half the radius of a lamp that shines all around: few paths with much light would be noise.
     """
     state = random
     lit = Lit()
@@ -120,6 +120,8 @@ def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, rando
         lit.direction = offset / distance
         lit.distance = distance
         far = wp.max(distance, least)
+        if kind != AREA:
+            far = wp.max(far, 0.5 * shape[0])
         cosine = -wp.dot(lit.direction, axis)
         part = 1.0 / (4.0 * PI * far * far)
         if kind == SPOT:

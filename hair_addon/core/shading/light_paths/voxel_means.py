@@ -5,6 +5,7 @@ import numpy as np
 
 _PRIOR = 16.0  # paths that the ratio of the voxels around stands for
 _WIDE_PRIOR = 1024.0  # the same for what is kept of the drawn
+_NOISE = 1.0  # how far what is kept may be beyond the voxel's own
 
 
 def shares(sums: np.ndarray, path_count: int) -> np.ndarray:
@@ -18,7 +19,9 @@ def shares(sums: np.ndarray, path_count: int) -> np.ndarray:
     pairs = [np.concatenate([found, even], axis=-1) for found in (sums[..., :3], sums[..., 6:])]
     light, drawn = (smooth_ratios(pair, path_count) for pair in pairs)
     wide_light, wide_drawn = (smooth_ratios(pair, path_count, _WIDE_PRIOR) for pair in pairs)
-    kept = np.clip((wide_light / np.maximum(wide_drawn, 1e-12)).min(axis=-1, keepdims=True), 0.0, 1.0)
+    kept = (wide_light / np.maximum(wide_drawn, 1e-12)).min(axis=-1, keepdims=True)
+    here = (light / np.maximum(drawn, 1e-12)).min(axis=-1, keepdims=True)
+    kept = np.clip(np.minimum(kept, _NOISE * here), 0.0, 1.0)
     return np.concatenate([light - kept * drawn, kept], axis=-1)
 
 
