@@ -13,7 +13,7 @@ from ...core.errors import HairError
 from ..data.strands import curves, simulated_guides
 from ..groom import bindings, hair_outside, pipeline, reweighed_hair, staleness, writing
 from ..groom.styles import painted_masks
-from ..host import running
+from ..host import running, running_operators
 from ..host.notices import text_of
 from ..render import hair_cache
 from ..settings import style_items
@@ -250,8 +250,7 @@ def write_after_pause():
 
 def is_stroke_running():
     """Whether an operator holds on to guides, in any window."""
-    windows = (window for manager in bpy.data.window_managers for window in manager.windows)
-    return any(o.bl_idname.startswith(_STROKES) for window in windows for o in window.modal_operators)
+    return running_operators.is_running(_STROKES)
 
 
 def follow_masks(surfaces, depsgraph):

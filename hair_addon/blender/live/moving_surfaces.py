@@ -10,7 +10,7 @@ import time
 import bpy
 
 from ..groom import paused_hair
-from ..host import running, scene_time
+from ..host import running, running_operators, scene_time
 from ..host.caches import Cache
 from ..render import hair_cache
 
@@ -97,5 +97,4 @@ def _cancel():
 
 
 def _is_transforming():
-    windows = (window for manager in bpy.data.window_managers for window in manager.windows)
-    return any(operator.bl_idname.startswith(_TRANSFORMS) for window in windows for operator in window.modal_operators)
+    return running_operators.is_running(_TRANSFORMS)

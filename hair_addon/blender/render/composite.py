@@ -148,7 +148,7 @@ def is_in_sequence(blender_scene):
     if not _is_of_another(blender_scene):
         return False
     running = [operator for window in bpy.context.window_manager.windows for operator in window.modal_operators]
-    is_animation = any(one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)
+    is_animation = any(one and one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)
     return is_animation or bpy.app.background
 
 

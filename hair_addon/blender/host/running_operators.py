@@ -1,0 +1,13 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that hold on to a window: strokes, drags and the like."""
+
+import bpy
+
+
+def is_running(prefix, window_managers=None):
+    """Whether an operator whose identifier begins so runs in any window; window_managers: those of the file."""
+    managers = bpy.data.window_managers if window_managers is None else window_managers
+    windows = (window for manager in managers for window in manager.windows)
+    # Blender lists handlers without an operator as None, as of one whose type was removed.
+    found = (operator for window in windows for operator in window.modal_operators if operator is not None)
+    return any(operator.bl_idname.startswith(prefix) for operator in found)

@@ -1,0 +1,20 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Operators that hold on to a window."""
+
+from types import SimpleNamespace
+
+from hair_addon.blender.host import running_operators
+
+
+def managers(*operators):
+    """One with two windows: the operators run in the second."""
+    return [SimpleNamespace(windows=[SimpleNamespace(modal_operators=[]), SimpleNamespace(modal_operators=operators)])]
+
+
+def test_handlers_without_an_operator_are_passed_over():
+    """As Blender lists them after the type of a running operator was removed."""
+    stroke = SimpleNamespace(bl_idname="SCULPT_CURVES_OT_brush_stroke")
+    assert running_operators.is_running("SCULPT_", managers(None, stroke))
+    assert not running_operators.is_running("TRANSFORM_", managers(None, stroke))
+    assert not running_operators.is_running("SCULPT_", managers(None))
+    assert not running_operators.is_running("SCULPT_")
