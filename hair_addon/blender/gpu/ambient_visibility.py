@@ -17,10 +17,8 @@ from .strand_textures import seen_points
 _SIZE = 256
 _POINT_COUNT, _LEAST_STRANDS = 11, 10_000
 _FULL_WIDTH = 0.5  # texels that a strand may be wide that is drawn for several
-_BYTES, _SUMS = (
-    "RGBA8",
-    "RGBA16F",
-)  # of a texture that strands' visibility is kept in, and one that sums are added up in
+_BYTES = "RGBA8"  # textures that strands' visibility is kept in
+_SUMS = "RGBA16F"  # and those in which sums are added up
 
 
 def measure(hair, surfaces, opacities, clear=(), forwards=None):

@@ -4,10 +4,14 @@
 import bpy
 
 
-def is_running(prefix, window_managers=None):
-    """Whether an operator whose identifier begins so runs in any window; window_managers: those of the file."""
+def found(window_managers=None):
+    """Operators that run in any window; window_managers: by default those of the file."""
     managers = bpy.data.window_managers if window_managers is None else window_managers
     windows = (window for manager in managers for window in manager.windows)
     # Blender lists handlers without an operator as None, as of one whose type was removed.
-    found = (operator for window in windows for operator in window.modal_operators if operator is not None)
-    return any(operator.bl_idname.startswith(prefix) for operator in found)
+    return [operator for window in windows for operator in window.modal_operators if operator is not None]
+
+
+def is_running(prefix, window_managers=None):
+    """Whether an operator whose identifier begins with a prefix runs in any window."""
+    return any(operator.bl_idname.startswith(prefix) for operator in found(window_managers))

@@ -12,6 +12,7 @@ from ...core.errors import HairError
 from ...core.imaging.pixel_sampling import RenderSettings
 from ..data.pictures import composite_nodes
 from ..data.strands import curves_objects
+from ..host import running_operators
 from ..host.caches import Cache
 from ..settings import setting_properties
 from . import viewport
@@ -147,8 +148,8 @@ def is_in_sequence(blender_scene):
     """
     if not _is_of_another(blender_scene):
         return False
-    running = [operator for window in bpy.context.window_manager.windows for operator in window.modal_operators]
-    is_animation = any(one and one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)
+    running = running_operators.found()
+    is_animation = any(one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)
     return is_animation or bpy.app.background
 
 

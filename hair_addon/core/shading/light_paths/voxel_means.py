@@ -4,8 +4,6 @@
 import numpy as np
 
 _PRIOR = 16.0  # paths that the ratio of the voxels around stands for
-_WIDE_PRIOR = 1024.0  # the same for what is kept of the drawn
-_NOISE = 1.0  # how far what is kept may be beyond the voxel's own
 
 
 def shares(sums: np.ndarray, path_count: int) -> np.ndarray:
@@ -13,19 +11,16 @@ def shares(sums: np.ndarray, path_count: int) -> np.ndarray:
     of what is drawn is kept.
 
     Both together are the paths' light. All that is drawn is kept, with its sharp shadows, but where that is more than
-    paths find in any channel: of the voxels around as well, as noise would take highlights away.
+    paths find in any channel.
     """
     even = sums[..., 3:6]
     pairs = [np.concatenate([found, even], axis=-1) for found in (sums[..., :3], sums[..., 6:])]
     light, drawn = (smooth_ratios(pair, path_count) for pair in pairs)
-    wide_light, wide_drawn = (smooth_ratios(pair, path_count, _WIDE_PRIOR) for pair in pairs)
-    kept = (wide_light / np.maximum(wide_drawn, 1e-12)).min(axis=-1, keepdims=True)
-    here = (light / np.maximum(drawn, 1e-12)).min(axis=-1, keepdims=True)
-    kept = np.clip(np.minimum(kept, _NOISE * here), 0.0, 1.0)
+    kept = np.clip((light / np.maximum(drawn, 1e-12)).min(axis=-1, keepdims=True), 0.0, 1.0)
     return np.concatenate([light - kept * drawn, kept], axis=-1)
 
 
-def smooth_ratios(sums: np.ndarray, path_count: int, prior_paths: float = _PRIOR) -> np.ndarray:
+def smooth_ratios(sums: np.ndarray, path_count: int) -> np.ndarray:
     """(Z, Y, X, 6) sums of light RGB and of even light RGB over some paths → (Z, Y, X, 3) ratios of both.
 
     From large voxels to small ones each ratio is drawn to that of the voxel around it, by a fixed number of average
@@ -36,7 +31,7 @@ def smooth_ratios(sums: np.ndarray, path_count: int, prior_paths: float = _PRIOR
         levels.append(_halved(levels[-1]))
     total = levels.pop()
     ratios = total[..., :3] / np.maximum(total[..., 3:], 1e-12)
-    prior = np.maximum(prior_paths / max(path_count, 1) * total[0, 0, 0, 3:], 1e-12)
+    prior = np.maximum(_PRIOR / max(path_count, 1) * total[0, 0, 0, 3:], 1e-12)
     for level in reversed(levels):
         around = _doubled(ratios, level.shape)
         ratios = (level[..., :3] + prior * around) / (level[..., 3:] + prior)
