@@ -163,7 +163,7 @@ OWNERS = {
     ),
     "self.report": (
         lambda path: list(attribute_lines(syntax(path), "self.report")),
-        r"blender/(ui/operators/.*|render/engine\.py)",
+        r"blender/(ui/operators/.*|render/frames/engine\.py)",
     ),
     "wp.kernel": (lambda path: list(attribute_lines(syntax(path), "wp.kernel", "wp.func")), r"core/.*"),
     "kernels": (

@@ -16,8 +16,8 @@ STATE = {
     "blender/live/first_setup.py: _job": "unregister",
     "blender/live/handlers.py: _is_opening": "the first update after a file was opened",
     "blender/live/handlers.py: _is_undone": "the first update after an undo",
-    "blender/render/engine.py: _listener": "listening, a context",
-    "blender/render/viewport.py: _handles": "unregister",
+    "blender/render/frames/engine.py: _listener": "listening, a context",
+    "blender/render/viewport/viewport.py: _handles": "unregister",
     "blender/ui/look_previews.py: _previews": "unregister",
     # Kernels stay loaded as long as Python runs.
     "core/kernels/kernel_cache.py: _choosing": "nobody: a lock",

@@ -4,8 +4,8 @@
 Grows hair on the sample's head, opens it in a window of a desktop Blender with the built extension, and takes a picture
 of each panel in a sidebar of `SIDEBAR_WIDTH`. With the name `windows`, also build/manual/window_*.png of the whole
 window for each kind of active object, to look for labels that are cut. With the name `five_minutes`, README's pictures
-of its five minutes alone: docs/five_minutes/*.png, cut out of what `tests/desktop/first_minutes.py` sees in a window;
-with `curly_hair` those of the page Curly Hair, of what `tests/desktop/curly_hair.py` sees.
+of its five minutes alone: docs/five_minutes/*.png, cut out of what `tests/desktop/manual/first_minutes.py` sees in
+a window; with `curly_hair` those of the page Curly Hair, of what `tests/desktop/manual/curly_hair.py` sees.
 """
 
 import shutil
@@ -19,11 +19,11 @@ ROOT = Path(__file__).resolve().parent.parent
 MANUAL = ROOT / "docs" / "manual"
 MODULE = "bl_ext.user_default.vellus"
 
-# Step of tests/desktop/first_minutes.py → its picture in README.
+# Step of tests/desktop/manual/first_minutes.py → its picture in README.
 FIVE_MINUTES = {"cube_near": "new_hair_system", "head": "guide_mask", "combed": "comb_guides", "shaded": "look"}
 FIVE_MINUTES_SAMPLES = 32  # per pixel: as an artist sees them
 
-# Steps of tests/desktop/curly_hair.py that the page Curly Hair shows.
+# Steps of tests/desktop/manual/curly_hair.py that the page Curly Hair shows.
 CURLY_HAIR = (
     *("bare_head", "hair_system", "combed", "shoulder_length", "fringe"),
     *("locks", "curls", "smooth_curls", "painted", "look"),
@@ -78,7 +78,7 @@ def take_five_minutes(blender, extension, folder):
     """Write README's pictures of the five minutes; returns the exit status."""
     import bpy
 
-    if error := take_walk(blender, "first_minutes", ["all"], extension, folder, FIVE_MINUTES_SAMPLES):
+    if error := take_walk(blender, "manual/first_minutes", ["all"], extension, folder, FIVE_MINUTES_SAMPLES):
         return error
     left, top, right, bottom = SEEN_PART
     for step, name in FIVE_MINUTES.items():
@@ -91,7 +91,7 @@ def take_five_minutes(blender, extension, folder):
 
 def take_curly_hair(blender, extension, folder):
     """Write the pictures of the page Curly Hair; returns the exit status."""
-    if error := take_walk(blender, "curly_hair", CURLY_PARTS, extension, folder):
+    if error := take_walk(blender, "manual/curly_hair", CURLY_PARTS, extension, folder):
         return error
     left, top, right, bottom = SEEN_PART
     for step in CURLY_HAIR:

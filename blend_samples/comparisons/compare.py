@@ -22,7 +22,8 @@ import hair_addon
 from blend_samples.heads import head
 from blend_samples.sheets import ratio_plot
 from hair_addon.blender.data import scene
-from hair_addon.blender.render import drawn_scene, hair_picture, offscreen
+from hair_addon.blender.render import drawn_scene, offscreen
+from hair_addon.blender.render.viewport import hair_picture
 
 WIDTH, HEIGHT = 400, 225
 CYCLES_SAMPLES = 128

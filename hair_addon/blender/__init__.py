@@ -9,7 +9,8 @@ from . import manual
 from .groom import hair_systems
 from .host import running
 from .live import first_setup, handlers, invalidation
-from .render import engine, viewport
+from .render.frames import engine
+from .render.viewport import viewport
 from .settings import preferences, properties, translations
 from .ui import asset_shelf, engine_panels, keymap, look_previews, menus, operators, panels
 

@@ -28,7 +28,8 @@ import hair_addon
 from blend_samples.heads import head
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu.display_transform import DisplayTransform
-from hair_addon.blender.render import drawn_scene, hair_picture, viewport
+from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render.viewport import hair_picture, viewport
 
 NATIVE = [
     (shading, hair_type, kind)

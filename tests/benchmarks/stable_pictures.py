@@ -30,7 +30,8 @@ from blend_samples.heads import head
 from hair_addon import api
 from hair_addon.blender.data import scene
 from hair_addon.blender.gpu import display_transform
-from hair_addon.blender.render import drawn_scene, hair_picture, offscreen, view_film
+from hair_addon.blender.render import drawn_scene, offscreen
+from hair_addon.blender.render.viewport import hair_picture, view_film
 
 BEHIND = 0.05  # scene-linear grey behind the hair
 

@@ -17,7 +17,8 @@ from hair_addon.blender.data import scene
 from hair_addon.blender.data.strands import curves
 from hair_addon.blender.host import running
 from hair_addon.blender.live import events, invalidation, live_hair
-from hair_addon.blender.render import drawn_scene, hair_cache, hair_picture
+from hair_addon.blender.render import drawn_scene, hair_cache
+from hair_addon.blender.render.viewport import hair_picture
 from tests.support.counting import counts_of
 from tests.support.meshes import HEAD
 

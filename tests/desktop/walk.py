@@ -207,14 +207,14 @@ def click():
     screen("clicks")
     with in_viewport():
         near = [(int(x) - region.x, int(y) - region.y) for x, y in places(points("Hair"))[20::41]]
-        on_hair = next(place for place in near if blender.render.viewport.hair_at(bpy.context, *place) == hair)
+        on_hair = next(place for place in near if blender.render.viewport.viewport.hair_at(bpy.context, *place) == hair)
         # What of the head is closest to the viewer is in front of everything else of it.
         eye = area.spaces.active.region_3d.view_matrix.inverted().translation
         skin = sorted(
             (head_object.matrix_world @ v.co for v in head_object.data.vertices), key=lambda p: (p - eye).length
         )
         near = places(np.array(skin)) - (region.x, region.y)
-        on_head = next(place for place in near if no_hair_near(blender.render.viewport, place))
+        on_head = next(place for place in near if no_hair_near(blender.render.viewport.viewport, place))
     facts["clicks"] = {}
     for tool in ("builtin.select_box", "builtin.select"):
         with in_viewport():
@@ -348,7 +348,7 @@ def reopen():
 
 def hurry():
     """Four samples a pixel in each pass, as with a graphics card: a picture is fine after eight redraws, not 32."""
-    sys.modules[f"{MODULE}.hair_addon.blender.render.hair_picture"].samples_per_side = lambda: 2
+    sys.modules[f"{MODULE}.hair_addon.blender.render.viewport.hair_picture"].samples_per_side = lambda: 2
     yield
 
 

@@ -43,12 +43,13 @@ class Walk:
 
 
 def take(desktop, name, extension, profile, backend, *, parts=("all",), more=(), folder=None, **details):
-    """Run the parts of a script of this folder, each in a Blender of its own, up to one that fails; returns the `Walk`.
+    """Run the parts of a script, each in a Blender of its own, up to one that fails; returns the `Walk`.
 
-    desktop: the `DesktopBlender`; extension: the zip; more: words of the script after those that all have; folder: its
-    name in out/desktop, by default that of the script and the backend; details: of `DesktopBlender.run`.
+    desktop: the `DesktopBlender`; name: the script's path in this folder, without `.py`; extension: the zip; more: its
+    words after those that all have; folder: its name in out/desktop, by default that of the script and the backend;
+    details: of `DesktopBlender.run`.
     """
-    made = build_extension.ROOT / "out" / "desktop" / (folder or f"{name}_{backend}")
+    made = build_extension.ROOT / "out" / "desktop" / (folder or f"{Path(name).name}_{backend}")
     shutil.rmtree(made, ignore_errors=True)
     made.mkdir(parents=True)
     script, walk = SCRIPTS / f"{name}.py", Walk(made, parts)

@@ -10,7 +10,8 @@ import numpy as np
 from hair_addon.blender.data.strands import curves as curves_door
 from hair_addon.blender.host import running
 from hair_addon.blender.live import events, handlers
-from hair_addon.blender.render import hair_cache, viewport
+from hair_addon.blender.render import hair_cache
+from hair_addon.blender.render.viewport import viewport
 from hair_addon.blender.ui import menus
 from hair_addon.core.errors import HairError
 from tests.support.reading import snapshot

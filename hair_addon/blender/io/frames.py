@@ -18,8 +18,8 @@ from ..data.strands import curves
 from ..groom.dynamics import frame_folders
 from ..host import scene_time
 from ..live import live_hair
-from ..render import engine as render_engine
-from ..render import viewport
+from ..render.frames import engine as render_engine
+from ..render.viewport import viewport
 
 # The user's names → Blender's names.
 ENGINES = {"vellus": viewport.ENGINE, "cycles": "CYCLES", "eevee": "BLENDER_EEVEE"}

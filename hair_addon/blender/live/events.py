@@ -5,7 +5,8 @@ After an event nothing is drawn or computed from what was cached before it.
 """
 
 from ..gpu import world_texture
-from ..render import hair_cache, viewport
+from ..render import hair_cache
+from ..render.viewport import viewport
 
 
 def scene_changed(is_hair_only=False):

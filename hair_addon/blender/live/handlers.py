@@ -10,7 +10,7 @@ from ..groom.dynamics import frame_folders
 from ..host import running, scene_time
 from ..host.notices import name_of
 from ..materials import looks
-from ..render import composite
+from ..render.frames import composite
 from ..settings import animated, style_items
 from . import (
     events,

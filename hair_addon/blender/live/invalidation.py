@@ -12,7 +12,9 @@ from ..gpu import light_grid, lights, shaders, surface_shading, world_texture
 from ..groom import bindings, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
-from ..render import composite, hair_cache, region_pictures, viewport
+from ..render import hair_cache
+from ..render.frames import composite
+from ..render.viewport import region_pictures, viewport
 from ..settings import animated
 from . import dynamics_state, every_frame, moving_surfaces, reported, simulated_hair, unlocked_renders
 

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..render import composite
+from ..render.frames import composite
 
 
 def begin():

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawing: the viewport, offscreen pictures and the render engine."""
+"""A scene's hair as it is drawn: its strands made for the GPU, its light, films of it; offscreen pictures."""
 
 from ...core.lazy import submodules
 

@@ -3,7 +3,7 @@
 
 import bpy
 
-from ..render.engine import NAME
+from ..render.frames.engine import NAME
 
 # Blender's panels list their engines. Panels for engines in general also apply to ours, except unsupported features;
 # and a few of EEVEE's, which have no general version.

@@ -7,7 +7,7 @@ from ..groom.foreign import particle_hair
 from ..groom.foreign.foreign_curves import is_foreign
 from ..groom.selection import guides_of, hair_of, parts_of
 from ..live import unlocked_renders
-from ..render import composite
+from ..render.frames import composite
 from ..settings.translations import CONTEXT, interface_text
 
 # In groups: length and shape, then number and place.

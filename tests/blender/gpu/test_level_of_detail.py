@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.gpu import drawing, level_of_detail, strand_textures, uniforms
-from hair_addon.blender.render import drawn_scene, hair_picture
+from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render.viewport import hair_picture
 from tests.support import glsl
 
 SIZE = 96

@@ -14,7 +14,8 @@ from hair_addon.blender.data import scene as scene_door
 from hair_addon.blender.host import running
 from hair_addon.blender.host.caches import Cache
 from hair_addon.blender.live import events, invalidation
-from hair_addon.blender.render import hair_cache, hair_picture, viewport
+from hair_addon.blender.render import hair_cache
+from hair_addon.blender.render.viewport import hair_picture, viewport
 from tests.blender.gpu.test_world_texture import environment_node
 from tests.blender.render.test_hair_places import view3d
 from tests.support.always import changed

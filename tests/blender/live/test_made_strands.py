@@ -15,7 +15,8 @@ from hair_addon.blender.gpu.strands import maker_choice, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
 from hair_addon.blender.live import live_hair
-from hair_addon.blender.render import drawn_scene, hair_cache, made_strands, viewport
+from hair_addon.blender.render import drawn_scene, hair_cache, made_strands
+from hair_addon.blender.render.viewport import viewport
 from hair_addon.blender.settings import preferences
 from hair_addon.core.errors import HairError
 from hair_addon.core.grooming import following

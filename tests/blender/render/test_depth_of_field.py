@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.scene import read_camera
-from hair_addon.blender.render import drawn_scene, offscreen, region_pictures, rendered_view, viewport
-from hair_addon.blender.render.view_film import ViewFilm
+from hair_addon.blender.render import drawn_scene, offscreen
+from hair_addon.blender.render.viewport import region_pictures, rendered_view, viewport
+from hair_addon.blender.render.viewport.view_film import ViewFilm
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support.rendering import rendered
 

@@ -7,7 +7,8 @@ import pytest
 
 from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.gpu import ambient_visibility
-from hair_addon.blender.render import drawn_scene, viewport
+from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render.viewport import viewport
 from tests.support.reading import points, write_points
 
 

@@ -4,7 +4,7 @@
 import bpy
 
 from ....core.imaging.pixel_sampling import PassSettings
-from ...render.engine import NAME
+from ...render.frames.engine import NAME
 from ...settings.setting_properties import names_of
 from ...settings.translations import CONTEXT
 from .tab import split

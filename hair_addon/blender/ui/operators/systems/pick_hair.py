@@ -3,7 +3,7 @@
 
 import bpy
 
-from ....render import viewport
+from ....render.viewport import viewport
 from ....settings.translations import CONTEXT
 
 

@@ -1,0 +1,6 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Rendered frames: the render engine, tiles, panoramas, and hair among the pictures of other engines."""
+
+from ....core.lazy import submodules
+
+__getattr__ = submodules(__name__)

@@ -1,0 +1,245 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair by Vellus in the pictures that Cycles or EEVEE renders of a scene.
+
+A scene has one render engine, so hair is rendered by another scene, which has the first as its background set: it sees
+all of its objects in the same frames. The compositor lays its picture over the other. Hair is hidden from the first
+scene's engine for as long.
+"""
+
+import bpy
+
+from ....core.errors import HairError
+from ....core.imaging.pixel_sampling import RenderSettings
+from ...data.pictures import composite_nodes
+from ...data.strands import curves_objects
+from ...host import running_operators
+from ...host.caches import Cache
+from ...settings import setting_properties
+from ..viewport import viewport
+
+_OF_SCENE = ("camera", "world", "frame_start", "frame_end", "frame_step")
+_OF_RENDER = (
+    *("resolution_x", "resolution_y", "resolution_percentage", "pixel_aspect_x", "pixel_aspect_y"),
+    *("use_border", "border_min_x", "border_max_x", "border_min_y", "border_max_y", "use_crop_to_border"),
+    *("fps", "fps_base", "filter_size", "use_lock_interface"),
+    *("use_multiview", "views_format"),
+    *("use_motion_blur", "motion_blur_shutter", "motion_blur_position"),
+    *("use_simplify", "simplify_subdivision_render"),
+)
+_OWN = {"is_hair_only", "composite_shadow", "has_preview_shadow"}  # of the scene's settings of ours
+
+refused_cache = Cache()  # session_uid of a hair's scene → errors of its renders since the last one began
+
+_COMPOSITED = "vellus_use_compositing"  # custom property of the hair's scene: what the render settings had
+
+
+def is_on(blender_scene):
+    """Whether hair is composited into a scene's pictures."""
+    return blender_scene.vellus.hair_scene is not None or composite_nodes.has_nodes(blender_scene)
+
+
+def turn_on(blender_scene):
+    """Composite hair into a scene's pictures. Raises `HairError`."""
+    if blender_scene.library is not None:
+        raise HairError("The scene is linked from another file and cannot be changed.")
+    if blender_scene.render.engine == viewport.ENGINE:
+        raise HairError("The render engine Vellus renders hair with its surfaces: choose Cycles or EEVEE.")
+    hair_scene = _new_hair_scene(blender_scene)
+    try:
+        composite_nodes.insert(blender_scene, hair_scene)
+    except HairError:
+        bpy.data.scenes.remove(hair_scene)
+        raise
+    hair_scene[_COMPOSITED] = blender_scene.render.use_compositing
+    blender_scene.render.use_compositing = True
+    blender_scene.vellus.hair_scene = hair_scene
+    follow(blender_scene)
+
+
+def turn_off(blender_scene):
+    """Leave everything as it was before `turn_on`, but for what the artist has changed since."""
+    hair_scene = blender_scene.vellus.hair_scene
+    composite_nodes.remove(blender_scene)
+    blender_scene.vellus.hair_scene = None
+    for hair_object in _hair_objects(blender_scene):
+        curves_objects.show_again(hair_object)
+    if hair_scene is not None:
+        blender_scene.render.use_compositing = bool(hair_scene.get(_COMPOSITED, True))
+        if not any(other.vellus.hair_scene == hair_scene for other in bpy.data.scenes):
+            bpy.data.scenes.remove(hair_scene)
+    follow_all()  # hair of this scene may be in another that composites it
+
+
+def suspend():
+    """Let Cycles and EEVEE render hair themselves until `follow_all`: without the add-on nothing renders it."""
+    for blender_scene in bpy.data.scenes:
+        if blender_scene.vellus.hair_scene is not None and blender_scene.library is None:
+            composite_nodes.adjust(blender_scene, False, False)
+        for hair_object in _hair_objects(blender_scene):
+            curves_objects.show_again(hair_object)
+
+
+def follow_all():
+    """`follow` every scene of the file."""
+    for blender_scene in list(bpy.data.scenes):
+        follow(blender_scene)
+
+
+def follow(blender_scene):
+    """Bring the scene of the hair, the compositor and the hair's visibility up to date with a scene.
+
+    What is up to date is not written.
+    """
+    state = blender_scene.vellus
+    if state.hair_scene is None:
+        return
+    if state.hair_scene.background_set == blender_scene and blender_scene.library is None:
+        _bring_up_to_date(blender_scene, state.hair_scene)
+    for hair_object in _hair_objects(blender_scene):
+        curves_objects.hide_from_engines(hair_object, is_seen_by_rays=state.composite_shadow == "ENGINE")
+
+
+def needs_repair(blender_scene):
+    """Whether a scene's hair is rendered by the hair's scene of another, of which it is a copy, or by a deleted one."""
+    if blender_scene.library is not None:
+        return False
+    hair_scene = blender_scene.vellus.hair_scene
+    if hair_scene is None:
+        return composite_nodes.have_lost_scene(blender_scene)
+    return hair_scene.background_set != blender_scene
+
+
+def repair():
+    """Give copies of scenes a hair's scene of their own, and turn off where that was deleted.
+
+    Not within an update of a depsgraph or beside a render: it creates and removes datablocks.
+    """
+    for blender_scene in list(bpy.data.scenes):
+        if needs_repair(blender_scene):
+            if blender_scene.vellus.hair_scene is None:
+                turn_off(blender_scene)
+            else:
+                _separate(blender_scene)
+                follow(blender_scene)
+
+
+def refuse(hair_scene, sentence):
+    """Keep the error of a scene that was rendered, if it is the hair of another: Blender only prints it."""
+    if _is_of_another(hair_scene):
+        told = refused_cache.get(hair_scene.original.session_uid, list)
+        told += [] if sentence in told else [sentence]
+
+
+def refusals(blender_scene):
+    """Errors of the hair in the last render of a scene."""
+    hair_scene = blender_scene.vellus.hair_scene
+    return [] if hair_scene is None else refused_cache.get(hair_scene.session_uid) or []
+
+
+def _is_of_another(blender_scene):
+    return any(other.vellus.hair_scene == blender_scene.original for other in bpy.data.scenes)
+
+
+def is_in_sequence(blender_scene):
+    """Whether a scene is rendered as the hair of another in an animation, or without a window.
+
+    Blender does not tell the engine of a scene that the compositor has rendered that this is for an animation. Without
+    a window it cannot be known, and nothing has played.
+    """
+    if not _is_of_another(blender_scene):
+        return False
+    running = running_operators.found()
+    is_animation = any(one.bl_idname == "RENDER_OT_render" and one.properties.animation for one in running)
+    return is_animation or bpy.app.background
+
+
+def _separate(blender_scene):
+    """Part a copy of a scene from the hair's scene of the original: by one of its own, or none without nodes for it."""
+    state = blender_scene.vellus
+    of_original, state.hair_scene = state.hair_scene, None
+    if composite_nodes.are_of(blender_scene, of_original):
+        hair_scene = _new_hair_scene(blender_scene)
+        hair_scene[_COMPOSITED] = of_original.get(_COMPOSITED, True)
+        composite_nodes.lay_over(blender_scene, hair_scene)
+        state.hair_scene = hair_scene
+
+
+def _bring_up_to_date(blender_scene, hair_scene):
+    """Copy what a scene shares with its hair's scene, and adjust its nodes."""
+    state = blender_scene.vellus
+    is_ours = blender_scene.render.engine == viewport.ENGINE
+    _copy(blender_scene, hair_scene, _OF_SCENE)
+    _copy(blender_scene.render, hair_scene.render, _OF_RENDER)
+    _copy_shutter_curve(blender_scene.render.motion_blur_shutter_curve, hair_scene.render.motion_blur_shutter_curve)
+    _copy(state, hair_scene.vellus, [n for n in setting_properties.names_of(RenderSettings) if n not in _OWN])
+    _copy_cameras(blender_scene, hair_scene)
+    _copy_views(blender_scene.render.views, hair_scene.render.views)
+    composite_nodes.adjust(blender_scene, state.composite_shadow == "PASS", not is_ours)
+
+
+def _new_hair_scene(blender_scene):
+    hair_scene = bpy.data.scenes.new(f"{blender_scene.name} Hair")
+    hair_scene.background_set = blender_scene
+    hair_scene.render.engine, hair_scene.render.film_transparent = viewport.ENGINE, True
+    hair_scene.vellus.is_hair_only = True
+    view_layer = hair_scene.view_layers[0]
+    view_layer.use_pass_z = view_layer.vellus.has_hair_shadow = True
+    return hair_scene
+
+
+def _copy(source, target, names):
+    for name in names:
+        value = getattr(source, name)
+        if getattr(target, name) != value:
+            setattr(target, name, value)
+
+
+def _copy_shutter_curve(source, target):
+    """The points of a `CurveMapping` of one curve."""
+    wanted = _points_of(source)
+    if _points_of(target) == wanted:
+        return
+    points = target.curves[0].points
+    while len(points) < len(wanted):
+        points.new(0.5, 1.0)
+    while len(points) > len(wanted):
+        points.remove(points[1])  # ends cannot be removed
+    for point, (place, kind) in zip(points, wanted, strict=True):
+        point.location, point.handle_type = place, kind
+    target.update()
+
+
+def _points_of(mapping):
+    return [(tuple(point.location), point.handle_type) for point in mapping.curves[0].points]
+
+
+def _copy_cameras(blender_scene, hair_scene):
+    """Markers that change the camera."""
+    wanted = [(marker.frame, marker.camera) for marker in blender_scene.timeline_markers if marker.camera is not None]
+    if [(marker.frame, marker.camera) for marker in hair_scene.timeline_markers] != wanted:
+        hair_scene.timeline_markers.clear()
+        for frame, camera in wanted:
+            hair_scene.timeline_markers.new(camera.name, frame=frame).camera = camera
+
+
+def _copy_views(source, target):
+    """Which views a stereo picture has, and the cameras of each."""
+    wanted = [(view.name, view.use, view.camera_suffix) for view in source]
+    if [(view.name, view.use, view.camera_suffix) for view in target] == wanted:
+        return
+    for view in [view for view in target if view.name not in source]:
+        target.remove(view)
+    for name, is_used, suffix in wanted:
+        view = target.get(name) or target.new(name)
+        view.use, view.camera_suffix = is_used, suffix
+
+
+def _hair_objects(blender_scene):
+    """Objects of hair in a scene, and in collections that it has instances of."""
+    objects = {*blender_scene.objects}
+    objects |= {o for other in blender_scene.objects if other.instance_collection for o in _instanced(other)}
+    return [o for o in objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR"]
+
+
+def _instanced(instancer):
+    return instancer.instance_collection.all_objects

@@ -1,0 +1,234 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The render engine: surfaces and hair by the viewport's drawing code, at any resolution, also without a window."""
+
+import contextlib
+import time
+
+import bpy
+import numpy as np
+
+from ....core.errors import HairError
+from ....core.imaging import pixel_sampling
+from ....core.long_work import Stopped, no_progress
+from ...data import scene
+from ...data.pictures import camera_lens, panoramic_camera, view_cameras
+from ...gpu import drawing, world_texture
+from ...groom.dynamics import frame_folders
+from ...host import scene_time
+from ...settings import setting_properties
+from ...settings.translations import error_text, interface_text
+from .. import drawn_scene, film, light_paths, motion_vectors
+from ..viewport import rendered_view, viewport
+from . import composite
+from .panoramic_frame import PanoramicFrame
+from .tiled_frame import Frame
+
+NAME = viewport.ENGINE
+
+_CURVE_PARTS = 256  # that a shutter curve is read in, as by Cycles
+_TURN = 0.002  # [s] between passes, to let the window redraw
+
+
+_listener = no_progress  # an additional progress callback of renders, which may raise `Stopped`
+
+
+@contextlib.contextmanager
+def listening(progress):
+    """Report renders to progress(step, part) in a context; a render ends without a picture if that raises `Stopped`."""
+    global _listener
+    _listener = progress
+    try:
+        yield
+    finally:
+        _listener = no_progress
+
+
+class VellusRenderEngine(bpy.types.RenderEngine):
+    """Surfaces and hair shaded as in the viewport"""
+
+    bl_idname = NAME
+    bl_label = "Vellus"
+    bl_use_gpu_context = True
+    bl_use_eevee_viewport = True  # for Material Preview
+    bl_use_shading_nodes_custom = False
+
+    def update_render_passes(self, scene=None, renderlayer=None):
+        """Tell Blender which passes there will be: sockets of the compositor, layers of a multilayer file."""
+        for name in _passes(renderlayer, scene.render.use_motion_blur):
+            channels, kind = film.channels_of(name)
+            self.register_pass(scene, renderlayer, name, len(channels), channels, kind)
+
+    def view_update(self, context, depsgraph):
+        """Called by Blender after changes, which the handlers process."""
+
+    def view_draw(self, context, depsgraph):
+        """Draw a viewport with Rendered shading."""
+        try:
+            if rendered_view.draw(context):
+                self.tag_redraw()
+        except HairError as error:
+            self.error_set(error_text(error))
+
+    def render(self, depsgraph):
+        """Render a view layer in the depsgraph's frame."""
+        try:
+            self._render(depsgraph)
+        except HairError as error:
+            self._refuse(depsgraph.scene, error_text(error))
+        except KeyboardInterrupt:  # a script's
+            self._refuse(depsgraph.scene, interface_text("Canceled: nothing was rendered."))
+        except Exception as error:  # a bug must not produce a black picture as a result
+            self._refuse(depsgraph.scene, interface_text("Vellus could not render this: {error}", error=error))
+            raise
+
+    def _refuse(self, blender_scene, sentence):
+        self.report({"ERROR"}, sentence)
+        composite.refuse(blender_scene, sentence)
+
+    def _render(self, depsgraph):
+        blender_scene, view_layer = depsgraph.scene, depsgraph.view_layer
+        _require_supported(self.camera_override)
+        if self.is_animation or composite.is_in_sequence(blender_scene):
+            frame_folders.require_baked([scene_time.frame_of(blender_scene)])
+        size, window = scene.picture_size(blender_scene.render)
+        views = self._views(view_layer)
+        offsets = _offsets(blender_scene.render, blender_scene.vellus.motion_steps)
+        sample_count = view_layer.samples or blender_scene.vellus.sample_count
+        passes = _passes(view_layer, blender_scene.render.use_motion_blur)
+        film_settings = passes, blender_scene.render.film_transparent, blender_scene.render.filter_size
+        has_lens = camera_lens.read_lens(blender_scene, depsgraph, self.camera_override) is not None
+        lens_passes = -(-pixel_sampling.LENS_PASSES // len(offsets)) if has_lens else 1
+        path_count = -(-light_paths.path_count(blender_scene, size) // len(offsets))
+        film_settings = -(-sample_count // len(offsets)), *film_settings, lens_passes, path_count
+        frames = {view: self._frame(depsgraph, view, size, window, film_settings) for view in views}
+        others = self._others(depsgraph, size, views) if "Vector" in passes else {}
+        world_texture.check_image()
+        known, refused, done, in_all = {}, {}, 0, sum(frame.pass_count for frame in frames.values()) * len(offsets)
+        for index in scene_time.visit(blender_scene, offsets, self.frame_set):
+            said = interface_text("Motion step {number} of {count}", number=index + 1, count=len(offsets))
+            self.update_stats("", said)
+            with drawing.ALONE:
+                drawn = drawn_scene.read_render(depsgraph, known, refused.__setitem__)
+            for view, frame in frames.items():
+                with drawing.ALONE:
+                    camera = self._camera(depsgraph, view, size)
+                    lens = camera_lens.read_lens(blender_scene, depsgraph, self._camera_object(depsgraph, view))
+                    moving = None
+                    if others:
+                        now, (before, after) = motion_vectors.places(drawn, *camera), others[view]
+                        moving = motion_vectors.Motion(before, now, after, size)
+                for _pass in frame.expose(drawn, *camera, moving, lens):
+                    done += 1
+                    if not bpy.app.background:
+                        time.sleep(_TURN)
+                    self.update_progress(done / in_all)
+                    if self.test_break() or _is_stopped(done / in_all):
+                        return
+                if index + 1 == len(offsets) or not bpy.app.background:
+                    self._show(view_layer, view, window, frame.arrays())
+        # Last, so that there is a picture of everything else. A command that renders to a file fails: a picture
+        # without some of the hair is not a valid result.
+        for error in refused.values():
+            self._refuse(blender_scene, error_text(error))
+
+    def _views(self, view_layer):
+        """Names of the views of a stereo picture; of other pictures the empty name."""
+        result = self.begin_result(0, 0, 1, 1, layer=view_layer.name)
+        names = [view.name for view in result.views]
+        self.end_result(result, cancel=True)
+        return names or [""]
+
+    def _camera(self, depsgraph, view, size):
+        """(world to view, view to clip) of a view."""
+        camera, eye = self._camera_object(depsgraph, view), None
+        if view and camera is not None:
+            eye = self.camera_model_matrix(camera), self.camera_shift_x(camera)
+        return scene.read_camera(depsgraph.scene, depsgraph, *size, camera, eye)
+
+    def _camera_object(self, depsgraph, view):
+        """The evaluated camera of a view, None without one. The view is that of the engine from now on."""
+        if view:
+            self.active_view_set(view)
+        camera = self.camera_override or depsgraph.scene.camera
+        return camera and view_cameras.camera_of_view(depsgraph.scene, camera.original, view).evaluated_get(depsgraph)
+
+    def _frame(self, depsgraph, view, size, window, settings):
+        """What a view is rendered into."""
+        self._camera(depsgraph, view, size)  # raises an error if there is none
+        camera = self._camera_object(depsgraph, view)
+        shift = self.camera_shift_x(camera) if view and camera.type == "CAMERA" else None
+        panorama = panoramic_camera.read_panorama(depsgraph.scene, camera, size, shift)
+        if panorama is None:
+            return Frame(size, window, *settings)
+        if self.use_spherical_stereo(camera):
+            raise HairError("Vellus cannot render spherical stereo: turn off Spherical Stereo of the camera.")
+        if "Vector" in settings[1]:
+            raise HairError("Panoramic cameras have no motion vectors: turn off the pass Vector.")
+        clip = camera.data.clip_start, camera.data.clip_end
+        outside = 0.0 if depsgraph.scene.vellus.is_hair_only else 1.0
+        return PanoramicFrame(panorama, clip, outside, size, window, *settings)
+
+    def _others(self, depsgraph, size, views):
+        """Where everything is a frame before and a frame after: {view: [`motion.Places`]}."""
+        found = {view: [] for view in views}
+        for _index in scene_time.visit(depsgraph.scene, [-1.0, 1.0], self.frame_set):
+            with drawing.ALONE:
+                there = drawn_scene.read_unlit(depsgraph, {}, _unheard)
+                for view, places in found.items():
+                    places.append(motion_vectors.places(there, *self._camera(depsgraph, view, size)))
+        return found
+
+    def _show(self, view_layer, view, window, arrays):
+        """Pass the current picture of a view to Blender."""
+        result = self.begin_result(0, 0, *window[2:], layer=view_layer.name, view=view)
+        for render_pass in result.layers[0].passes:
+            if render_pass.name in arrays:
+                render_pass.rect.foreach_set(np.ascontiguousarray(arrays[render_pass.name]).ravel())
+        self.end_result(result)
+
+
+def _unheard(_datablock, _error):
+    """Hair that cannot be drawn is reported for the frame itself, not for those around it."""
+
+
+def _is_stopped(part):
+    try:
+        _listener("Rendering", part)
+    except Stopped:
+        return True
+    return False
+
+
+def _passes(view_layer, is_blurred):
+    """Names of the passes that are switched on. What is blurred already has no motion that could blur it."""
+    wanted = setting_properties.to_settings(view_layer.vellus, pixel_sampling.PassSettings)
+    names = ["Combined"]
+    if view_layer.use_pass_z:
+        names.append("Depth")
+    if view_layer.use_pass_vector and not is_blurred:
+        names.append("Vector")
+    if view_layer.use_pass_shadow:
+        names.append("Shadow")
+    if wanted.has_hair_mask:
+        names.append("Hair Mask")
+    if wanted.has_lobes:
+        names += film.LOBES
+    if wanted.has_hair_shadow:
+        names.append("Hair Shadow")
+    return names
+
+
+def _offsets(render, count):
+    """Of the moments that are rendered, from the frame [frames]."""
+    if not render.use_motion_blur or render.motion_blur_shutter <= 0.0:
+        return [0.0]
+    curve = render.motion_blur_shutter_curve
+    curve.initialize()
+    openings = [curve.evaluate(curve.curves[0], (part + 0.5) / _CURVE_PARTS) for part in range(_CURVE_PARTS)]
+    shutter, position = render.motion_blur_shutter, render.motion_blur_position
+    return pixel_sampling.moments(shutter, position, count, np.array(openings)).tolist()
+
+
+def _require_supported(camera):
+    if camera is not None and camera.type == "CAMERA" and camera.data.type not in {"PERSP", "ORTHO", "PANO"}:
+        raise HairError("Vellus renders perspective, orthographic and panoramic cameras: change the camera type.")

@@ -1,0 +1,61 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rendered frame of a panoramic camera: the faces of a cube around it, drawn as frames and resampled."""
+
+import numpy as np
+
+from ....core import imaging
+from .. import film
+from .tiled_frame import Frame
+
+
+class PanoramicFrame:
+    """As `Frame`, of a `Panorama`.
+
+    clip: (nearest, farthest) distance along each face's axis that is seen [m]; outside: opacity of the black around the
+    circle of a fisheye lens: one, as in Cycles, or zero for a picture that is laid over another.
+    """
+
+    def __init__(self, panorama, clip, outside, size, window, sample_count, passes, *settings):
+        self._lookup = imaging.panorama.FaceLookup(panorama, size, window)
+        self._clip, self._outside = clip, outside
+        side = (self._lookup.side, self._lookup.side)
+        self._faces = {
+            face: Frame(side, part, sample_count, passes, *settings) for face, part in self._lookup.windows.items()
+        }
+        self._passes = passes
+
+    @property
+    def pass_count(self):
+        """Number of passes per motion sample."""
+        return sum(frame.pass_count for frame in self._faces.values())
+
+    def expose(self, drawn, world_to_view, _view_to_clip, _motion=None, _lens=None):
+        """As of `Frame`, without motion vectors and depth of field."""
+        to_clip = _face_projection(self._lookup.half_width, *self._clip)
+        for face, frame in self._faces.items():
+            turn = np.eye(4)
+            turn[:3, :3] = imaging.panorama.FACES[face]
+            yield from frame.expose(drawn, turn @ world_to_view, to_clip)
+            frame.free_film()
+
+    def arrays(self):
+        """As of `Frame`; depths are distances from the camera."""
+        found = {face: frame.arrays() for face, frame in self._faces.items()}
+        return {
+            name: self._array(name, {face: arrays[name] for face, arrays in found.items()}) for name in self._passes
+        }
+
+    def _array(self, name, pictures):
+        if name == "Depth":
+            return self._lookup.distances(pictures, film.FAR)
+        unseen = {"Combined": (0.0, 0.0, 0.0, self._outside), "Hair Mask": (0.0,), "Hair Shadow": (1.0, 1.0, 1.0)}
+        return self._lookup.means(pictures, unseen.get(name, (0.0, 0.0, 0.0)))
+
+
+def _face_projection(half_width, near, far):
+    """(4, 4) view to clip of a square face; half_width: the tangent of half its angle."""
+    matrix = np.zeros((4, 4))
+    matrix[0, 0] = matrix[1, 1] = 1.0 / half_width
+    matrix[2, 2:] = (far + near) / (near - far), 2.0 * far * near / (near - far)
+    matrix[3, 2] = -1.0
+    return matrix

@@ -1,0 +1,76 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A rendered frame: the mean over its motion samples, by tiles and passes."""
+
+import numpy as np
+
+from ....core.imaging import pixel_sampling
+from ...gpu import drawing
+from .. import film, light_paths
+
+
+class Frame:
+    """Arrays {pass: (height, width, channels) float32} of a window of a picture, first row at the bottom.
+
+    size: (width, height) of the whole picture [pixels]; window: (left, bottom, width, height) of what is rendered;
+    sample_count: of a pixel in each moment; passes, is_transparent, filter_width: of `film.Film`; lens_passes: how many
+    passes a moment has at least, for depth of field; path_count: of paths through the grid of light in each, 0: none.
+    """
+
+    def __init__(
+        self, size, window, sample_count, passes, is_transparent, filter_width=0.0, lens_passes=1, path_count=0
+    ):
+        self._size, self._window, self._path_count = size, window, path_count
+        self._per_side = pixel_sampling.samples_per_side(sample_count, lens_passes)
+        self._turns = sample_count // self._per_side**2
+        self._tiles = pixel_sampling.tiles(window, film.largest_tile(self._per_side, filter_width))
+        self._new_film = lambda tile: film.Film(tile[2:], self._per_side, passes, is_transparent, filter_width)
+        self._film, self._moment_count, self._sums = None, 0, {}
+
+    @property
+    def pass_count(self):
+        """Number of passes per motion sample."""
+        return len(self._tiles) * self._turns
+
+    def expose(self, drawn, world_to_view, view_to_clip, motion=None, lens=None):
+        """Draw a moment: a generator that yields after each pass, so that whoever draws may stop.
+
+        drawn: `DrawnScene`; world_to_view, view_to_clip: (4, 4); motion: for the pass "Vector"; lens: `Lens`, None: all
+        in focus.
+        """
+        drawn = light_paths.with_grid(drawn, world_to_view, view_to_clip, self._path_count, self._moment_count)
+        for tile in self._tiles:
+            if self._film is None or self._film.size != tile[2:]:
+                self._film = self._new_film(tile)
+            self._film.clear()
+            self._film.motion = motion
+            for turn in range(self._turns):
+                with drawing.ALONE:
+                    turns_before = self._moment_count * self._turns
+                    self._film.add_pass(
+                        drawn, world_to_view, view_to_clip, self._size, turns_before + turn, tile[:2], lens
+                    )
+                yield
+            with drawing.ALONE:
+                self._add(tile, self._film.read())
+        self._moment_count += 1
+
+    def free_film(self):
+        """Free the memory of the graphics card, until the next moment is drawn."""
+        self._film = None
+
+    def _add(self, tile, arrays):
+        left, bottom, width, height = tile
+        left, bottom = left - self._window[0], bottom - self._window[1]
+        for name, values in arrays.items():
+            if name not in self._sums:
+                shape = (self._window[3], self._window[2], values.shape[-1])
+                self._sums[name] = np.full(shape, film.FAR if name == "Depth" else 0.0, np.float32)
+            part = self._sums[name][bottom : bottom + height, left : left + width]
+            if name == "Depth":
+                np.minimum(part, values, out=part)
+            else:
+                part += values
+
+    def arrays(self):
+        """The mean over the moments so far; the nearest depths."""
+        return {n: a if n == "Depth" else a / np.float32(self._moment_count) for n, a in self._sums.items()}

@@ -1,0 +1,168 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A viewport's picture of hair: linear light, refined pass by pass while nothing moves."""
+
+import functools
+
+import gpu
+import numpy as np
+
+from ...gpu import drawing, shaders
+from ...gpu.visibility_buffer import VisibilityBuffer
+from .. import scene_drawing
+from . import picture_detail
+from .history import History
+
+SAMPLE_COUNT = 32  # of a pixel, in all passes of a picture
+
+
+def samples_per_side():
+    """Samples per pixel side in each pass: fewer with software rendering, for responsiveness."""
+    return 1 if gpu.platform.device_type_get() == "SOFTWARE" else 2
+
+
+class HairPicture:
+    """The mean of passes, each of which samples other places of the pixels and takes other samples of thin strands.
+
+    Light is premultiplied with the part of a pixel that hair covers. per_side: samples along each side of a pixel in a
+    pass, by default as many as the machine is fit for; small hair has more.
+    """
+
+    def __init__(self, size, per_side=None):
+        self.size = size  # [pixels]
+        self.per_side = per_side or samples_per_side()
+        self.pass_count = self._first_turn = 0
+        self._detail = picture_detail.whole(size, self.per_side)
+        self._history = History(self.size)
+        self._view = None  # record of the last pass
+        self._pass = VisibilityBuffer(*self._detail.buffer_size)
+        self._color = gpu.types.GPUTexture(self.size, format="RGBA16F")
+        self._depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+        self._sum = gpu.types.GPUFrameBuffer(color_slots=self._color, depth_slot=self._depth)
+
+    @property
+    def is_fine(self):
+        """Whether another pass would change nothing that is seen."""
+        return self.pass_count >= self._pass_total
+
+    @property
+    def _pass_total(self):
+        return -(-SAMPLE_COUNT // self._detail.per_side**2)
+
+    def restart(self, is_moved=False):
+        """Start another picture; is_moved: of the same things from elsewhere, or elsewhere."""
+        if is_moved:
+            self._history.turn((self._color, self.pass_count), self.pass_count / self._pass_total)
+            self._first_turn += self.pass_count
+        else:
+            self._history.forget()
+            self._first_turn = 0
+        self.pass_count = 0
+
+    def add_pass(self, drawn, world_to_view, view_to_clip, is_see_through=False, outline=None, is_shadowed=False):
+        """Draw a `DrawnScene` once more.
+
+        world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not hide hair; outline: a `HairOutline` that
+        takes part in it until it is fine; is_shadowed: whether it darkens surfaces by the shadow of hair.
+        """
+        camera, turn = (world_to_view, view_to_clip), self._first_turn + self.pass_count
+        if self.pass_count == 0:
+            view, is_lit = self._view, is_shadowed and not is_see_through
+            relight = functools.partial(scene_drawing.relight_viewport, drawn, view, self._pass, is_lit)
+            self._history.follow_light(drawn, camera, self._pass, relight)
+            self._choose_detail(drawn, camera, is_shadowed)
+        self._view = view = self._detail.pass_record(camera, self.size, turn)
+        is_outlined = outline is not None and not outline.is_fine
+        if is_outlined:
+            outline.add_pass(drawn, view, self._pass, self._detail)
+        has_shadow = is_shadowed and not is_see_through
+        with self._pass.surfaces() if has_shadow else self._pass.hiding():
+            if has_shadow:
+                scene_drawing.draw_viewport_shadow(drawn, view)
+            elif not is_see_through:
+                scene_drawing.draw_hiding(drawn, view)
+        scene_drawing.draw_hair(drawn, view, self._pass, is_viewport=True)
+        if is_outlined:
+            outline.add_seen(self._pass, self._detail)
+        with self._sum.bind():
+            if self.pass_count == 0:
+                self._sum.clear(color=(0.0, 0.0, 0.0, 0.0), depth=1.0)
+            self._accumulate()
+        self.pass_count += 1
+        part_left = 1.0 - self.pass_count / self._pass_total
+        light = self._color, self.pass_count
+        samples = self._pass, self._detail
+        self._history.add(drawn, camera, view, samples, light, self.pass_count, part_left, is_shadowed)
+
+    def _choose_detail(self, drawn, camera, is_shadowed):
+        """Sample small hair finely, unless shadows on surfaces, which may be anywhere, are in the picture."""
+        detail = picture_detail.whole(self.size, self.per_side)
+        if not is_shadowed:
+            detail = picture_detail.of_hair(drawn, camera, self.size, self.per_side)
+        self._detail = detail
+        if self._pass.size != detail.buffer_size:
+            self._pass = VisibilityBuffer(*detail.buffer_size)
+
+    def _accumulate(self):
+        program = shaders.accumulate_program()
+        program.bind()
+        program.uniform_int("samples_per_side", self._detail.per_side)
+        program.uniform_int("first_place", self._detail.corner)
+        program.uniform_sampler("picture", self._pass.color)
+        program.uniform_sampler("depths", self._pass.depths)
+        program.uniform_sampler("surface_depth", self._pass.surface_depth)
+        # Light is additive; of depths the nearest is kept.
+        for weight, depth_test in ((1.0, "NONE"), (0.0, "LESS_EQUAL")):
+            program.uniform_float("weight", weight)
+            with drawing.gpu_state(depth_test, depth_writes=depth_test != "NONE", blend="ADDITIVE_PREMULT"):
+                drawing.cover(program)
+
+    def show(self, display_table, exposure, opacity=1.0, depth_test="LESS_EQUAL"):
+        """Lay the picture over the viewport that is bound.
+
+        display_table: texture of a `DisplayTransform`'s table; exposure: what light is multiplied by; depth_test:
+        against what the viewport holds.
+        """
+        program = shaders.display_program()
+        x, y, _width, _height = gpu.state.viewport_get()
+        program.bind()
+        program.uniform_float("origin", (x, y))
+        program.uniform_float("exposure", exposure)
+        program.uniform_float("opacity", opacity)
+        carried = self._history.picture
+        program.uniform_int("pass_count", self.pass_count if carried is None else 1)
+        program.uniform_sampler("passes", self._color if carried is None else carried)
+        program.uniform_sampler("depths", self._depth)
+        program.uniform_sampler("display_table", display_table)
+        # Its depth is not written: surfaces occlude guides, the hair around them does not.
+        with drawing.gpu_state(depth_test, depth_writes=False, blend="ALPHA_PREMULT"):
+            drawing.cover(program)
+
+    def hair_at(self, x, y):
+        """Which of the hair is seen at a pixel, counted from 0; None where there is none within the pixel."""
+        left, bottom, width, height = self._detail.tile
+        if not (left <= x < left + width and bottom <= y < bottom + height):
+            return None
+        side = self._detail.per_side
+        places = [(side * (x - left) + i, side * (y - bottom) + j) for j in range(side) for i in range(side)]
+        return next((found for place in places if (found := self._pass.hair_at(*place)) is not None), None)
+
+    def read(self):
+        """(height, width, 4) float32: premultiplied linear light, first row at the bottom."""
+        pixels = self._sum.read_color(0, 0, *self.size, 4, 0, "FLOAT")
+        return np.array(pixels, np.float32).reshape(self.size[1], self.size[0], 4) / self.pass_count
+
+    def read_shown(self):
+        """The same of what `show` shows, which may hold some of what was shown before something moved."""
+        return self.read() if self._history.picture is None else self._history.read()
+
+
+def table_texture(table):
+    """(N, N, N, 3) float32, the last axis but one running along x → a texture between whose texels colours blend."""
+    size = len(table)
+    texels = np.ones((size, size, size, 4), np.float32)
+    texels[..., :3] = table
+    data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+    texture = gpu.types.GPUTexture((size, size, size), format="RGBA16F", data=data)
+    texture.filter_mode(True)
+    texture.extend_mode("EXTEND")
+    return texture

@@ -1,0 +1,202 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""What a viewport showed before: it takes part in its next pictures, so that few samples flicker less.
+
+When something moves, the picture that was shown is carried to where its contents are now, and blended with the passes
+of the new one. It counts for less with each pass, and for nothing in the last one: a picture at rest is the mean of its
+own passes. Where the two disagree by more than noise it counts for less from the start [Karis14] [Yang20].
+"""
+
+from dataclasses import dataclass
+
+import gpu
+import numpy as np
+
+from ...gpu import drawing, history_programs, strand_textures, uniforms
+from .. import motion_vectors
+
+_COLOR, _PASSES = "RGBA16F", "R16F"
+
+# Passes that the picture before may be worth: of the same strands, and of others, with which noise would hide a change.
+_MOST_PASSES, _MOST_OF_OTHERS = 24.0, 2.0
+_MOST_OF_STILL = 96.0  # where nothing but lights has moved: it is not blurred, and only light may lag
+
+
+class _Targets:
+    """Textures and their framebuffer, which does not own them."""
+
+    def __init__(self, size, formats, is_smooth):
+        self.size = size
+        self.textures = [gpu.types.GPUTexture(size, format=one) for one in formats]
+        for texture in self.textures:
+            texture.filter_mode(is_smooth)
+            texture.extend_mode("EXTEND")
+            texture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0))
+        self._framebuffer = gpu.types.GPUFrameBuffer(color_slots=tuple(self.textures))
+
+    def fill(self, program, samplers, **constants):
+        """Run a program on every texel; constants: numbers."""
+        with self._framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
+            with drawing.bound(program, {}, samplers):
+                for name, value in constants.items():
+                    program.uniform_float(name, value)
+                drawing.cover(program)
+
+    def draw(self, batch, program, samplers, blocks):
+        """Draw a batch over nothing; blocks: {instance: record}."""
+        blocks = {name: uniforms.uniform_buffer(record) for name, record in blocks.items()}
+        with self._framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False):
+            self._framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0))
+            with drawing.bound(program, blocks, samplers):
+                batch.draw(program)
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a picture was of."""
+
+    looks: tuple  # `Shading`s of all hair: pictures of one history have the same ones
+    places: motion_vectors.Places
+    world_to_clip: np.ndarray
+
+    def is_still(self, other):
+        """Whether nothing but lights differs from other `_Seen` hair."""
+        return (
+            np.array_equal(self.world_to_clip, other.world_to_clip)
+            and _are_same(self.looks, other.looks)
+            and self.places.has_still_hair(other.places)
+            and self.places.has_still_surfaces(other.places)
+        )
+
+
+def _seen(drawn, camera):
+    """`_Seen` of a `DrawnScene` from a camera (world to view, view to clip)."""
+    # Of hair that is wet in places, which may be mixed in other ways than before.
+    looks = tuple(layer for _strands, shading, *_ in drawn.hair for layer, _mix in shading.layers)
+    return _Seen(looks, motion_vectors.places(drawn, *camera), camera[1] @ camera[0])
+
+
+class History:
+    """What a picture of size (width, height) [pixels] showed before."""
+
+    def __init__(self, size):
+        self.size = size
+        self._shown = self._before = None  # _Targets: the picture, and how many passes it is worth
+        self._carried = self._blocks = self._block_batch = None
+        self._seen = None
+        self._is_carried = False
+        self._relit = None  # _Targets: blocks of samples in the light before, and in the light now
+        self._is_relit = False
+
+    @property
+    def picture(self):
+        """The texture to be shown in place of the passes, or None."""
+        return self._shown.textures[0] if self._is_carried else None
+
+    def read(self):
+        """(height, width, 4) float32 of `picture`, first row at the bottom."""
+        return np.array(self.picture.read(), np.float32).reshape(self.size[1], self.size[0], 4)
+
+    def forget(self):
+        """Start without what was shown before."""
+        self._seen, self._is_carried = None, False
+
+    def turn(self, light, part_done):
+        """Keep what is shown, as something has moved; light: as for `add`; part_done: of all passes, those in it."""
+        if self._seen is None or not part_done:
+            return
+        if self._shown is None:
+            self._allocate()
+        if not self._is_carried:
+            self._mix(light, part_done * _MOST_OF_STILL, 0.0)
+        self._shown, self._before = self._before, self._shown
+
+    def _allocate(self):
+        formats = (_COLOR, _PASSES)
+        self._shown, self._before, self._carried = (_Targets(self.size, formats, True) for _ in range(3))
+        blocks = tuple(-(-length // history_programs.BLOCK_SIDE) for length in self.size)
+        self._blocks = [_Targets(blocks, (_COLOR, _COLOR), True) for _ in range(2)]
+        self._block_batch = strand_textures.bare_vertices(6 * blocks[0] * blocks[1], "TRIS")
+
+    def follow_light(self, drawn, camera, buffer, relight):
+        """Find how the light of the last pass changes with a `DrawnScene`, where nothing but lights has moved.
+
+        camera: its (world to view, view to clip); buffer: `VisibilityBuffer` of that pass; relight: returns a texture
+        of its samples in the light of the scene.
+        """
+        self._is_relit = self._seen is not None and self._seen.is_still(_seen(drawn, camera))
+        if not self._is_relit:
+            return
+        size = tuple(-(-length // history_programs.BLOCK_SIDE) for length in buffer.size)
+        if self._relit is None or self._relit[0].size != size:
+            self._relit = [_Targets(size, (_COLOR, _COLOR), True) for _ in range(2)]
+        program = history_programs.blocks_program()
+        self._relit[0].fill(program, {"picture": buffer.color}, weight=1.0)
+        self._relit[1].fill(program, {"picture": relight()}, weight=1.0)
+
+    def add(self, drawn, camera, view, samples, light, pass_count, part_left, has_lit_surfaces=False):
+        """Take note of a pass, the pass_count-th of a picture.
+
+        drawn: the `DrawnScene`; camera: its (world to view, view to clip); view: record of the pass; samples: its
+        `VisibilityBuffer`, and the `picture_detail.Detail` that this has; light: (texture, weight) of the passes so
+        far, their sum and what to divide it by; part_left: of all passes, those that are still to come;
+        has_lit_surfaces: whether surfaces, or shadows on them, are in it.
+        """
+        if pass_count == 1:
+            self._turn_to(drawn, camera, view, samples, light, has_lit_surfaces)
+        if self._is_carried:
+            self._is_carried = part_left > 0.0
+        if self._is_carried:
+            self._mix(light, pass_count, part_left)
+
+    def _turn_to(self, drawn, camera, view, samples, light, has_lit_surfaces):
+        before, self._seen = self._seen, _seen(drawn, camera)
+        self._is_carried = before is not None and _are_same(before.looks, self._seen.looks)
+        if self._is_carried:
+            self._carry(before, drawn, view, samples, light, has_lit_surfaces)
+
+    def _carry(self, before, drawn, view, samples, light, has_lit_surfaces):
+        now, (buffer, detail) = self._seen, samples
+        record = uniforms.HISTORY.record()
+        record["now_to_before"] = (before.world_to_clip @ np.linalg.inv(now.world_to_clip)).T
+        record["size"][:2], record["samples_per_side"] = self.size, detail.per_side
+        record["first_column"], record["first_row"] = detail.corner
+        record["has_surface_motion"] = has_surfaces = not now.places.has_still_surfaces(before.places)
+        record["has_hair_motion"] = has_hair = not now.places.has_still_hair(before.places)
+        has_same_strands = now.places.has_same_strands(before.places)
+        record["most_passes"] = _MOST_PASSES if has_same_strands else _MOST_OF_OTHERS
+        record["is_still"], record["has_lit_surfaces"] = self._is_relit, has_lit_surfaces
+        if record["is_still"]:
+            record["most_passes"] = _MOST_OF_STILL
+        motion = light[0]
+        if has_hair or has_surfaces:
+            steps = motion_vectors.Motion(before.places, now.places, now.places, self.size)
+            motion = motion_vectors.draw(drawn, steps, view, buffer, has_surfaces)
+        program = history_programs.blocks_program()
+        for blocks, of in zip(self._blocks, ((self._before.textures[0], 1.0), light), strict=True):
+            blocks.fill(program, {"picture": of[0]}, weight=of[1])
+        (before_blocks, now_blocks), (picture, passes) = self._blocks, self._before.textures
+        samplers = {
+            "before": picture,
+            "before_passes": passes,
+            "before_mean": before_blocks.textures[0],
+            "before_deviation": before_blocks.textures[1],
+            "now_mean": now_blocks.textures[0],
+            "now_deviation": now_blocks.textures[1],
+            "motion": motion,
+            "light_before": (self._relit or self._blocks)[0].textures[0],
+            "light_now": (self._relit or self._blocks)[1].textures[0],
+            "depths": buffer.nearest_depths(),
+            "segments": buffer.segments,
+        }
+        self._carried.draw(self._block_batch, history_programs.carry_program(), samplers, {"history": record})
+
+    def _mix(self, light, pass_count, part_left):
+        sums, weight = light
+        carried, passes = self._carried.textures
+        samplers = {"sums": sums, "carried": carried, "carried_passes": passes}
+        program = history_programs.mix_program()
+        self._shown.fill(program, samplers, weight=weight, pass_count=float(pass_count), part_left=part_left)
+
+
+def _are_same(looks, others):
+    return len(looks) == len(others) and all(look is other for look, other in zip(looks, others, strict=True))

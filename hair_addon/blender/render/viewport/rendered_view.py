@@ -1,0 +1,33 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Viewports with Rendered shading: surfaces and hair, refined pass by pass while nothing moves."""
+
+from ...data.pictures import camera_lens
+from ...gpu import drawing
+from . import hair_picture, region_pictures, viewport
+from .view_film import ViewFilm
+
+
+def draw(context):
+    """Draw the context's viewport; returns whether another pass would make it finer."""
+    with drawing.ALONE:
+        drawn, camera = viewport.drawn_scene_of(context), viewport.matrices_of(context.region_data)
+        lens = _lens(context)
+        per_side = 1 if lens is not None else hair_picture.samples_per_side()
+        options = per_side, context.scene.render.film_transparent
+        kept = region_pictures.picture_of(context.region, ViewFilm, *options)
+        film = kept.picture
+        if kept.turn_to(drawn, (*map(float, (*camera[0].ravel(), *camera[1].ravel())), lens)):
+            film.restart(is_moved=True)
+        if not film.is_fine:
+            film.add_pass(drawn, *camera, lens)
+        film.show()
+        return not film.is_fine
+
+
+def _lens(context):
+    """The `Lens` that a viewport looks through: that of the camera, where it is seen through one."""
+    space, region_view = context.space_data, context.region_data
+    if region_view.view_perspective != "CAMERA":
+        return None
+    camera = space.camera if space.use_local_camera else context.scene.camera
+    return camera_lens.read_lens(context.scene, context.evaluated_depsgraph_get(), camera)

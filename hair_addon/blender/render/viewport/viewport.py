@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The draw handler: hair and guides in every 3-D viewport, after Blender's own drawing.
+
+Hair is drawn into a picture of its own and laid over the viewport through the scene's view transform. Surfaces hide it
+in that picture, sample by sample: what the viewport itself holds as depth is up to date only while overlays are drawn.
+While nothing moves the picture is refined, and then only composited.
+"""
+
+from dataclasses import dataclass
+
+import bpy
+import numpy as np
+
+from ....core.errors import HairError
+from ...data import scene
+from ...data.strands import curves_objects
+from ...gpu import drawing, shaders
+from ...gpu.display_transform import DisplayTransform
+from ...groom import bindings, paused_hair
+from ...host import scene_time
+from ...host.caches import Cache
+from ...host.engines import ENGINE
+from ...host.notices import say
+from ...materials import looks
+from .. import drawn_scene, hair_cache
+from . import hair_picture, region_pictures, selected_hair
+from .outline import HairOutline
+
+# Pixels: guides are lines of constant width.
+_GUIDE_WIDTH = 2.0
+
+_handles = []  # of draw handlers
+
+view_cache = Cache()  # pointer of a viewport → _View
+display_table_cache = Cache(capacity=4)  # DisplayTransform → texture
+
+
+@dataclass
+class _View:
+    """What a viewport draws until something moves."""
+
+    shows: tuple  # what it may leave out
+    drawn: drawn_scene.DrawnScene | None = None
+    outdated: drawn_scene.DrawnScene | None = None  # from before hair changed, and nothing else
+    former: drawn_scene.DrawnScene | None = None  # from before anything changed
+    is_playing: bool = False  # whether it was read while the animation played, or something moved a surface
+
+
+def register():
+    """Start drawing in every 3-D viewport that there is."""
+    _handles.append(bpy.types.SpaceView3D.draw_handler_add(draw, (), "WINDOW", "POST_VIEW"))
+
+
+def unregister():
+    """Stop drawing, and leave hair and guides to Blender's own drawing."""
+    for datablock in bpy.data.hair_curves:
+        if datablock.vellus.kind != "NONE":
+            curves_objects.draw_natively(datablock, True)
+    while _handles:
+        bpy.types.SpaceView3D.draw_handler_remove(_handles.pop(), "WINDOW")
+
+
+def invalidate(is_hair_only=False):
+    """Something moved: read the scene again with the next redraw. is_hair_only: all but hair is as it was."""
+    for view in view_cache.values():
+        view.former = view.drawn or view.former
+        view.outdated = (view.drawn or view.outdated) if is_hair_only else None
+        view.drawn = None
+
+
+def draw():
+    """Draw the context's viewport. Only changes are uploaded to the GPU.
+
+    Errors of hair must not prevent drawing the viewport: they are reported once, and the hair is skipped.
+    """
+    context = bpy.context
+    with drawing.ALONE:
+        _draw(context)
+
+
+def _draw(context):
+    try:
+        if context.space_data.shading.type == "RENDERED":  # there the render engine draws hair by itself
+            _draw_outline(context)
+        else:
+            _draw_hair(context)
+        if context.space_data.overlay.show_overlays:
+            _draw_guides(context)
+    except HairError as error:
+        say(str(error))
+
+
+def _draw_hair(context):
+    viewport, region = context.space_data, context.region
+    drawn = drawn_scene_of(context)
+    if not drawn.hair:
+        return
+    xray = _xray(viewport.shading)
+    outlined = selected_hair.outlined(context, drawn, is_see_through=xray is not None)
+    is_shadowed = viewport.shading.type == "MATERIAL" and context.scene.vellus.has_preview_shadow
+    kept = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed)
+    kept.picture.show(
+        _display_table(DisplayTransform.of(context.scene)),
+        2.0**context.scene.view_settings.exposure,
+        1.0 if xray is None else xray,
+        "LESS_EQUAL" if viewport.overlay.show_overlays and xray is None else "ALWAYS",
+    )
+    if kept.outline is not None:
+        kept.outline.show()
+    # At rest, the programs that the next edit needs are compiled: one a redraw, as each may take a second.
+    if not kept.picture.is_fine or hair_cache.prepare_makers():
+        region.tag_redraw()
+
+
+def _draw_outline(context):
+    """Draw the outline of selected hair over a render engine's picture."""
+    region, wanted = context.region, None
+    if selected_hair.may_be_outlined(context):
+        drawn = drawn_scene_of(context)
+        wanted = selected_hair.outlined(context, drawn)
+    if wanted is None:
+        region_pictures.drop_picture(region, selected_hair.LoneOutline)
+        return
+    kept = region_pictures.picture_of(region, selected_hair.LoneOutline)
+    outline, matrices = kept.picture, matrices_of(context.region_data)
+    if kept.turn_to(drawn, (wanted, *(tuple(map(float, matrix.ravel())) for matrix in matrices))):
+        outline.restart(dict(wanted[0]), wanted[1])
+    if not outline.is_fine:
+        outline.add_pass(drawn, *matrices)
+    outline.show()
+    if not outline.is_fine:
+        region.tag_redraw()
+
+
+def is_ours(context):
+    """Whether all of a viewport is drawn by our render engine."""
+    return context.space_data.shading.type == "RENDERED" and context.scene.render.engine == ENGINE
+
+
+def hair_at(context, x, y):
+    """The hair object that the context's viewport shows at a pixel of its region, or None."""
+    kept = region_pictures.known_picture(context.region, hair_picture.HairPicture)
+    width, height = kept.picture.size if kept else (0, 0)
+    if context.space_data.shading.type == "RENDERED" or not (0 <= x < width and 0 <= y < height):
+        return None
+    view = view_cache.get(context.space_data.as_pointer())
+    if view is None or kept.drawn is not view.drawn:
+        return None  # the picture is outdated and about to be redrawn
+    index = kept.picture.hair_at(x, y)
+    uid = None if index is None else kept.drawn.owners[index]
+    return next((o for o in context.view_layer.objects if o.session_uid == uid), None)
+
+
+def drawn_scene_of(context):
+    """The `DrawnScene` of the context's viewport, read if something has moved."""
+    viewport = context.space_data
+    key, shows = viewport.as_pointer(), (is_ours(context), *_what_shows(viewport))
+    view = view_cache.get(key)
+    if view is None or view.shows != shows:  # what one viewport leaves out is no change of the scene
+        view = view_cache.keep(key, _View(shows))
+    is_playing = scene_time.is_playing() or paused_hair.is_any()
+    if view.is_playing and not is_playing and view.drawn is not None:  # refined at rest
+        view.outdated, view.drawn = view.drawn, None
+    if view.drawn is None:
+        before, view.outdated = view.outdated, None
+        former, view.former = view.former, None
+        view.is_playing = is_playing
+        view.drawn = drawn_scene.read(
+            context.scene,
+            context.view_layer,
+            context.evaluated_depsgraph_get(),
+            viewport,
+            hair_cache.refuse,
+            before=before,
+            is_draft=bindings.has_unwritten(),
+            is_hair_only=not is_ours(context),
+            former=former if is_playing else None,
+        )
+        if view.drawn.hair:
+            hair_cache.choose_makers()
+    return view.drawn
+
+
+def _what_shows(viewport):
+    """Key of what a viewport shows, and of what is needed to show it."""
+    return (
+        viewport.shading.type == "MATERIAL",
+        viewport.local_view is not None,
+        viewport.use_local_collections,
+        viewport.show_object_viewport_mesh,
+        viewport.show_object_viewport_curves,
+    )
+
+
+def _xray(shading):
+    """Opacity of the X-ray view, from 0 to 1; None if surfaces occlude."""
+    if shading.type == "WIREFRAME":
+        return shading.xray_alpha_wireframe if shading.show_xray_wireframe else None
+    return shading.xray_alpha if shading.type == "SOLID" and shading.show_xray else None
+
+
+def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=False):
+    """The `RegionPicture` of a region, of this scene and view: restarted, with another pass, or unchanged.
+
+    outlined: as `selected_hair.outlined` returns it; is_shadowed: as for `HairPicture.add_pass`.
+    """
+    kept = region_pictures.picture_of(region, hair_picture.HairPicture)
+    options = is_see_through, is_shadowed
+    is_moved = kept.seen[:2] == options
+    seen = (*options, outlined, *map(tuple, view.view_matrix), *map(tuple, view.window_matrix))
+    if kept.turn_to(drawn, seen):
+        kept.picture.restart(is_moved)
+        if outlined is None:
+            kept.outline = None
+        else:
+            kept.outline = kept.outline or HairOutline(kept.picture.size)
+            kept.outline.restart(dict(outlined[0]), outlined[1])
+    if not kept.picture.is_fine:
+        kept.picture.add_pass(drawn, *matrices_of(view), is_see_through, kept.outline, is_shadowed)
+    return kept
+
+
+def matrices_of(view):
+    """(world to view, view to clip) of a `RegionView3D`, each (4, 4) float64."""
+    return np.array(view.view_matrix, np.float64), np.array(view.window_matrix, np.float64)
+
+
+def _display_table(transform):
+    return display_table_cache.get(transform, lambda: hair_picture.table_texture(transform.table()))
+
+
+def _draw_guides(context):
+    viewport = context.space_data
+    guide_objects = [o for o in scene.curves_objects(context.view_layer, "GUIDES", viewport) if _is_guide_shown(o)]
+    if guide_objects:
+        lights = drawn_scene_of(context).lights
+        view = drawing.view_record(*matrices_of(context.region_data), context.region.height, _GUIDE_WIDTH)
+        for guide_object in guide_objects:
+            _draw_guide_object(guide_object, view, lights)
+
+
+def _is_guide_shown(guide_object):
+    return guide_object.select_get() or guide_object.mode != "OBJECT" or looks.are_guides_shown(guide_object.data)
+
+
+def _draw_guide_object(guide_object, view, lights):
+    try:
+        guides = hair_cache.strands_on_gpu(guide_object.data)
+    except HairError as error:
+        hair_cache.refuse(guide_object.data, error)
+        return
+    if guides is not None:
+        program = shaders.strip_program("guides.frag")
+        with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+            drawing.draw_strands(guides, program, view, lights, np.array(guide_object.matrix_world, np.float64))

@@ -1,0 +1,262 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Viewports in which something moves: steady pictures, without what is no longer there."""
+
+import bpy
+import numpy as np
+import pytest
+from scipy.ndimage import binary_dilation
+
+from hair_addon.blender.data import scene
+from hair_addon.blender.gpu import drawing, strand_textures
+from hair_addon.blender.gpu.visibility_buffer import VisibilityBuffer
+from hair_addon.blender.render import drawn_scene, hair_cache, motion_vectors, scene_drawing
+from hair_addon.blender.render.viewport import hair_picture, view_film
+from tests.support.reading import points, write_points
+from tests.support.scenes import even_guides
+
+SIZE = 80
+FRAMES, WARM_UP = 4, 2
+
+
+def read_drawn():
+    bpy.context.view_layer.update()
+    return drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+
+
+def camera():
+    return scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), SIZE, SIZE)
+
+
+def new_picture(kind, size=SIZE):
+    if kind == "HAIR":
+        return hair_picture.HairPicture((size, size), 1)
+    return view_film.ViewFilm((SIZE, SIZE), 1, is_transparent=True)
+
+
+def move(picture, drawn, view):
+    """What a viewport shows of the first pass after something moved."""
+    picture.restart(is_moved=True)
+    picture.add_pass(drawn, *view)
+    return picture.read_shown()
+
+
+def rest(picture, drawn, view):
+    while not picture.is_fine:
+        picture.add_pass(drawn, *view)
+    return picture.read()
+
+
+def turn_object(degrees):
+    bpy.data.objects["Sphere"].rotation_euler.z = np.radians(degrees)
+
+
+def turn_camera(degrees):
+    angle = np.radians(degrees)
+    bpy.context.scene.camera.location = 6.0 * np.array([np.sin(angle), -np.cos(angle), 0.0])
+    bpy.context.scene.camera.rotation_euler.z = angle
+
+
+def turn_light(degrees):
+    bpy.data.objects["Sun"].rotation_euler = (0.9, 0.0, np.radians(2.0 * degrees))
+
+
+def comb(guides, way):
+    """Move the guides by their parts of a way, from root to tip."""
+    combed = points(guides)
+    combed += np.linspace(0.0, 1.0, combed.shape[1])[None, :, None] * np.float32(way)
+    write_points(guides, combed)
+    bpy.context.view_layer.update()
+
+
+def biggest_change(frames):
+    """The 99th percentile of how far a pixel with hair changes from frame to frame, as a display shows it on grey."""
+    frames = np.array(frames)
+    shown = (frames[..., :3] + 0.05 * (1.0 - frames[..., 3:])) ** (1.0 / 2.2)
+    is_hair = (frames[..., 3] > 0.02).any(axis=0)
+    return np.quantile(np.abs(np.diff(shown, axis=0)).max(axis=-1)[:, is_hair], 0.99)
+
+
+MOVEMENTS = [("HAIR", turn_object), ("HAIR", turn_camera), ("FILM", turn_camera), ("HAIR", turn_light)]
+
+
+@pytest.mark.parametrize(("kind", "turn"), MOVEMENTS)
+def test_what_moves_changes_no_more_than_pictures_at_rest(lit, kind, turn):
+    """From rest, a degree a frame, one sample a pixel: at most 1.2 times as much, and as bright."""
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
+    moving, shown, still = new_picture(kind), [], []
+    turn_camera(0.0)
+    drawn = read_drawn()
+    for frame in range(FRAMES):
+        turn(float(frame))
+        bpy.context.view_layer.update()
+        drawn, view = drawn if turn is turn_camera else read_drawn(), camera()
+        shown.append(move(moving, drawn, view) if frame else rest(moving, drawn, view))
+        if frame >= WARM_UP:
+            still.append(rest(new_picture(kind), drawn, view))
+    assert biggest_change(shown[WARM_UP:]) <= 1.2 * biggest_change(still)
+    means = [np.mean(frames, axis=(0, 1, 2)) for frames in (shown[WARM_UP:], still)]
+    np.testing.assert_allclose(*means, rtol=0.03)
+
+
+@pytest.mark.parametrize("kind", ["HAIR", "FILM"])
+def test_a_picture_that_comes_to_rest_is_the_mean_of_its_own_passes(lit, kind):
+    picture, drawn = new_picture(kind), read_drawn()
+    for degrees in (0.0, 2.0, 4.0):
+        turn_camera(degrees)
+        bpy.context.view_layer.update()
+        move(picture, drawn, camera())
+    assert not np.array_equal(picture.read_shown(), picture.read())
+    last = rest(picture, drawn, camera())
+    np.testing.assert_array_equal(picture.read_shown(), last)
+    np.testing.assert_allclose(last.mean(axis=(0, 1)), rest(new_picture(kind), drawn, camera()).mean(axis=(0, 1)), 0.02)
+
+
+@even_guides
+@pytest.mark.parametrize("kind", ["HAIR", "FILM"])
+def test_nothing_remains_where_something_has_been(lit, kind):
+    """Hair that moves by a tenth of the picture's width a frame leaves no trail, also where it moved away."""
+    picture = new_picture(kind)
+    rest(picture, read_drawn(), camera())
+    was_there = picture.read()[..., 3] > 0.0
+    for frame in range(4):
+        bpy.data.objects["Sphere"].location.x = 0.45 * (frame + 1)
+        drawn, view = read_drawn(), camera()
+        shown = move(picture, drawn, view)
+        is_there = rest(new_picture(kind), drawn, view)[..., 3] > 0.0
+        # A pixel is carried with what is beside it.
+        left = was_there & ~binary_dilation(is_there, iterations=5)
+        was_there |= is_there
+        assert left.sum() > 40
+        assert shown[left].mean() < 0.04
+    assert shown[left].max() < 0.2
+
+
+def test_light_that_goes_out_is_gone_in_a_few_frames(lit):
+    picture = new_picture("HAIR")
+    before = rest(picture, read_drawn(), camera())[..., :3].mean()
+    bpy.data.objects["Sun"].data.energy = 0.0
+    drawn = read_drawn()
+    after = [move(picture, drawn, camera())[..., :3].mean() for _ in range(4)]
+    assert after[-1] < 0.05 * before and after == sorted(after, reverse=True)
+
+
+def test_light_that_changes_is_shown_at_once(lit):
+    """With the first pass, and in each part of the picture: more light, little, and again as much as before."""
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
+    picture, side = new_picture("HAIR"), SIZE // 8
+    rest(picture, read_drawn(), camera())
+    for energy in (4.0, 0.5, 3.0):
+        bpy.data.objects["Sun"].data.energy = energy
+        drawn = read_drawn()
+        shown, still = move(picture, drawn, camera()), rest(new_picture("HAIR"), drawn, camera())
+        np.testing.assert_allclose(shown.mean(axis=(0, 1)), still.mean(axis=(0, 1)), rtol=0.02)
+        parts = [of.reshape(8, side, 8, side, 4).mean(axis=(1, 3)) for of in (shown, still)]
+        np.testing.assert_allclose(*parts, rtol=0.1, atol=0.1 * parts[1].max())
+
+
+def test_another_look_is_shown_at_once(lit):
+    picture = new_picture("HAIR")
+    rest(picture, read_drawn(), camera())
+    lit.data.vellus.appearance.melanin = 0.9
+    shown = move(picture, read_drawn(), camera())
+    np.testing.assert_array_equal(shown, picture.read())
+
+
+def seen(drawn, view):
+    """(record of a pass over a scene, buffer that hair was found for)."""
+    buffer, record = VisibilityBuffer(SIZE, SIZE), drawing.pass_record(*view, (SIZE, SIZE))
+    with buffer.surfaces():
+        scene_drawing.draw_hiding(drawn, record)
+    scene_drawing.find_hair(drawn, record, buffer)
+    return record, buffer
+
+
+def test_combed_strands_know_where_they_were(lit, monkeypatch):
+    """Where some strands are brought to their places, motion vectors are those of strands that are all uploaded."""
+    monkeypatch.setattr(strand_textures, "MOST_GROUPS", 7)
+    guides, view = bpy.data.objects["Guides"], camera()
+    vectors = {}
+    for is_uploaded in (False, True):
+        comb(guides, (0.0, 0.0, 0.0))
+        hair_cache.strand_cache.clear()
+        before = motion_vectors.places(read_drawn(), *view)
+        for way in ((0.1, 0.0, 0.0), (0.0, 0.0, 0.15)):
+            comb(guides, way)
+            if is_uploaded:
+                hair_cache.strand_cache.clear()
+            earlier, drawn = before, read_drawn()
+            before = motion_vectors.places(drawn, *view)
+            assert (drawn.hair[0][0].moved is None) == is_uploaded
+            assert not before.has_still_hair(earlier)
+            motion = motion_vectors.Motion(earlier, before, before, (SIZE, SIZE))
+            found = np.array(motion_vectors.draw(drawn, motion, *seen(drawn, view)).read(), np.float32)
+            vectors.setdefault(is_uploaded, []).append(found)
+        comb(guides, (-0.1, 0.0, -0.15))
+    for one, other in zip(vectors[False], vectors[True], strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-3)
+    assert np.abs(vectors[False]).max() > 1.0
+
+
+def test_surfaces_that_are_read_again_have_not_moved(lit):
+    """By where their corners are: a light that moves has all of the scene read again."""
+    view = camera()
+    before = motion_vectors.places(read_drawn(), *view)
+    bpy.data.objects["Sun"].rotation_euler.x += 0.1
+    assert before.surfaces and motion_vectors.places(read_drawn(), *view).has_still_surfaces(before)
+    bpy.data.objects["Sphere"].location.x += 0.1
+    assert not motion_vectors.places(read_drawn(), *view).has_still_surfaces(before)
+
+
+def push_surface(frame):
+    push = bpy.data.objects["Sphere"].modifiers.get("Push")
+    if push is None:
+        push = bpy.data.objects["Sphere"].modifiers.new("Push", "DISPLACE")
+        push.direction, push.mid_level = "X", 0.0
+    push.strength = 0.2 * frame
+
+
+def comb_aside(frame):
+    if frame:
+        comb(bpy.data.objects["Guides"], (0.2, 0.0, 0.0))
+
+
+@pytest.mark.parametrize("push", [push_surface, comb_aside])
+def test_hair_is_carried_where_it_moves(lit, push):
+    """Strands of which the points move, not the object: without their motion the picture would lag behind them."""
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.006
+    picture = new_picture("HAIR")
+    for frame in range(4):
+        push(frame)
+        drawn, view = read_drawn(), camera()
+        shown = move(picture, drawn, view)
+    still = rest(new_picture("HAIR"), drawn, view)
+    columns = np.arange(SIZE)
+    middles = [(of[..., 3].sum(axis=0) * columns).sum() / of[..., 3].sum() for of in (shown, still)]
+    assert abs(middles[0] - middles[1]) < 0.5
+
+
+@even_guides
+def test_the_first_pass_is_as_bright_as_the_last(thin):
+    """With one sample a pixel of strands that are thinner: the mean, and as far as noise allows each part's."""
+    picture, drawn, view = new_picture("HAIR", 3 * SIZE), read_drawn(), camera()
+    picture.add_pass(drawn, *view)
+    first, last = picture.read(), rest(picture, drawn, view)
+    np.testing.assert_allclose(first.mean(axis=(0, 1)), last.mean(axis=(0, 1)), rtol=0.03)
+    assert first[..., 3].mean() == pytest.approx(last[..., 3].mean(), rel=0.02)
+    side = SIZE // 4
+    parts = [of[..., 3].reshape(12, side, 12, side).mean(axis=(1, 3)) for of in (first, last)]
+    noise = np.sqrt(parts[1] * (1.0 - parts[1])) / side
+    assert np.abs(parts[0] - parts[1]).max() <= 3.0 * noise.max()
+
+
+@even_guides
+def test_strands_that_are_left_out_leave_no_trace(thin):
+    """From 4000 to 1000 of them: the picture of the change is as bright as the one at rest in a few frames."""
+    picture = new_picture("HAIR")
+    before = rest(picture, read_drawn(), camera())
+    thin.data.vellus.hair.strand_count = 1000
+    bpy.context.view_layer.update()
+    drawn, view = read_drawn(), camera()
+    still = rest(new_picture("HAIR"), drawn, view)
+    left = [move(picture, drawn, view).mean() - still.mean() for _ in range(4)]
+    assert abs(left[-1]) < 0.12 * abs(before.mean() - still.mean())

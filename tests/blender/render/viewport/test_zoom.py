@@ -1,0 +1,79 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair that a camera goes away from: as bright and as dense as it was, from the first pass on."""
+
+import bpy
+import numpy as np
+import pytest
+
+from hair_addon import api
+from hair_addon.blender.data import scene
+from hair_addon.blender.render import drawn_scene
+from hair_addon.blender.render.viewport import hair_picture, picture_detail
+from tests.support.scenes import even_guides
+
+SIZE = (640, 480)
+
+
+@pytest.fixture
+def locks(lit):
+    """Locks of strands that are thinner than a pixel, and hide each other."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 6000, 0.001
+    api.set_styles(lit.data, [api.Clump(size=0.15, amount=1.0)])
+    bpy.context.view_layer.update()
+    return drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
+
+
+def seen_from(distances):
+    """(world to view, view to clip) of a camera without perspective; hair is as small as from so many distances."""
+    camera = bpy.context.scene.camera
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 4.0 * distances
+    bpy.context.view_layer.update()
+    return scene.read_camera(bpy.context.scene, bpy.context.evaluated_depsgraph_get(), *SIZE)
+
+
+def summed(light):
+    """Red, green, blue and coverage of all pixels."""
+    return light.sum(axis=(0, 1))
+
+
+def fine(picture, drawn, camera):
+    """Sums of all passes of a picture, and of its first one: the mean of four, as one is a matter of chance."""
+    picture.restart()
+    firsts = []
+    for _ in range(4):
+        picture.add_pass(drawn, *camera)
+        firsts.append(summed(picture.read()))
+        picture.restart(is_moved=True)  # the next one has other samples
+    while not picture.is_fine:
+        picture.add_pass(drawn, *camera)
+    return summed(picture.read()), np.mean(firsts, axis=0)
+
+
+@even_guides
+def test_small_hair_is_as_bright_and_covers_as_much(locks):
+    """With one sample a pixel, near by and far away, in the first pass and in the last."""
+    picture, near = hair_picture.HairPicture(SIZE, 1), None
+    for distances in (1.0, 4.0, 15.0):
+        last, first = fine(picture, locks, seen_from(distances))
+        near = last if near is None else near
+        np.testing.assert_allclose(first, last, rtol=0.02)
+        np.testing.assert_allclose(last * distances**2, near, rtol=0.03)
+
+
+def test_a_finer_part_of_a_picture_shows_what_the_whole_does(locks, monkeypatch):
+    """Which hair is at a pixel, too; beside the part there is none."""
+    camera = seen_from(10.0)
+    finer = hair_picture.HairPicture(SIZE, 1)
+    fine(finer, locks, camera)
+    monkeypatch.setattr(picture_detail, "of_hair", lambda *given: picture_detail.whole(*given[2:]))
+    plain = hair_picture.HairPicture(SIZE, 1)
+    fine(plain, locks, camera)
+    covered = [picture.read()[..., 3] for picture in (finer, plain)]
+    assert covered[0].sum() > 20.0
+    for axis in (0, 1):
+        middles = [np.average(np.arange(SIZE[1 - axis]), weights=of.sum(axis=1 - axis)) for of in covered]
+        assert middles[0] == pytest.approx(middles[1], abs=0.5)
+    y, x = np.unravel_index(np.argmax(covered[0]), covered[0].shape)
+    assert finer.hair_at(int(x), int(y)) == 0
+    assert finer.hair_at(3, 3) is None and finer.hair_at(SIZE[0] - 1, SIZE[1] - 1) is None

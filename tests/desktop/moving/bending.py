@@ -1,0 +1,140 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair on a surface that bends while the timeline plays, and by a slider, in a window.
+
+Run by a desktop Blender as steps.py says. Writes pictures of the screen.
+"""
+
+import sys
+from pathlib import Path
+
+import bpy
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT))
+from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
+from tests.desktop.window import (  # noqa: E402
+    MODULE,
+    in_viewport,
+    install,
+    offscreen_light,
+    take_picture,
+    viewport,
+    wait,
+    wait_for,
+)
+
+LAST = 6  # frame that is played to
+
+
+def addon():
+    return sys.modules[f"{MODULE}.hair_addon.blender"]
+
+
+def ball():
+    return bpy.data.objects["Ball"]
+
+
+def slider():
+    return ball().data.shape_keys.key_blocks["Bent"]
+
+
+def hair():
+    return next(o for o in bpy.data.objects if o.type == "CURVES" and o.data.vellus.kind == "HAIR")
+
+
+def evaluated():
+    """(N, 3) points as Blender's evaluation has them for viewports."""
+    curves = hair().evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    return positions(curves)
+
+
+def positions(curves):
+    found = np.empty((len(curves.points), 3), np.float32)
+    curves.attributes["position"].data.foreach_get("vector", found.ravel())
+    return found
+
+
+def state():
+    """(whether hair is paused, how far Blender's evaluation has moved its points at most)."""
+    moved = float(np.abs(evaluated() - positions(hair().data)).max())
+    return addon().data.strands.follow_nodes.is_paused(hair()), moved
+
+
+def hair_on_a_ball_that_bends():
+    install(ZIP)
+    for thing in list(bpy.data.objects):
+        if thing.type == "MESH":
+            bpy.data.objects.remove(thing)
+    with in_viewport():
+        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.1)
+        bpy.context.object.name = "Ball"
+        bpy.ops.vellus.add_hair("EXEC_DEFAULT", guide_count=100, length=0.06, strand_count=1000)
+    ball().shape_key_add(name="Basis")
+    bent = ball().shape_key_add(name="Bent")
+    for point in bent.data:
+        point.co.x += 8.0 * max(point.co.z, 0.0) ** 2
+    for frame, amount in ((1, 0.0), (LAST, 1.0), (60, 0.0)):
+        slider().value = amount
+        slider().keyframe_insert("value", frame=frame)
+    bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 60
+    bpy.context.scene.frame_set(1)
+    view = viewport()[0].spaces.active.region_3d
+    view.view_location, view.view_distance = (0.02, 0.0, 0.02), 0.7
+    with in_viewport():
+        bpy.ops.object.select_all(action="DESELECT")
+    yield from wait(0.5)
+
+
+def played():
+    """Blender leaves the strands at rest while the timeline plays, and the window shows them carried."""
+    with in_viewport():
+        bpy.ops.screen.animation_play()
+    yield from wait_for(lambda: bpy.context.scene.frame_current >= LAST, 120.0)
+    facts["playing"] = state()
+    take_picture(OUT / "playing.png", redraws=1)
+    facts["playing_light"] = offscreen_light(addon())
+    facts["frame"] = bpy.context.scene.frame_current
+    with in_viewport():
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    yield from wait(0.5)
+    facts["stopped"] = state()
+    facts["stopped_frame"] = bpy.context.scene.frame_current
+    take_picture(OUT / "stopped.png", redraws=1)
+    playing, stopped = facts.pop("playing_light"), offscreen_light(addon())
+    is_hair = (playing[..., 3] > 0.0) | (stopped[..., 3] > 0.0)
+    facts["covered"] = float(is_hair.mean())
+    facts["differ"] = float((np.abs(playing - stopped)[..., 3] > 2.5 / 16.0)[is_hair].mean())
+
+
+def played_beside_workbench():
+    """Hair that another engine shows is carried in each frame: Workbench stands for all, as it draws at once."""
+    bpy.context.scene.render.engine = "BLENDER_WORKBENCH"
+    space = viewport()[0].spaces.active
+    space.shading.type = "RENDERED"
+    with in_viewport():
+        bpy.ops.screen.animation_play()
+    at = bpy.context.scene.frame_current
+    yield from wait_for(lambda: bpy.context.scene.frame_current >= at + 2, 120.0)
+    facts["beside Workbench"] = state()
+    with in_viewport():
+        bpy.ops.screen.animation_cancel(restore_frame=False)
+    space.shading.type = "SOLID"
+    yield from wait(0.5)
+
+
+def dragged():
+    """A slider bends the surface step by step, and rests."""
+    ball().data.shape_keys.animation_data_clear()
+    yield from wait(0.5)
+    for step in range(8):
+        slider().value = 0.1 * step
+        yield
+    facts["dragged"] = state()
+    yield from wait_for(lambda: not state()[0], 20.0)
+    facts["rested"] = state()
+    take_picture(OUT / "rested.png", redraws=1)
+
+
+if __name__ == "__main__":
+    take((hair_on_a_ball_that_bends, played, played_beside_workbench, dragged))

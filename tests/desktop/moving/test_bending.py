@@ -1,0 +1,39 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Hair on a surface that bends in a window: Blender does not carry what Vellus draws until the surface rests."""
+
+import pytest
+
+from tests.desktop import walks
+from tools import desktop_blender
+
+pytestmark = pytest.mark.desktop
+
+# Of the pixels with hair: rounding flips single samples at the edges of strands.
+FLIPPED = 0.002
+
+SIZE = (640, 400)  # of the window [pixels]: software drivers take their time for each
+
+
+@pytest.fixture(scope="module", params=desktop_blender.BACKENDS)
+def walk(request, desktop, extension, new_profile):
+    """The `Walk` with one backend."""
+    return walks.take(desktop, "moving/bending", extension, new_profile(), request.param, size=SIZE)
+
+
+def test_it_comes_to_its_end(walk):
+    walk.assert_done()
+    assert walk.complaints() == []
+
+
+def test_hair_is_at_rest_for_blender_while_the_surface_moves(walk):
+    facts = walk.facts
+    assert facts["playing"] == [True, 0.0] and facts["dragged"] == [True, 0.0]
+    for moment in ("stopped", "beside Workbench", "rested"):
+        is_paused, moved = facts[moment]
+        assert not is_paused and moved > 0.01, moment
+
+
+def test_the_window_shows_what_it_shows_at_rest(walk):
+    facts = walk.facts
+    assert facts["frame"] == facts["stopped_frame"]
+    assert facts["covered"] > 0.02 and facts["differ"] < FLIPPED
