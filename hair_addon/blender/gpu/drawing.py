@@ -16,7 +16,7 @@ import numpy as np
 
 from ...core import geometry
 from . import shaders, uniforms
-from .strand_textures import MOST_GROUPS, TEXTURE_WIDTH, bare_vertices, vertex_count
+from .strand_textures import TEXTURE_WIDTH, bare_vertices, run_for_each, vertex_count
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,14 +238,12 @@ def walk_strands(strands, program, record, blocks, samplers, images, constants, 
     walked = (strand_count, first_count, strand_count - first_count)[part]
     if not walked:
         return
-    groups = -(-walked * runs // shaders.RUN_GROUP_SIZE)
-    rows = -(-groups // MOST_GROUPS)
     with bound(program, blocks, {**strand_samplers(strands), **samplers}):
         for name, texture in images.items():
             program.image(name, texture)
         for name, value in (constants | {"walked_part": part}).items():
             program.uniform_int(name, value)
-        gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+        run_for_each(program, walked * runs, shaders.RUN_GROUP_SIZE)
 
 
 def dispatch_over(program, size):

@@ -298,14 +298,22 @@ def keep_strands(strands, kept, count, row_kept, listed=None):
     _dispatch(program, numbers, strands, count)
 
 
+def run_for_each(program, count, group_size):
+    """Run a bound compute program for each of `count` strands, segments or texels, `group_size` in a work group.
+
+    Work groups beyond `MOST_GROUPS` stand in further rows, along y, of which the last may have some without work.
+    """
+    groups = -(-count // group_size)
+    rows = -(-groups // MOST_GROUPS)
+    gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+
+
 def _dispatch(program, numbers, strands, count):
     """Run a bound program on each texel of so many strands."""
     texel_count = geometry.packed_strands.texel_count(strands.point_count)
     for name, value in (numbers | {"texel_count": texel_count, "row_strands": strands.row_strands}).items():
         program.uniform_int(name, value)
-    groups = -(-count * texel_count // _MOVE_GROUP_SIZE)
-    rows = -(-groups // MOST_GROUPS)
-    gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+    run_for_each(program, count * texel_count, _MOVE_GROUP_SIZE)
     gpu.shader.unbind()
 
 

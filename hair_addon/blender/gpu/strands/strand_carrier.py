@@ -13,7 +13,7 @@ import numpy as np
 
 from ....core.kernels.checks import require_count, require_indices
 from .. import shaders
-from ..strand_textures import MOST_GROUPS, StrandsOnGPU
+from ..strand_textures import StrandsOnGPU, run_for_each
 from . import vertex_turner
 from .strand_changes import StrandChanges, declare_put, new_changes, rows_texture
 
@@ -58,9 +58,7 @@ class StrandCarrier:
             ("row_strands", strands.row_strands),
         ):
             program.uniform_int(name, value)
-        groups = -(-strands.strand_count // _GROUP_SIZE)
-        rows = -(-groups // MOST_GROUPS)
-        gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+        run_for_each(program, strands.strand_count, _GROUP_SIZE)
         gpu.shader.unbind()
         return self.changes.changed(strands)
 

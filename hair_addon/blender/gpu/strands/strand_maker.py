@@ -13,7 +13,7 @@ import numpy as np
 from ....core.interpolation.hair_binding import HairBinding
 from ....core.kernels.checks import require_count, require_indices
 from .. import shaders, uniforms
-from ..strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU, row_strands_of
+from ..strand_textures import TEXTURE_WIDTH, StrandsOnGPU, row_strands_of, run_for_each
 from .strand_changes import StrandChanges, declare_put, empty_rows, new_changes, rows_texture
 
 _GROUP_SIZE = 64
@@ -74,9 +74,7 @@ class StrandMaker:
             self.changes.bind(program)
         program.uniform_int("first_strand", first)
         program.uniform_int("some_count", count)
-        groups = -(-count // _GROUP_SIZE)
-        rows = -(-groups // MOST_GROUPS)
-        gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+        run_for_each(program, count, _GROUP_SIZE)
         gpu.shader.unbind()
 
     def limited(self, fading: tuple[float, float, float, float], keep_length: float) -> "StrandMaker":

@@ -18,7 +18,7 @@ from ....core.styling import frizz, program_rows
 from ....core.styling.program_rows import Program
 from ....core.styling.random_numbers import PURPOSES
 from .. import shaders, uniforms
-from ..strand_textures import MOST_GROUPS, TEXTURE_WIDTH, StrandsOnGPU, row_strands_of
+from ..strand_textures import TEXTURE_WIDTH, StrandsOnGPU, row_strands_of, run_for_each
 from . import strand_changes, strand_maker
 from .strand_changes import StrandChanges
 from .strand_maker import StrandMaker
@@ -117,9 +117,7 @@ class StyleMaker:
         self.changes.bind(program)
         program.uniform_int("first_strand", first)
         program.uniform_int("some_count", count)
-        groups = -(-count // _GROUP_SIZE)
-        rows = -(-groups // MOST_GROUPS)
-        gpu.compute.dispatch(program, -(-groups // rows), rows, 1)
+        run_for_each(program, count, _GROUP_SIZE)
         gpu.shader.unbind()
 
     def rebound(self, binding: HairBinding, styling: "Styling") -> "StyleMaker | None":
