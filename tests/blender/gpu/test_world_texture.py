@@ -33,6 +33,8 @@ def picture(rng):
 def environment_node(scene, image, **settings):
     """Light the scene with a picture; returns the node that holds it."""
     scene.world = bpy.data.worlds.new("World")
+    # Cycles would look for bright places at more pixels than the picture has, for a second.
+    scene.world.cycles.sampling_method, scene.world.cycles.sample_map_resolution = "MANUAL", 64
     tree = scene.world.node_tree
     background = next(node for node in tree.nodes if node.type == "BACKGROUND")
     node = tree.nodes.new("ShaderNodeTexEnvironment")
