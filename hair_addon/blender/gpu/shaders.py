@@ -63,7 +63,7 @@ def compile_one(makers):
 
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
-# See shaders/world_visibility.frag.
+# See shaders/world_visibility.comp.
 VISIBILITY_SAMPLERS = (
     "visibility_x_y",
     "visibility_z",
@@ -72,7 +72,6 @@ VISIBILITY_SAMPLERS = (
     "visibility_color",
 )
 STRAND_SAMPLERS = ("strands", "strand_radii")  # see shaders/include/segment.glsl
-VISIBILITY_TARGETS = ("seen_x_y", "seen_z", "seen_surface", "seen_channels", "seen_color")
 
 
 def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
@@ -257,25 +256,6 @@ def surface_info():
     varying.smooth("VEC3", "drawn_position")
     varying.smooth("VEC3", "surface_normal")
     return info, varying
-
-
-@kept
-def visibility_program():
-    """The program that adds up how much of the world the texels of `places` see."""
-    info = gpu.types.GPUShaderCreateInfo()
-    declare_scene(info, is_lit=False)
-    for slot, name in enumerate(("places", "strand_radii"), start=len(SHADOW_SAMPLERS)):
-        info.sampler(slot, "FLOAT_2D", name)
-    return compile_drawing(info, "cover.vert", "world_visibility.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
-
-
-@kept
-def visibility_bytes_program():
-    """The program that keeps what strands see in fewer bytes."""
-    info = gpu.types.GPUShaderCreateInfo()
-    for slot, name in enumerate(VISIBILITY_SAMPLERS):
-        info.sampler(slot, "FLOAT_2D", name)
-    return compile_drawing(info, "cover.vert", "visibility_bytes.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
 
 
 @kept

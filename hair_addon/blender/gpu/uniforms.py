@@ -76,7 +76,6 @@ VIEW = Block(
         "thickness": "float",
         "seen_points": "int",  # of each strand's points, those of the visibility textures
         "seen_opacity": "float",  # of a strand, for which they hold
-        "seen_in_bytes": "int",  # whether those textures have bytes: shaders/include/seen_bytes.glsl
         "row_strands": "int",
         "radius_strands": "int",  # whose radii are stored: one for all, or each
         "radius_unit": "float",  # that they are stored in
