@@ -4,14 +4,11 @@
 
 #include "include/shadow.glsl"
 
-// Distances go through their range this often in half a turn: in a few samples next to each other both are even.
-const float TURNS = 8.0;
-// Of that light, the part that comes from within four times the distance: light from farther away is faint, and noisy.
-const float MOST_PART = 0.94;
-// Distance at which places of the map are looked up most, and the least that light is taken to come from, as parts of the
-// hair's extent.
-const float REFLECTION_DISTANCE = 0.12;
-const float LEAST_DISTANCE = 0.015;
+// Distances across the light at which hair is looked up, least and largest, as parts of the hair's extent; how often they go
+// through this range in half a turn: with five in a turn, places of samples next to each other are even in both.
+const float NEAREST = 0.015;
+const float FARTHEST = 0.45;
+const float TURNS = 2.5;
 // Distance of neighbors that tell the slope of the hair's lit side, as a part of the map; and the largest difference of
 // their depths: beyond it they are of different locks.
 const float SLOPE_REACH = 0.012;
@@ -52,10 +49,10 @@ vec3 lit_side_normal(vec3 place, float front, float extent, float meters, Across
 // of one place of the map, another in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`.
 vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn)
 {
-  // Places as even light from a plane at this distance would come from.
-  float most = REFLECTION_DISTANCE * light.extent;
-  float part = MOST_PART * fract(TURNS * atan(turn.y, turn.x) / PI);
-  vec2 offset = turn * (most * sqrt(part / (1.0 - part)));
+  // As many places at each distance as light that falls with its square needs.
+  float range = log(FARTHEST / NEAREST);
+  float away = NEAREST * light.extent * exp(range * fract(TURNS * atan(turn.y, turn.x) / PI));
+  vec2 offset = turn * away;
   float map_meters = across.w / across.scale;
   vec3 place = at + vec3(offset / map_meters, 0.0);
   vec2 ends = textureLod(hair_front, place, 0.0).rg;
@@ -71,8 +68,7 @@ vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, v
     return vec3(0.0);
   }
   float squared = dot(way, way);
-  // Over the density of the places.
-  float weight = MOST_PART * most * most / ((1.0 - part) * (1.0 - part) * max(squared, pow(LEAST_DISTANCE * light.extent, 2.0)));
+  float weight = 2.0 * range * away * away / squared;  // over the density of the places, and pi
   float count = textureLod(hair_layers, place, 0.0)[layer_of(ends.y - ends.x)];
   return reflected_by_hair(count) * (facing * sent * weight / squared);
 }
