@@ -132,6 +132,7 @@ def _see_through_hair(drawn, view):
     if drawn.hair:
         shading = drawn.hair[ambient_visibility.densest([strands for strands, *_ in drawn.hair])][1]
         view["hair_forward"][:3], view["seen_opacity"] = shading.forward, shading.opacity
+        view["hair_reflectance"][:3] = shading.reflectance
 
 
 def _farther(view):
