@@ -4,16 +4,15 @@
 #include "include/shadow.glsl"
 #include "include/packed_strand.glsl"
 #include "include/seen_bytes.glsl"
+#include "include/vertex_place.glsl"
 #include "include/put_seen_sums.glsl"
 
-// A place of a strand whose first texel is given, or of a surface.
+// A place of a strand whose first texel is given; of a surface, of the vertex of that texel.
 vec3 place_of(ivec2 first, int point)
 {
   point = clamp(point, 0, view.point_count - 1);
-  vec3 place = texelFetch(places, first, 0).xyz;
-  if (view.point_count > 1) {
-    place = packed_place(places, first, packed_head(places, first), point);
-  }
+  vec3 place = (view.point_count > 1) ? packed_place(places, first, packed_head(places, first), point) :
+                                        vertex_place(places, first.y * view.row_strands + first.x);
   return (view.object_to_world * vec4(place, 1.0)).xyz;
 }
 

@@ -71,7 +71,7 @@ float crossed_before_surface(vec3 at, float depth)
   return front * (1.0 - smoothstep(1.0, 1.5, ends.x));
 }
 
-// A color that `drawing.packed_colors` has packed.
+// A color that `surface_textures.packed_colors` has packed.
 vec3 unpacked_color(float packed_value)
 {
   vec3 root = mod(floor(packed_value / vec3(65536.0, 256.0, 1.0)), 256.0) / 255.0;

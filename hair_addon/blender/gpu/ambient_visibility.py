@@ -132,10 +132,8 @@ def _view_of_strands(strands, to_world):
 
 
 def _view_of_surface(surface):
-    view = uniforms.VIEW.record()
-    view["object_to_world"] = np.eye(4)
-    view["point_count"], view["row_strands"] = 1, surface.row_corners
-    view["seen_points"] = 1
+    view = surface.placed(uniforms.VIEW.record())
+    view["point_count"], view["seen_points"] = 1, 1
     return view
 
 

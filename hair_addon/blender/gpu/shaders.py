@@ -221,18 +221,12 @@ SURFACE_IMAGES = ("color_image", "roughness_image", "normal_image")  # of a `Sur
 
 @kept
 def surface_program():
-    """The program that draws a lit surface: attributes position, normal, uv; the block of its material, its images."""
-    info, varying = surface_info()
-    declare_scene(info, uniforms.SURFACE.source)
-    info.vertex_in(2, "VEC2", "uv")
+    """The program that draws a lit surface: the block of its material, its images."""
+    info = lit_surface_info(uniforms.SURFACE.source)
     info.uniform_buf(2, "Surface", "surface")
     names = (*SURFACE_IMAGES, "surface_albedo")
-    for slot, name in enumerate(names, start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)):
+    for slot, name in enumerate(names, start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS) + 2):
         info.sampler(slot, "FLOAT_2D", name)
-    varying.smooth("VEC4", "corner_seen_x_y")
-    varying.smooth("VEC4", "corner_seen_z")
-    varying.smooth("VEC2", "surface_uv")
-    info.vertex_out(varying)
     return compile_drawing(info, "lit_surface.vert", "surface.frag")
 
 
@@ -243,20 +237,28 @@ def surface_depth_program(fragment="shadow_surface.frag"):
     declare_scene(info, shadow_samplers=(), is_lit=False)
     info.sampler(0, "FLOAT_2D", "places")
     varying.smooth("VEC3", "drawn_position")
-    varying.flat("FLOAT", "packed_color")
     info.vertex_out(varying)
     return compile_drawing(info, "surface_place.vert", fragment)
 
 
-def surface_info():
-    """(info, varying) of a program that draws triangles with the attributes position and normal."""
-    info = gpu.types.GPUShaderCreateInfo()
-    info.vertex_in(0, "VEC3", "position")
-    info.vertex_in(1, "VEC3", "normal")
-    varying = gpu.types.GPUStageInterfaceInfo("surface_varying")
-    varying.smooth("VEC3", "drawn_position")
-    varying.smooth("VEC3", "surface_normal")
-    return info, varying
+def lit_surface_info(structs=""):
+    """Info of a program of lit_surface.vert: its attributes, and the samplers of the scene and of `SurfaceOnGPU`."""
+    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
+    declare_scene(info, structs)
+    for slot, name in enumerate(("places", "normals"), start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
+    for slot, (kind, name) in enumerate((("INT", "corner_vertex"), ("INT", "corner_normal"), ("VEC2", "uv"))):
+        info.vertex_in(slot, kind, name)
+    for kind, name in (
+        ("VEC3", "drawn_position"),
+        ("VEC3", "surface_normal"),
+        ("VEC4", "corner_seen_x_y"),
+        ("VEC4", "corner_seen_z"),
+        ("VEC2", "surface_uv"),
+    ):
+        varying.smooth(kind, name)
+    info.vertex_out(varying)
+    return info
 
 
 @kept

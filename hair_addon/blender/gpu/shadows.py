@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from . import drawing, shaders, shadow_programs, uniforms
+from . import drawing, shaders, shadow_programs, surface_textures, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 
@@ -127,7 +127,7 @@ class ShadowMaps:
             drawing.gpu_state("LESS_EQUAL", depth_writes=True),
         ):
             for surface in surfaces:
-                drawing.draw_surface_depth(surface, view, lights)
+                surface_textures.draw_depth(surface, view, lights)
         self._blur(layer, _blur_of(lights["light"][layer], self._size))
         self._filter(shadow_programs.hidden_program(), hidden, surface_depth=self._surface_depth)
         self._surfaces[layer] = drawn_with, hidden

@@ -83,6 +83,7 @@ VIEW = Block(
         "pixels_per_unit": "float",  # at distance one, in a perspective
         "least_half_width": "float",  # there as well
         "depth_rise": "float",  # of a sample's side towards the viewer, at distance one
+        "surface_color": "float",  # of a surface in shadow maps, packed
         "light_index": "int",  # the light that a shadow pass looks from
         "sample_offset": "float",  # how far samples of thin strands lie off their centers, as a part of it
         "coverage_turn": "float",  # by which a pass takes other samples of thin strands

@@ -5,7 +5,15 @@ import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import drawing, hair_shading, shaders, strand_textures, uniforms, visibility_buffer
+from hair_addon.blender.gpu import (
+    drawing,
+    hair_shading,
+    shaders,
+    strand_textures,
+    surface_textures,
+    uniforms,
+    visibility_buffer,
+)
 from hair_addon.core.shading.fibre import kajiya_kay
 
 SIZE = (160, 96)
@@ -36,8 +44,8 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
         if hiding_at is not None:
             corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
             corners[3:, :2] = [[-9, -9], [0, 9], [-9, 9]]
-            surface = drawing.upload_surface(corners, corners)
-            drawing.draw_surface_depth(surface, view, lights, "surface_hides.frag")
+            surface = surface_textures.upload_surface(corners, np.arange(6, dtype=np.int32))
+            surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
     hair = [
         (strand_textures.upload_strands(points, radii), shading, to_world, none, steps)
         for points, radii, to_world in placed
