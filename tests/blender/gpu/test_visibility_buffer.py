@@ -100,7 +100,8 @@ def test_a_wide_angle_sees_strands_as_thick_as_its_rays_do(shading, in_compute):
     wide = PERSPECTIVE.copy()
     wide[0, 0], wide[1, 1] = SIZE[1] / SIZE[0], 1.0
     height, width = np.indices(SIZE[::-1])
-    rays = np.stack([(2 * width + 1 - SIZE[0]) / SIZE[1], (2 * height + 1) / SIZE[1] - 1, -np.ones(SIZE[::-1])], axis=-1)
+    x, y = (2 * width + 1 - SIZE[0]) / SIZE[1], (2 * height + 1 - SIZE[1]) / SIZE[1]
+    rays = np.stack([x, y, np.full(x.shape, -1.0)], axis=-1)
     places = (((1.8, 0.5), (0.0, 1.0, 0.1)), ((-0.3, -1.0), (1.0, 0.1, -0.1)), ((-1.4, 1.0), (1.0, -0.8, 0.0)))
     for middle, along in places:
         along = np.array(along) / np.linalg.norm(along)
