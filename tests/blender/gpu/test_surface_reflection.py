@@ -9,7 +9,7 @@ from tests.support import glsl
 
 @pytest.mark.parametrize("half_radius, alpha", [(0.09, 0.002), (0.05, 0.01), (0.03, 0.03)])
 def test_a_disk_is_mirrored_with_the_light_that_it_sends(half_radius, alpha):
-    """Over all normals the distribution is one, as of a small lamp; a smooth surface shows the disk even, to its border."""
+    """Over all normals the integral is one, as of a small lamp; a smooth surface shows an even disk with a border."""
     angle = np.linspace(0.0, 1.2, 40_001)
     text = glsl.source("include/surface_reflection.glsl")
     values = glsl.evaluate(
