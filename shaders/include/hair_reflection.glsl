@@ -49,6 +49,9 @@ vec3 lit_side_normal(vec3 place, float front, float extent, float meters, Across
 // of one place of the map, another in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`.
 vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn)
 {
+  if (view.hair_reflectance.rgb == vec3(0.0)) {
+    return vec3(0.0);  // a model without light between strands
+  }
   // As many places at each distance as light that falls with its square needs.
   float range = log(FARTHEST / NEAREST);
   float away = NEAREST * light.extent * exp(range * fract(TURNS * atan(turn.y, turn.x) / PI));
@@ -70,5 +73,7 @@ vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, v
   float squared = dot(way, way);
   float weight = 2.0 * range * away * away / squared;  // over the density of the places, and pi
   float count = textureLod(hair_layers, place, 0.0)[layer_of(ends.y - ends.x)];
-  return reflected_by_hair(count) * (facing * sent * weight / squared);
+  // Where hair shades a surface, its lit side is on the other side.
+  float open = exp(-crossed_before_surface(at, depth));
+  return reflected_by_hair(count) * (open * facing * sent * weight / squared);
 }
