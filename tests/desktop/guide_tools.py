@@ -16,7 +16,7 @@ sys.path.insert(0, str(ROOT))
 from tests.desktop import grooms  # noqa: E402
 from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
-    MODULE,
+    addon,
     curve_points,
     drag,
     in_viewport,
@@ -53,7 +53,7 @@ def guides():
 
 
 def bound():
-    return sys.modules[f"{MODULE}.hair_addon.blender"].groom.bindings.of(of_kind("HAIR").data)
+    return addon().groom.bindings.of(of_kind("HAIR").data)
 
 
 def strands():

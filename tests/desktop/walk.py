@@ -18,6 +18,7 @@ sys.path.insert(0, str(ROOT))
 from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
+    addon,
     curve_points,
     drag,
     import_head,
@@ -122,7 +123,7 @@ def grow():
     bpy.data.objects["Guides"].hide_set(True)
     show("grown", results=[list(distributed), list(interpolated)])
     facts["sidebar"] = {"rectangle": rectangle(sidebar), "category": sidebar.active_panel_category}
-    np.save(OUT / "offscreen.npy", offscreen_light(sys.modules[f"{MODULE}.hair_addon.blender"]))
+    np.save(OUT / "offscreen.npy", offscreen_light(addon()))
     settings = bpy.context.scene.view_settings
     facts["transform"] = [settings.view_transform, settings.look, settings.exposure, settings.gamma]
     yield
@@ -202,7 +203,7 @@ def comb():
 
 def click():
     """On hair and beside it, with each of the tools that select."""
-    blender = sys.modules[f"{MODULE}.hair_addon.blender"]
+    blender = addon()
     area, region = viewport()
     hair, head_object = bpy.data.objects["Hair"], bpy.data.objects["Head"]
     screen("clicks")
@@ -326,7 +327,7 @@ def twins():
 
 def break_shader():
     """A driver that refuses the shader that lays hair over the viewport: twice, and mended again."""
-    shaders = sys.modules[f"{MODULE}.hair_addon.blender.gpu.shaders"]
+    shaders = addon().gpu.shaders
     file = shaders.FOLDER / "include" / "display_place.glsl"
     text = file.read_text()
     file.write_text(text.replace("return log2", "return nonsense + log2"))
@@ -349,7 +350,7 @@ def reopen():
 
 def hurry():
     """Four samples a pixel in each pass, as with a graphics card: a picture is fine after eight redraws, not 32."""
-    sys.modules[f"{MODULE}.hair_addon.blender.render.viewport.hair_picture"].samples_per_side = lambda: 2
+    addon().render.viewport.hair_picture.samples_per_side = lambda: 2
     yield
 
 

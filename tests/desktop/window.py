@@ -24,6 +24,11 @@ def install(path):
     """Install the extension from its zip, unless the profile has it; returns its package `blender`."""
     if MODULE not in bpy.context.preferences.addons:
         bpy.ops.extensions.package_install_files(filepath=path, repo="user_default", enable_on_install=True)
+    return addon()
+
+
+def addon():
+    """The package `blender` of the add-on that is installed."""
     return sys.modules[f"{MODULE}.hair_addon.blender"]
 
 
@@ -33,7 +38,7 @@ def refine_to(sample_count=2):
     For drivers without a GPU; once the add-on is installed, in each Blender of a walk.
     """
     bpy.context.preferences.system.viewport_aa = "OFF"
-    sys.modules[f"{MODULE}.hair_addon.blender"].render.viewport.hair_picture.SAMPLE_COUNT = sample_count
+    addon().render.viewport.hair_picture.SAMPLE_COUNT = sample_count
 
 
 def window():

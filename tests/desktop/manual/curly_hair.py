@@ -21,6 +21,7 @@ from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
     activate,
+    addon,
     click,
     curve_points,
     drag,
@@ -52,10 +53,6 @@ hidden = []  # panels that the sidebar does not show
 
 def picture(name):
     take_picture(OUT / f"{name}.png", SAMPLES)
-
-
-def addon():
-    return sys.modules[f"{MODULE}.hair_addon.blender"]
 
 
 def hair_object():

@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
-    MODULE,
+    addon,
     in_viewport,
     install,
     offscreen_light,
@@ -26,10 +26,6 @@ from tests.desktop.window import (  # noqa: E402
 )
 
 LAST = 6  # frame that is played to
-
-
-def addon():
-    return sys.modules[f"{MODULE}.hair_addon.blender"]
 
 
 def ball():

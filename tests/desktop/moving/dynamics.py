@@ -19,6 +19,7 @@ from tests.desktop.steps import OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
     activate,
+    addon,
     curve_points,
     in_viewport,
     install,
@@ -39,10 +40,6 @@ COMPARED = 12  # frame whose light is compared, played and baked
 SCENE, LIGHT = OUT / "dynamics.blend", OUT / "played.npy"
 STRANDS = OUT / "strands.npy"
 seen = {}  # frame → strands as they were drawn when it was played
-
-
-def addon():
-    return sys.modules[f"{MODULE}.hair_addon.blender"]
 
 
 def scene():

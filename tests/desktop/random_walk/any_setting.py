@@ -22,7 +22,7 @@ from tests.desktop.random_walk import any_scene  # noqa: E402
 from tests.desktop.random_walk.any_exchange import Exchanges  # noqa: E402
 from tests.desktop.random_walk.any_operation import Operations  # noqa: E402
 from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
-from tests.desktop.window import MODULE, in_viewport, install, refine_to, viewport, wait  # noqa: E402
+from tests.desktop.window import MODULE, addon, in_viewport, install, refine_to, viewport, wait  # noqa: E402
 
 
 class Artist(Operations, Exchanges):
@@ -33,7 +33,7 @@ class Artist(Operations, Exchanges):
         self.folder = folder
         self.scene = str(folder / "any_setting.blend")
         self.step_count, self.taken, self.redraw_count = 0, [], 0
-        self.blender = sys.modules[f"{MODULE}.hair_addon.blender"]
+        self.blender = addon()
         self.core = sys.modules[f"{MODULE}.hair_addon.core"]
         refine_to(1)  # it is not the quality of pictures that is looked at
         bpy.types.SpaceView3D.draw_handler_add(self._count_redraw, (), "WINDOW", "POST_PIXEL")
