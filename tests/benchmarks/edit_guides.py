@@ -69,6 +69,8 @@ class Editing:
         self.stroke()
         self.drawn = self.read()  # bound now
         hair_cache.choose_makers()
+        while hair_cache.prepare_makers():
+            pass
 
     def read(self, **details):
         """The `DrawnScene` as a viewport reads it."""

@@ -49,7 +49,14 @@ def drawn(hair):
     """(S, P, 3) in the texture that the shader reads, after a viewport has drawn it."""
     on_gpu = hair_cache.strands_on_gpu(hair.data)
     hair_cache.choose_makers()
+    prepare()
     return drawn_strands.places(on_gpu)
+
+
+def prepare():
+    """Compile what a viewport at rest does."""
+    while hair_cache.prepare_makers():
+        pass
 
 
 def grown(hair):

@@ -62,6 +62,11 @@ def compile_one(makers):
     return False
 
 
+def are_compiled(makers):
+    """Whether all of the programs of `compile_one` are."""
+    return all(program_cache.get((make.__wrapped__, arguments)) is not None for make, arguments in makers)
+
+
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
 # See shaders/world_visibility.comp.
 VISIBILITY_SAMPLERS = (

@@ -184,7 +184,9 @@ def may_make(session_uid):
 def may_restyle(session_uid, bound, styles):
     """Whether the GPU makes what viewports show of bound hair with other styles."""
     kept = _strands_of(session_uid)
-    return may_make(session_uid) and bound.straight is None and kept.making.can_style(styles)
+    if not may_make(session_uid) or bound.straight is not None:
+        return False
+    return kept.making.can_style(styles) and kept.making.is_prepared(bound, styles)
 
 
 def prepare_makers():

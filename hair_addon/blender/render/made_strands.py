@@ -38,6 +38,7 @@ class Making:
     maker: strand_maker.StrandMaker | style_maker.StyleMaker | None = None
     carrier: strand_carrier.StrandCarrier | None = None  # None while what is drawn is at rest, or was uploaded
     is_chosen: bool = False  # whether it is to make them with the next edit
+    is_to_prepare: bool = False  # whether it would, were all programs compiled
     may_carry: bool = False  # whether it is to carry them with the next pose
     is_refused: bool = False  # whether the driver makes no such strands
     due: BoundHair | None = None  # whose guides were combed: the next redraw makes its strands
@@ -50,21 +51,29 @@ class Making:
         return [texture for one in (self.maker, self.carrier) if one is not None for texture in one.textures]
 
     def choose(self, is_wanted: bool, bound: BoundHair | None) -> None:
-        """Choose what it is to do: carry strands, and make those of `BoundHair` with their styles."""
+        """Choose what it is to do: carry strands, and make those of `BoundHair` with their styles.
+
+        It makes none before its programs are compiled, which may take a second: no edit waits for that.
+        """
         self.may_carry = is_wanted and not self.is_refused
-        self.is_chosen = self.may_carry and bound is not None and self.can_style(bound.styles)
+        self.is_to_prepare = self.may_carry and bound is not None and self.can_style(bound.styles)
+        self.is_chosen = self.is_to_prepare and self.is_prepared(bound, bound.styles)
 
     def prepare(self, bound: BoundHair) -> bool:
-        """Compile one program that the next edit of `BoundHair` needs; whether there was one."""
-        if not self.is_chosen:
+        """Compile one program that edits of `BoundHair` need; whether there was one."""
+        if not self.is_to_prepare:
             return False
-        slot_count = bound.binding.guide_weights.indices.shape[1]
-        needed = style_maker.programs_of(bound.styles.styling, slot_count, len(bound.radii))
         try:
-            return shaders.compile_one(needed)
+            was_missing = shaders.compile_one(_programs_of(bound, bound.styles))
         except HairError:
             self._refuse()
             return False
+        self.is_chosen = self.is_prepared(bound, bound.styles)
+        return was_missing
+
+    def is_prepared(self, bound: BoundHair, styles: StyledHair) -> bool:
+        """Whether all programs are compiled that edits of `BoundHair` with such styles need."""
+        return shaders.are_compiled(_programs_of(bound, styles))
 
     def can_style(self, styles: StyledHair) -> bool:
         """Whether styles can be applied to strands that are made here: the one place where that is decided."""
@@ -92,7 +101,8 @@ class Making:
         return True
 
     def _refuse(self):
-        self.is_refused, self.is_chosen, self.may_carry, self.carrier = True, False, False, None
+        self.is_refused, self.carrier = True, None
+        self.is_chosen = self.is_to_prepare = self.may_carry = False
 
     def _make(self, kept):
         bound, binding, known = self.due, self.due.binding, self._binding
@@ -158,3 +168,9 @@ def _followed(bound):
     """(G, P, 3): guides as strands follow them, which styles may lean."""
     styling = bound.styles.styling
     return (bound.guides if styling is None else styling.guides(bound.guides)).numpy()
+
+
+def _programs_of(bound, styles):
+    """Programs that make the strands of `BoundHair` with a `StyledHair`."""
+    slot_count = bound.binding.guide_weights.indices.shape[1]
+    return style_maker.programs_of(styles.styling, slot_count, len(bound.radii))

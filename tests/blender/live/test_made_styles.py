@@ -14,7 +14,7 @@ from hair_addon.core.grooming import following
 from hair_addon.core.styling import bend, clump, curl, frizz, lean, wet
 from tests.support import drawn_strands
 from tests.support.counting import counts_of
-from tests.support.made_strands import CLOSE, comb, drawn, grown
+from tests.support.made_strands import CLOSE, comb, drawn, grown, prepare
 from tests.support.reading import points
 from tests.support.scenes import even_guides
 
@@ -70,16 +70,29 @@ def test_a_stroke_on_styled_hair_computes_nothing_here(watched, monkeypatch, sty
     assert np.abs(shown - grown(watched)).max() > 0.01  # without styles
 
 
-def test_programs_are_compiled_before_the_first_edit_one_at_a_time(watched):
+def test_edits_wait_for_no_program(watched, monkeypatch):
+    """Programs are compiled at rest, one at a time; until then Warp makes the strands."""
     watched.data.vellus.hair.point_count = 19  # as nowhere else
-    add_styles(watched, clump.Settings(size=0.3, levels=1), bend.Settings())
-    known = [len(shaders.program_cache)]
+    bpy.context.view_layer.update()
+    with monkeypatch.context() as undisturbed:
+        undisturbed.setattr(hair_cache, "prepare_makers", lambda: False)  # no viewport comes to rest
+        known, calls = [len(shaders.program_cache)], counts_of(undisturbed)
+        for settings in (clump.Settings(size=0.3, levels=1), bend.Settings()):
+            style_items.add(watched.data.vellus, settings)
+        written(watched)
+        drawn(watched)
+        assert not hair_cache.may_make(watched.data.session_uid)
+        comb(5)
+        assert drawn_strands.are_drawn(drawn(watched), bindings.of(watched.data).points)
+        assert len(shaders.program_cache) == known[-1] and calls["uploads"] + calls["moves"] > 0
     while hair_cache.prepare_makers():
         known.append(len(shaders.program_cache))
     assert known[-1] > known[0] and set(np.diff(known)) == {1}
+    calls = counts_of(monkeypatch)
     comb(5)
     drawn(watched)
     assert len(shaders.program_cache) == known[-1]
+    assert calls == {"searches": 0, "uploads": 0, "moves": 0, "writes": 0}
 
 
 def test_hair_of_another_number_of_points_than_its_guides(watched, monkeypatch):
@@ -123,6 +136,7 @@ def test_settings_of_weights_are_followed_with_all_styles(watched, settings, mon
     for name, value in settings.items():
         setattr(watched.data.vellus.hair, name, value)
     bpy.context.view_layer.update()
+    prepare()
     comb(9)
     slide(watched, 0, "amount", 0.7)
     shown = drawn(watched)
