@@ -58,13 +58,14 @@ void main()
                                      light.blend,
                                      light.radius,
                                      drawn_position);
-      vec3 arriving = facing * past_hair;
+      // A plane receives less of a wide lobe of the world than a ball does, in the mean by its variance.
+      float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
+      vec3 arriving = facing * past_hair * ((light.kind == LIGHT_SUN) ? 1.0 - blur : 1.0);
       irradiance += arriving;
       float n_dot_l = max(dot(N, L), 1e-3);
       vec3 H = normalize(L + V);
       float v_dot_h = clamp(dot(V, H), 0.0, 1.0);
       // A light's size widens its highlight: half its angle, seen by the microfacets' normals.
-      float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
       float widened = min(sqrt(alpha * alpha + 0.5 * blur), 1.0);
       vec3 dielectric = vec3(F_dielectric(v_dot_h, surface.reflectance));
       vec3 fresnel = mix(dielectric, F_schlick(v_dot_h, albedo), surface.metallic);

@@ -20,9 +20,10 @@ _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 @dataclass(frozen=True)
 class Lobe:
-    """A bright part of the surroundings: unit direction towards it, irradiance (3,) of a plane that faces it [W/m²].
+    """A bright part of the surroundings: unit direction towards it, irradiance (3,) of a small ball [W/m²].
 
-    variance: of its light about the direction, along each of two axes [rad²].
+    variance: of its light about the direction, along each of two axes [rad²]; a plane that faces it receives one minus
+    that part.
     """
 
     direction: np.ndarray
@@ -50,14 +51,13 @@ def _without_lobes(radiance):
     lobes = []
     for _ in range(_LOBE_LIMIT):
         window, excess = _brightest(left, directions, solid_angles)
-        moments = np.einsum("nc,nd,n->cd", excess, directions[window], solid_angles[window])
         power = excess.T @ solid_angles[window]
         if not power @ _LUMINANCE > least:
             break
-        moment = _LUMINANCE @ moments
+        moment = (excess @ _LUMINANCE * solid_angles[window]) @ directions[window]
         closeness = np.linalg.norm(moment) / (power @ _LUMINANCE)
         direction = moment / np.linalg.norm(moment)
-        lobes.append(Lobe(direction, np.maximum(moments @ direction, 0.0), 1.0 - float(closeness)))
+        lobes.append(Lobe(direction, np.maximum(power, 0.0), 1.0 - float(closeness)))
         left[window] -= excess
     return lobes, left
 

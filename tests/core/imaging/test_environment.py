@@ -41,6 +41,17 @@ def test_a_bright_lobe_is_found_with_its_place_light_and_width(rng, sharpness):
     np.testing.assert_allclose(sides, 0.2, atol=0.02)
 
 
+def test_a_wide_lobe_gives_a_ball_all_its_light():
+    """A cone of 29 degrees: a plane that faces it receives 4 % less, which the variance tells."""
+    least = np.cos(np.radians(29.0))
+    (lobe,), _sides = environment.split(
+        surroundings(lambda directions: 5.0 * np.maximum(directions[:, 1] - least, 0.0) / (1.0 - least))
+    )
+    plane = 10.0 * np.pi * ((1.0 - least**3) / 3.0 - 0.5 * least * (1.0 - least**2)) / (1.0 - least)
+    np.testing.assert_allclose(lobe.irradiance, 5.0 * np.pi * (1.0 - least), rtol=0.01)
+    np.testing.assert_allclose(lobe.irradiance * (1.0 - lobe.variance), plane, rtol=0.01)
+
+
 def test_two_lamps_are_two_lobes():
     lamps = np.array([[0.6, 0.0, 0.8], [-0.8, 0.6, 0.0]])
     lobes, _sides = environment.split(

@@ -42,8 +42,8 @@ def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
     if kind == lamps.SUN:  # even light over its disk, not over its angles
         radiance = radiance / cosine**3
     world = replace(surroundings(), world=np.repeat(radiance[..., None], 3, axis=-1))
-    found = [ratio(found_by(grid, light, ALONG_Y, 50_000)) for light in (surroundings(lamps=wide), world)]
-    np.testing.assert_allclose(found[0], found[1], rtol=0.025)
+    found = [ratio(found_by(grid, light, ALONG_Y, 60_000)) for light in (surroundings(lamps=wide), world)]
+    np.testing.assert_allclose(found[0], found[1], rtol=0.04)
 
 
 def test_near_a_lamp_light_grows_as_its_disk_does(rng):
