@@ -2,12 +2,13 @@
 // Light of a lamp that hair reflects to a surface beside it: shadow maps hold the hair's lit side, which is taken for a matt
 // surface that sends light in turn [Dachsbacher05]. Needs the samplers of include/shadow.glsl.
 
-#include "include/coverage.glsl"
 #include "include/shadow.glsl"
 
-// Distances across the light at which hair is looked up, least and largest, as parts of the hair's extent.
+// Distances across the light at which hair is looked up, least and largest, as parts of the hair's extent; how often they go
+// through this range in half a turn: with five in a turn, places of samples next to each other are even in both.
 const float NEAREST = 0.015;
 const float FARTHEST = 0.45;
+const float TURNS = 2.5;
 // Distance of neighbors that tell the slope of the hair's lit side, as a part of the map; and the largest difference of
 // their depths: beyond it they are of different locks.
 const float SLOPE_REACH = 0.012;
@@ -51,11 +52,9 @@ vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, v
   if (view.hair_reflectance.rgb == vec3(0.0)) {
     return vec3(0.0);  // a model without light between strands
   }
-  // A lattice, as `sample_turn` has, would leave stripes where samples of a pixel repeat it.
-  ivec2 sample_place = ivec2(gl_FragCoord.xy) + ivec2(view.first_column, view.first_row);
   // As many places at each distance as light that falls with its square needs.
   float range = log(FARTHEST / NEAREST);
-  float away = NEAREST * light.extent * exp(range * fract(random_of_tile(sample_place) + view.coverage_turn));
+  float away = NEAREST * light.extent * exp(range * fract(TURNS * atan(turn.y, turn.x) / PI));
   vec2 offset = turn * away;
   float map_meters = across.w / across.scale;
   vec3 place = at + vec3(offset / map_meters, 0.0);
