@@ -203,7 +203,7 @@ def light():
     lens.use_dof, lens.aperture_fstop, lens.aperture_blades = True, FSTOP, 7
     lens.focus_distance = _distance_to(camera, NEAR_EYE)
     _place("Key", (-0.36, -1.20, 1.38), 28.0, 0.40)
-    _place("Rim", (-0.50, 1.08, 1.65), 45.0, 0.4)
+    _place("Rim", (-0.65, 0.95, 1.35), 34.0, 0.4)
     _place("Fill", (1.0, -1.15, 0.85), 8.0, 0.9)
     second = bpy.data.objects.new("Rim 2", bpy.data.objects["Rim"].data.copy())
     scene.collection.objects.link(second)

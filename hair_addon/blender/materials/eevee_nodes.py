@@ -27,6 +27,8 @@ _NODES = {
     "Around": ("ShaderNodeBsdfTranslucent", {}, (560, -160)),
     "Highlight": ("ShaderNodeBsdfAnisotropic", {}, (560, -300)),
     "Sum": ("ShaderNodeAddShader", {}, (740, -160)),
+    # Without it EEVEE takes translucent hair to be as thick as its bounds are wide, and finds shadows beyond.
+    "Strand": ("ShaderNodeHairInfo", {}, (740, -300)),
     "Output": ("ShaderNodeOutputMaterial", {"target": "EEVEE"}, (920, -160)),
 }
 
@@ -36,6 +38,7 @@ _LINKS = (
     ("Around", 0, "Sum", 0),
     ("Highlight", 0, "Sum", 1),
     ("Sum", 0, "Output", "Surface"),
+    ("Strand", "Thickness", "Output", "Thickness"),
 )
 
 

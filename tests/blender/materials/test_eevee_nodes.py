@@ -74,3 +74,9 @@ def test_random_colors_are_shown_too(hair):
         hair.data.vellus.appearance.random_color = random_color
         bpy.context.view_layer.update()
         assert tree.nodes["EEVEE Color"].inputs[0].is_linked == (random_color > 0.0)
+
+
+def test_strands_are_as_thick_for_light_as_they_are(hair):
+    """Else EEVEE takes hair to be as thick as its bounds, and no strand shades another."""
+    thickness = hair.data.materials[0].node_tree.nodes["EEVEE Output"].inputs["Thickness"]
+    assert [link.from_socket.name for link in thickness.links] == ["Thickness"]
