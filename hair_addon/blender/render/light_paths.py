@@ -14,7 +14,7 @@ from ..settings import preferences
 from . import seen_strands
 
 _PATHS_A_PIXEL = 8
-_LEAST_PATHS, _MOST_PATHS = 20_000, 200_000  # over the part of the picture that holds the hair
+_LEAST_PATHS, _MOST_PATHS = 20_000, 300_000  # over the part of the picture that holds the hair
 
 
 def path_count(blender_scene, size):

@@ -2,8 +2,8 @@
 """Light among strands: paths from seen strands through a grid of all, gathered by voxel.
 
 Each path finds all light that its strand sends to the viewer, after any number of events. Beside it is what the same
-strands would send back of even light, and what is drawn of them without paths: lamps' light that has met nothing, with
-sharp shadows. Of these three `voxel_means` tells how each strand of a voxel is shaded, so that their mean is that of
+strands would send back of even light, and what is drawn of them without paths: dual scattering, with sharp shadows. Of
+these three `voxel_means` tells how each strand of a voxel is shaded, so that their mean is that of
 the paths.
 """
 

@@ -3,7 +3,7 @@
 
 import numpy as np
 
-_PRIOR = 256.0  # paths that the ratio of the voxels around stands for
+_PRIOR = 512.0  # paths that the ratio of the voxels around stands for
 
 
 def shares(sums: np.ndarray, path_count: int) -> np.ndarray:

@@ -266,3 +266,15 @@ def test_voxels_without_paths_take_the_ratio_around_them(rng):
     filled = rng.random((4, 4, 4)) < 0.3
     sums[filled] = np.array([2.0, 4.0, 6.0, 1.0, 1.0, 1.0]) * rng.uniform(1, 50, filled.sum())[:, None]
     np.testing.assert_allclose(voxel_means.smooth_ratios(sums, 1000), np.tile([2.0, 4.0, 6.0], (4, 4, 4, 1)), rtol=1e-9)
+
+
+def test_drawn_light_keeps_edges_that_noisy_paths_do_not_find(rng):
+    """Where what is drawn has an edge of the paths' light, few paths say how bright both sides are."""
+    even = np.ones((8, 8, 8, 3))
+    drawn = np.where(np.arange(8) < 3, 0.2, 1.0)[:, None] * even
+    expected = 0.6 * drawn + 0.3 * even
+    light = expected * rng.exponential(size=(8, 8, 8, 1))
+    found = voxel_means.shares(np.concatenate([light, even, drawn], axis=-1), 8**3)
+    there = found[..., :3] + found[..., 3:] * drawn
+    np.testing.assert_allclose(there.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.15)
+    assert there.std(axis=(0, 1)).max() < 0.05
