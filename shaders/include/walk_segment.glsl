@@ -41,7 +41,7 @@ void walk(Segment segment, ivec2 size)
   float widening = (way.x == 0.0) ? 1.0 : length(way) / abs(way.x);
   float least_half_width = view.least_half_width * view.pixels_per_unit;
   float most_reach = max(max(segment.half_width.x, segment.half_width.y), least_half_width) * widening;
-  ivec2 first_place = ivec2(view.first_column, view.first_row);
+  ivec2 first_place = is_steep ? ivec2(view.first_row, view.first_column) : ivec2(view.first_column, view.first_row);
   int column = first_column;
   while (column <= last_column) {
     // As far as the end of the tile.
@@ -64,16 +64,15 @@ void walk(Segment segment, ivec2 size)
       float middle = start.y + along * way.y;
       float reach = half_width * widening;
       float offset_part = view.sample_offset * offset_share(true_half_width);
-      float most = reach + 0.5 * offset_part;
-      int first_row = max(int(ceil(clamp(middle - most, -1.0, 1e6) - 0.5)), 0);
-      int last_row = min(int(ceil(clamp(middle + most, -1.0, 1e6) - 0.5)) - 1, last_place.y);
+      if (offset_part > 0.0) {
+        ivec2 place = first_place + ivec2(column, 0);
+        middle -= offset_part * sample_offset(place.x, float(place.y) + middle, view.coverage_turn);
+      }
+      int first_row = max(int(ceil(clamp(middle - reach, -1.0, 1e6) - 0.5)), 0);
+      int last_row = min(int(ceil(clamp(middle + reach, -1.0, 1e6) - 0.5)) - 1, last_place.y);
       for (int row = first_row; row <= last_row; row++) {
-        ivec2 place = is_steep ? ivec2(row, column) : ivec2(column, row);
-        float at = float(row) + 0.5;
-        at += (offset_part > 0.0) ? offset_part * sample_offset(place + first_place, view.coverage_turn) : 0.0;
-        if (offset_part == 0.0 || abs(at - middle) < reach) {
-          meet(place, along, (at - middle) / reach, true_half_width / half_width);
-        }
+        float across = (float(row) + 0.5 - middle) / reach;
+        meet(is_steep ? ivec2(row, column) : ivec2(column, row), along, across, true_half_width / half_width);
       }
     }
   }
