@@ -5,9 +5,31 @@
 #include "include/segment.glsl"
 #include "include/tile.glsl"
 
+const int RUNS_IN_ROW = 16384;  // of `seen_runs`
+
 vec2 end_depths;  // of the axis
 vec2 end_rises;  // from there to the side that faces the viewer
 uint this_index;
+bool is_seen = false;
+
+ivec2 run_texel(int run)
+{
+  int texel = first_run + run;
+  return ivec2(texel & (RUNS_IN_ROW - 1), texel / RUNS_IN_ROW);
+}
+
+// Indices are those of runs whose depths were the least when they were met: of one in many.
+bool is_left_out(int run)
+{
+  return is_depth == 0 && imageLoad(seen_runs, run_texel(run)).r == 0u;
+}
+
+void end_run(int run)
+{
+  if (is_depth != 0) {
+    imageStore(seen_runs, run_texel(run), uvec4(is_seen ? 1u : 0u));
+  }
+}
 
 void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
 {
@@ -42,6 +64,7 @@ void meet(ivec2 place, float along, float across, float coverage)
   uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, along) - rise, 0.0));
   uint nearest = imageLoad(depths, place).r;
   if (is_depth != 0) {
+    is_seen = is_seen || depth <= nearest;
     // Most samples are occluded: reading first is cheaper than writing.
     if (depth < nearest) {
       imageAtomicMin(depths, place, depth);

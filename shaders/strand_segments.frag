@@ -9,11 +9,11 @@ void main()
   // As in walk_segment.glsl: a sample lies off its center along the axis on which the strand is shorter.
   vec2 across = vec2(dFdx(strand_side_place), dFdy(strand_side_place));
   bool is_steep = abs(across.x) > abs(across.y);
-  float step = is_steep ? across.x : across.y;
+  float slope = is_steep ? across.x : across.y;
   place = is_steep ? place.yx : place;
-  float middle = place.y - strand_side_place / ((step == 0.0) ? 1.0 : step);
+  float middle = place.y - strand_side_place / ((slope == 0.0) ? 1.0 : slope);
   float offset = strand_offset_part * sample_offset(int(place.x), middle, view.coverage_turn);
-  float side = strand_side_place + offset * step;
+  float side = strand_side_place + offset * slope;
   if (strand_offset_part > 0.0 && abs(side) >= strand_coverage) {
     discard;
   }

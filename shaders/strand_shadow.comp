@@ -18,6 +18,13 @@ void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
   end_depths = mix(vec2(depth_of(first.xyz)), vec2(depth_of(second.xyz)), segment.part);
 }
 
+bool is_left_out(int run)
+{
+  return false;
+}
+
+void end_run(int run) {}
+
 // What is hidden by surfaces alone is not known of a whole part.
 bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
 {

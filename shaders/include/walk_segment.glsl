@@ -17,6 +17,9 @@ const float LEAST_BEND = 1.0;
 
 // Functions that a program defines before it includes this:
 //
+// bool is_left_out(int run), void end_run(int run)
+//     whether a run of segments need not be walked along; the end of one that was. Runs of strands that are drawn are
+//     counted in the order of these, whatever part of them is walked
 // void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
 //     the start of a segment
 // bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
@@ -106,18 +109,18 @@ void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
   }
 }
 
-// The turn of a run among all strands that are drawn, of which one in FIRST_SHARE comes before the others.
+// The turn of a strand among all that are drawn, of which one in FIRST_SHARE comes before the others.
 const int FIRST_SHARE = 8;
 const int WALK_ALL = 0;
 const int WALK_FIRST = 1;
 const int WALK_OTHERS = 2;
 
-int walked_turn(int run)
+int walked_turn(int walked)
 {
   if (walked_part == WALK_FIRST) {
-    return run * FIRST_SHARE;
+    return walked * FIRST_SHARE;
   }
-  return (walked_part == WALK_OTHERS) ? run + run / (FIRST_SHARE - 1) + 1 : run;
+  return (walked_part == WALK_OTHERS) ? walked + walked / (FIRST_SHARE - 1) + 1 : walked;
 }
 
 // The run of segments of this thread, between every how many-th point is drawn.
@@ -128,7 +131,8 @@ void walk_run(ivec2 size)
   int pieces = view.drawn_points - 1;
   int runs = (pieces + RUN_LENGTH - 1) / RUN_LENGTH;
   int turn = walked_turn(index / runs);
-  if (turn >= view.drawn_strands) {
+  int run = turn * runs + index % runs;
+  if (turn >= view.drawn_strands || is_left_out(run)) {
     return;
   }
   int strand = drawn_strand(turn);
@@ -156,4 +160,5 @@ void walk_run(ivec2 size)
     first = second;
     start = end;
   }
+  end_run(run);
 }

@@ -219,6 +219,11 @@ def strand_samplers(strands):
     return {"strands": strands.texture, "strand_radii": strands.radii_texture}
 
 
+def runs_of_strand(record):
+    """How many runs of segments each strand of a record of `strand_record` is walked along in."""
+    return -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
+
+
 # Which of the strands are walked along, and how many in how many: WALK_ALL and the like of
 # shaders/include/walk_segment.glsl.
 WALK_ALL, WALK_FIRST, WALK_OTHERS = range(3)
@@ -232,7 +237,6 @@ def walk_strands(strands, program, record, blocks, samplers, images, constants, 
     reads and writes; constants: {name: int}; part: of the strands, all or those of `WALK_FIRST` or `WALK_OTHERS`, which
     are all together.
     """
-    runs = -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
     strand_count = int(record["drawn_strands"])
     first_count = -(-strand_count // _FIRST_SHARE)
     walked = (strand_count, first_count, strand_count - first_count)[part]
@@ -243,7 +247,7 @@ def walk_strands(strands, program, record, blocks, samplers, images, constants, 
             program.image(name, texture)
         for name, value in (constants | {"walked_part": part}).items():
             program.uniform_int(name, value)
-        run_for_each(program, walked * runs, shaders.RUN_GROUP_SIZE)
+        run_for_each(program, walked * runs_of_strand(record), shaders.RUN_GROUP_SIZE)
 
 
 def dispatch_over(program, size):

@@ -140,8 +140,9 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.
 @kept
 def segments_program():
     """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
-    constants = ("first_segment", "is_depth", "are_tiles_known")
-    return _walk("strand_segments.comp", ("depths", "segments"), constants, samplers=(("farthest_depths", "UINT_2D"),))
+    constants = ("first_segment", "first_run", "is_depth", "are_tiles_known")
+    samplers = (("farthest_depths", "UINT_2D"),)
+    return _walk("strand_segments.comp", ("depths", "segments", "seen_runs"), constants, samplers=samplers)
 
 
 @kept

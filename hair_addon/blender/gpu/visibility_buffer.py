@@ -37,6 +37,10 @@ class _Placed:
     def segment_count(self):
         return self.strands.strand_count * (int(self.record["drawn_points"]) - 1)
 
+    @property
+    def run_count(self):
+        return int(self.record["drawn_strands"]) * drawing.runs_of_strand(self.record)
+
 
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
@@ -55,6 +59,7 @@ class VisibilityBuffer:
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
         tiles = tuple(-(-length // visibility_programs.TILE) for length in self.size)
         self._farthest = gpu.types.GPUTexture(tiles, format="R32UI")  # of the depths in each
+        self._seen_runs = None  # a texel for each run of segments that is walked along
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
         self._has_strips = False  # whether `depths` are of strips alone
@@ -181,6 +186,7 @@ class VisibilityBuffer:
     def _find(self):
         """Find the nearest segments by a compute program: first depths, then indices."""
         self._copy_depths(is_start=True)
+        self._provide_runs(sum(placed.run_count for placed in self._hair))
         self._is_color_stale = self._has_strips = False
         all_blocks = [
             {"view": uniforms.uniform_buffer(placed.record), "lights": placed.lights} for placed in self._hair
@@ -196,6 +202,12 @@ class VisibilityBuffer:
         self._find_farthest()
         self._walk(all_blocks, drawing.WALK_ALL, is_depth=0, are_tiles_known=True)
 
+    def _provide_runs(self, count):
+        """Make the texture of runs larger where it has fewer texels."""
+        rows = -(-count // visibility_programs.RUNS_IN_ROW)
+        if self._seen_runs is None or self._seen_runs.height < rows:
+            self._seen_runs = gpu.types.GPUTexture((visibility_programs.RUNS_IN_ROW, max(rows, 1)), format="R32UI")
+
     def _find_farthest(self):
         """Fill the tiles with the farthest of their depths."""
         program = visibility_programs.farthest_depths_program()
@@ -205,9 +217,12 @@ class VisibilityBuffer:
 
     def _walk(self, all_blocks, part, is_depth, are_tiles_known=False):
         program = shaders.segments_program()
-        images, samplers = {"depths": self.depths, "segments": self.segments}, {"farthest_depths": self._farthest}
+        images = {"depths": self.depths, "segments": self.segments, "seen_runs": self._seen_runs}
+        samplers, first_run = {"farthest_depths": self._farthest}, 0
         for placed, blocks in zip(self._hair, all_blocks, strict=True):
-            constants = {"first_segment": placed.first, "is_depth": is_depth, "are_tiles_known": int(are_tiles_known)}
+            constants = {"first_segment": placed.first, "first_run": first_run}
+            constants |= {"is_depth": is_depth, "are_tiles_known": int(are_tiles_known)}
+            first_run += placed.run_count
             drawing.walk_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
 
     def nearest_depths(self):

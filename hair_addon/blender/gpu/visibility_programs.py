@@ -5,6 +5,7 @@ import gpu
 
 from . import shaders
 
+RUNS_IN_ROW = 16384  # RUNS_IN_ROW of shaders/strand_segments.comp
 TILE = 8  # samples along each side of a tile: TILE of shaders/include/tile.glsl
 
 
