@@ -66,7 +66,7 @@ def main():
     bpy.ops.wm.save_as_mainfile(filepath=str(out / "head.blend"), compress=True)
     drawn = read()
     for model in MODELS.values():
-        hair.data.vellus.model = model
+        portrait.make_chestnut(hair.data, model)
         draw(with_look(drawn, hair.data), out / f"{model.lower()}.png", has_blur=False)
     with as_auburn(hair.data):
         auburn = with_world(with_look(drawn, hair.data))
@@ -162,7 +162,7 @@ def print_frame_table(drawn, hair):
             bpy.context.view_layer.update()
             drawn = read()
         for label, model in MODELS.items():
-            hair.vellus.model = model
+            portrait.make_chestnut(hair, model)
             reported = REPORT_FRAMES.get((label, strand_count), "-")
             speed = _frames_per_second(_head_and_hair(with_look(drawn, hair)))
             print(f"  {strand_count:6} strands, {label:30} {reported:>10} {speed:17.1f}")

@@ -7,5 +7,5 @@ void main()
 {
   Light light = lights.light[view.light_index];
   float depth = light_depth(light.kind, light.position.xyz, light.axis.xyz, light.near, light.extent, drawn_position);
-  color = vec4(min(depth, FAR_SURFACE), packed_color, 0.0, 1.0);
+  color = vec4(min(depth, FAR_SURFACE), view.surface_color, 0.0, 1.0);
 }

@@ -68,7 +68,13 @@ void main()
       float widened = min(sqrt(alpha * alpha + 0.5 * blur), 1.0);
       vec3 dielectric = vec3(F_dielectric(v_dot_h, surface.reflectance));
       vec3 fresnel = mix(dielectric, F_schlick(v_dot_h, albedo), surface.metallic);
-      float facets = D_ggx(clamp(dot(N, H), 0.0, 1.0), widened) * V_smith(n_dot_l, n_dot_v, alpha);
+      float n_dot_h = clamp(dot(N, H), 0.0, 1.0);
+      float facets = D_ggx(n_dot_h, widened);
+      float mirrored = smoothstep(0.25, 1.0, 0.5 * blur / (alpha * alpha));
+      if (mirrored > 0.0) {
+        facets = mix(facets, D_ggx_of_disk(n_dot_h, sqrt(blur), alpha), mirrored);
+      }
+      facets *= V_smith(n_dot_l, n_dot_v, alpha);
       highlight += arriving * gain * fresnel * facets;
     }
   }

@@ -2,21 +2,13 @@
 // Turns a surface at its vertices, of which only the places are uploaded: core/geometry/vertex_turns.py on any GPU.
 
 #include "include/nearest_rotation.glsl"
-#include "include/strand.glsl"
+#include "include/vertex_place.glsl"
 
 // Texels of a face in `faces`: columns of the inverse of its edges and normal at rest, each with one of its vertices;
 // of a vertex in `turned`: see carry_strands.comp. A vertex in `rings` has its place, and where its faces begin and end
 // in `around`.
 const int FACE_TEXELS = 3;
 const int TURNED_TEXELS = 3;
-
-vec3 place(sampler2D places, int index)
-{
-  ivec2 texel = strand_texel(index, 0, 3, textureSize(places, 0).x / 3);
-  return vec3(texelFetch(places, texel, 0).r,
-              texelFetch(places, texel + ivec2(1, 0), 0).r,
-              texelFetch(places, texel + ivec2(2, 0), 0).r);
-}
 
 bool are_apart(vec3 one, vec3 other)
 {
@@ -43,12 +35,12 @@ void main()
     vec4 column_0 = texelFetch(faces, texel, 0);
     vec4 column_1 = texelFetch(faces, texel + ivec2(1, 0), 0);
     vec4 column_2 = texelFetch(faces, texel + ivec2(2, 0), 0);
-    vec3 first = place(now, int(column_0.w));
-    vec3 second = place(now, int(column_1.w));
-    vec3 last = place(now, int(column_2.w));
-    is_turned = is_turned || are_apart(first, place(smooth_rest, int(column_0.w))) ||
-                are_apart(second, place(smooth_rest, int(column_1.w))) ||
-                are_apart(last, place(smooth_rest, int(column_2.w)));
+    vec3 first = vertex_place(now, int(column_0.w));
+    vec3 second = vertex_place(now, int(column_1.w));
+    vec3 last = vertex_place(now, int(column_2.w));
+    is_turned = is_turned || are_apart(first, vertex_place(smooth_rest, int(column_0.w))) ||
+                are_apart(second, vertex_place(smooth_rest, int(column_1.w))) ||
+                are_apart(last, vertex_place(smooth_rest, int(column_2.w)));
     vec3 along = second - first;
     vec3 across = last - first;
     // Squares of short edges would be zero.
@@ -62,9 +54,9 @@ void main()
   if (is_turned) {
     turn = nearest_rotation(total);
   }
-  vec3 now_here = place(now, int(ring.x));
+  vec3 now_here = vertex_place(now, int(ring.x));
   bool is_moved = are_apart(turn[0], vec3(1.0, 0.0, 0.0)) || are_apart(turn[1], vec3(0.0, 1.0, 0.0)) ||
-                  are_apart(now_here, place(rest_places, int(ring.x)));
+                  are_apart(now_here, vertex_place(rest_places, int(ring.x)));
   ivec2 texel = strand_texel(here, 0, TURNED_TEXELS, imageSize(turned).x / TURNED_TEXELS);
   imageStore(turned, texel, vec4(now_here, is_moved ? 1.0 : 0.0));
   imageStore(turned, texel + ivec2(1, 0), vec4(turn[0], 0.0));

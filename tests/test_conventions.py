@@ -262,7 +262,7 @@ def test_core_imports_without_blender():
     )
 
 
-def test_register_is_light(tmp_path):
+def test_register_is_light():
     """Blender registers add-ons while an artist waits for it to start: a part of its own time, and without Warp."""
     source = (
         "import sys, time\n"
@@ -278,10 +278,8 @@ def test_register_is_light(tmp_path):
         "hair_addon.unregister()\n"
         "print(ours / blender)\n"
     )
-    # Compiled by the first run, as on an artist's machine, whatever the environment says of bytecode.
-    kept = {"PYTHONDONTWRITEBYTECODE": "", "PYTHONPYCACHEPREFIX": str(tmp_path)}
-    run_python(source, **kept)
-    assert any(float(run_python(source, **kept).split()[-1]) < 0.5 for _ in range(2))
+    # Compiled by the first run at the latest, as on an artist's machine, whatever the environment says of bytecode.
+    assert any(float(run_python(source, PYTHONDONTWRITEBYTECODE="").split()[-1]) < 0.5 for _ in range(3))
 
 
 # RELIABILITY: somebody hostile supplies the .blend; and an extension has no business on the network.

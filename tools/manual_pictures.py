@@ -21,7 +21,8 @@ MODULE = "bl_ext.user_default.vellus"
 
 # Step of tests/desktop/manual/first_minutes.py → its picture in README.
 FIVE_MINUTES = {"cube_near": "new_hair_system", "head": "guide_mask", "combed": "comb_guides", "shaded": "look"}
-FIVE_MINUTES_SAMPLES = 32  # per pixel: as an artist sees them
+SAMPLES = 32  # per pixel: as an artist sees them
+FIVE_MINUTES_STRANDS, CURLY_STRANDS = 40_000, 16_000
 
 # Steps of tests/desktop/manual/curly_hair.py that the page Curly Hair shows.
 CURLY_HAIR = (
@@ -78,7 +79,7 @@ def take_five_minutes(blender, extension, folder):
     """Write README's pictures of the five minutes; returns the exit status."""
     import bpy
 
-    if error := take_walk(blender, "manual/first_minutes", ["all"], extension, folder, FIVE_MINUTES_SAMPLES):
+    if error := take_walk(blender, "manual/first_minutes", ["all"], extension, folder, SAMPLES, FIVE_MINUTES_STRANDS):
         return error
     left, top, right, bottom = SEEN_PART
     for step, name in FIVE_MINUTES.items():
@@ -91,7 +92,7 @@ def take_five_minutes(blender, extension, folder):
 
 def take_curly_hair(blender, extension, folder):
     """Write the pictures of the page Curly Hair; returns the exit status."""
-    if error := take_walk(blender, "manual/curly_hair", CURLY_PARTS, extension, folder):
+    if error := take_walk(blender, "manual/curly_hair", CURLY_PARTS, extension, folder, SAMPLES, CURLY_STRANDS):
         return error
     left, top, right, bottom = SEEN_PART
     for step in CURLY_HAIR:

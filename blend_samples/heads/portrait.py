@@ -18,7 +18,8 @@ NEAR_EYE = Vector((0.032, -0.135, 0.731))  # [m]: in focus
 # Absorption per fibre radius at the roots, which a key light from above would else show brighter than the lengths, and
 # the part of it at the tips, which the sun has bleached. Light that is scattered once takes little color from hair: the
 # classic model shows light brown lengths as olive, and has darker ones.
-AUBURN, CHESTNUT = (1.05, 2.07, 3.91), (0.50, 1.15, 2.80)
+# Kajiya-Kay's color is that of light scattered many times, which takes much: it has lighter hair.
+AUBURN, CHESTNUT, LIGHT_CHESTNUT = (1.05, 2.07, 3.91), (0.50, 1.15, 2.80), (0.175, 0.40, 0.98)
 _AUBURN_TIP, _CHESTNUT_TIP = 0.18, 0.40
 GAZE, AHEAD = CAMERA, (0.0, -1.50, 0.735)  # [m]: what the eyes look at; straight ahead
 FSTOP = 8.0
@@ -68,6 +69,12 @@ def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
     look.random_color = 0.2
     look.tip_absorption, look.gradient_start, look.gradient_end = _CHESTNUT_TIP, 0.05, 0.42
     return guides, hair
+
+
+def make_chestnut(hair, model):
+    """Give hair Curves the look of the pictures of both classic models, by one of them."""
+    hair.vellus.model = model
+    hair.vellus.appearance.absorption = LIGHT_CHESTNUT if model == "KAJIYA_KAY" else CHESTNUT
 
 
 def make_auburn(hair):
@@ -196,7 +203,7 @@ def light():
     lens.use_dof, lens.aperture_fstop, lens.aperture_blades = True, FSTOP, 7
     lens.focus_distance = _distance_to(camera, NEAR_EYE)
     _place("Key", (-0.36, -1.20, 1.38), 28.0, 0.40)
-    _place("Rim", (-0.65, 0.95, 1.35), 34.0, 0.4)
+    _place("Rim", (-0.50, 1.08, 1.65), 45.0, 0.4)
     _place("Fill", (1.0, -1.15, 0.85), 8.0, 0.9)
     second = bpy.data.objects.new("Rim 2", bpy.data.objects["Rim"].data.copy())
     scene.collection.objects.link(second)

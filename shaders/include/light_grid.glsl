@@ -7,7 +7,7 @@ bool has_light_grid()
 }
 
 // Of visible strands around a place: RGB, radiance that arrives among strands, as even light that they would send to the
-// viewer alike; alpha, the part of lamps' light by shadow maps that is kept.
+// viewer alike; alpha, the part of light by dual scattering that is kept beside it.
 vec4 light_among_strands(vec3 position)
 {
   return textureLod(light_grid, (position - lights.grid_corner.xyz) * lights.grid_scale.xyz, 0.0);

@@ -58,8 +58,8 @@ float disk_irradiance(float height, float beside, float radius)
   return flat_part / (0.5 * (cosines.x + cosines.y));
 }
 
-// Irradiance [W/m²] of a small ball at `position`, per its cross section. power: RGB watts, or W/m² of a sun; radius: of an
-// area light's disk.
+// Irradiance [W/m²] of a small ball at `position`, per its cross section. power: RGB watts, or W/m² of a sun; radius: of
+// the light's disk, which point and spot lights turn to the ball.
 vec3 light_irradiance(int kind,
                       vec3 light_position,
                       vec3 axis,
@@ -84,6 +84,8 @@ vec3 light_irradiance(int kind,
     float beside = length(offset - height * axis);
     return power / PI * disk_irradiance(height, beside, radius) * area_falloff(cos_angle, cos_cone);
   }
-  vec3 irradiance = power / (4.0 * PI * distance_squared);
+  // The mean of cos / distance² over the disk.
+  float edge = sqrt(distance_squared + radius * radius);
+  vec3 irradiance = power / (2.0 * PI * edge * (edge + sqrt(distance_squared)));
   return (kind == LIGHT_SPOT) ? irradiance * spot_falloff(cos_angle, cos_cone, blend) : irradiance;
 }

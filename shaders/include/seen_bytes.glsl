@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // What a point of a strand sees of the world, in the twenty bytes that visibility textures have for it: its sums over the
-// directions (world_visibility.frag) from zero to one, so that a step is as little seen in shade as in light.
+// directions (world_visibility.comp) from zero to one, so that a step is as little seen in shade as in light.
 
 struct Seen {
   vec4 x_y;

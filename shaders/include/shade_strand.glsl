@@ -47,25 +47,7 @@ bool is_visible(vec3 irradiance)
   return max(irradiance.r, max(irradiance.g, irradiance.b)) > LEAST_IRRADIANCE;
 }
 
-// Radiance towards the viewer where paths through a grid have found all light: that of lamps, straight from them, is drawn
-// here as far as the grid keeps it, and the rest is the grid's.
-vec3 strand_light_on_grid(SeenStrand strand)
-{
-  vec4 among = light_among_strands(drawn_position);
-  vec3 radiance = vec3(0.0);
-  for (int index = 0; index < lights.count; index++) {
-    Light light = lights.light[index];
-    LampLight lamp = lamp_on_strand(light, strand.root);
-    vec3 arriving = lamp.irradiance * lamp.open * exp(-lamp.front);
-    if (is_visible(arriving)) {
-      float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
-      radiance += arriving * hair_bsdf(strand.T, lamp.L, strand.V, blur);
-    }
-  }
-  return max(among.a * radiance + drawn_lobes.w * among.rgb * strand.returned, vec3(0.0));
-}
-
-// The same by dual scattering.
+// Radiance towards the viewer by dual scattering.
 vec3 strand_light(SeenStrand strand)
 {
   vec3 T = strand.T;
@@ -123,6 +105,14 @@ vec3 strand_light(SeenStrand strand)
     }
   }
   return radiance;
+}
+
+// The same where paths through a grid have found all light: as much of it is kept as the grid says, and the rest is the
+// grid's.
+vec3 strand_light_on_grid(SeenStrand strand)
+{
+  vec4 among = light_among_strands(drawn_position);
+  return among.a * strand_light(strand) + drawn_lobes.w * among.rgb * strand.returned;
 }
 
 vec4 sample_value()

@@ -71,7 +71,7 @@ float crossed_before_surface(vec3 at, float depth)
   return front * (1.0 - smoothstep(1.0, 1.5, ends.x));
 }
 
-// A color that `drawing.packed_colors` has packed.
+// A color that `surface_textures.packed_colors` has packed.
 vec3 unpacked_color(float packed_value)
 {
   vec3 root = mod(floor(packed_value / vec3(65536.0, 256.0, 1.0)), 256.0) / 255.0;
@@ -109,14 +109,19 @@ float surface_beyond(Light light, vec3 at, float depth, vec3 L, out vec3 normal,
   return found * step(depth, total / max(found, 0.25) + SURFACE_BIAS);
 }
 
+// Part of light that `count` strands send back, as `layer_parts` has it.
+vec3 reflected_by_hair(float count)
+{
+  vec3 reflectance = view.hair_reflectance.rgb;
+  vec3 left = transmitted(2.0 * count, view.hair_forward.rgb);
+  return reflectance * (vec3(1.0) - left) / (vec3(1.0) - reflectance * reflectance * left);
+}
+
 // Light of a surface of a color, relative to that which it reflects at once: hair above it, of `count` strands, sends a
 // part of it back to the surface, again and again.
 vec3 between_hair_and_surface(vec3 color, float count)
 {
-  vec3 reflectance = view.hair_reflectance.rgb;
-  vec3 left = transmitted(2.0 * count, view.hair_forward.rgb);
-  vec3 reflected = reflectance * (vec3(1.0) - left) / (vec3(1.0) - reflectance * reflectance * left);
-  return vec3(1.0) / (vec3(1.0) - color * reflected);
+  return vec3(1.0) / (vec3(1.0) - color * reflected_by_hair(count));
 }
 
 // Light that surfaces reflect to a strand, as a part of even light around it, for unit irradiance of the light: through the

@@ -11,6 +11,16 @@ float D_ggx(float n_dot_h, float alpha)
   return squared / (PI * spread * spread);
 }
 
+// The same for light from a disk, which a smooth surface mirrors with its border: half vectors within half of its angular
+// radius are as one. n_dot_h: to the disk's middle; half_radius: half of the angular radius. The factor keeps the integral
+// for small angles.
+float D_ggx_of_disk(float n_dot_h, float half_radius, float alpha)
+{
+  float outside = max(acos(clamp(n_dot_h, 0.0, 1.0)) - half_radius, 0.0);
+  float ratio = half_radius / alpha;
+  return D_ggx(cos(outside), alpha) / (1.0 + ratio * (0.5 * PI + ratio));
+}
+
 // Part of the microfacets that both light and eye see, over 4 (N·L) (N·V) [Heitz14, Eq. 99].
 float V_smith(float n_dot_l, float n_dot_v, float alpha)
 {

@@ -3,7 +3,7 @@
 // the lamp is wide; what strands pass on leaves the hair in all directions and is spread over the surface by its distance.
 // Needs the samplers of include/shadow.glsl.
 
-#include "include/shadow.glsl"
+#include "include/hair_reflection.glsl"
 
 const int TAP_COUNT = 4;
 // Distances of hair from the surface, as parts of the hair's extent: where it is looked for first, and the largest.
@@ -26,27 +26,6 @@ float disk_cosine(float cosine, float sine)
   return (cosine >= sine) ? cosine : 0.25 * above * above / max(sine, 1e-4);
 }
 
-// Places across a light's direction, for distances in meters.
-struct Across {
-  vec3 right;
-  vec3 up;
-  float scale;  // of the map, times the distance to the light's plane
-  float w;
-};
-
-Across across_of(Light light, vec3 position)
-{
-  mat4 m = light.world_to_shadow;
-  vec3 right = vec3(m[0][0], m[1][0], m[2][0]);
-  vec3 up = vec3(m[0][1], m[1][1], m[2][1]);
-  Across across;
-  across.right = normalize(right);
-  across.up = normalize(up);
-  across.scale = 0.5 * length(right);
-  across.w = dot(vec4(m[0][3], m[1][3], m[2][3], m[3][3]), vec4(position, 1.0));
-  return across;
-}
-
 // A direction for the samples of a place in the picture, another one in each pass.
 vec2 sample_turn()
 {
@@ -66,15 +45,17 @@ void surface_visibility(
   float direct = disk_cosine(cosine, tangent * inversesqrt(1.0 + tangent * tangent));
   past_surfaces = direct;
   past_hair = vec3(direct);
-  if (cosine < LEAST_COSINE) {
-    return;
-  }
   vec3 at;
   float depth;
   if (!shadow_place(light, position, at, depth)) {
     return;
   }
   Across across = across_of(light, position);
+  vec3 reflected = hair_reflection(light, across, at, depth, N, L, turn);
+  past_hair += reflected;
+  if (cosine < LEAST_COSINE) {
+    return;
+  }
   float texel = 1.0 / float(textureSize(hair_front, 0).x);
   vec2 aside = turn;
   float away = FIRST_DISTANCE;
@@ -105,5 +86,5 @@ void surface_visibility(
     }
   }
   past_surfaces = direct * seen;
-  past_hair = (vec3(direct * between) + through) / float(TAP_COUNT);
+  past_hair = (vec3(direct * between) + through) / float(TAP_COUNT) + reflected;
 }

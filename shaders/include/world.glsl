@@ -55,7 +55,7 @@ float all_seen(vec4 seen_x_y, vec4 seen_z)
   return dot(seen_x_y, vec4(1.0)) + seen_z.x + seen_z.y;
 }
 
-// Mean number of strands behind the light that arrives: `world_visibility.frag` sums its exponential in seen_z.
+// Mean number of strands behind the light that arrives: `world_visibility.comp` sums its exponential in seen_z.
 float mean_strands_behind(vec4 seen_x_y, vec4 seen_z, float opacity)
 {
   return -log(clamp(seen_z.z / max(all_seen(seen_x_y, seen_z), 1e-6), 1e-4, 1.0)) / opacity;

@@ -24,6 +24,7 @@ from tests.desktop.window import (  # noqa: E402
     key,
     of_kind,
     places,
+    refine_to,
     take_picture,
     viewport,
     wait,
@@ -71,6 +72,7 @@ def are_in(rows, others):
 def groom():
     """Hair on a sphere, its guides waved, one eighth of them selected in Sculpt Mode; two empties to cut with."""
     install(ZIP)
+    refine_to()
     for thing in list(bpy.data.objects):
         bpy.data.objects.remove(thing)
     with in_viewport():
@@ -109,7 +111,7 @@ def use(name):
     for _entry in range(list(TOOLS).index(name)):
         yield from key("DOWN_ARROW")
     if name == "smooth_guides":
-        take_picture(OUT / "menu.png")
+        take_picture(OUT / "menu.png", redraws=2)
     count = len(bpy.context.window_manager.operators)
     yield from key("RET")
     yield from wait_for(
@@ -176,13 +178,13 @@ def comb_straight():
             facts["is straight in the stroke"] = bound() is not None and bound().straight is not None
     yield from wait(1.0)
     facts["straightened"], facts["combed"] = float(np.abs(straight - styled).max()), followed
-    take_picture(OUT / "straight.png")
+    take_picture(OUT / "straight.png", redraws=2)
     with in_viewport():
         bpy.ops.object.mode_set(mode="OBJECT")
     yield from wait(1.0)
     facts["is styled again"] = bound() is None or bound().straight is None
     facts["styled again"] = float(np.abs(strands() - styled).max())
-    take_picture(OUT / "styled.png")
+    take_picture(OUT / "styled.png", redraws=2)
     facts["status"] = of_kind("HAIR").data.vellus.status
 
 

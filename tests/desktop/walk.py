@@ -131,6 +131,7 @@ def grow():
 def shading_modes():
     """Hair in every way a viewport shades."""
     area, _region = viewport()
+    bpy.context.scene.eevee.taa_samples = 1  # EEVEE's pictures are not compared
     for mode in ("WIREFRAME", "SOLID", "MATERIAL", "RENDERED"):
         area.spaces.active.shading.type = mode
         yield from shaders_compiled()

@@ -27,6 +27,15 @@ def install(path):
     return sys.modules[f"{MODULE}.hair_addon.blender"]
 
 
+def refine_to(sample_count=2):
+    """Viewports draw so many samples of each pixel's hair, and one of all else: each is a redraw of its own.
+
+    For drivers without a GPU; once the add-on is installed, in each Blender of a walk.
+    """
+    bpy.context.preferences.system.viewport_aa = "OFF"
+    sys.modules[f"{MODULE}.hair_addon.blender"].render.viewport.hair_picture.SAMPLE_COUNT = sample_count
+
+
 def window():
     return bpy.context.window_manager.windows[0]
 

@@ -108,8 +108,9 @@ def hair_is_what_its_settings_say():
 def what_is_drawn_is_what_is_there():
     """What is kept on the GPU is what a first drawing would bring there, once what waits for an update has had it."""
     bpy.context.view_layer.update()
-    for datablock in {o.data for o in bpy.context.view_layer.objects if o.type == "CURVES"} & {*ours()}:
-        kept = _drawn_points(datablock)
+    present = {o.data for o in bpy.context.view_layer.objects if o.type == "CURVES"}
+    # All that is kept is read first: what stands on one surface is made anew together.
+    for datablock, kept in [(datablock, _drawn_points(datablock)) for datablock in ours() if datablock in present]:
         events.strands_made(datablock)
         if datablock.surface is not None:
             events.surface_moved(datablock.surface)

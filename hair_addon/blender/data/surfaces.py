@@ -8,11 +8,11 @@ from functools import cached_property
 import numpy as np
 
 from ...core import geometry
-from ...core.geometry.mesh import Faces, TriMesh
+from ...core.geometry.mesh import Faces, TriMesh, check_mesh
 from ...core.kernels.checks import require_indices
 
 # What does not follow from where vertices are posed, and is kept in another pose.
-_AT_REST = ("to_local_axes", "shape", "extent", "topology")
+_AT_REST = ("to_local_axes", "local_mesh", "shape", "extent", "topology")
 
 _MOST_TURNINGS = 8  # of a surface: of the hair and the guides on it
 
@@ -55,6 +55,13 @@ class Surface:
     def is_deformed(self):
         """Whether shape keys or modifiers deform it."""
         return not np.array_equal(self.rest, self.posed)
+
+    @cached_property
+    def local_mesh(self):
+        """The `TriMesh` at rest in local coordinates. Raises `HairError` as `check_mesh`."""
+        mesh = TriMesh(self.rest, self.mesh.triangles)
+        check_mesh(mesh)
+        return mesh
 
     @cached_property
     def posed_mesh(self):

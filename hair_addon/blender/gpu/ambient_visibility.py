@@ -9,7 +9,7 @@ import gpu
 import numpy as np
 
 from ...core.imaging import ambient_cube
-from . import drawing, shaders, shadows, uniforms
+from . import drawing, seen_programs, shaders, shadows, uniforms
 from .strand_textures import seen_points
 
 # Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as they can resolve.
@@ -17,8 +17,6 @@ from .strand_textures import seen_points
 _SIZE = 256
 _POINT_COUNT, _LEAST_STRANDS = 11, 10_000
 _FULL_WIDTH = 0.5  # texels that a strand may be wide that is drawn for several
-_BYTES = "RGBA8"  # textures that strands' visibility is kept in
-_SUMS = "RGBA16F"  # and those in which sums are added up
 
 
 def measure(hair, surfaces, opacities, clear=(), forwards=None):
@@ -134,10 +132,8 @@ def _view_of_strands(strands, to_world):
 
 
 def _view_of_surface(surface):
-    view = uniforms.VIEW.record()
-    view["object_to_world"] = np.eye(4)
-    view["point_count"], view["row_strands"] = 1, surface.row_corners
-    view["seen_points"] = 1
+    view = surface.placed(uniforms.VIEW.record())
+    view["point_count"], view["seen_points"] = 1, 1
     return view
 
 
@@ -150,16 +146,12 @@ class _Target:
 
     def __init__(self, place, is_in_bytes=False):
         self.view, self.places = place
-        self.view["seen_in_bytes"] = is_in_bytes
-        self.size = _size_of(*place)
-        kind = _BYTES if is_in_bytes else _SUMS
-        self.take({name: _texture(self.size, kind) for name in shaders.VISIBILITY_SAMPLERS})
+        self.size, self._format = _size_of(*place), seen_programs.BYTES if is_in_bytes else seen_programs.SUMS
+        self.take({name: _texture(self.size, self._format) for name in shaders.VISIBILITY_SAMPLERS})
 
     def take(self, textures):
         """Add up in these textures {sampler: texture}, from zero."""
-        self.textures, self.framebuffer = textures, _framebuffer(textures)
-        with self.framebuffer.bind():
-            self.framebuffer.clear(color=(0.0, 0.0, 0.0, 0.0))
+        self.textures, self._is_first = textures, True
 
     def completed(self, before):
         """Textures {sampler: texture} of what was added up; it begins again from zero.
@@ -170,15 +162,25 @@ class _Target:
         if _is_surface((self.view, self.places)):
             self.take(before)
             return found
-        with _framebuffer(before).bind(), drawing.gpu_state("NONE", depth_writes=False):
-            drawing.draw_cover(shaders.visibility_bytes_program(), {}, found)
+        program = seen_programs.bytes_program()
+        with drawing.bound(program, {}, found):
+            self._dispatch(program, before)
         self.take(found)
         return before
 
     def add(self, lights, maps):
-        with self.framebuffer.bind(), drawing.gpu_state("NONE", depth_writes=False, blend="ADDITIVE_PREMULT"):
-            blocks = {"view": self.view, "lights": lights}
-            drawing.draw_cover(shaders.visibility_program(), blocks, {**self.places, **maps})
+        program = seen_programs.visibility_program(self._format)
+        blocks = {"view": uniforms.uniform_buffer(self.view), "lights": uniforms.uniform_buffer(lights)}
+        with drawing.bound(program, blocks, {**self.places, **maps}):
+            if self._format == seen_programs.SUMS:
+                program.uniform_int("is_first", int(self._is_first))
+            self._dispatch(program, self.textures)
+        self._is_first = False
+
+    def _dispatch(self, program, textures):
+        for name, texture in zip(seen_programs.IMAGES, textures.values(), strict=True):
+            program.image(name, texture)
+        drawing.dispatch_over(program, self.size)
 
 
 def _size_of(view, places):
@@ -188,10 +190,6 @@ def _size_of(view, places):
 def _is_surface(place):
     """Whether a place of `_places` is a surface."""
     return int(place[0]["point_count"]) == 1
-
-
-def _framebuffer(textures):
-    return gpu.types.GPUFrameBuffer(color_slots=tuple(textures.values()))
 
 
 def _texture(size, kind):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Drawing of strands as strips, and of surfaces, into the bound framebuffer.
+"""Drawing of strands as strips into the bound framebuffer.
 
 Strands are camera-facing strips without vertex attributes: the vertex shader fetches points from a texture.
 """
@@ -9,46 +9,12 @@ import math
 import threading
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
 
 import gpu
 import numpy as np
 
-from ...core import geometry
 from . import shaders, uniforms
-from .strand_textures import TEXTURE_WIDTH, bare_vertices, run_for_each, vertex_count
-
-
-@dataclass(frozen=True, eq=False)
-class SurfaceOnGPU:
-    """Triangles of a surface: their corners' places in a texture."""
-
-    places: gpu.types.GPUTexture
-    row_corners: int
-    corner_count: int
-    corners: dict  # {attribute: (3 F, N) values} of `batch`
-
-    @cached_property
-    def fingerprint(self) -> str:
-        """Of the corners' places, for motion vectors."""
-        return geometry.fingerprint.fingerprint(self.corners["position"])
-
-    @cached_property
-    def batch(self) -> gpu.types.GPUBatch:
-        """The triangles with all attributes, uploaded for who needs more than their places."""
-        layout = gpu.types.GPUVertFormat()
-        for name, values in self.corners.items():
-            layout.attr_add(id=name, comp_type="F32", len=values.shape[1], fetch_mode="FLOAT")
-        vertices = gpu.types.GPUVertBuf(layout, self.corner_count)
-        for name, values in self.corners.items():
-            # Other types than contiguous float32 would be accepted silently and drawn incorrectly.
-            vertices.attr_fill(name, np.ascontiguousarray(values, np.float32))
-        return gpu.types.GPUBatch(type="TRIS", buf=vertices)
-
-    @cached_property
-    def bare(self) -> gpu.types.GPUBatch:
-        """The same without attributes: a shader reads `places`."""
-        return bare_vertices(self.corner_count, "TRIS")
+from .strand_textures import bare_vertices, run_for_each, vertex_count
 
 
 @dataclass(frozen=True)
@@ -256,17 +222,6 @@ def dispatch_over(program, size):
     gpu.compute.dispatch(program, width, height, 1)
 
 
-def draw_surface_depth(surface, view, lights, fragment="shadow_surface.frag"):
-    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surface_hides.frag."""
-    program, samplers = shaders.surface_depth_program(fragment), {"places": surface.places}
-    _draw(surface.bare, program, view, uniforms.uniform_buffer(lights), samplers, surface.corner_count)
-
-
-def draw_triangles(surface, program, view, lights, samplers):
-    """Draw a surface's batch with a program."""
-    _draw(surface, program, view, uniforms.uniform_buffer(lights), samplers)
-
-
 def _draw(batch, program, view, lights, samplers, count=0):
     with bound(program, {"view": uniforms.uniform_buffer(view), "lights": lights}, samplers):
         batch.draw_range(program, elem_count=count)  # zero: all there are
@@ -286,41 +241,6 @@ def bound(program, blocks, samplers):
         program.uniform_sampler(name, texture)
     yield
     gpu.shader.unbind()
-
-
-def upload_surface(positions, normals, uvs=None, colors=()):
-    """(3 F, 3) float32 corner positions and unit normals in world space, (3 F, 2) UVs → `SurfaceOnGPU`.
-
-    Normals, of what is drawn as depth alone, and UVs may be None. colors: (number of corners, linear RGB) of one part
-    after the other as they light hair; black without.
-    """
-    row_corners = min(len(positions), TEXTURE_WIDTH)
-    colors = colors or ((len(positions), (0.0, 0.0, 0.0)),)
-    packed = packed_colors([color for _count, color in colors]).repeat([count for count, _color in colors])
-    places = _places_texture(positions, packed, row_corners)
-    # Those that are missing are as many, without their memory.
-    normals = np.broadcast_to(np.float32(0.0), positions.shape) if normals is None else normals
-    uvs = np.broadcast_to(np.float32(0.0), (len(positions), 2)) if uvs is None else uvs
-    corners = {"position": positions, "normal": normals, "uv": uvs}
-    return SurfaceOnGPU(places, row_corners, len(positions), corners)
-
-
-def packed_colors(colors):
-    """(N, 3) linear RGB → (N,) float32: square roots in eight bits each, as whole numbers that floats hold exactly."""
-    roots = np.rint(255.0 * np.sqrt(np.clip(colors, 0.0, 1.0)))
-    return (roots @ np.array([65536.0, 256.0, 1.0])).astype(np.float32)
-
-
-def _places_texture(positions, colors, row_corners):
-    """(N, 3) places with (N,) packed colors in a texture, `row_corners` a row."""
-    row_count = -(-len(positions) // row_corners)
-    texels = np.empty((row_count * row_corners, 4), np.float32)
-    texels[: len(positions), :3], texels[: len(positions), 3] = positions, colors
-    texels[len(positions) :] = 0.0
-    data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
-    texture = gpu.types.GPUTexture((row_corners, row_count), format="RGBA32F", data=data)
-    texture.filter_mode(False)
-    return texture
 
 
 def draw_cover(program, blocks, samplers):

@@ -40,15 +40,8 @@ def strand_arrival_program():
 
 @shaders.kept
 def lit_surface_program(fragment):
-    """The program of how much light reaches surfaces, by a .frag: attributes position, normal, uv."""
-    info, varying = shaders.surface_info()
-    shaders.declare_scene(info)
-    info.vertex_in(2, "VEC2", "uv")
-    varying.smooth("VEC4", "corner_seen_x_y")
-    varying.smooth("VEC4", "corner_seen_z")
-    varying.smooth("VEC2", "surface_uv")
-    info.vertex_out(varying)
-    return shaders.compile_drawing(info, "lit_surface.vert", fragment)
+    """The program of how much light reaches surfaces, by a .frag."""
+    return shaders.compile_drawing(shaders.lit_surface_info(), "lit_surface.vert", fragment)
 
 
 MOTION_FORMAT = "RGBA32F"  # of how far things move
@@ -68,11 +61,10 @@ def strand_motion_program():
 def surface_motion_program():
     """The same for surfaces: see surface_motion.vert."""
     info = gpu.types.GPUShaderCreateInfo()
-    info.vertex_in(0, "VEC3", "position")
     info.typedef_source(uniforms.VIEW.source + uniforms.MOTION.source)
     info.uniform_buf(0, "View", "view")
     info.uniform_buf(1, "Motion", "motion")
-    for slot, name in enumerate(("places_before", "places_after")):
+    for slot, name in enumerate(("places", "places_before", "places_after")):
         info.sampler(slot, "FLOAT_2D", name)
     varying = gpu.types.GPUStageInterfaceInfo("motion_varying")
     for name in ("place_now", "place_before", "place_after"):

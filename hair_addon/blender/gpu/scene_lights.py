@@ -120,9 +120,10 @@ def places_of_hair(points, to_world):
     return some @ to_world[:3, :3].T + to_world[:3, 3]
 
 
-def places_on_surface(positions):
-    """(P, 3) places [m] among the corners (N, 3) of a surface."""
-    return positions[:: -(-len(positions) // _PLACES)].astype(float)
+def places_on_surface(vertices, triangles, to_world):
+    """(P, 3) places [m] among the corners of triangles (N,) of vertices (V, 3) that `to_world` (4, 4) transforms."""
+    some = vertices[triangles[:: -(-len(triangles) // _PLACES)]].astype(float)
+    return some @ to_world[:3, :3].T + to_world[:3, 3]
 
 
 def new_maps(record):

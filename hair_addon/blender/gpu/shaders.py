@@ -63,7 +63,7 @@ def compile_one(makers):
 
 
 SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
-# See shaders/world_visibility.frag.
+# See shaders/world_visibility.comp.
 VISIBILITY_SAMPLERS = (
     "visibility_x_y",
     "visibility_z",
@@ -72,7 +72,6 @@ VISIBILITY_SAMPLERS = (
     "visibility_color",
 )
 STRAND_SAMPLERS = ("strands", "strand_radii")  # see shaders/include/segment.glsl
-VISIBILITY_TARGETS = ("seen_x_y", "seen_z", "seen_surface", "seen_channels", "seen_color")
 
 
 def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
@@ -222,18 +221,12 @@ SURFACE_IMAGES = ("color_image", "roughness_image", "normal_image")  # of a `Sur
 
 @kept
 def surface_program():
-    """The program that draws a lit surface: attributes position, normal, uv; the block of its material, its images."""
-    info, varying = surface_info()
-    declare_scene(info, uniforms.SURFACE.source)
-    info.vertex_in(2, "VEC2", "uv")
+    """The program that draws a lit surface: the block of its material, its images."""
+    info = lit_surface_info(uniforms.SURFACE.source)
     info.uniform_buf(2, "Surface", "surface")
     names = (*SURFACE_IMAGES, "surface_albedo")
-    for slot, name in enumerate(names, start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)):
+    for slot, name in enumerate(names, start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS) + 2):
         info.sampler(slot, "FLOAT_2D", name)
-    varying.smooth("VEC4", "corner_seen_x_y")
-    varying.smooth("VEC4", "corner_seen_z")
-    varying.smooth("VEC2", "surface_uv")
-    info.vertex_out(varying)
     return compile_drawing(info, "lit_surface.vert", "surface.frag")
 
 
@@ -244,39 +237,28 @@ def surface_depth_program(fragment="shadow_surface.frag"):
     declare_scene(info, shadow_samplers=(), is_lit=False)
     info.sampler(0, "FLOAT_2D", "places")
     varying.smooth("VEC3", "drawn_position")
-    varying.flat("FLOAT", "packed_color")
     info.vertex_out(varying)
     return compile_drawing(info, "surface_place.vert", fragment)
 
 
-def surface_info():
-    """(info, varying) of a program that draws triangles with the attributes position and normal."""
-    info = gpu.types.GPUShaderCreateInfo()
-    info.vertex_in(0, "VEC3", "position")
-    info.vertex_in(1, "VEC3", "normal")
-    varying = gpu.types.GPUStageInterfaceInfo("surface_varying")
-    varying.smooth("VEC3", "drawn_position")
-    varying.smooth("VEC3", "surface_normal")
-    return info, varying
-
-
-@kept
-def visibility_program():
-    """The program that adds up how much of the world the texels of `places` see."""
-    info = gpu.types.GPUShaderCreateInfo()
-    declare_scene(info, is_lit=False)
-    for slot, name in enumerate(("places", "strand_radii"), start=len(SHADOW_SAMPLERS)):
+def lit_surface_info(structs=""):
+    """Info of a program of lit_surface.vert: its attributes, and the samplers of the scene and of `SurfaceOnGPU`."""
+    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
+    declare_scene(info, structs)
+    for slot, name in enumerate(("places", "normals"), start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
-    return compile_drawing(info, "cover.vert", "world_visibility.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
-
-
-@kept
-def visibility_bytes_program():
-    """The program that keeps what strands see in fewer bytes."""
-    info = gpu.types.GPUShaderCreateInfo()
-    for slot, name in enumerate(VISIBILITY_SAMPLERS):
-        info.sampler(slot, "FLOAT_2D", name)
-    return compile_drawing(info, "cover.vert", "visibility_bytes.frag", [(name, "VEC4") for name in VISIBILITY_TARGETS])
+    for slot, (kind, name) in enumerate((("INT", "corner_vertex"), ("INT", "corner_normal"), ("VEC2", "uv"))):
+        info.vertex_in(slot, kind, name)
+    for kind, name in (
+        ("VEC3", "drawn_position"),
+        ("VEC3", "surface_normal"),
+        ("VEC4", "corner_seen_x_y"),
+        ("VEC4", "corner_seen_z"),
+        ("VEC2", "surface_uv"),
+    ):
+        varying.smooth(kind, name)
+    info.vertex_out(varying)
+    return info
 
 
 @kept

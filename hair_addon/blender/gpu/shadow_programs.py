@@ -1,47 +1,59 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""GLSL files → GPU programs that filter a light's shadow map."""
+"""GLSL files → GPU programs that filter a light's shadow map: each fills `filtered`, or a layer of it.
+
+They are compute programs: graphics cards made for computing draw with few of their processors.
+"""
 
 import gpu
 
 from . import shaders, uniforms
 
+_READ_WRITE = {"READ", "WRITE"}
+
 
 @shaders.kept
 def rows_program():
     """The program that finds the ends of each texel's row in `fronts` and `backs`, a deep opacity map's first pass."""
-    return _filter("shadow_rows.frag", {"fronts": "UINT_2D", "backs": "UINT_2D"})
+    return _filter("shadow_rows.comp", "RG32F", {"fronts": "UINT_2D", "backs": "UINT_2D"})
 
 
 @shaders.kept
 def fill_program():
-    """The program that fills gaps of `fronts` and `backs` from the result of `rows_program`."""
-    return _filter("shadow_fill.frag", {"fronts": "UINT_2D", "backs": "UINT_2D", "row_ends": "FLOAT_2D"})
+    """The program that fills gaps of `fronts` and `backs` from the result of `rows_program`, into a layer."""
+    samplers = {"fronts": "UINT_2D", "backs": "UINT_2D", "row_ends": "FLOAT_2D"}
+    return _filter("shadow_fill.comp", "RG32F", samplers, in_layer=True)
 
 
 @shaders.kept
 def counts_program():
-    """The program that makes layers of `counts`, a deep opacity map's second pass where it is computed."""
-    return _filter("shadow_counts.frag", {"counts": "UINT_2D"})
+    """The program that makes layers of `counts`, a deep opacity map's second pass, and leaves all its images empty."""
+    images = {"counts": _READ_WRITE, "fronts": _READ_WRITE, "backs": _READ_WRITE}
+    return _filter("shadow_counts.comp", "RGBA16F", {}, in_layer=True, images=images)
 
 
 @shaders.kept
 def hidden_program():
     """The program that finds the depth behind which strands are hidden by the surfaces of `surface_depth`."""
-    return _filter("shadow_hidden.frag", {"surface_depth": "FLOAT_2D"})
+    return _filter("shadow_hidden.comp", "R32F", {"surface_depth": "FLOAT_2D_ARRAY"})
 
 
 @shaders.kept
 def moments_program():
     """The program that blurs `surface_depth` along an axis: depths if is_depth, else its first result."""
     constants = (("IVEC2", "along"), ("INT", "taps"), ("INT", "is_depth"), ("FLOAT", "deviation"))
-    return _filter("shadow_moments.frag", {"surface_depth": "FLOAT_2D"}, constants)
+    return _filter("shadow_moments.comp", "RGBA32F", {"surface_depth": "FLOAT_2D_ARRAY"}, constants, in_layer=True)
 
 
-def _filter(fragment, samplers, constants=()):
+def _filter(file, texture_format, samplers, constants=(), in_layer=False, images=None):
+    """The program of a file; texture_format: of `filtered`, an array with `in_layer`; images: of integers."""
     info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
     info.typedef_source(uniforms.LIGHT.source)
-    for constant in constants:
+    for constant in (*constants, *((("INT", "layer"),) if in_layer else ())):
         info.push_constant(*constant)
     for slot, (sampler, kind) in enumerate(samplers.items()):
         info.sampler(slot, kind, sampler)
-    return shaders.compile_drawing(info, "cover.vert", fragment)
+    info.image(0, texture_format, "FLOAT_2D_ARRAY" if in_layer else "FLOAT_2D", "filtered", qualifiers={"WRITE"})
+    for slot, (name, qualifiers) in enumerate((images or {}).items(), start=1):
+        info.image(slot, "R32UI", "UINT_2D", name, qualifiers=qualifiers)
+    return shaders.compile_compute(info, file)

@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from . import drawing, shaders, shadow_programs, uniforms
+from . import drawing, shaders, shadow_programs, surface_textures, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 
@@ -40,17 +40,20 @@ class ShadowMaps:
         self._hair_layers = _array(size, layer_count, "RGBA16F")
         self._surface_moments = _array(size, layer_count, "RGBA32F")
         self._in_compute = shaders.has_image_atomics() if in_compute is None else in_compute
-        self._targets = {}  # (texture, layer) that is filtered into → its framebuffer
         self._sphere = None  # that maps were aimed at last
         self._views = {}  # index of a light not near hair → (what it was aimed by, view, what `_aim` wrote)
         self._surfaces = {}  # layer → (what its surfaces were drawn with, texture of the depth that they hide behind)
         # Target of the drawing before it is filtered into a map.
-        self._surface_depth = gpu.types.GPUTexture((size, size), format="RG32F")  # and their color
-        self._half_blurred = gpu.types.GPUTexture((size, size), format="RGBA32F")
+        self._surface_depth = _array(size, 1, "RG32F")  # and their color
+        self._half_blurred = _array(size, 1, "RGBA32F")
         self._fronts, self._backs = (gpu.types.GPUTexture((size, size), format="R32UI") for _ in range(2))
         self._row_ends = gpu.types.GPUTexture((size, size), format="RG32F")
         self._counts = gpu.types.GPUTexture((4 * size, size), format="R32UI") if self._in_compute else None
+        self._is_empty = False  # whether nothing is in the images that strands are walked into
         self._depth = gpu.types.GPUTexture((size, size), format="DEPTH_COMPONENT32F")
+        self._drawing_depth = gpu.types.GPUFrameBuffer(
+            color_slots=_slot(self._surface_depth, 0), depth_slot=self._depth
+        )
 
     @property
     def samplers(self):
@@ -105,8 +108,6 @@ class ShadowMaps:
 
     def _draw_light(self, layer, view, lights, light_block, hair, surfaces, steps):
         hidden = {"hidden_depth": self._drawn_surfaces(layer, view, lights, surfaces)}
-        self._fronts.clear(format="UINT", value=(_NOTHING,))
-        self._backs.clear(format="UINT", value=(0,))
         placed = [(strands, _record(strands, view, to_world, steps)) for strands, to_world in hair]
         if self._in_compute:
             self._walk(layer, placed, light_block, hidden)
@@ -121,11 +122,14 @@ class ShadowMaps:
             return hidden
         if hidden is None:
             hidden = gpu.types.GPUTexture((self._size, self._size), format="R32F")
-        with self._target(self._surface_depth, value=_NO_SURFACE), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        with (
+            drawing.cleared(self._drawing_depth, _NO_SURFACE),
+            drawing.gpu_state("LESS_EQUAL", depth_writes=True),
+        ):
             for surface in surfaces:
-                drawing.draw_surface_depth(surface, view, lights)
+                surface_textures.draw_depth(surface, view, lights)
         self._blur(layer, _blur_of(lights["light"][layer], self._size))
-        self._filter(hidden, None, shadow_programs.hidden_program(), surface_depth=self._surface_depth)
+        self._filter(shadow_programs.hidden_program(), hidden, surface_depth=self._surface_depth)
         self._surfaces[layer] = drawn_with, hidden
         return hidden
 
@@ -134,17 +138,26 @@ class ShadowMaps:
         program = shaders.strand_shadow_program()
         samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
+        if not self._is_empty:
+            self._clear_ends()
+            self._counts.clear(format="UINT", value=(0,))
+        self._is_empty = False
         placed = [(*one, {"view": uniforms.uniform_buffer(one[1]), "lights": lights}) for one in placed]
         for strands, record, blocks in placed:
             drawing.walk_strands(strands, program, record, blocks, samplers, images, {"is_front": 1})
         self._fill_fronts(layer)
-        self._counts.clear(format="UINT", value=(0,))
         for strands, record, blocks in placed:
             drawing.walk_strands(strands, program, record, blocks, samplers, images, {"is_front": 0})
-        self._filter(self._hair_layers, layer, shadow_programs.counts_program(), counts=self._counts)
+        self._filter(shadow_programs.counts_program(), self._hair_layers, layer, images)
+        self._is_empty = True
+
+    def _clear_ends(self):
+        self._fronts.clear(format="UINT", value=(_NOTHING,))
+        self._backs.clear(format="UINT", value=(0,))
 
     def _draw_strips(self, layer, placed, lights, hidden):
         """Draw the same map with triangle strips."""
+        self._clear_ends()
         end = shaders.strip_program("shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden))
         layers = shaders.strip_program("shadow_layers.frag", ("hair_front",), samplers=tuple(hidden))
         for texture, depth, test in ((self._fronts, 1.0, "LESS_EQUAL"), (self._backs, 0.0, "GREATER_EQUAL")):
@@ -163,14 +176,14 @@ class ShadowMaps:
 
     def _fill_fronts(self, layer):
         ends = {"fronts": self._fronts, "backs": self._backs}
-        self._filter(self._row_ends, None, shadow_programs.rows_program(), **ends)
-        self._filter(self._hair_front, layer, shadow_programs.fill_program(), **ends, row_ends=self._row_ends)
+        self._filter(shadow_programs.rows_program(), self._row_ends, **ends)
+        self._filter(shadow_programs.fill_program(), self._hair_front, layer, **ends, row_ends=self._row_ends)
 
     def _blur(self, layer, deviation):
         """Fill a layer of the surfaces' moments from their raw depth, blurred by a deviation in texels."""
         program = shadow_programs.moments_program()
         passes = (
-            (self._half_blurred, None, self._surface_depth, (1, 0)),
+            (self._half_blurred, 0, self._surface_depth, (1, 0)),
             (self._surface_moments, layer, self._half_blurred, (0, 1)),
         )
         for target, target_layer, source, along in passes:
@@ -179,14 +192,16 @@ class ShadowMaps:
             program.uniform_int("taps", int(np.ceil(2.0 * deviation)))
             program.uniform_int("is_depth", int(source is self._surface_depth))
             program.uniform_float("deviation", deviation)
-            self._filter(target, target_layer, program, surface_depth=source)
+            self._filter(program, target, target_layer, surface_depth=source)
 
-    def _filter(self, target, layer, program, **sources):
+    def _filter(self, program, target, layer=None, images=None, **sources):
         """Write all of a texture, or of its layer, with a program that reads others: nothing needs to be cleared."""
-        if (target, layer) not in self._targets:
-            self._targets[target, layer] = gpu.types.GPUFrameBuffer(color_slots=_slot(target, layer))
-        with self._targets[target, layer].bind(), drawing.gpu_state("NONE", depth_writes=False):
-            drawing.draw_cover(program, {}, sources)
+        with drawing.bound(program, {}, sources):
+            for name, image in ({"filtered": target} | (images or {})).items():
+                program.image(name, image)
+            if layer is not None:
+                program.uniform_int("layer", layer)
+            drawing.dispatch_over(program, (self._size, self._size))
 
     def _target(self, texture, layer=None, value=(0.0,) * 4):
         framebuffer = gpu.types.GPUFrameBuffer(color_slots=_slot(texture, layer), depth_slot=self._depth)

@@ -17,17 +17,15 @@ def draw(surface, parts, view, lights, scene_samplers):
     parts: (first corner, number of corners, `SurfaceMaterial`), ...; view, lights: records of `uniforms`;
     scene_samplers: {sampler: texture} of shadows and of the world's visibility.
     """
-    placed = view.copy()
-    placed["row_strands"] = surface.row_corners
-    blocks = {"view": uniforms.uniform_buffer(placed), "lights": uniforms.uniform_buffer(lights)}
+    blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
     program = shaders.surface_program()
     for first, count, material in parts:
         images = {name: _texture(getattr(material, name)) for name in shaders.SURFACE_IMAGES}
         blocks["surface"] = uniforms.uniform_buffer(_record(material, images))
         samplers = {"surface_albedo": _albedo_texture()}
         samplers |= {name: _white() if texture is None else texture for name, texture in images.items()}
-        with drawing.bound(program, blocks, scene_samplers | samplers):
-            surface.batch.draw_range(program, elem_start=first, elem_count=count)
+        with drawing.bound(program, blocks, surface.samplers | scene_samplers | samplers):
+            surface.corners.lit.draw_range(program, elem_start=first, elem_count=count)
 
 
 def _texture(image_map):

@@ -76,7 +76,6 @@ VIEW = Block(
         "thickness": "float",
         "seen_points": "int",  # of each strand's points, those of the visibility textures
         "seen_opacity": "float",  # of a strand, for which they hold
-        "seen_in_bytes": "int",  # whether those textures have bytes: shaders/include/seen_bytes.glsl
         "row_strands": "int",
         "radius_strands": "int",  # whose radii are stored: one for all, or each
         "radius_unit": "float",  # that they are stored in
@@ -84,6 +83,7 @@ VIEW = Block(
         "pixels_per_unit": "float",  # at distance one, in a perspective
         "least_half_width": "float",  # there as well
         "depth_rise": "float",  # of a sample's side towards the viewer, at distance one
+        "surface_color": "float",  # of a surface in shadow maps, packed
         "light_index": "int",  # the light that a shadow pass looks from
         "sample_offset": "float",  # how far samples of thin strands lie off their centers, as a part of it
         "coverage_turn": "float",  # by which a pass takes other samples of thin strands

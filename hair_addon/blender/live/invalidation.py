@@ -8,7 +8,7 @@ stale.
 from ..data import guide_map_readers, scene, subdivided_surfaces
 from ..data.pictures import drawn_meshes
 from ..data.strands import simulated_guides
-from ..gpu import light_grid, lights, shaders, surface_shading, world_texture
+from ..gpu import light_grid, lights, shaders, surface_shading, surface_textures, world_texture
 from ..groom import bindings, paused_hair
 from ..groom.dynamics import frame_folders, guide_simulation
 from ..host import notices
@@ -57,6 +57,7 @@ OTHERS = (
     guide_simulation.stiffness_cache,
     shaders.complaint_cache,
     surface_shading.texture_cache,
+    surface_textures.surface_cache,
     notices.said_cache,
 )
 

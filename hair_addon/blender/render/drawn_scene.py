@@ -12,6 +12,7 @@ from ..gpu import (
     drawing,
     scene_lights,
     strand_textures,
+    surface_textures,
     uniforms,
 )
 from ..gpu import lights as light_door
@@ -206,19 +207,37 @@ def read_unlit(depsgraph, known, refused):
 
 def _corners_of(meshes):
     """`DrawnScene.meshes`."""
-    return tuple((mesh.positions, mesh.normals, mesh.triangle_colors) for mesh in meshes if not mesh.is_clear)
+    return tuple((mesh.positions, mesh.corner_normals, mesh.triangle_colors) for mesh in meshes if not mesh.is_clear)
 
 
 def _upload(meshes, is_shaded):
     """(surfaces, those that are clear, receivers) of a `DrawnScene`; is_shaded: whether they are seen as we shade."""
     uploaded = {False: [], True: []}
     for mesh in meshes:
-        surface = drawing.upload_surface(mesh.positions, mesh.normals, mesh.uvs, mesh.colors), mesh.parts
-        receiver = scene_lights.Receiver(mesh.owner[1::-1], scene_lights.places_on_surface(mesh.positions))
-        uploaded[is_shaded and mesh.is_clear].append((surface, receiver))
+        places = scene_lights.places_on_surface(mesh.vertices, mesh.triangles, mesh.to_world)
+        receiver = scene_lights.Receiver(mesh.owner[1::-1], places)
+        uploaded[is_shaded and mesh.is_clear].append(((_on_gpu(mesh), mesh.parts), receiver))
     solid, clear = ([surface for surface, _receiver in uploaded[is_clear]] for is_clear in (False, True))
     receivers = tuple(receiver for is_clear in (False, True) for _surface, receiver in uploaded[is_clear])
     return solid, tuple(clear), receivers
+
+
+def _on_gpu(mesh):
+    """The `SurfaceOnGPU` of a `DrawnMesh`: of what was drawn of its object before, what is the same stays."""
+    uid, cache = mesh.owner[0], surface_textures.surface_cache
+    return cache.keep(
+        uid,
+        surface_textures.upload_surface(
+            mesh.vertices,
+            mesh.triangles,
+            mesh.normals,
+            mesh.has_vertex_normals,
+            mesh.uvs,
+            mesh.colors,
+            mesh.to_world,
+            cache.get(uid),
+        ),
+    )
 
 
 def _placed(hair):
@@ -289,6 +308,6 @@ def _have_same_places(drawn, hair, surfaces):
     """Whether the visibility textures of a `DrawnScene` have a texel for each place of some hair and surfaces."""
     sizes, others = ([(one[0].strand_count, one[0].point_count) for one in many] for many in (drawn.hair, hair))
     corners, other_corners = (
-        [surface.corner_count for surface, _parts in many] for many in ((*drawn.surfaces, *drawn.clear), surfaces)
+        [surface.vertex_count for surface, _parts in many] for many in ((*drawn.surfaces, *drawn.clear), surfaces)
     )
     return sizes == others and corners == other_corners

@@ -14,7 +14,8 @@ class Places:
     """Transforms and points of everything drawn at one time.
 
     world_to_clip: (4, 4); hair: {owner: (texture of points, (S, P) how many, object to world, how these were moved)};
-    surfaces: {owner: (texture of corners, how many, their fingerprint)}. Owners are keys of `_told_apart`.
+    surfaces: {owner: (texture of vertices, how many, their fingerprint, object to world)}. Owners are keys of
+    `_told_apart`.
     """
 
     world_to_clip: np.ndarray
@@ -81,8 +82,11 @@ class Motion:
         now = self.now.surfaces[owner]
         before, after = (other.surfaces.get(owner, now) for other in (self.before, self.after))
         before, after = (place if place[1] == now[1] else now for place in (before, after))
-        matrices = [moment.world_to_clip for moment in (self.before, self.now, self.after)]
-        return self._record(matrices), {"places_before": before[0], "places_after": after[0]}
+        matrices = [
+            moment.world_to_clip @ place[3]
+            for moment, place in zip((self.before, self.now, self.after), (before, now, after), strict=True)
+        ]
+        return self._record(matrices), {"places": now[0], "places_before": before[0], "places_after": after[0]}
 
     def _record(self, matrices):
         record = uniforms.MOTION.record()
@@ -100,11 +104,9 @@ def draw(drawn, motion, view, buffer, has_surfaces=True):
     with buffer.surfaces_of_part(render_programs.MOTION_FORMAT), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for (surface, _parts), owner in surfaces:
             record, samplers = motion.surface(owner)
-            placed = view.copy()
-            placed["row_strands"] = surface.row_corners
-            blocks = {"view": uniforms.uniform_buffer(placed), "motion": uniforms.uniform_buffer(record)}
+            blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "motion": uniforms.uniform_buffer(record)}
             with drawing.bound(render_programs.surface_motion_program(), blocks, samplers):
-                surface.batch.draw(render_programs.surface_motion_program())
+                surface.corners.triangles.draw(render_programs.surface_motion_program())
     inputs = [({"motion": record}, samplers) for record, samplers in map(motion.hair, _told_apart(drawn.owners))]
     return buffer.part_by(render_programs.strand_motion_program(), render_programs.MOTION_FORMAT, inputs)
 
@@ -116,7 +118,7 @@ def places(drawn, world_to_view, view_to_clip):
         for (strands, _shading, to_world, *_), owner in zip(drawn.hair, _told_apart(drawn.owners), strict=True)
     }
     surfaces = {
-        owner: (surface.places, surface.corner_count, surface.fingerprint)
+        owner: (surface.places, surface.shape, surface.fingerprint, surface.to_world)
         for (surface, _parts), owner in zip(drawn.surfaces, _told_apart(drawn.surface_owners), strict=True)
     }
     return Places(view_to_clip @ world_to_view, hair, surfaces)

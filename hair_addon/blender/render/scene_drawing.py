@@ -7,6 +7,7 @@ from ..gpu import (
     level_of_detail,
     render_programs,
     surface_shading,
+    surface_textures,
     world_texture,
 )
 
@@ -18,7 +19,7 @@ def draw_hiding(drawn, view):
     """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for surface, _parts in drawn.surfaces:
-            drawing.draw_surface_depth(surface, view, drawn.lights, "surface_hides.frag")
+            surface_textures.draw_depth(surface, view, drawn.lights, "surface_hides.frag")
 
 
 def draw_hair(drawn, view, buffer, is_viewport=False):
@@ -112,11 +113,9 @@ def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
     program = render_programs.lit_surface_program(fragment)
     for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
         if parts is None and are_holdouts_left_out:
-            drawing.draw_surface_depth(surface, view, lights, "surface_hides.frag")
+            surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
             continue
-        placed = view.copy()
-        placed["row_strands"] = surface.row_corners
-        drawing.draw_triangles(surface.batch, program, placed, lights, samplers)
+        surface_textures.draw_lit(surface, program, view, lights, samplers)
 
 
 def _light_of(drawn, solid):
@@ -132,6 +131,7 @@ def _see_through_hair(drawn, view):
     if drawn.hair:
         shading = drawn.hair[ambient_visibility.densest([strands for strands, *_ in drawn.hair])][1]
         view["hair_forward"][:3], view["seen_opacity"] = shading.forward, shading.opacity
+        view["hair_reflectance"][:3] = shading.reflectance
 
 
 def _farther(view):
@@ -152,7 +152,7 @@ def draw_surfaces(drawn, view):
             draw_hiding(drawn, _farther(view))
         for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
             if parts is None:
-                drawing.draw_surface_depth(surface, view, lights, "surface_hides.frag")
+                surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
                 continue
             surface_shading.draw(surface, parts, view, lights, samplers)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA_PREMULT"):

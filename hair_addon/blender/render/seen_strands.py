@@ -1,7 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The strands that a camera sees, and what is drawn of them without light among strands: where paths of light start."""
-
-from dataclasses import replace
+"""The strands that a camera sees, and what is drawn of them by dual scattering: where paths of light start."""
 
 import numpy as np
 
@@ -23,12 +21,10 @@ def find(drawn, grid, camera, window, count, turn):
     view = drawing.pass_record(*camera, whole, turn, tile)
     view["sample_offset"] = 0.0  # a path begins on the ray through a sample's center
     buffer = VisibilityBuffer(*tile[2:])
-    lights = drawn.lights.copy()
-    lights["grid_scale"][:3] = 1.0  # lamps alone: there is no grid of light yet
     with drawing.ALONE:
         with buffer.surfaces():
             scene_drawing.draw_hiding(drawn, view)
-        scene_drawing.draw_hair(replace(drawn, lights=lights, hair_lights=None), view, buffer)
+        scene_drawing.draw_hair(drawn, view, buffer)
         shape = tile[3], tile[2]
         found = np.array(buffer.segments.read(), np.int64).reshape(shape)
         color = np.array(buffer.color.read(), np.float32).reshape(*shape, 4)[..., :3]

@@ -29,7 +29,8 @@ def irradiance(lamps: np.ndarray, places: np.ndarray) -> np.ndarray:
     cos_angle = np.sum(lamps["axis"][:, None, :3] * offsets, axis=-1) / np.sqrt(squared)
     cos_cone, blend, radius = (lamps[name][:, None].astype(float) for name in ("cos_cone", "blend", "radius"))
     beam = _spot_falloff(cos_angle, cos_cone, blend)
-    point = np.where(kind == SPOT, beam, 1.0) / (4.0 * np.pi * squared)
+    edge = np.sqrt(squared + np.square(radius))
+    point = np.where(kind == SPOT, beam, 1.0) / (2.0 * np.pi * edge * (edge + np.sqrt(squared)))
     height = np.maximum(cos_angle, 0.0) * np.sqrt(squared)
     beside = np.sqrt(np.maximum(squared - np.square(height), 0.0))
     area = _disk_irradiance(height, beside, radius) * _area_falloff(cos_angle, cos_cone) / np.pi

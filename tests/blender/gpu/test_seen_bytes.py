@@ -5,7 +5,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import ambient_visibility, shaders, strand_textures
+from hair_addon.blender.gpu import ambient_visibility, seen_programs, shaders, strand_textures
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging import ambient_cube
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
@@ -40,7 +40,7 @@ vec4 kept(vec4 x_y, vec4 z, vec4 surface, vec4 channels, vec4 color, int which)
 
 
 def sums(rng):
-    """Five (N, 4) sums over directions as world_visibility.frag makes them, of dark and of open places."""
+    """Five (N, 4) sums over directions as world_visibility.comp makes them, of dark and of open places."""
     axes, weights = ambient_cube.DIRECTIONS, 6.0 * ambient_cube.WEIGHTS
 
     def parts(*more):
@@ -94,7 +94,7 @@ def test_bytes_of_visibility_are_no_visible_step_in_pictures(thin, monkeypatch):
     bpy.context.view_layer.update()
     settings = PictureSettings(120, 120, 2)
     kept = offscreen.draw_picture(settings)
-    monkeypatch.setattr(ambient_visibility, "_BYTES", "RGBA32F")
+    monkeypatch.setattr(seen_programs, "BYTES", "RGBA32F")
     wide = offscreen.draw_picture(settings)
     shown, wanted = (255.0 * np.clip(picture[..., :3], 0.0, 1.0) ** (1.0 / 2.2) for picture in (kept, wide))
     bpy.context.view_layer.update()

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import ambient_visibility, drawing, shadows, strand_textures, uniforms
+from hair_addon.blender.gpu import ambient_visibility, drawing, shadows, strand_textures, surface_textures, uniforms
 
 
 def tuft(rng, strand_count=3000):
@@ -32,13 +32,13 @@ def lit(lights, hair, surfaces, places, size=512):
     """(N,) part of a sun's light that arrives at places (N, 3), by way of what the world's visibility reads of maps."""
     maps = shadows.ShadowMaps(size, 1)
     maps.draw(lights, [(hair, np.eye(4))], surfaces)
-    receiver = drawing.upload_surface(*[np.repeat(places, 3, axis=0).astype(np.float32)] * 2)
+    receiver = surface_textures.upload_surface(places.astype(np.float32), np.zeros(3, np.int32))
     view = ambient_visibility._view_of_surface(receiver)
     view["seen_opacity"] = 1.0
     target = ambient_visibility._Target((view, {"places": receiver.places, "strand_radii": receiver.places}))
     target.add(lights, maps.samplers)
     texels = np.concatenate([np.array(t.read()).reshape(-1, 4) for t in target.textures.values()], axis=1)
-    return texels[:, :6].sum(axis=1)[: 3 * len(places) : 3]  # of the six sides
+    return texels[:, :6].sum(axis=1)[: len(places)]  # of the six sides
 
 
 def test_shadows_in_hair_do_not_flicker_while_the_sun_turns(scene, rng):
@@ -97,7 +97,7 @@ def test_the_shadow_of_an_edge_is_as_wide_as_the_light(scene, rng, radius):
     corners = np.array(
         [[0, -9, height], [9, -9, height], [9, 9, height], [0, -9, height], [9, 9, height], [0, 9, height]]
     )
-    roof = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
+    roof = surface_textures.upload_surface(corners.astype(np.float32), np.arange(6, dtype=np.int32))
     x = np.linspace(-0.1, 0.1, 801)
     places = np.stack([x, np.zeros_like(x), np.zeros_like(x)], axis=-1)
     light = lit(sun(0.0, 0.5 * np.pi, radius), hair, [roof], places)
@@ -129,7 +129,7 @@ def test_a_floor_lets_no_light_of_a_low_sun_through(scene, rng):
     points, radii = tuft(rng, 100)
     hair = strand_textures.upload_strands(points, np.full_like(radii, 1e-9))
     corners = 9.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    floor = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
+    floor = surface_textures.upload_surface(corners.astype(np.float32), np.arange(6, dtype=np.int32))
     places = 0.1 * rng.uniform(-1.0, 1.0, (200, 3))
     places[:, 2] = 0.003
     for height in (0.2, 0.6, 1.5):
@@ -144,7 +144,7 @@ def test_lights_near_hair_cast_shadows(scene, rng, kind, height):
     points, radii = tuft(rng, 300)
     hair = strand_textures.upload_strands(points, radii)
     corners = 9.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    floor = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
+    floor = surface_textures.upload_surface(corners.astype(np.float32), np.arange(6, dtype=np.int32))
     lights = sun(0.0, 0.5 * np.pi)
     lights["light"][0]["kind"] = kind
     lights["light"][0]["position"][:3] = 0.0, 0.0, height

@@ -5,7 +5,15 @@ import gpu
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import drawing, hair_shading, shaders, strand_textures, uniforms, visibility_buffer
+from hair_addon.blender.gpu import (
+    drawing,
+    hair_shading,
+    shaders,
+    strand_textures,
+    surface_textures,
+    uniforms,
+    visibility_buffer,
+)
 from hair_addon.core.shading.fibre import kajiya_kay
 
 SIZE = (160, 96)
@@ -36,8 +44,8 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
         if hiding_at is not None:
             corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
             corners[3:, :2] = [[-9, -9], [0, 9], [-9, 9]]
-            surface = drawing.upload_surface(corners, corners)
-            drawing.draw_surface_depth(surface, view, lights, "surface_hides.frag")
+            surface = surface_textures.upload_surface(corners, np.arange(6, dtype=np.int32))
+            surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
     hair = [
         (strand_textures.upload_strands(points, radii), shading, to_world, none, steps)
         for points, radii, to_world in placed
@@ -84,6 +92,26 @@ def test_a_sample_is_covered_if_its_centre_lies_in_the_strand(shading, in_comput
         second = (centres - [0.012, 0.005]) @ along > 0.1
         away = np.abs((centres - [0.012, 0.005]) @ along - 0.1) > 0.03
         np.testing.assert_array_equal(found[(found >= 0) & away], second[(found >= 0) & away])
+
+
+@pytest.mark.parametrize("in_compute", [True, False])
+def test_a_wide_angle_sees_strands_as_thick_as_its_rays_do(shading, in_compute):
+    """Towards the corners of a picture, where a perspective stretches: the distance of a ray from the axis decides."""
+    wide = PERSPECTIVE.copy()
+    wide[0, 0], wide[1, 1] = SIZE[1] / SIZE[0], 1.0
+    height, width = np.indices(SIZE[::-1])
+    x, y = (2 * width + 1 - SIZE[0]) / SIZE[1], (2 * height + 1 - SIZE[1]) / SIZE[1]
+    rays = np.stack([x, y, np.full(x.shape, -1.0)], axis=-1)
+    places = (((1.8, 0.5), (0.0, 1.0, 0.1)), ((-0.3, -1.0), (1.0, 0.1, -0.1)), ((-1.4, 1.0), (1.0, -0.8, 0.0)))
+    for middle, along in places:
+        along = np.array(along) / np.linalg.norm(along)
+        points = (np.array([*middle, -1.5]) + np.array([-4.0, 0.0, 4.0])[:, None] * along)[None].astype(np.float32)
+        radii = np.full((1, 3), 0.08, np.float32)
+        found, _depths = drawn([(points, radii, np.eye(4))], wide, shading, in_compute)
+        across = np.cross(rays, along)
+        distance = np.abs(across @ points[0, 1]) / np.linalg.norm(across, axis=-1)
+        assert (distance < 0.08).sum() > 300
+        assert (found >= 0).sum() == pytest.approx((distance < 0.08).sum(), rel=0.015)
 
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL], ids=["perspective", "parallel"])

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import ambient_visibility, drawing, shaders, strand_textures, uniforms
+from hair_addon.blender.gpu import ambient_visibility, shaders, strand_textures, surface_textures, uniforms
 from tests.support import glsl
 
 COUNT = 200
@@ -61,7 +61,7 @@ def test_a_floor_hides_half_of_the_world_of_every_channel(scene, rng):
     points = roots[:, None] + np.linspace(0.0, 0.3, 5)[:, None] * np.array([0.3, 0.0, 1.0])
     hair = strand_textures.upload_strands(points.astype(np.float32), np.full((50, 5), 1e-7, np.float32))
     corners = 99.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
-    floor = drawing.upload_surface(corners.astype(np.float32), np.tile([0.0, 0.0, 1.0], (6, 1)).astype(np.float32))
+    floor = surface_textures.upload_surface(corners.astype(np.float32), np.arange(6, dtype=np.int32))
     forward = np.array([0.9, 0.5, 0.1])
     (seen,), _surfaces = ambient_visibility.measure([(hair, np.eye(4))], [floor], [0.5], forwards=[forward])
     texture = seen["visibility_channels"]

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.gpu import ambient_visibility, drawing, lights, strand_textures, world_texture
+from hair_addon.blender.gpu import ambient_visibility, lights, strand_textures, surface_textures, world_texture
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging import environment
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
@@ -33,6 +33,8 @@ def picture(rng):
 def environment_node(scene, image, **settings):
     """Light the scene with a picture; returns the node that holds it."""
     scene.world = bpy.data.worlds.new("World")
+    # Cycles would look for bright places at more pixels than the picture has, for a second.
+    scene.world.cycles.sampling_method, scene.world.cycles.sample_map_resolution = "MANUAL", 64
     tree = scene.world.node_tree
     background = next(node for node in tree.nodes if node.type == "BACKGROUND")
     node = tree.nodes.new("ShaderNodeTexEnvironment")
@@ -138,12 +140,11 @@ def test_the_picture_is_seen_behind_the_scene(scene, rng, tmp_path):
 
 def seen(places, strands=None, opacity=1.0):
     """(N, 6) part of each side that places (N, 3) see among strands (S, P, 3) of radius (S, P)."""
-    corners = np.repeat(places, 3, axis=0).astype(np.float32)
-    surface = drawing.upload_surface(corners, np.zeros_like(corners))
+    surface = surface_textures.upload_surface(places.astype(np.float32), np.zeros(3, np.int32))
     hair = [(strand_textures.upload_strands(*strands), np.eye(4))] if strands else []
     _hair, (found,) = ambient_visibility.measure(hair, [surface], [opacity] * len(hair))
     texels = [np.array(found[name].read()).reshape(-1, 4) for name in ("visibility_x_y", "visibility_z")]
-    return np.concatenate([texels[0], texels[1][:, :2]], axis=1)[: len(corners) : 3]
+    return np.concatenate([texels[0], texels[1][:, :2]], axis=1)[: len(places)]
 
 
 def test_nothing_hides_the_world_from_places_without_hair(scene, rng):

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.data.strands import curves
-from hair_addon.blender.gpu import ambient_visibility, drawing, shaders, strand_textures
+from hair_addon.blender.gpu import ambient_visibility, shaders, strand_textures, surface_textures
 from hair_addon.blender.gpu.strands import maker_choice, strand_maker
 from hair_addon.blender.groom import bindings
 from hair_addon.blender.host import running, scene_time
@@ -260,7 +260,7 @@ def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watc
         shown = frame(shown)
     programs, maps, calls = len(shaders.program_cache), shown.shadow_maps, counts_of(monkeypatch)
     textures, sent, surfaces = [], [], []
-    texture, buffer, draw_surface = gpu.types.GPUTexture, gpu.types.Buffer, drawing.draw_surface_depth
+    texture, buffer, draw_surface = gpu.types.GPUTexture, gpu.types.Buffer, surface_textures.draw_depth
 
     def sized(kind, size, values):
         if kind == "FLOAT":  # others are blocks of uniforms
@@ -269,7 +269,7 @@ def test_a_stroke_uploads_its_guides_reads_a_box_and_allocates_nothing_else(watc
 
     monkeypatch.setattr(gpu.types, "GPUTexture", lambda *given, **named: textures.append(1) or texture(*given, **named))
     monkeypatch.setattr(gpu.types, "Buffer", sized)
-    monkeypatch.setattr(drawing, "draw_surface_depth", lambda *given: surfaces.append(1) or draw_surface(*given))
+    monkeypatch.setattr(surface_textures, "draw_depth", lambda *given: surfaces.append(1) or draw_surface(*given))
     for _ in range(3):
         comb(20, next(to_and_fro))
         shown = frame(shown)

@@ -25,7 +25,7 @@ def baked(lit, tmp_path):
     """Thick hair on a sphere that swings in front of a camera, with baked frames, in one of them."""
     swing(bpy.data.objects["Sphere"])
     lit.data.vellus.hair.radius = 0.03
-    simulate(bpy.data.objects["Guides"], tmp_path / "frames", automatic_substeps=False)
+    simulate(bpy.data.objects["Guides"], tmp_path / "frames", substeps=4)
     run_now(guide_baking.baking([bpy.data.objects["Guides"].data], FRAME + 1, bpy.context.scene))
     bpy.context.scene.frame_set(FRAME)
     return lit

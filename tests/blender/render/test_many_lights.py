@@ -11,7 +11,7 @@ from hair_addon.blender.gpu import uniforms
 from hair_addon.blender.render import offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
-COUNT = 40
+COUNT = 24
 
 
 @pytest.fixture
@@ -42,7 +42,7 @@ def light_of(lamps, chosen):
     return light()
 
 
-def test_forty_lights_are_the_sum_of_all(lamps):
+def test_many_lights_are_the_sum_of_all(lamps):
     """Of pictures in which each is drawn by itself: light is additive."""
     together = light()
     size = uniforms.LIGHT_CAPACITY

@@ -54,6 +54,13 @@ def styled(hair):
     return hair
 
 
+@pytest.fixture
+def still(hair):
+    """Hair that is not made anew by what is changed: locks for a head would be tens of thousands."""
+    state().is_live = False
+    return hair
+
+
 @pytest.mark.parametrize("offer", OFFERS)
 @pytest.mark.parametrize("is_fitted", [True, False])
 def test_the_menu_adds_its_styles(hair, offer, is_fitted):
@@ -262,7 +269,7 @@ def test_curls_on_hand_made_guides_get_the_points_for_their_mean_length(hair):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_setting_of_a_style_has_a_row(hair, kind):
+def test_every_setting_of_a_style_has_a_row(still, kind):
     style_items.assign(state(), [KINDS[kind]()])
     drawn = draw_all([panel for panel in panels.CLASSES if panel.bl_idname.startswith("VELLUS_PT_styles")])
     names = [name for name, *_ in declared(KINDS[kind])]
@@ -271,7 +278,7 @@ def test_every_setting_of_a_style_has_a_row(hair, kind):
     assert (draw(bpy.types.VELLUS_PT_styles_profile) is not None) == is_profiled
 
 
-def test_names_of_data_are_picked(hair):
+def test_names_of_data_are_picked(still):
     sphere = bpy.data.objects["Sphere"]
     for settings, picked in ((trim.Settings(), "cutter"), (lean.Settings(), "target")):
         style_items.assign(state(), [settings])
@@ -305,24 +312,24 @@ EFFECTIVE = [
 
 
 @pytest.mark.parametrize("case", NOTES)
-def test_why_a_style_does_nothing_is_said(hair, case):
+def test_why_a_style_does_nothing_is_said(still, case):
     settings, words = NOTES[case]
     style_items.assign(state(), [settings])
     assert words in " ".join(draw(bpy.types.VELLUS_PT_styles).texts)
 
 
 @pytest.mark.parametrize("settings", EFFECTIVE, ids=lambda settings: kind_of(settings))
-def test_of_others_nothing_is_said(hair, settings):
+def test_of_others_nothing_is_said(still, settings):
     style_items.assign(state(), [settings])
-    assert style_notes.notes_of(hair.data, state().styles[0]) == []
+    assert style_notes.notes_of(still.data, state().styles[0]) == []
 
 
-def test_the_order_of_styles_is_explained(hair):
+def test_the_order_of_styles_is_explained(still):
     style_items.assign(state(), [wet.Settings(), curl.Settings(), lean.Settings()])
-    first, second, third = (style_notes.notes_of(hair.data, item) for item in state().styles)
+    first, second, third = (style_notes.notes_of(still.data, item) for item in state().styles)
     assert "Wet belongs last" in first[0] and second == [] and "Lean acts on guides" in third[0]
     state().styles[1].curl.is_on = state().styles[2].lean.is_on = False
-    assert style_notes.notes_of(hair.data, state().styles[0]) == []
+    assert style_notes.notes_of(still.data, state().styles[0]) == []
 
 
 @pytest.mark.parametrize("settings", [clump.Settings(size=0.3, levels=2), wet.Settings(lock=0.3)], ids=kind_of)

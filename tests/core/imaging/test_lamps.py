@@ -67,3 +67,13 @@ def test_ambient_light_of_places_is_their_mean(rng):
     some, places = some_lamps(rng, 8), rng.normal(size=(5, 3))
     one_by_one = np.mean([lamps.ambient_sides(some, place[None]) for place in places], axis=0)
     np.testing.assert_allclose(lamps.ambient_sides(some, places), one_by_one, rtol=1e-9)
+
+
+def test_a_lamp_that_shines_all_around_turns_its_disk_to_all():
+    """At any distance it is an area lamp that faces the place, with a quarter of the power."""
+    around = np.zeros(1, LAMP)
+    around["kind"], around["radius"], around["axis"][0, 2], around["power"] = lamps.POINT, 0.3, -1.0, 4.0
+    forward = around.copy()
+    forward["kind"], forward["power"] = lamps.AREA, 1.0
+    places = np.array([[0.0, 0.0, -height] for height in (0.01, 0.1, 0.3, 1.0, 20.0)])
+    np.testing.assert_allclose(lamps.irradiance(around, places), lamps.irradiance(forward, places), rtol=1e-6)

@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The manual's page Curly Hair in ten steps, in a window: from a bare head to curly hair with a fringe.
 
-Run by a desktop Blender as steps.py says, with one of `PARTS`. Writes a picture of the screen for each step, of which
-`tools/manual_pictures.py curly_hair` makes those of the page. After the ten steps a style is keyed, moved and undone,
-and hair is combed with its styles on.
+Run by a desktop Blender as steps.py says, with one of `PARTS`; MORE is how many samples a pixel and strands the hair
+has. Writes a picture of the screen for each step, of which `tools/manual_pictures.py curly_hair` makes those of the
+page, with as many as an artist sees. After the ten steps a style is keyed, moved and undone, and hair is combed with
+its styles on.
 """
 
 import math
@@ -16,7 +17,7 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
-from tests.desktop.steps import OUT, PART, ZIP, facts, take  # noqa: E402
+from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
     activate,
@@ -30,6 +31,7 @@ from tests.desktop.window import (  # noqa: E402
     mask_scalp,
     of_kind,
     places,
+    refine_to,
     sidebar,
     take_picture,
     viewport,
@@ -37,7 +39,8 @@ from tests.desktop.window import (  # noqa: E402
     wait_for,
 )
 
-STRAND_COUNT = 16_000  # software drivers take their time for each
+# Few, for drivers without a GPU, which take one sample with each redraw.
+SAMPLES, STRAND_COUNT = map(int, MORE) if MORE else (2, 3_000)
 
 # Pixels from the upper left corner of a sidebar of the default width that shows the panel Styles alone.
 _ADD_FIRST = (120, 46)  # the button of a hair without styles
@@ -48,7 +51,11 @@ hidden = []  # panels that the sidebar does not show
 
 
 def picture(name):
-    take_picture(OUT / f"{name}.png")
+    take_picture(OUT / f"{name}.png", SAMPLES)
+
+
+def addon():
+    return sys.modules[f"{MODULE}.hair_addon.blender"]
 
 
 def hair_object():
@@ -61,7 +68,7 @@ def guides_object():
 
 def strands():
     """(S, P, 3) positions of the hair as it is drawn, which may not be written yet."""
-    bound = sys.modules[f"{MODULE}.hair_addon.blender"].groom.bindings.of(hair_object().data)
+    bound = addon().groom.bindings.of(hair_object().data)
     if bound is not None:
         return bound.points.copy()
     return curve_points(hair_object()).reshape(len(hair_object().data.curves), -1, 3)
@@ -75,7 +82,7 @@ def moved(before):
 
 def show_styles_alone():
     """Of the tab's panels, the sidebar shows Styles and no other."""
-    classes = sys.modules[f"{MODULE}.hair_addon.blender"].panels.CLASSES
+    classes = addon().panels.CLASSES
     for panel in reversed(classes):
         is_shown = panel.bl_idname.startswith(("VELLUS_PT_style", "VELLUS_UL"))
         if not is_shown and panel.is_registered and getattr(panel, "bl_category", "") == "Hair":
@@ -115,6 +122,8 @@ def offers():
 def bare_head():
     """1. A head with a vertex group where hair grows."""
     install(ZIP)
+    if not MORE:
+        refine_to(SAMPLES)
     bpy.context.preferences.system.use_region_overlap = False
     for thing in list(bpy.data.objects):
         if thing.type == "MESH":
@@ -328,6 +337,8 @@ PARTS = {
 
 def go_on():
     """Open the file of the part before."""
+    if not MORE:
+        refine_to(SAMPLES)
     bpy.ops.wm.open_mainfile(filepath=str(SCENE))
     yield from wait(1.0)
     activate(hair_object())

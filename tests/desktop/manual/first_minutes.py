@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The first ten minutes of a new artist, in a window: three clicks to hair, then README's five minutes.
 
-Run by a desktop Blender as steps.py says, with a clean profile; MORE is how many samples a pixel has. Writes a picture
-of the screen for each step, of which `tools/manual_pictures.py five_minutes` makes README's, with as many samples as an
-artist sees.
+Run by a desktop Blender as steps.py says, with a clean profile; MORE is how many samples a pixel and strands the head
+has. Writes a picture of the screen for each step, of which `tools/manual_pictures.py five_minutes` makes README's, with
+as many as an artist sees.
 """
 
 import sys
@@ -17,7 +17,6 @@ ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.steps import MORE, OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
-    MODULE,
     click,
     curve_points,
     drag,
@@ -27,6 +26,7 @@ from tests.desktop.window import (  # noqa: E402
     mask_scalp,
     of_kind,
     places,
+    refine_to,
     sidebar,
     take_picture,
     viewport,
@@ -34,7 +34,8 @@ from tests.desktop.window import (  # noqa: E402
     wait_for,
 )
 
-SAMPLES = int(MORE[0]) if MORE else 8  # few, for drivers without a GPU, which take one with each redraw
+# Few, for drivers without a GPU, which take one sample with each redraw.
+SAMPLES, STRAND_COUNT = map(int, MORE) if MORE else (2, 5_000)
 
 # Pixels from the upper right corner of the 3D view: the arrow that opens its sidebar.
 _ARROW = (8, 86)
@@ -84,7 +85,8 @@ def three_clicks():
     """From the installed extension to hair on the default cube: the sidebar, the tab, the button."""
     install(ZIP)
     bpy.context.preferences.system.use_region_overlap = False
-    sys.modules[f"{MODULE}.hair_addon.blender"].render.viewport.hair_picture.SAMPLE_COUNT = SAMPLES
+    if not MORE:
+        refine_to(SAMPLES)
     area, _region = viewport()
     yield
     step("installed")
@@ -126,13 +128,13 @@ def grow_on_the_head():
         bpy.ops.vellus.add_hair("INVOKE_DEFAULT")
     yield from wait_for(lambda: of_kind("HAIR") is not None)
     guides, hair = of_kind("GUIDES").data.vellus, of_kind("HAIR").data
-    hair.vellus.hair.strand_count = 40_000
+    hair.vellus.hair.strand_count = STRAND_COUNT
     guides.guides.density_group = "scalp"
     guides.guides.length = 0.12
     guides.guides.gravity = 0.75
     guides.guides.drape = True
     hair.vellus.hair.thickness = 0.15
-    yield from wait_for(lambda: len(hair.curves) == 40_000)
+    yield from wait_for(lambda: len(hair.curves) == STRAND_COUNT)
     step("head")
     group = hair.surface.vertex_groups["scalp"].index
     weights = np.array([any(g.group == group for g in v.groups) for v in hair.surface.data.vertices])

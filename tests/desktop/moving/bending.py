@@ -18,6 +18,7 @@ from tests.desktop.window import (  # noqa: E402
     in_viewport,
     install,
     offscreen_light,
+    refine_to,
     take_picture,
     viewport,
     wait,
@@ -63,6 +64,7 @@ def state():
 
 def hair_on_a_ball_that_bends():
     install(ZIP)
+    refine_to()
     for thing in list(bpy.data.objects):
         if thing.type == "MESH":
             bpy.data.objects.remove(thing)

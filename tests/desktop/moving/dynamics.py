@@ -25,6 +25,7 @@ from tests.desktop.window import (  # noqa: E402
     key,
     of_kind,
     offscreen_light,
+    refine_to,
     take_picture,
     viewport,
     wait,
@@ -110,6 +111,7 @@ def look(_scene, _depsgraph):
 
 def hair_on_a_swinging_ball():
     install(ZIP)
+    refine_to()
     for thing in list(bpy.data.objects):
         if thing.type == "MESH":
             bpy.data.objects.remove(thing)
@@ -148,7 +150,7 @@ def played():
         "picture": differ(before, light()),
         "state": state(),
     }
-    take_picture(OUT / "played.png")
+    take_picture(OUT / "played.png", redraws=2)
 
 
 def jumped_back():
@@ -202,7 +204,7 @@ def baked():
     go_to(COMPARED)
     facts["bake"]["picture"] = differ(np.load(LIGHT), light())
     facts["bake"]["covered"] = float((np.load(LIGHT)[..., 3] > 0.0).mean())
-    take_picture(OUT / "baked.png")
+    take_picture(OUT / "baked.png", redraws=2)
 
 
 def stopped():
@@ -339,6 +341,7 @@ PARTS["end"] = (loaded, ended, deleted, disabled)
 
 def go_on():
     """Open the file of the part before."""
+    refine_to()
     bpy.ops.wm.open_mainfile(filepath=str(SCENE))
     yield from wait(1.0)
     activate(of_kind("GUIDES"))

@@ -22,7 +22,7 @@ from tests.desktop.random_walk import any_scene  # noqa: E402
 from tests.desktop.random_walk.any_exchange import Exchanges  # noqa: E402
 from tests.desktop.random_walk.any_operation import Operations  # noqa: E402
 from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
-from tests.desktop.window import MODULE, in_viewport, install, viewport, wait  # noqa: E402
+from tests.desktop.window import MODULE, in_viewport, install, refine_to, viewport, wait  # noqa: E402
 
 
 class Artist(Operations, Exchanges):
@@ -35,7 +35,7 @@ class Artist(Operations, Exchanges):
         self.step_count, self.taken, self.redraw_count = 0, [], 0
         self.blender = sys.modules[f"{MODULE}.hair_addon.blender"]
         self.core = sys.modules[f"{MODULE}.hair_addon.core"]
-        self.blender.render.viewport.hair_picture.SAMPLE_COUNT = 1  # one pass a picture
+        refine_to(1)  # it is not the quality of pictures that is looked at
         bpy.types.SpaceView3D.draw_handler_add(self._count_redraw, (), "WINDOW", "POST_PIXEL")
 
     def _count_redraw(self):

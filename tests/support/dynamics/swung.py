@@ -15,10 +15,11 @@ def swing(surface):
 
 
 def simulate(guides, folder, **settings):
-    """Make guides simulate, with some settings, and frames in a folder."""
+    """Make guides simulate, with some settings, and frames in a folder: coarsely, where nothing else is asked for."""
     state = guides.data.vellus
     state.cache_folder = str(folder)
-    for name, value in {"vertex_count": 9, **settings}.items():
+    coarse = {"vertex_count": 9, "substeps": 2, "automatic_substeps": False}
+    for name, value in (coarse | settings).items():
         setattr(state.dynamics, name, value)
     state.simulates = True
     bpy.context.view_layer.update()

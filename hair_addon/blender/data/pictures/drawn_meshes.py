@@ -15,18 +15,37 @@ from . import surface_materials
 
 @dataclass(frozen=True)
 class DrawnMesh:
-    """Triangles as they are drawn: (3 F, 3) float32 corner positions [m] and unit normals in world space, (3 F, 2) UVs.
+    """Triangles as they are drawn: (V, 3) float32 vertices in the object's coordinates, (3 F,) vertices of corners.
 
-    parts: (first corner, number of corners, `SurfaceMaterial`) of each material. A holdout has none: where it is
-    nearest the picture is empty. owner: `owner_of` it.
+    to_world: (4, 4), from there to world space [m]; normals: unit, (V, 3) of vertices or (3 F, 3) of corners, in the
+    object's coordinates too; uvs: (3 F, 2), None: zero; parts: (first corner, number of corners, `SurfaceMaterial`) of
+    each material. A holdout has none: where it is nearest the picture is empty. owner: `owner_of` it.
     """
 
-    positions: np.ndarray
+    vertices: np.ndarray
+    triangles: np.ndarray
+    to_world: np.ndarray
     normals: np.ndarray | None  # None where they were not read
-    uvs: np.ndarray
+    has_vertex_normals: bool
+    uvs: np.ndarray | None
     parts: tuple | None
     owner: tuple = ()
     colors: tuple = ()  # (number of corners, linear RGB) of each material, in the corners' order
+
+    @property
+    def positions(self):
+        """(3 F, 3) float32 positions of corners in world space [m]."""
+        placed = self.vertices @ self.to_world[:3, :3].T.astype(np.float32)
+        placed += self.to_world[:3, 3].astype(np.float32)
+        return placed[self.triangles]
+
+    @property
+    def corner_normals(self):
+        """(3 F, 3) float32 unit normals of corners in world space."""
+        placed = self.normals @ np.linalg.pinv(self.to_world[:3, :3])
+        placed /= np.maximum(np.sqrt(np.einsum("nc,nc->n", placed, placed)), 1e-12)[:, None]
+        placed = placed.astype(np.float32)
+        return placed[self.triangles] if self.has_vertex_normals else placed
 
     @property
     def triangle_colors(self):
@@ -51,8 +70,8 @@ class _Layout:
 
     @cached_property
     def vertices(self):
-        """(3 F',) vertices of its triangles, of the type that NumPy gathers by without a copy."""
-        return self.faces.corner_vertices[self.loops].astype(np.intp)
+        """(3 F',) int32 vertices of its triangles."""
+        return self.faces.corner_vertices[self.loops]
 
     def fits(self, faces, slots):
         if faces is not self.faces:
@@ -80,7 +99,7 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
                 continue
             mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, has_normals)
             meshes.append(replace(mesh, owner=owner_of(instance)))
-    return [mesh for mesh in meshes if len(mesh.positions)]
+    return [mesh for mesh in meshes if len(mesh.triangles)]
 
 
 def held_out(meshes):
@@ -106,25 +125,34 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
     try:
         vertices = scene.vertex_positions(mesh)
         layout = _layout(mesh_object, mesh, is_moving)
-        normals = _corner_normals(mesh, to_world).take(layout.loops, axis=0) if has_normals else None
+        has_vertex_normals = not has_normals or mesh.normals_domain == "POINT"
+        normals = _normals(mesh, layout, has_vertex_normals) if has_normals else None
         parts = _parts(mesh_object, layout.runs)
         uvs = _read_uvs(mesh, layout.loops, () if is_holdout else parts)
     finally:
         mesh_object.to_mesh_clear()
-    placed = vertices @ to_world[:3, :3].T.astype(np.float32)
-    placed += to_world[:3, 3].astype(np.float32)
-    positions = placed.take(layout.vertices, axis=0)
     colors = tuple((count, material.color) for _first, count, material in parts)
-    return DrawnMesh(positions, normals, uvs, None if is_holdout else parts, colors=colors)
+    return DrawnMesh(
+        vertices,
+        layout.vertices,
+        to_world,
+        normals,
+        has_vertex_normals,
+        uvs,
+        None if is_holdout else parts,
+        colors=colors,
+    )
 
 
-def _corner_normals(mesh, to_world):
-    """(C, 3) float32 unit normals of a mesh's corners in world space."""
-    local = np.empty((len(mesh.loops), 3), np.float32)
-    mesh.corner_normals.foreach_get("vector", local.ravel())
-    normals = local @ np.linalg.pinv(to_world[:3, :3])
-    normals /= np.maximum(np.sqrt(np.einsum("nc,nc->n", normals, normals)), 1e-12)[:, None]
-    return normals.astype(np.float32)
+def _normals(mesh, layout, has_vertex_normals):
+    """Float32 unit normals of vertices (V, 3), or of drawn corners (3 F, 3)."""
+    if has_vertex_normals:
+        normals = np.empty((len(mesh.vertices), 3), np.float32)
+        mesh.vertex_normals.foreach_get("vector", normals.ravel())
+        return normals
+    normals = np.empty((len(mesh.loops), 3), np.float32)
+    mesh.corner_normals.foreach_get("vector", normals.ravel())
+    return normals.take(layout.loops, axis=0)
 
 
 def _layout(mesh_object, mesh, is_moving):
@@ -161,11 +189,11 @@ def _parts(mesh_object, runs):
 
 
 def _read_uvs(mesh, loops, parts):
-    """(3 F, 2) float32 UVs of drawn corners, of each part by the UV map of its images: zero without."""
+    """(3 F, 2) float32 UVs of drawn corners, of each part by the UV map of its images; None where there is none."""
     names = [material.uv_map for _first, _count, material in parts]
     layers = [None if name is None else (mesh.uv_layers.get(name) or _active_uvs(mesh)) for name in names]
     if all(layer is None for layer in layers):
-        return np.broadcast_to(np.float32(0.0), (len(loops), 2))  # as many, without their memory
+        return None
     uvs = np.zeros((len(loops), 2), np.float32)
     for (first, count, _material), layer in zip(parts, layers, strict=True):
         if layer is not None:

@@ -14,7 +14,6 @@ from ....core import geometry
 from ....core.geometry.mesh import require_finite
 from .. import scene
 from ..scene import Surface
-from . import curves
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,8 @@ class Pose:
         if not len(lost):
             return places
         vertices, barycentric = vertices.copy(), barycentric.copy()
-        nearest = curves.nearest_roots(surface, surface.from_local(firsts[lost]))
+        # In local coordinates, as the nodes of follow_nodes.py find it, and whatever the scale of the object becomes.
+        nearest = geometry.closest_point.SurfaceQuery(surface.local_mesh).nearest(firsts[lost])
         vertices[lost], barycentric[lost] = surface.places(nearest)
         return vertices, barycentric
 

@@ -120,8 +120,10 @@ def logistic_part(scale: float):
 
 
 @wp.func
-def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float):
-    """Radiance towards the viewer, for unit irradiance from the light; both are unit vectors from the fibre."""
+def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float, weight: wp.vec3):
+    """(radiance towards the viewer for unit irradiance from the light, density [1/sr] with which `turn` takes the
+    light's direction for a path of this weight); both are unit vectors from the fibre.
+    """
     sin_o = wp.clamp(wp.dot(fibre.tangent, viewer), -_STEEPEST, _STEEPEST)
     sin_i = wp.clamp(wp.dot(fibre.tangent, light), -_STEEPEST, _STEEPEST)
     cos_o = wp.sqrt(1.0 - sin_o * sin_o)
@@ -130,6 +132,7 @@ def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float):
     fresnel = reflectance(cos_o * wp.sqrt(1.0 - h * h), fibre.eta)
     crossing = transmittance(h, sin_o, cos_o, fibre.eta, fibre.sigma_a)
     total = wp.vec3(0.0, 0.0, 0.0)
+    of_all = float(0.0)
     for path in range(4):
         shift, v = lobe(path, fibre)
         part = longitudinal(sin_i, sin_o, shift, v)
@@ -140,8 +143,10 @@ def value(fibre: Fibre, viewer: wp.vec3, light: wp.vec3, h: float):
             turned = turned - 2.0 * PI * wp.floor(turned / (2.0 * PI) + 0.5)
             e = wp.exp(-wp.abs(turned) / fibre.scale)
             part = part * e / (fibre.scale * (1.0 + e) * (1.0 + e) * (1.0 - 2.0 * logistic_part(fibre.scale)))
-        total += part * attenuation(path, fresnel, crossing)
-    return total
+        left = attenuation(path, fresnel, crossing)
+        total += part * left
+        of_all += wp.dot(weight, left)
+    return total, wp.dot(weight, total) / wp.max(of_all, 1e-30)
 
 
 @wp.func

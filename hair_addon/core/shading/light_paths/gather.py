@@ -15,9 +15,10 @@ import warp as wp
 from ...kernels import parallel
 from ...kernels.checks import require_count, require_indices
 from . import grid_walk
-from .fibre_walk import PI, Fibre, even_return, turn, value
+from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, seen_place, walk
-from .light_sources import Lit, Sources, choose, lit_by, on_disk, world_radiance
+from .lamp_light import Event, light_at_once, light_by_share, light_met
+from .light_sources import Sources, on_disk, world_radiance
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -25,9 +26,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
-_LAMPS_AT_ONCE = wp.constant(8)  # that light a seen strand
-_OFFSETS_AT_ONCE = wp.constant(4)  # over the part of its width around the one that is seen
-_AROUND = wp.constant(0.25)  # half that part, of the radius
 _LEAST_PATHS = 4096  # fewer are not worth a thread
 
 
@@ -82,116 +80,6 @@ class _Rays:
     side: int  # rays along each of x and y
 
 
-@wp.func
-def _is_shadowed(medium: Medium, lit: Lit, position: wp.vec3, own: int):
-    """Whether a lamp's light does not arrive at a place on strand `own`, -1 for a surface."""
-    if lit.casts_shadow == 0:
-        return False
-    met = walk(medium, position, lit.direction, lit.distance, own)
-    return met.kind != PASSED
-
-
-@wp.func
-def _lamp_at(sources: Sources, index: int, turns: int, position: wp.vec3, least: float, random: wp.uint32):
-    """(`Lit` of a lamp by its index, or of any one with its share where there are more than turns; random state)."""
-    state = random
-    chosen = index
-    share = float(1.0)
-    if sources.count > turns:
-        any_lamp, one_over_chance, after = choose(sources, state)
-        state = after
-        chosen = any_lamp
-        share = one_over_chance / float(turns)
-    lit, after = lit_by(sources, chosen, position, least, state)
-    lit.irradiance = lit.irradiance * share
-    return lit, after
-
-
-@wp.func
-def _scattered(fibre: Fibre, viewer: wp.vec3, lit: Lit, offset: float, shift: float):
-    """Radiance that a strand sends to the viewer of a lamp's light: the mean around an offset in its width."""
-    light = wp.vec3(0.0, 0.0, 0.0)
-    for step in range(_OFFSETS_AT_ONCE):
-        h = offset + _AROUND * (2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0)
-        # Back from beyond the edge: the mean over all offsets stays that over the width.
-        if wp.abs(h) > 1.0:
-            h = wp.sign(h) * 2.0 - h
-        light += value(fibre, viewer, lit.direction, h)
-    return wp.cw_mul(lit.irradiance, light / float(_OFFSETS_AT_ONCE))
-
-
-@wp.func
-def _light_at_once(
-    medium: Medium,
-    sources: Sources,
-    fibre: Fibre,
-    viewer: wp.vec3,
-    position: wp.vec3,
-    offset: float,
-    own: int,
-    random: wp.uint32,
-):
-    """(radiance of lamps' light that a seen strand sends to the viewer, random state): all lamps are traced."""
-    state = random
-    light = wp.vec3(0.0, 0.0, 0.0)
-    turns = wp.min(sources.count, _LAMPS_AT_ONCE)
-    for index in range(turns):
-        lit, after = _lamp_at(sources, index, turns, position, 0.5 * medium.least_cell, state)
-        state = after
-        if wp.max(lit.irradiance) > 0.0 and not _is_shadowed(medium, lit, position, own):
-            light += _scattered(fibre, viewer, lit, offset, wp.randf(state))
-    return light, state
-
-
-@wp.func
-def _light_by_share(
-    medium: Medium,
-    sources: Sources,
-    fibre: Fibre,
-    viewer: wp.vec3,
-    position: wp.vec3,
-    offset: float,
-    own: int,
-    normal: wp.vec3,
-    random: wp.uint32,
-):
-    """(the same of a strand met later, or where `own` is below zero of a white surface, random state).
-
-    Of what all lamps would send without shadows one is drawn by its share, and traced [Talbot05].
-    """
-    state = random
-    total = float(0.0)
-    kept = wp.vec3(0.0, 0.0, 0.0)
-    kept_lit = Lit()
-    turns = wp.min(sources.count, _LAMPS_AT_ONCE)
-    for index in range(turns):
-        lit, after = _lamp_at(sources, index, turns, position, 0.5 * medium.least_cell, state)
-        state = after
-        light = lit.irradiance * (wp.max(wp.dot(normal, lit.direction), 0.0) / PI)
-        if own >= 0 and wp.max(lit.irradiance) > 0.0:
-            light = _scattered(fibre, viewer, lit, offset, wp.randf(state))
-        amount = light[0] + light[1] + light[2]
-        if amount > 0.0:
-            total += amount
-            if wp.randf(state) * total <= amount:
-                kept = light / amount
-                kept_lit = lit
-    if total > 0.0:
-        if _is_shadowed(medium, kept_lit, position, own):
-            total = 0.0
-    return kept * total, state
-
-
-@wp.func
-def _off_surface(normal: wp.vec3, random: wp.uint32):
-    """(direction of light that a diffuse surface sends back, random state)."""
-    state = random
-    squared = wp.randf(state)
-    turned = wp.randf(state)
-    direction = on_disk(normal, 1.0, squared, turned) + wp.sqrt(wp.max(0.0, 1.0 - squared)) * normal
-    return wp.normalize(direction), state
-
-
 @wp.kernel
 def _find(
     medium: Medium,
@@ -214,6 +102,16 @@ def _find(
         out_segment[path] = met.index
     out_position[path] = met.position
     out_viewer[path] = -direction
+
+
+@wp.func
+def _off_surface(normal: wp.vec3, random: wp.uint32):
+    """(direction of light that a diffuse surface sends back, random state)."""
+    state = random
+    squared = wp.randf(state)
+    turned = wp.randf(state)
+    direction = on_disk(normal, 1.0, squared, turned) + wp.sqrt(wp.max(0.0, 1.0 - squared)) * normal
+    return wp.normalize(direction), state
 
 
 @wp.kernel
@@ -242,35 +140,33 @@ def _gather(
             light += wp.cw_mul(weight, world_radiance(sources, direction))
             event = _MOST_EVENTS
         else:
-            position = met.position
-            own = int(-1)
+            here = Event()
+            here.position = met.position
+            here.own = -1
+            here.weight = weight
             if met.kind == STRAND:
-                fibre = fibre_of(medium, met.index)
-                viewer = -direction
-                own = medium.strands[met.index]
-                h = -met.offset
+                here.fibre = fibre_of(medium, met.index)
+                here.facing = -direction
+                here.own = medium.strands[met.index]
+                here.offset = -met.offset
                 if event == 0:
-                    out_even[path] = even_return(fibre, viewer)
-                    at_once, after = _light_at_once(medium, sources, fibre, viewer, position, h, own, state)
-                    state = after
-                    light += at_once
+                    out_even[path] = even_return(here.fibre, here.facing)
+                    light_there, after = light_at_once(medium, sources, here, state)
                 else:
-                    light_there, after = _light_by_share(
-                        medium, sources, fibre, viewer, position, h, own, viewer, state
-                    )
-                    state = after
-                    light += wp.cw_mul(weight, light_there)
-                direction, weight, after = turn(fibre, viewer, weight, h, state)
+                    light_there, after = light_by_share(medium, sources, here, state)
+                state = after
+                direction, weight, after = turn(here.fibre, here.facing, weight, here.offset, state)
                 state = after
             else:
-                normal = met.normal
-                position = position - direction * (1e-4 * medium.least_cell)
+                here.facing = met.normal
+                here.position = met.position - direction * (1e-4 * medium.least_cell)
                 weight = wp.cw_mul(weight, medium.albedo[met.index])
-                light_there, after = _light_by_share(medium, sources, Fibre(), normal, position, 0.0, -1, normal, state)
+                here.weight = weight
+                light_there, after = light_by_share(medium, sources, here, state)
                 state = after
-                light += wp.cw_mul(weight, light_there)
-                direction, after = _off_surface(normal, state)
+                direction, after = _off_surface(met.normal, state)
                 state = after
+            light += light_there
             event += 1
             brightest = wp.max(weight)
             if brightest < _DIM:
@@ -278,7 +174,10 @@ def _gather(
                     event = _MOST_EVENTS
                 weight = weight * (_DIM / wp.max(brightest, 1e-12))
             if event < _MOST_EVENTS:
-                met = walk(medium, position, direction, _FAR, own)
+                met = walk(medium, here.position, direction, _FAR, here.own)
+                light_there, after = light_met(medium, sources, here, direction, met, state)
+                state = after
+                light += wp.cw_mul(weight, light_there)
     out_light[path] = light
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps and the world as paths see them: shaders/include/lights.glsl, at a random point of each lamp."""
+"""Lamps and the world as paths see them: shaders/include/lights.glsl, at a point of each lamp."""
 
 import warp as wp
 
@@ -8,6 +8,7 @@ from .grid_walk import FAR
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
+_NO_AREA = wp.constant(1e-20)  # of a lamp [m²]: no direction meets it
 SUN, POINT, SPOT, AREA = (wp.constant(kind) for kind in range(4))  # as `core.imaging.lamps`
 
 
@@ -27,11 +28,15 @@ class Sources:
 
 @wp.struct
 class Lit:
-    """Light of a lamp at a place: unit vector towards it, distance [m], irradiance."""
+    """Light of a lamp at a place: unit vector towards a point of it, distance [m], irradiance.
+
+    density: of random points of the lamp in this direction [1/sr]; the lamp's radiance is it times the irradiance.
+    """
 
     direction: wp.vec3
     distance: float
     irradiance: wp.vec3
+    density: float
     casts_shadow: int
 
 
@@ -93,40 +98,84 @@ def choose(sources: Sources, random: wp.uint32):
 
 
 @wp.func
-def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, random: wp.uint32):
-    """(`Lit` by a lamp, random state); least: distance [m] below which no light grows.
-
-    Nor does it nearer than half the radius of a lamp that shines all around: few paths with much light would be noise.
-    """
-    state = random
-    lit = Lit()
-    kind = sources.kind[chosen]
-    axis = sources.axis[chosen]
+def _sent(sources: Sources, chosen: int, offset: wp.vec3, lit: Lit, least: float):
+    """`Lit` with its irradiance and density, of a direction and a distance; offset: to the lamp's middle [m]."""
     shape = sources.shape[chosen]
-    one = wp.randf(state)
-    other = wp.randf(state)
-    lit.casts_shadow = int(shape[3])
+    kind = sources.kind[chosen]
+    area = wp.max(PI * shape[0] * shape[0], _NO_AREA)
     if kind == SUN:
-        lit.direction = wp.normalize(on_disk(axis, shape[0], one, other) - axis)
-        lit.distance = FAR
+        cosine = wp.max(-wp.dot(lit.direction, sources.axis[chosen]), 1e-6)
         lit.irradiance = sources.power[chosen]
+        lit.density = 1.0 / (area * cosine * cosine * cosine)
     else:
-        offset = sources.position[chosen] - position
-        facing = axis
-        if kind != AREA:
-            facing = wp.normalize(offset)
-        offset = offset + on_disk(facing, shape[0], one, other)
-        distance = wp.max(wp.length(offset), 1e-6)
-        lit.direction = offset / distance
-        lit.distance = distance
-        far = wp.max(distance, least)
-        if kind != AREA:
-            far = wp.max(far, 0.5 * shape[0])
-        cosine = -wp.dot(lit.direction, axis)
-        part = 1.0 / (4.0 * PI * far * far)
+        cosine = -wp.dot(lit.direction, sources.axis[chosen])
+        part = 1.0 / (4.0 * PI)
         if kind == SPOT:
             part = part * spot_falloff(cosine, shape[1], shape[2])
         if kind == AREA:
-            part = wp.max(cosine, 0.0) / (PI * far * far) * area_falloff(cosine, shape[1])
-        lit.irradiance = part * sources.power[chosen]
-    return lit, state
+            part = area_falloff(cosine, shape[1]) / PI
+        facing = wp.max(-wp.dot(lit.direction, _disk_normal(sources, chosen, offset)), 0.0)
+        squared = lit.distance * lit.distance
+        near = wp.dot(offset, offset) + shape[0] * shape[0]
+        dim = wp.min(1.0, near / (least * least))
+        lit.irradiance = (dim * part * facing / squared) * sources.power[chosen]
+        lit.density = squared / (wp.max(facing, 1e-6) * area)
+    return lit
+
+
+@wp.func
+def _disk_normal(sources: Sources, chosen: int, offset: wp.vec3):
+    """The side of a lamp's disk that gives light: all around it turns to what it lights."""
+    normal = sources.axis[chosen]
+    if sources.kind[chosen] != AREA:
+        normal = -wp.normalize(offset)
+    return normal
+
+
+@wp.func
+def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, random: wp.uint32):
+    """(`Lit` by a random point of a lamp, random state); least: distance [m] below which no light grows.
+
+    Only lamps smaller than that have so few paths with so much light.
+    """
+    state = random
+    lit = Lit()
+    axis = sources.axis[chosen]
+    one = wp.randf(state)
+    other = wp.randf(state)
+    radius = sources.shape[chosen][0]
+    lit.casts_shadow = int(sources.shape[chosen][3])
+    offset = sources.position[chosen] - position
+    if sources.kind[chosen] == SUN:
+        lit.direction = wp.normalize(on_disk(axis, radius, one, other) - axis)
+        lit.distance = FAR
+    else:
+        to_point = offset + on_disk(_disk_normal(sources, chosen, offset), radius, one, other)
+        lit.distance = wp.max(wp.length(to_point), 1e-6)
+        lit.direction = to_point / lit.distance
+    return _sent(sources, chosen, offset, lit, least), state
+
+
+@wp.func
+def lit_from(sources: Sources, chosen: int, position: wp.vec3, direction: wp.vec3, least: float):
+    """`Lit` by the point of a lamp in a direction; without irradiance where the lamp is not there."""
+    lit = Lit()
+    lit.casts_shadow = int(sources.shape[chosen][3])
+    lit.direction = direction
+    radius = sources.shape[chosen][0]
+    offset = sources.position[chosen] - position
+    normal = sources.axis[chosen]
+    if sources.kind[chosen] == SUN:
+        lit.distance = FAR
+        facing = -wp.dot(direction, normal)
+        beside = direction + facing * normal
+        is_there = facing > 0.0 and wp.length(beside) < radius * facing
+    else:
+        normal = _disk_normal(sources, chosen, offset)
+        facing = -wp.dot(direction, normal)
+        lit.distance = -wp.dot(offset, normal) / wp.max(facing, 1e-6)
+        beside = lit.distance * direction - offset
+        is_there = facing > 1e-6 and lit.distance > 0.0 and wp.length(beside) < radius
+    if is_there:
+        lit = _sent(sources, chosen, offset, lit, least)
+    return lit

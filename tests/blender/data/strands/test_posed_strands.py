@@ -70,6 +70,21 @@ def test_strands_whose_roots_are_lost_are_rooted_where_it_is_nearest(bent):
     np.testing.assert_array_equal(pose.carry(points, "of another surface", places), nearest)
 
 
+def test_where_it_is_nearest_is_a_matter_of_the_mesh_not_of_its_object_s_scale(hair):
+    """So it is for the nodes that renders read, and strands stay where they are drawn when the scale changes."""
+    surface, (points, *_rooted) = hair.data.surface, at_rest(hair)
+    twist = surface.modifiers.new("Twist", "SIMPLE_DEFORM")
+    twist.deform_method, twist.angle = "TWIST", 1.0
+    points += np.float32([0.0, 0.0, 0.5])  # beside the surface, as strands that were moved by hand
+    carried = []
+    for scale in ((1.0, 1.0, 1.0), (1.0, 3.0, 0.5)):
+        surface.scale = scale
+        bpy.context.view_layer.update()
+        carried.append(pose_of(hair).carry(points, "of another surface", None))
+    assert np.abs(carried[0] - points).max() > 0.2
+    np.testing.assert_allclose(*carried, atol=1e-5)
+
+
 def test_a_surface_at_rest_and_none_carry_nothing(hair):
     for surface in (hair.data.surface, None):
         pose = posed_strands.read_pose(surface, scene.present_depsgraph())

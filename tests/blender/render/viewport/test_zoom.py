@@ -11,14 +11,14 @@ from hair_addon.blender.render import drawn_scene
 from hair_addon.blender.render.viewport import hair_picture, picture_detail
 from tests.support.scenes import even_guides
 
-SIZE = (640, 480)
+SIZE = (320, 240)
 
 
 @pytest.fixture
 def locks(lit):
     """Locks of strands that are thinner than a pixel, and hide each other."""
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
-    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 6000, 0.001
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 3000, 0.002
     api.set_styles(lit.data, [api.Clump(size=0.15, amount=1.0)])
     bpy.context.view_layer.update()
     return drawn_scene.read(bpy.context.scene, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get())
@@ -54,7 +54,7 @@ def fine(picture, drawn, camera):
 def test_small_hair_is_as_bright_and_covers_as_much(locks):
     """With one sample a pixel, near by and far away, in the first pass and in the last."""
     picture, near = hair_picture.HairPicture(SIZE, 1), None
-    for distances in (1.0, 4.0, 15.0):
+    for distances in (1.0, 2.0, 7.5):
         last, first = fine(picture, locks, seen_from(distances))
         near = last if near is None else near
         np.testing.assert_allclose(first, last, rtol=0.02)
@@ -63,7 +63,7 @@ def test_small_hair_is_as_bright_and_covers_as_much(locks):
 
 def test_a_finer_part_of_a_picture_shows_what_the_whole_does(locks, monkeypatch):
     """Which hair is at a pixel, too; beside the part there is none."""
-    camera = seen_from(10.0)
+    camera = seen_from(5.0)
     finer = hair_picture.HairPicture(SIZE, 1)
     fine(finer, locks, camera)
     monkeypatch.setattr(picture_detail, "of_hair", lambda *given: picture_detail.whole(*given[2:]))

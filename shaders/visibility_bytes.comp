@@ -2,20 +2,19 @@
 // Visibility of the world from strands, which was added up one direction after the other, as it is kept.
 
 #include "include/seen_bytes.glsl"
+#include "include/put_seen_bytes.glsl"
 
 void main()
 {
-  ivec2 cell = ivec2(gl_FragCoord.xy);
+  ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(cell, imageSize(seen_x_y)))) {
+    return;
+  }
   Seen seen;
   seen.x_y = texelFetch(visibility_x_y, cell, 0);
   seen.z = texelFetch(visibility_z, cell, 0);
   seen.surface = texelFetch(visibility_surface, cell, 0);
   seen.channels = texelFetch(visibility_channels, cell, 0);
   seen.color = texelFetch(visibility_color, cell, 0);
-  Seen bytes = seen_to_bytes(seen);
-  seen_x_y = bytes.x_y;
-  seen_z = bytes.z;
-  seen_surface = bytes.surface;
-  seen_channels = bytes.channels;
-  seen_color = bytes.color;
+  put_seen(cell, seen);
 }

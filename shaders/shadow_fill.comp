@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// After shadow_rows.frag: texels without strands get the nearest front and the last back around them, so that
+// After shadow_rows.comp: texels without strands get the nearest front and the last back around them, so that
 // interpolation of both is valid.
 
 #include "include/opacity.glsl"
 
 void main()
 {
-  ivec2 here = ivec2(gl_FragCoord.xy);
+  ivec2 here = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(here, textureSize(fronts, 0)))) {
+    return;
+  }
   int last = textureSize(fronts, 0).y - 1;
   vec2 ends = vec2(front_of_bits(texelFetch(fronts, here, 0).r), front_of_bits(texelFetch(backs, here, 0).r));
   if (ends.x >= FAR) {
@@ -15,5 +18,5 @@ void main()
       ends = vec2(min(ends.x, near.x), max(ends.y, near.y));
     }
   }
-  color = vec4(ends, 0.0, 0.0);
+  imageStore(filtered, ivec3(here, layer), vec4(ends, 0.0, 0.0));
 }

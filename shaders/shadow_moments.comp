@@ -13,7 +13,7 @@ ivec2 last;
 
 vec3 values_at(int tap)
 {
-  vec3 values = texelFetch(surface_depth, clamp(here + tap * along, ivec2(0), last), 0).rgb;
+  vec3 values = texelFetch(surface_depth, ivec3(clamp(here + tap * along, ivec2(0), last), 0), 0).rgb;
   return (is_depth != 0) ? vec3(warped_depth(values.r), 0.0, values.r) : values;
 }
 
@@ -28,8 +28,11 @@ float curve_of_warp(float depth, float before, float after)
 
 void main()
 {
-  here = ivec2(gl_FragCoord.xy);
-  last = textureSize(surface_depth, 0) - 1;
+  here = ivec2(gl_GlobalInvocationID.xy);
+  last = textureSize(surface_depth, 0).xy - 1;
+  if (any(greaterThan(here, last))) {
+    return;
+  }
   vec3 middle = values_at(0);
   vec3 total = vec3(0.0, middle.yz);
   float squares = 0.0;  // of differences to the middle, which keep their digits
@@ -58,7 +61,8 @@ void main()
   vec3 mean = total / weights;
   float variance = max(squares / weights - mean.x * mean.x, 0.0);
   float beside_slope = max(variance - slope * slope / (reach * weights), 0.0);
-  vec4 own = texelFetch(surface_depth, here, 0);
+  vec4 own = texelFetch(surface_depth, ivec3(here, 0), 0);
   float own_color = (is_depth != 0) ? own.g : own.a;
-  color = vec4(mean.x + middle.x - curve / weights, mean.y + min(variance, STEP * beside_slope), mean.z, own_color);
+  vec4 found = vec4(mean.x + middle.x - curve / weights, mean.y + min(variance, STEP * beside_slope), mean.z, own_color);
+  imageStore(filtered, ivec3(here, layer), found);
 }

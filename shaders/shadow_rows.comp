@@ -5,7 +5,10 @@
 
 void main()
 {
-  ivec2 here = ivec2(gl_FragCoord.xy);
+  ivec2 here = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(here, textureSize(fronts, 0)))) {
+    return;
+  }
   int last = textureSize(fronts, 0).x - 1;
   uint front = 0xFFFFFFFFu;
   uint back = 0u;
@@ -14,5 +17,5 @@ void main()
     front = min(front, texelFetch(fronts, place, 0).r);
     back = max(back, texelFetch(backs, place, 0).r);
   }
-  color = vec4(front_of_bits(front), front_of_bits(back), 0.0, 0.0);
+  imageStore(filtered, here, vec4(front_of_bits(front), front_of_bits(back), 0.0, 0.0));
 }

@@ -4,21 +4,24 @@
 #include "include/shadow.glsl"
 #include "include/packed_strand.glsl"
 #include "include/seen_bytes.glsl"
+#include "include/vertex_place.glsl"
+#include "include/put_seen_sums.glsl"
 
-// A place of a strand whose first texel is given, or of a surface.
+// A place of a strand whose first texel is given; of a surface, of the vertex of that texel.
 vec3 place_of(ivec2 first, int point)
 {
   point = clamp(point, 0, view.point_count - 1);
-  vec3 place = texelFetch(places, first, 0).xyz;
-  if (view.point_count > 1) {
-    place = packed_place(places, first, packed_head(places, first), point);
-  }
+  vec3 place = (view.point_count > 1) ? packed_place(places, first, packed_head(places, first), point) :
+                                        vertex_place(places, first.y * view.row_strands + first.x);
   return (view.object_to_world * vec4(place, 1.0)).xyz;
 }
 
 void main()
 {
-  ivec2 cell = ivec2(gl_FragCoord.xy);
+  ivec2 cell = ivec2(gl_GlobalInvocationID.xy);
+  if (any(greaterThanEqual(cell, imageSize(seen_x_y)))) {
+    return;
+  }
   int strand = cell.x / view.seen_points;
   int point = min((cell.x - strand * view.seen_points) * SEEN_STEP, view.point_count - 1);
   bool is_strand = view.point_count > 1;
@@ -76,12 +79,5 @@ void main()
     sums.channels += vec4(open * past_hair_channels, beyond);
     sums.z += vec4(plus.z, minus.z, others);
   }
-  if (view.seen_in_bytes != 0) {
-    sums = seen_to_bytes(sums);
-  }
-  seen_x_y = sums.x_y;
-  seen_z = sums.z;
-  seen_surface = sums.surface;
-  seen_channels = sums.channels;
-  seen_color = sums.color;
+  put_seen(cell, sums);
 }

@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Surfaces on the GPU: places of vertices in a texture, and what belongs to corners of triangles, which stays.
+
+A pose uploads the places of vertices, twelve bytes each. An object that moves as a whole uploads nothing.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import groupby
+
+import gpu
+import numpy as np
+
+from ...core import geometry
+from ...core.kernels.checks import require_count, require_indices
+from ..host.caches import Cache
+from . import drawing, shaders, uniforms
+from .strand_textures import TEXTURE_WIDTH
+
+_ROW_VERTICES = TEXTURE_WIDTH // 3  # at most; each is three texels
+
+surface_cache = Cache(capacity=64)  # session_uid of a mesh object → `SurfaceOnGPU` that was drawn of it last
+
+
+@dataclass(frozen=True, eq=False)
+class _Corners:
+    """What stays of a surface while it moves; made by `_corners`."""
+
+    vertices: np.ndarray  # (3 F,) int32, of each corner
+    has_vertex_normals: bool  # whether normals are of vertices, not of corners
+    uvs: np.ndarray | None  # (3 F, 2), None: zero
+    colors: tuple  # (number of corners, packed color) of one material after the other
+    vertex_count: int
+
+    def is_same(self, other):
+        """Whether other corners are drawn alike."""
+        mine, its = ((c.has_vertex_normals, c.colors, c.vertex_count, c.uvs is None) for c in (self, other))
+        return mine == its and all(
+            a is b or np.array_equal(a, b) for a, b in ((self.vertices, other.vertices), (self.uvs, other.uvs))
+        )
+
+    @cached_property
+    def triangles(self):
+        """The batch of indexed triangles without attributes: a shader reads places by the index of a vertex."""
+        vertices = gpu.types.GPUVertBuf(gpu.types.GPUVertFormat(), self.vertex_count)
+        indices = gpu.types.GPUIndexBuf(type="TRIS", seq=np.ascontiguousarray(self.vertices.reshape(-1, 3), np.int32))
+        return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
+
+    @cached_property
+    def lit(self):
+        """The batch of triangles with attributes corner_vertex, corner_normal and uv, for who needs normals."""
+        count = len(self.vertices)
+        normals = self.vertices if self.has_vertex_normals else np.arange(count)
+        uvs = np.zeros((count, 2)) if self.uvs is None else self.uvs
+        layout = gpu.types.GPUVertFormat()
+        for name in ("corner_vertex", "corner_normal"):
+            layout.attr_add(id=name, comp_type="I32", len=1, fetch_mode="INT")
+        layout.attr_add(id="uv", comp_type="F32", len=2, fetch_mode="FLOAT")
+        buffer = gpu.types.GPUVertBuf(layout, count)
+        # Other types than these would be accepted silently and drawn incorrectly.
+        buffer.attr_fill("corner_vertex", np.ascontiguousarray(self.vertices, np.int32))
+        buffer.attr_fill("corner_normal", np.ascontiguousarray(normals, np.int32))
+        buffer.attr_fill("uv", np.ascontiguousarray(uvs, np.float32))
+        return gpu.types.GPUBatch(type="TRIS", buf=buffer)
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceOnGPU:
+    """Triangles of a surface, placed by a matrix."""
+
+    places: gpu.types.GPUTexture  # of vertices, in the object's coordinates
+    normals: gpu.types.GPUTexture  # in the same; any texture where there are none
+    corners: _Corners
+    to_world: np.ndarray  # (4, 4)
+    vertices: np.ndarray  # (V, 3) float32, as uploaded
+    normals_here: np.ndarray | None
+
+    @property
+    def vertex_count(self) -> int:
+        return self.corners.vertex_count
+
+    @property
+    def row_vertices(self) -> int:
+        """Whole vertices in a row of textures that have a texel for each."""
+        return min(self.vertex_count, _ROW_VERTICES)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """How many vertices and corners it has."""
+        return self.vertex_count, len(self.corners.vertices)
+
+    @cached_property
+    def fingerprint(self) -> tuple:
+        """Of the places of its vertices in the world, for motion vectors."""
+        return self.shape, geometry.fingerprint.fingerprint(self.vertices), self.to_world.tobytes()
+
+    @property
+    def samplers(self) -> dict:
+        """{sampler: texture} of a program that draws it lit."""
+        return {"places": self.places, "normals": self.normals}
+
+    def placed(self, view: np.ndarray) -> np.ndarray:
+        """A copy of a `uniforms.VIEW` record that places it."""
+        record = view.copy()
+        record["object_to_world"] = self.to_world.T
+        record["row_strands"] = self.row_vertices
+        return record
+
+
+def upload_surface(
+    vertices, triangles, normals=None, has_vertex_normals=True, uvs=None, colors=(), to_world=None, known=None
+):
+    """(V, 3) float32 places and (3 F,) vertices of triangles → `SurfaceOnGPU`. Raises `HairError`.
+
+    normals: (V, 3) of vertices, or without has_vertex_normals (3 F, 3) of corners, unit, None of what is drawn as depth
+    alone: in the coordinates of places, which to_world (4, 4) transforms, None: those of the world. uvs: (3 F, 2) or
+    None; colors: (number of corners, linear RGB) of one part after the other as they light hair; black without. known:
+    what was drawn of the same object before, None: nothing. What is equal is not uploaded again.
+    """
+    packed = tuple(packed_colors([color for _count, color in colors]).tolist()) if colors else (0.0,)
+    counts = [count for count, _color in colors] if colors else [len(triangles)]
+    corners = _Corners(triangles, has_vertex_normals, uvs, tuple(zip(counts, packed, strict=True)), len(vertices))
+    if known is not None and known.corners.is_same(corners):
+        corners = known.corners
+    else:
+        require_indices("vertices", triangles, len(vertices))
+        require_count("corners of materials", sum(counts), len(triangles))
+    places = _texture_of(vertices, known and (known.vertices, known.places))
+    if normals is None:
+        normals_texture = places
+    else:
+        require_count("normals", len(normals), len(vertices) if has_vertex_normals else len(triangles))
+        normals_texture = _texture_of(normals, known and (known.normals_here, known.normals))
+    to_world = np.eye(4) if to_world is None else to_world
+    return SurfaceOnGPU(places, normals_texture, corners, to_world, vertices, normals)
+
+
+def packed_colors(colors):
+    """(N, 3) linear RGB → (N,) float32: square roots in eight bits each, as whole numbers that floats hold exactly."""
+    roots = np.rint(255.0 * np.sqrt(np.clip(colors, 0.0, 1.0)))
+    return (roots @ np.array([65536.0, 256.0, 1.0])).astype(np.float32)
+
+
+def _texture_of(vectors, known):
+    """(N, 3) float32 in a texture of three texels each; known: (vectors, texture) of before, or None."""
+    if known is not None and known[0] is not None and np.array_equal(vectors, known[0]):
+        return known[1]
+    row = min(len(vectors), _ROW_VERTICES)
+    row_count = -(-len(vectors) // row)
+    texels = np.ascontiguousarray(vectors, np.float32).ravel()
+    if row_count * row > len(vectors):
+        texels = np.append(texels, np.zeros(3 * (row_count * row - len(vectors)), np.float32))
+    data = gpu.types.Buffer("FLOAT", texels.size, texels)
+    texture = gpu.types.GPUTexture((3 * row, row_count), format="R32F", data=data)
+    texture.filter_mode(False)
+    return texture
+
+
+_COLORED = "shadow_surface.frag"  # the only one that a material's color matters to
+
+
+def draw_depth(surface, view, lights, fragment=_COLORED):
+    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surface_hides.frag."""
+    program = shaders.surface_depth_program(fragment)
+    placed, light_block = surface.placed(view), uniforms.uniform_buffer(lights)
+    first, has_color = 0, fragment == _COLORED
+    for color, parts in groupby(surface.corners.colors, key=lambda part: part[1] if has_color else 0.0):
+        count = sum(part_count for part_count, _color in parts)
+        placed["surface_color"] = color
+        blocks = {"view": uniforms.uniform_buffer(placed), "lights": light_block}
+        with drawing.bound(program, blocks, {"places": surface.places}):
+            surface.corners.triangles.draw_range(program, elem_start=first, elem_count=count)
+        first += count
+
+
+def draw_lit(surface, program, view, lights, samplers):
+    """Draw all corners of a `SurfaceOnGPU` with a program of `shaders.lit_surface_info`."""
+    blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
+    with drawing.bound(program, blocks, surface.samplers | samplers):
+        surface.corners.lit.draw(program)

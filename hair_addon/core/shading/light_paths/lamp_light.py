@@ -1,0 +1,150 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Light of lamps at the events of a path: of random points of lamps, and of lamps that the path meets [Veach95].
+
+Both find the same light: each counts by its share of both densities (the balance heuristic), so that neither lamps near
+a strand nor narrow lobes give few paths much light.
+"""
+
+import warp as wp
+
+from .fibre_walk import PI, Fibre, value
+from .grid_walk import PASSED, Medium, Met, walk
+from .light_sources import Lit, Sources, choose, lit_by, lit_from
+
+wp.set_module_options({"enable_backward": False, "fast_math": True})
+
+_LAMPS_AT_ONCE = wp.constant(8)  # that light an event
+_OFFSETS_AT_ONCE = wp.constant(4)  # over the part of a strand's width around the one that is met
+_AROUND = wp.constant(0.25)  # half that part, of the radius
+_LEAST = wp.constant(0.5)  # of the smallest cell: distance below which no lamp's light grows
+
+
+@wp.struct
+class Event:
+    """A place on strand `own`, or where that is below zero on a diffuse surface.
+
+    facing: unit vector towards the path's last place, or the surface's normal; offset: in the strand's width, from -1
+    to 1; weight: of light from there to the viewer, with the surface's color.
+    """
+
+    position: wp.vec3
+    facing: wp.vec3
+    weight: wp.vec3
+    offset: float
+    own: int
+    fibre: Fibre
+
+
+@wp.func
+def _is_shadowed(medium: Medium, lit: Lit, here: Event):
+    """Whether a lamp's light does not arrive at an event."""
+    if lit.casts_shadow == 0:
+        return False
+    met = walk(medium, here.position, lit.direction, lit.distance, here.own)
+    return met.kind != PASSED
+
+
+@wp.func
+def _one_of(sources: Sources, index: int, random: wp.uint32):
+    """(a lamp by its index, or any one where there are more than `_LAMPS_AT_ONCE`; its share; random state)."""
+    state = random
+    if sources.count <= _LAMPS_AT_ONCE:
+        return index, 1.0, state
+    chosen, one_over_chance, after = choose(sources, state)
+    return chosen, one_over_chance / float(_LAMPS_AT_ONCE), after
+
+
+@wp.func
+def _lamp_at(medium: Medium, sources: Sources, index: int, here: Event, random: wp.uint32):
+    """(`Lit` of `_one_of` the lamps with its share, that share, random state)."""
+    chosen, share, after = _one_of(sources, index, random)
+    lit, state = lit_by(sources, chosen, here.position, _LEAST * medium.least_cell, after)
+    return lit, share, state
+
+
+@wp.func
+def _offset_at(here: Event, step: int, shift: float):
+    """An offset around that of an event."""
+    h = here.offset + _AROUND * (2.0 * (float(step) + shift) / float(_OFFSETS_AT_ONCE) - 1.0)
+    # Back from beyond the edge: the mean over all offsets stays that over the width.
+    if wp.abs(h) > 1.0:
+        h = wp.sign(h) * 2.0 - h
+    return h
+
+
+@wp.func
+def _scattered(here: Event, lit: Lit, shift: float):
+    """Light of a point of a lamp that goes to the viewer, by its share of densities: the mean around an offset."""
+    light = wp.vec3(0.0, 0.0, 0.0)
+    if here.own < 0:
+        density = wp.max(wp.dot(here.facing, lit.direction), 0.0) / PI
+        light = wp.cw_mul(here.weight, lit.irradiance) * (density * lit.density / (lit.density + density))
+    else:
+        for step in range(_OFFSETS_AT_ONCE):
+            h = _offset_at(here, step, shift)
+            found, density = value(here.fibre, here.facing, lit.direction, h, here.weight)
+            light += found * (lit.density / (lit.density + density))
+        light = wp.cw_mul(here.weight, wp.cw_mul(lit.irradiance, light / float(_OFFSETS_AT_ONCE)))
+    return light
+
+
+@wp.func
+def light_at_once(medium: Medium, sources: Sources, here: Event, random: wp.uint32):
+    """(radiance of lamps' light that an event sends to the viewer, random state): all lamps are traced."""
+    state = random
+    light = wp.vec3(0.0, 0.0, 0.0)
+    for index in range(wp.min(sources.count, _LAMPS_AT_ONCE)):
+        lit, share, after = _lamp_at(medium, sources, index, here, state)
+        state = after
+        if wp.max(lit.irradiance) > 0.0 and not _is_shadowed(medium, lit, here):
+            light += share * _scattered(here, lit, wp.randf(state))
+    return light, state
+
+
+@wp.func
+def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uint32):
+    """(the same light, random state): of what all lamps would send without shadows one is drawn by its share, and
+    traced [Talbot05].
+    """
+    state = random
+    total = float(0.0)
+    kept = wp.vec3(0.0, 0.0, 0.0)
+    kept_lit = Lit()
+    for index in range(wp.min(sources.count, _LAMPS_AT_ONCE)):
+        lit, share, after = _lamp_at(medium, sources, index, here, state)
+        state = after
+        light = wp.vec3(0.0, 0.0, 0.0)
+        if wp.max(lit.irradiance) > 0.0:
+            light = share * _scattered(here, lit, wp.randf(state))
+        amount = light[0] + light[1] + light[2]
+        if amount > 0.0:
+            total += amount
+            if wp.randf(state) * total <= amount:
+                kept = light / amount
+                kept_lit = lit
+    if total > 0.0:
+        if _is_shadowed(medium, kept_lit, here):
+            total = 0.0
+    return kept * total, state
+
+
+@wp.func
+def light_met(medium: Medium, sources: Sources, here: Event, direction: wp.vec3, met: Met, random: wp.uint32):
+    """(radiance of lamps in the direction in which a path leaves an event, by its share of densities, random state).
+
+    met: what the path meets there.
+    """
+    state = random
+    light = wp.vec3(0.0, 0.0, 0.0)
+    for index in range(wp.min(sources.count, _LAMPS_AT_ONCE)):
+        chosen, share, after = _one_of(sources, index, state)
+        state = after
+        lit = lit_from(sources, chosen, here.position, direction, _LEAST * medium.least_cell)
+        if wp.max(lit.irradiance) > 0.0:
+            end = wp.dot(met.position - here.position, direction)
+            if met.kind == PASSED or lit.casts_shadow == 0 or lit.distance < end:
+                density = wp.max(wp.dot(here.facing, direction), 0.0) / PI
+                if here.own >= 0:
+                    _found, density = value(here.fibre, here.facing, direction, here.offset, here.weight)
+                light += lit.irradiance * (share * lit.density * density / (lit.density + density))
+    return light, state

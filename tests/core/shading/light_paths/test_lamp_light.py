@@ -1,0 +1,70 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Lamps as paths see them: as bright as the world where they fill a part of it, and found by few paths."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hair_addon.core.imaging import lamps
+from hair_addon.core.shading.light_paths import gather
+from hair_addon.core.shading.tables import lookup_tables
+from tests.core.shading.light_paths.test_gather import (
+    ALONG_Y,
+    LAMP,
+    found_by,
+    grid_of,
+    ratio,
+    strands_in_a_box,
+    surroundings,
+)
+
+
+def lamp(kind, distance, radius, power=1.0):
+    """A lamp on the viewer's side of the origin, which shines along y."""
+    found = np.zeros(1, LAMP)
+    found["kind"], found["radius"], found["casts_shadow"] = kind, radius, 1
+    found["position"][0, 1], found["axis"][0, 1], found["power"][0, :3] = -distance, 1.0, power
+    return found
+
+
+@pytest.mark.parametrize("kind", [lamps.SUN, lamps.POINT, lamps.AREA])
+def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
+    """Hair in a cone of light: a lamp far off, and a world with the radiance of its disk in each direction."""
+    rough = lookup_tables.Settings(mode="energy", roughness=0.8, radial_roughness=0.8)
+    grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.02, rough, cell_count=5_000)
+    power = {lamps.SUN: 3.0, lamps.POINT: 12.0 * np.pi * 500.0**2, lamps.AREA: 3.0 * np.pi * 500.0**2}[kind]
+    wide = lamp(kind, 500.0, 1.5 if kind == lamps.SUN else 750.0, power)
+    v, u = (np.arange(256) + 0.5) / 256 - 0.5, 0.5 - (np.arange(512) + 0.5) / 512
+    latitude, longitude = np.meshgrid(np.pi * v, 2.0 * np.pi * u, indexing="ij")
+    cosine = np.maximum(-np.cos(latitude) * np.sin(longitude), 1e-9)  # with the direction to the lamp's middle
+    radiance = np.where(np.sqrt(1.0 - cosine**2) / cosine < 1.5, 3.0 / (np.pi * 1.5**2), 0.0)
+    if kind == lamps.SUN:  # even light over its disk, not over its angles
+        radiance = radiance / cosine**3
+    world = replace(surroundings(), world=np.repeat(radiance[..., None], 3, axis=-1))
+    found = [ratio(found_by(grid, light, ALONG_Y, 50_000)) for light in (surroundings(lamps=wide), world)]
+    np.testing.assert_allclose(found[0], found[1], rtol=0.025)
+
+
+def test_near_a_lamp_light_grows_as_its_disk_does(rng):
+    """Strands at a quarter of a lamp's radius: one that shines all around turns its disk to them."""
+    thin = np.stack([np.linspace(-0.02, 0.02, 3), np.zeros(3), np.zeros(3)], axis=-1)[None]
+    grid = grid_of(thin, (0.05, 0.3, 1.0), 0.002, cell_count=1_000)
+    sides = np.array([0.02, 0.0, 0.0]), np.array([0.0, 0.0, 0.004])
+    rays = gather.Rays(np.array([-0.01, -0.1, -0.002]), *sides, np.array([-0.01, 0.1, -0.002]), *sides)
+    around, forward = (
+        ratio(found_by(grid, surroundings(lamps=lamp(kind, 0.1, 0.4, power)), rays, 20_000))
+        for kind, power in ((lamps.POINT, 4.0), (lamps.AREA, 1.0))
+    )
+    np.testing.assert_allclose(around, forward, rtol=0.03)
+
+
+def test_a_lamp_among_hair_is_found_by_few_paths(rng):
+    """A disk of 6 cm amid strands: means of few paths differ little, as no path has too much light."""
+    grid = grid_of(strands_in_a_box(rng, 4_000), (0.02, 0.04, 0.06), 0.004, cell_count=50_000)
+    sides = np.array([0.3, 0.0, 0.0]), np.array([0.0, 0.0, 0.3])
+    near = gather.Rays(np.array([-0.15, -0.3, -0.15]), *sides, np.array([-0.15, 4.0, -0.15]), *sides)
+    up = lamp(lamps.AREA, 0.0, 0.06)
+    up["axis"][0, :3] = 0.0, 0.0, 1.0
+    means = [ratio(found_by(grid, surroundings(lamps=up), near, 4_000, seed)).mean() for seed in range(6)]
+    assert np.std(means) < 0.2 * np.mean(means)
