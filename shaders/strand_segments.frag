@@ -12,7 +12,7 @@ void main()
   float slope = is_steep ? across.x : across.y;
   place = is_steep ? place.yx : place;
   float middle = place.y - strand_side_place / ((slope == 0.0) ? 1.0 : slope);
-  float offset = strand_offset_part * sample_offset(int(place.x), middle, view.coverage_turn);
+  float offset = strand_offset_part * sample_offset(int(place.x), middle, offset_turn(view.coverage_turn));
   float side = strand_side_place + offset * slope;
   if (strand_offset_part > 0.0 && abs(side) >= strand_coverage) {
     discard;

@@ -5,23 +5,24 @@
 // longer one shows patterns along strands of a few slopes, which it meets at the same offset again and again.
 const int OFFSET_PART_BITS = 2;
 
-// Random number in [0, 1) of two integers.
-float random_of_part(ivec2 part)
-{
-  uint bits = uint(part.x) * 1597334677u ^ uint(part.y) * 3812015801u;
-  bits = (bits ^ (bits >> 15u)) * 747796405u;
-  return float(bits >> 8u) / 16777216.0;
-}
-
 // Offset in [-0.5, 0.5), across a column, of its samples beside the axis of a strand. Strands beside each other have the
 // same one: what they cover together is then that of the picture's area [Cook86]. It is one number for the whole column of a
 // strand, so that the samples that it covers are found without trying any. A low-discrepancy sequence [Roberts18] gives less
-// noise than random numbers. column, middle: of the whole picture, and where the axis is in it; turn: of the pass.
-float sample_offset(int column, float middle, float turn)
+// noise than random numbers. column, middle: of the whole picture, and where the axis is in it; turn: of `offset_turn`.
+// Graphics hardware converts integers and floats at an eighth of the speed of arithmetic, so that most of it is in bits.
+float sample_offset(int column, float middle, uint turn)
 {
-  ivec2 part = ivec2(column, int(floor(middle))) >> OFFSET_PART_BITS;
-  float within = float(column & ((1 << OFFSET_PART_BITS) - 1));
-  return fract(random_of_part(part) + turn + 0.61803399 * within) - 0.5;
+  uvec2 part = uvec2(ivec2(column, int(floor(middle))) >> OFFSET_PART_BITS);
+  uint bits = part.x * 1597334677u ^ part.y * 3812015801u;
+  bits = (bits ^ (bits >> 15u)) * 747796405u;
+  bits += turn + uint(column & ((1 << OFFSET_PART_BITS) - 1)) * 2654435769u;
+  return uintBitsToFloat(0x3F800000u | (bits >> 9u)) - 1.5;
+}
+
+// The turn of a pass, from 0 to 1, as a part of 2^32.
+uint offset_turn(float turn)
+{
+  return uint(fract(turn) * 16777216.0) << 8u;
 }
 
 // How much of that offset samples take from strands of a half width [samples]: wide strands have smooth edges without it.

@@ -124,7 +124,7 @@ def sample_offsets(columns, middles, turn):
     columns, middles = np.broadcast_arrays(columns, middles)
     text = glsl.source("include/coverage.glsl")
     x, y = columns.ravel().astype(np.int32), middles.ravel()
-    return glsl.evaluate(text, "float", f"sample_offset(x, y, {turn:.4f})", x=x, y=y).reshape(columns.shape)
+    return glsl.evaluate(text, "float", f"sample_offset(x, y, offset_turn({turn:.4f}))", x=x, y=y).reshape(columns.shape)
 
 
 @pytest.mark.parametrize("width", [0.03, 0.25, 0.7])
@@ -141,7 +141,7 @@ def test_samples_hit_just_the_part_that_a_thin_strand_covers(width):
 
 
 def test_samples_lie_anywhere_in_their_squares():
-    columns, middles = np.indices((256, 256))
+    columns, middles = np.indices((512, 512))
     offsets, part = sample_offsets(columns, middles + 0.5, 0.25), 1.0 / 16.0
     np.testing.assert_allclose(np.histogram(offsets, 16, (-0.5, 0.5))[0] / offsets.size, part, atol=0.05 * part)
 
