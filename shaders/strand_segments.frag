@@ -5,11 +5,15 @@
 
 void main()
 {
-  ivec2 place = ivec2(gl_FragCoord.xy) + ivec2(view.first_column, view.first_row);
+  vec2 place = gl_FragCoord.xy + vec2(view.first_column, view.first_row);
   // As in walk_segment.glsl: a sample lies off its center along the axis on which the strand is shorter.
   vec2 across = vec2(dFdx(strand_side_place), dFdy(strand_side_place));
-  float offset = strand_offset_part * sample_offset(place, view.coverage_turn);
-  float side = strand_side_place + offset * (abs(across.x) > abs(across.y) ? across.x : across.y);
+  bool is_steep = abs(across.x) > abs(across.y);
+  float slope = is_steep ? across.x : across.y;
+  place = is_steep ? place.yx : place;
+  float middle = place.y - strand_side_place / ((slope == 0.0) ? 1.0 : slope);
+  float offset = strand_offset_part * sample_offset(int(place.x), middle, offset_turn(view.coverage_turn));
+  float side = strand_side_place + offset * slope;
   if (strand_offset_part > 0.0 && abs(side) >= strand_coverage) {
     discard;
   }

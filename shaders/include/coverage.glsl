@@ -1,26 +1,29 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Where samples look at strands: those of thin strands away from their centers, so that no strand is ever widened.
 
-// Tiles of 4 × 4 samples have offsets from a lattice, moved at random from tile to tile: a larger one shows patterns along
-// strands of a few slopes, which it meets at the same offset again and again.
-const int OFFSET_TILE_BITS = 2;
+// Offsets come from a sequence along four columns, moved at random from one part of four columns and two rows to the next:
+// along longer ones there are patterns in strands of a few slopes, which meet the same offset again and again.
+const int COLUMN_BITS = 2;
+const int ROW_BITS = 1;
 
-// Random number in [0, 1) of two integers.
-float random_of_tile(ivec2 tile)
+// Offset in [-0.5, 0.5), across a column, of its samples beside the axis of a strand: one number for the whole column, so
+// that the samples that it covers are found without trying any. Strands whose axes are in one part have the same one: what
+// they cover together is then that of the picture's area [Cook86]. A low-discrepancy sequence [Roberts18] gives less noise
+// than random numbers. column, middle: of the whole picture, and where the axis is in it; turn: of `offset_turn`. Graphics
+// hardware converts integers and floats at an eighth of the speed of arithmetic, so that most of it is in bits.
+float sample_offset(int column, float middle, uint turn)
 {
-  uint bits = uint(tile.x) * 1597334677u ^ uint(tile.y) * 3812015801u;
+  uvec2 part = uvec2(column >> COLUMN_BITS, int(floor(middle)) >> ROW_BITS);
+  uint bits = part.x * 1597334677u ^ part.y * 3812015801u;
   bits = (bits ^ (bits >> 15u)) * 747796405u;
-  return float(bits >> 8u) / 16777216.0;
+  bits += turn + uint(column & ((1 << COLUMN_BITS) - 1)) * 2654435769u;
+  return uintBitsToFloat(0x3F800000u | (bits >> 9u)) - 1.5;
 }
 
-// Offset in [-0.5, 0.5) of a sample from its center, the same for all strands: what they cover together is then that of
-// the picture's area [Cook86]. A low-discrepancy sequence [Roberts18] gives less noise than random numbers. turn: of the
-// pass.
-float sample_offset(ivec2 sample_place, float turn)
+// The turn of a pass, from 0 to 1, as a part of 2^32.
+uint offset_turn(float turn)
 {
-  ivec2 within = sample_place & ((1 << OFFSET_TILE_BITS) - 1);
-  vec2 steps = vec2(0.75487767, 0.56984029) * vec2(within);
-  return fract(random_of_tile(sample_place >> OFFSET_TILE_BITS) + turn + steps.x + steps.y) - 0.5;
+  return uint(fract(turn) * 16777216.0) << 8u;
 }
 
 // How much of that offset samples take from strands of a half width [samples]: wide strands have smooth edges without it.

@@ -28,6 +28,12 @@ const float LEAST_BEND = 1.0;
 //     a covered sample: its parameter along the segment, its offset from the axis as a part of the drawn half width, and
 //     the coverage of the drawn width by the strand
 
+// The first of the samples, counted from -1, whose center lies beyond a place.
+int first_sample(float place)
+{
+  return int(ceil(clamp(place, -1.0, 1e6) - 0.5));
+}
+
 // Samples that lie in the segment, column by column along the axis on which it is longer. Across the columns, samples may
 // lie off their centers.
 void walk(Segment segment, ivec2 size)
@@ -37,47 +43,52 @@ void walk(Segment segment, ivec2 size)
   vec2 start = is_steep ? segment.start.yx : segment.start.xy;
   vec2 end = is_steep ? segment.end.yx : segment.end.xy;
   ivec2 last_place = (is_steep ? size.yx : size) - 1;
-  int first_column = max(int(ceil(clamp(min(start.x, end.x), -1.0, 1e6) - 0.5)), 0);
-  int last_column = min(int(ceil(clamp(max(start.x, end.x), -1.0, 1e6) - 0.5)) - 1, last_place.x);
+  int first_column = max(first_sample(min(start.x, end.x)), 0);
+  int last_column = min(first_sample(max(start.x, end.x)) - 1, last_place.x);
+  if (last_column < first_column) {
+    return;
+  }
   vec2 way = end - start;
+  float slope = way.y / way.x;
+  float per_column = 1.0 / way.x;
   // Width across the columns, of a strip that is as wide as the strand across its own axis.
-  float widening = (way.x == 0.0) ? 1.0 : length(way) / abs(way.x);
+  float widening = sqrt(1.0 + slope * slope);
   float least_half_width = view.least_half_width * view.pixels_per_unit;
   float most_reach = max(max(segment.half_width.x, segment.half_width.y), least_half_width) * widening;
-  ivec2 first_place = ivec2(view.first_column, view.first_row);
+  ivec2 first_place = is_steep ? ivec2(view.first_row, view.first_column) : ivec2(view.first_column, view.first_row);
+  uint turn = offset_turn(view.coverage_turn);
   int column = first_column;
+  float beyond = float(first_column) + 0.5 - start.x;  // the column's center from the start
   while (column <= last_column) {
     // As far as the end of the tile.
-    int end_column = min(column / TILE * TILE + TILE - 1, last_column);
-    float first_along = (float(column) + 0.5 - start.x) / way.x;
-    float last_along = (float(end_column) + 0.5 - start.x) / way.x;
-    vec2 rows = start.y + vec2(first_along, last_along) * way.y;
-    int low_row = int(clamp(min(rows.x, rows.y) - most_reach - 1.0, -1.0, 1e6));
-    int high_row = int(clamp(max(rows.x, rows.y) + most_reach + 1.0, -1.0, 1e6));
-    ivec2 low = ivec2(column, max(low_row, 0));
-    ivec2 high = ivec2(end_column, min(high_row, last_place.y));
-    if (high.y < low.y || is_hidden(is_steep ? low.yx : low, is_steep ? high.yx : high, first_along, last_along)) {
+    int end_column = min((column & ~(TILE - 1)) + TILE - 1, last_column);
+    float end_beyond = beyond + float(end_column - column);
+    vec2 rows = start.y + vec2(beyond, end_beyond) * slope;
+    ivec2 low = ivec2(column, max(first_sample(min(rows.x, rows.y) - most_reach - 0.5), 0));
+    ivec2 high = ivec2(end_column, min(first_sample(max(rows.x, rows.y) + most_reach + 0.5), last_place.y));
+    vec2 alongs = vec2(beyond, end_beyond) * per_column;
+    if (high.y < low.y || is_hidden(is_steep ? low.yx : low, is_steep ? high.yx : high, alongs.x, alongs.y)) {
       column = end_column + 1;
+      beyond = end_beyond + 1.0;
       continue;
     }
     for (; column <= end_column; column++) {
-      float along = (float(column) + 0.5 - start.x) / way.x;
+      float along = beyond * per_column;
       float true_half_width = mix(segment.half_width.x, segment.half_width.y, along);
       float half_width = max(true_half_width, least_half_width);
-      float middle = start.y + along * way.y;
+      float middle = start.y + beyond * slope;
       float reach = half_width * widening;
       float offset_part = view.sample_offset * offset_share(true_half_width);
-      float most = reach + 0.5 * offset_part;
-      int first_row = max(int(ceil(clamp(middle - most, -1.0, 1e6) - 0.5)), 0);
-      int last_row = min(int(ceil(clamp(middle + most, -1.0, 1e6) - 0.5)) - 1, last_place.y);
-      for (int row = first_row; row <= last_row; row++) {
-        ivec2 place = is_steep ? ivec2(row, column) : ivec2(column, row);
-        float at = float(row) + 0.5;
-        at += (offset_part > 0.0) ? offset_part * sample_offset(place + first_place, view.coverage_turn) : 0.0;
-        if (offset_part == 0.0 || abs(at - middle) < reach) {
-          meet(place, along, (at - middle) / reach, true_half_width / half_width);
-        }
+      if (offset_part > 0.0) {
+        middle -= offset_part * sample_offset(first_place.x + column, float(first_place.y) + middle, turn);
       }
+      int first_row = max(first_sample(middle - reach), 0);
+      int last_row = min(first_sample(middle + reach) - 1, last_place.y);
+      for (int row = first_row; row <= last_row; row++) {
+        float across = (float(row) + 0.5 - middle) / reach;
+        meet(is_steep ? ivec2(row, column) : ivec2(column, row), along, across, true_half_width / half_width);
+      }
+      beyond += 1.0;
     }
   }
 }
@@ -96,8 +107,8 @@ void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
   if (half_width < LEAST_BEND || (was_steep == is_steep && left * right > 0.0)) {
     return;
   }
-  ivec2 low = max(ivec2(ceil(clamp(end - half_width, vec2(-1.0), vec2(1e6)) - 0.5)), ivec2(0));
-  ivec2 high = min(ivec2(ceil(clamp(end + half_width, vec2(-1.0), vec2(1e6)) - 0.5)), size) - 1;
+  ivec2 low = max(ivec2(first_sample(end.x - half_width), first_sample(end.y - half_width)), ivec2(0));
+  ivec2 high = min(ivec2(first_sample(end.x + half_width), first_sample(end.y + half_width)), size) - 1;
   for (int row = low.y; row <= high.y; row++) {
     for (int column = low.x; column <= high.x; column++) {
       vec2 way = vec2(column, row) + 0.5 - end;

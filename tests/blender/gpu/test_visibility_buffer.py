@@ -154,7 +154,7 @@ def test_thin_strands_in_one_line_cover_what_one_of_them_does(shading, in_comput
     """A fifth of a sample wide: neither widened nor counted one by one, in one picture of lines of many slopes."""
     sample = 2.0 * HALF_WIDTH / SIZE[0]
     hits = columns = 0
-    for slope in np.linspace(-0.4, 0.4, 9):
+    for slope in np.linspace(-0.4, 0.4, 35):
         points = np.zeros((10, 3, 3), np.float32)
         points[..., 0] = np.array([-1.0, 0.0, 1.0]) * HALF_WIDTH
         points[..., 1] = 0.0037 + slope * points[..., 0]

@@ -119,30 +119,30 @@ def test_hair_is_laid_over_a_viewport_in_its_colours(lit):
 # ------------------------------------------------------------------------------------------------- thin strands
 
 
-def sample_offsets(turn, size=64):
-    """(size, size) offsets of samples from their centers."""
-    y, x = (grid.ravel() for grid in np.indices((size, size)))
+def sample_offsets(columns, middles, turn):
+    """Offsets of the samples beside axes of strands; arguments of one shape, but for the pass."""
+    columns, middles = np.broadcast_arrays(columns, middles)
     text = glsl.source("include/coverage.glsl")
-    found = glsl.evaluate(text, "float", f"sample_offset(ivec2(x, y), {turn:.4f})", x=x, y=y)
-    return found.reshape(size, size)
+    x, y = columns.ravel().astype(np.int32), middles.ravel()
+    return glsl.evaluate(text, "float", f"sample_offset(x, y, offset_turn({turn:.4f}))", x=x, y=y).reshape(columns.shape)
 
 
 @pytest.mark.parametrize("width", [0.03, 0.25, 0.7])
 def test_samples_hit_just_the_part_that_a_thin_strand_covers(width):
     """Along lines of any slope, in one pass; along sixteen samples about as evenly as by chance."""
-    along, squares = np.arange(48) + 0.5, []
-    for offsets in (sample_offsets(0.3), sample_offsets(0.3).T):
-        for slope in (-1.0, -0.6, -0.25, 0.0, 0.15, 0.31, 0.75, 1.0):
-            lines = 32.0 + slope * (along - 24.0) + np.arange(-7.0, 7.0, 0.37)[:, None]
-            at = np.arange(64)[:, None] + 0.5 + offsets[:, :48]
-            hits = (np.abs(at - lines[:, None]) < 0.5 * width).sum(axis=1)
-            assert hits.mean() == pytest.approx(width, rel=0.1, abs=0.015)
-            squares.append(((hits.reshape(-1, 16).sum(axis=1) - 16.0 * width) ** 2).mean())
+    columns, squares = np.arange(48), []
+    for slope in (-1.0, -0.6, -0.25, 0.0, 0.15, 0.31, 0.75, 1.0):
+        lines = 32.0 + slope * (columns - 23.5) + np.arange(-7.0, 7.0, 0.37)[:, None]
+        centers = lines - sample_offsets(columns, lines, 0.3)
+        hits = np.floor(centers + 0.5 * width + 0.5) - np.floor(centers - 0.5 * width + 0.5)
+        assert hits.mean() == pytest.approx(width, rel=0.1, abs=0.015)
+        squares.append(((hits.reshape(-1, 16).sum(axis=1) - 16.0 * width) ** 2).mean())
     assert np.mean(squares) < 1.4 * 16.0 * width * (1.0 - width)
 
 
 def test_samples_lie_anywhere_in_their_squares():
-    offsets, part = sample_offsets(0.25, 256), 1.0 / 16.0
+    columns, middles = np.indices((512, 512))
+    offsets, part = sample_offsets(columns, middles + 0.5, 0.25), 1.0 / 16.0
     np.testing.assert_allclose(np.histogram(offsets, 16, (-0.5, 0.5))[0] / offsets.size, part, atol=0.05 * part)
 
 
