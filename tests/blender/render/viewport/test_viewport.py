@@ -124,7 +124,8 @@ def sample_offsets(columns, middles, turn):
     columns, middles = np.broadcast_arrays(columns, middles)
     text = glsl.source("include/coverage.glsl")
     x, y = columns.ravel().astype(np.int32), middles.ravel()
-    return glsl.evaluate(text, "float", f"sample_offset(x, y, offset_turn({turn:.4f}))", x=x, y=y).reshape(columns.shape)
+    found = glsl.evaluate(text, "float", f"sample_offset(x, y, offset_turn({turn:.4f}))", x=x, y=y)
+    return found.reshape(columns.shape)
 
 
 @pytest.mark.parametrize("width", [0.03, 0.25, 0.7])
