@@ -48,25 +48,31 @@ vec4 to_clip(vec4 point)
   return view.object_to_clip * vec4(point.xyz, 1.0);
 }
 
-// How much wider strands along a line of the picture [samples] are than through its middle: a perspective stretches what is
-// beside its axis.
-float width_stretch(vec2 start, vec2 end, vec2 size)
+// Place [samples] where a perspective's axis meets the picture.
+vec2 axis_place(vec2 size)
 {
   mat4 to_clip = view.object_to_clip;
-  vec3 forward = vec3(to_clip[0][3], to_clip[1][3], to_clip[2][3]);
+  vec4 forward = vec4(to_clip[0][3], to_clip[1][3], to_clip[2][3], 0.0);
+  return (view.is_perspective == 0) ? vec2(0.0) : sample_place(to_clip * forward, size).xy;
+}
+
+// How much wider strands along a line of the picture [samples] are than through its middle: a perspective stretches what is
+// beside its axis. axis: of `axis_place`.
+float width_stretch(vec2 start, vec2 end, vec2 axis)
+{
   vec2 along = end - start;
   float squared = dot(along, along);
   if (view.is_perspective == 0 || squared < 1e-12) {
     return 1.0;
   }
-  vec2 beside = start - sample_place(to_clip * vec4(forward, 0.0), size).xy;
+  vec2 beside = start - axis;
   float distance = (beside.x * along.y - beside.y * along.x) / view.pixels_per_unit;
   return sqrt(1.0 + distance * distance / squared);
 }
 
 // False where a segment lies behind the near plane. start, end: its two points in clip space; size: of the picture
-// [samples].
-bool segment_in_front(vec4 start, vec4 end, vec2 radii, vec2 size, out Segment segment)
+// [samples]; axis: of `axis_place`.
+bool segment_in_front(vec4 start, vec4 end, vec2 radii, vec2 size, vec2 axis, out Segment segment)
 {
   vec2 beyond = vec2(start.z + start.w, end.z + end.w);
   segment.part = vec2(0.0, 1.0);
@@ -85,7 +91,7 @@ bool segment_in_front(vec4 start, vec4 end, vec2 radii, vec2 size, out Segment s
   segment.start = sample_place(start, size);
   segment.end = sample_place(end, size);
   segment.half_width = radii * (view.object_scale * view.thickness * view.pixels_per_unit) / segment.w;
-  segment.half_width *= width_stretch(segment.start.xy, segment.end.xy, size);
+  segment.half_width *= width_stretch(segment.start.xy, segment.end.xy, axis);
   return true;
 }
 

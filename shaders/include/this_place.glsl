@@ -38,7 +38,8 @@ void find_place(int index, vec2 at, vec2 size)
   vec4 first = strand_point(strand_index, texel, head, start);
   vec4 second = strand_point(strand_index, texel, head, end);
   Segment segment;
-  bool is_in_front = segment_in_front(to_clip(first), to_clip(second), vec2(first.w, second.w), size, segment);
+  vec2 radii = vec2(first.w, second.w);
+  bool is_in_front = segment_in_front(to_clip(first), to_clip(second), radii, size, axis_place(size), segment);
   float t = is_in_front ? place_on_segment(segment, at) : 0.0;
   vec3 before = packed_place(strands, texel, head, max(start - 1, 0));
   vec3 after = packed_place(strands, texel, head, min(end + 1, view.point_count - 1));

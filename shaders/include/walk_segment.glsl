@@ -154,11 +154,12 @@ void walk_run(ivec2 size)
   vec4 head = packed_head(strands, texel);
   vec4 first = strand_point(strand, texel, head, piece_start(piece));
   vec4 start = to_clip(first);
+  vec2 axis = axis_place(vec2(size));
   for (; piece < last; piece++) {
     vec4 second = strand_point(strand, texel, head, piece_start(piece + 1));
     vec4 end = to_clip(second);
     Segment segment;
-    if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), segment)) {
+    if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), axis, segment)) {
       begin(strand, piece, segment, first, second);
       walk(segment, size);
       if (FILLS_BENDS && piece + 1 < pieces && segment.part.y == 1.0 && segment.half_width.y >= LEAST_BEND) {
