@@ -6,6 +6,7 @@ import numpy as np
 from blend_samples.sheets import picture_files
 
 _WINDOW = 2.0  # deviation [pixels] of the blur before structure is compared
+_BLACK = 1e-7  # light that no display shows
 _GREY = 0.22  # display value that the mean of the first picture is brought to
 
 
@@ -15,8 +16,8 @@ def mean(picture):
 
 
 def ratio(reference, picture):
-    """(3,) mean colour of a picture, relative to that of a reference."""
-    return mean(picture) / np.maximum(mean(reference), 1e-9)
+    """(3,) mean colour of a picture, relative to that of a reference; one where both are black."""
+    return (mean(picture) + _BLACK) / (mean(reference) + _BLACK)
 
 
 def deviation(reference, picture):

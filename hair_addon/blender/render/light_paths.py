@@ -15,6 +15,7 @@ from . import seen_strands
 
 _PATHS_A_PIXEL = 8
 _LEAST_PATHS, _MOST_PATHS = 20_000, 300_000  # over the part of the picture that holds the hair
+_MOST_TIMES = 4  # where that part is mostly empty, or few of its paths find light
 
 
 def path_count(blender_scene, size):
@@ -47,8 +48,9 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
     seen = seen_strands.find(drawn, grid, (world_to_view, view_to_clip), window, count, seed)
     if not len(seen.segments):
         return drawn
-    sums = light_paths.gather.gather(grid, _surroundings(drawn), seen, seed, device)
-    means = [light_paths.voxel_means.shares(of_hair, len(seen.segments)) for of_hair in sums]
+    most = _MOST_TIMES * count
+    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, seed, device, most)
+    means = [light_paths.voxel_means.shares(of_hair, taken) for of_hair in sums]
     visibility = [
         {**textures, "light_grid": light_grid.upload(of_hair)}
         for textures, of_hair in zip(drawn.hair_visibility, means, strict=True)

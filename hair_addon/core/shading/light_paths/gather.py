@@ -27,6 +27,8 @@ _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _LEAST_PATHS = 4096  # fewer are not worth a thread
+_KNOWN = 0.015  # standard error of the mean light, as a part of it, below which no more paths are taken
+_MOST_TURNS = 64  # of paths from the same places, each as many as all before
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,10 +209,18 @@ def seen_by(
 
 
 def gather(
-    grid: StrandGrid, surroundings: Surroundings, seen: Seen, seed: int = 0, device: wp.DeviceLike = "cpu"
-) -> np.ndarray:
+    grid: StrandGrid,
+    surroundings: Surroundings,
+    seen: Seen,
+    seed: int = 0,
+    device: wp.DeviceLike = "cpu",
+    most_paths: int = 0,
+) -> tuple[np.ndarray, int]:
     """(systems, Z, Y, X, 9) float64 by voxel: sums over paths of RGB, their light, what even light would give, and what
-    is drawn without paths.
+    is drawn without paths; and how many paths.
+
+    One starts at each place that is seen. As many as there were follow again and again, until the standard error of
+    their mean light is 1.5 % of it, or there would be more than `most_paths`: few paths of dark hair find a lamp.
     """
     count = len(seen.segments)
     require_indices("segments", seen.segments, len(grid.points) - 1)
@@ -219,11 +229,36 @@ def gather(
     with wp.ScopedDevice(device):
         mesh = _mesh(surroundings.corners)
         medium, sources = _medium(grid, surroundings.normals, surroundings.albedo, mesh), _sources(surroundings)
-        places = [wp.array(seen.segments.astype(np.int32), dtype=int)]
-        places += [_vectors(values) for values in (seen.positions, seen.directions)]
-        found = [wp.zeros(count, dtype=wp.vec3) for _ in range(3)]
-        _launch(_gather, count, [medium, sources, *places, seed, *found], device)
-        positions, light, even = (array.numpy() for array in found)
+        sums, moments, times, turn = 0.0, np.zeros(2), 0, 0
+        while True:
+            more = max(times, 1)
+            each = Seen(*(np.tile(values, (more, 1)[: np.ndim(values)]) for values in vars(seen).values()))
+            positions, light, even = _traced(medium, sources, each, seed * _MOST_TURNS + turn, device)
+            sums = sums + _by_voxel(grid, each, positions, light, even)
+            brightness = light.sum(axis=1, dtype=np.float64)
+            moments += brightness.sum(), np.square(brightness).sum()
+            times, turn = times + more, turn + 1
+            taken = times * count
+            if not count or 2 * taken > most_paths or _standard_error(*moments, taken) < _KNOWN:
+                return sums, taken
+
+
+def _traced(medium, sources, seen, seed, device):
+    """Of paths that start at what is seen: places there, light, and what even light would give, (N, 3) each."""
+    places = [wp.array(seen.segments.astype(np.int32), dtype=int)]
+    places += [_vectors(values) for values in (seen.positions, seen.directions)]
+    found = [wp.zeros(len(seen.segments), dtype=wp.vec3) for _ in range(3)]
+    _launch(_gather, len(seen.segments), [medium, sources, *places, seed, *found], device)
+    return [array.numpy() for array in found]
+
+
+def _standard_error(total, squares, count):
+    """Of the mean of values with a sum and a sum of squares, as a part of it."""
+    return np.sqrt(max(squares - total * total / count, 0.0)) / total if total > 0.0 else np.inf
+
+
+def _by_voxel(grid, seen, positions, light, even):
+    """(systems, Z, Y, X, 9) sums over paths."""
     x, y, z = grid.voxels
     at = ((positions - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(int).clip(0, np.array([x, y, z]) - 1)
     system = grid.systems[grid.strands[seen.segments]]

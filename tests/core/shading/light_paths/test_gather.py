@@ -57,7 +57,7 @@ def sun(axis, power=3.0):
 def found_by(grid, light, rays, path_count, seed=0):
     """What paths of rays find."""
     seen = gather.seen_by(grid, light.corners, rays, path_count, seed)
-    return gather.gather(grid, light, seen, seed)
+    return gather.gather(grid, light, seen, seed)[0]
 
 
 def ratio(sums):
@@ -85,7 +85,7 @@ def test_light_of_voxels_and_what_they_keep_of_the_drawn_is_that_of_paths(rng):
     grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), cell_count=5_000)
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     seen = gather.seen_by(grid, light.corners, ALONG_Y, 20_000)
-    (alone,) = gather.gather(grid, light, seen)
+    (alone,) = gather.gather(grid, light, seen)[0]
     lights, even = alone[..., :3], alone[..., 3:6]
     for drawn, low, high in (
         (0.0 * lights, 0.0, 1.0),
@@ -146,7 +146,7 @@ def test_a_strand_within_another_is_shaded_on_the_far_side(rng, axis, least, mos
             grid_of(np.concatenate([alone, alone + other]), BLACK, 0.01, cell_count=1_000),
             surroundings(lamps=sun(axis)),
             seen,
-        )[..., 0].sum()
+        )[0][..., 0].sum()
         for other in (far, near, before)
     )
     assert least * one <= both <= most * one
@@ -192,11 +192,29 @@ def test_a_sheet_of_strands_lets_as_much_through_as_poisson_says(height):
     assert (ratio(dark) < 1.0).all()
 
 
+def test_more_paths_are_taken_where_few_find_light(rng):
+    """A sun behind deep hair: its light is known better by them. In an even world none is needed."""
+    grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), cell_count=20_000)
+    behind, even = surroundings(lamps=sun((0.0, -1.0, 0.0))), surroundings(world=1.0)
+    seen = gather.seen_by(grid, behind.corners, ALONG_Y, 400)
+    count = len(seen.segments)
+    bright, taken = gather.gather(grid, even, seen, most_paths=64 * count)
+    assert taken < 64 * count
+    few, many = (
+        [gather.gather(grid, behind, seen, seed, most_paths=most) for seed in range(8)] for most in (0, 64 * count)
+    )
+    assert all(taken == count for _sums, taken in few) and all(taken == 64 * count for _sums, taken in many)
+    for sums, _taken in many:
+        np.testing.assert_allclose(sums[..., 3:], 64 * few[0][0][..., 3:], rtol=1e-5)
+    spread = [np.std([ratio(sums)[0] for sums, _taken in found]) for found in (few, many)]
+    assert spread[1] < 0.3 * spread[0]
+
+
 def lit_from_below(grid, light):
     """`ratio` of light that does not come straight from a lamp."""
     seen = gather.seen_by(grid, light.corners, ALONG_Y, 100_000)
-    found = gather.gather(grid, light, seen)
-    straight = gather.gather(grid, replace(light, albedo=0.0 * light.albedo), seen)
+    found, _count = gather.gather(grid, light, seen)
+    straight, _count = gather.gather(grid, replace(light, albedo=0.0 * light.albedo), seen)
     return (found - straight)[..., :3].sum(axis=(0, 1, 2, 3)) / found[..., 3:6].sum(axis=(0, 1, 2, 3))
 
 
