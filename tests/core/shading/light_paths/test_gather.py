@@ -198,7 +198,7 @@ def test_more_paths_are_taken_where_few_find_light(rng):
     behind, even = surroundings(lamps=sun((0.0, -1.0, 0.0))), surroundings(world=1.0)
     seen = gather.seen_by(grid, behind.corners, ALONG_Y, 400)
     count = len(seen.segments)
-    bright, taken = gather.gather(grid, even, seen, most_paths=64 * count)
+    _bright, taken = gather.gather(grid, even, seen, most_paths=64 * count)
     assert taken < 64 * count
     few, many = (
         [gather.gather(grid, behind, seen, seed, most_paths=most) for seed in range(8)] for most in (0, 64 * count)
