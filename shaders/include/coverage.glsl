@@ -1,22 +1,23 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Where samples look at strands: those of thin strands away from their centers, so that no strand is ever widened.
 
-// Offsets come from a sequence along four columns, moved at random from one part of four columns and two rows to the next:
-// along longer ones there are patterns in strands of a few slopes, which meet the same offset again and again.
-const int COLUMN_BITS = 2;
-const int ROW_BITS = 1;
+// Parts of 4 × 4 samples have offsets from a lattice, moved at random from part to part: a larger one shows patterns along
+// strands of a few slopes, which it meets at the same offset again and again.
+const int OFFSET_BITS = 2;
 
 // Offset in [-0.5, 0.5), across a column, of its samples beside the axis of a strand: one number for the whole column, so
-// that the samples that it covers are found without trying any. Strands whose axes are in one part have the same one: what
-// they cover together is then that of the picture's area [Cook86]. A low-discrepancy sequence [Roberts18] gives less noise
+// that the samples that it covers are found without trying any. Strands whose axes are in one row have the same one: what
+// they cover together is then that of the picture's area [Cook86]. A low-discrepancy lattice [Roberts18] gives less noise
 // than random numbers. column, middle: of the whole picture, and where the axis is in it; turn: of `offset_turn`. Graphics
 // hardware converts integers and floats at an eighth of the speed of arithmetic, so that most of it is in bits.
 float sample_offset(int column, float middle, uint turn)
 {
-  uvec2 part = uvec2(column >> COLUMN_BITS, int(floor(middle)) >> ROW_BITS);
+  ivec2 place = ivec2(column, int(floor(middle)));
+  uvec2 part = uvec2(place >> OFFSET_BITS);
+  uvec2 within = uvec2(place & ((1 << OFFSET_BITS) - 1));
   uint bits = part.x * 1597334677u ^ part.y * 3812015801u;
   bits = (bits ^ (bits >> 15u)) * 747796405u;
-  bits += turn + uint(column & ((1 << COLUMN_BITS) - 1)) * 2654435769u;
+  bits += turn + within.x * 3242174889u + within.y * 2447445414u;
   return uintBitsToFloat(0x3F800000u | (bits >> 9u)) - 1.5;
 }
 

@@ -38,10 +38,10 @@ def summed(light):
 
 
 def fine(picture, drawn, camera):
-    """Sums of all passes of a picture, and of its first one: the mean of four, as one is a matter of chance."""
+    """Sums of all passes of a picture, and of its first one: the mean of sixteen, as one is a matter of chance."""
     picture.restart()
     firsts = []
-    for _ in range(4):
+    for _ in range(16):
         picture.add_pass(drawn, *camera)
         firsts.append(summed(picture.read()))
         picture.restart(is_moved=True)  # the next one has other samples
