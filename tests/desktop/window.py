@@ -203,7 +203,7 @@ def offscreen_light(blender):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(bpy.context.scene, bpy.context.view_layer, depsgraph, area.spaces.active)
     matrices = np.array(view.view_matrix, np.float64), np.array(view.window_matrix, np.float64)
-    record = drawing.view_record(*matrices, size[1], least_width=1.0)
+    record = drawing.pass_record(*matrices, size)
     buffer = blender.gpu.visibility_buffer.VisibilityBuffer(*size)
     with buffer.surfaces():
         blender.render.scene_drawing.draw_hiding(drawn, record)
