@@ -229,17 +229,17 @@ def gather(
     with wp.ScopedDevice(device):
         mesh = _mesh(surroundings.corners)
         medium, sources = _medium(grid, surroundings.normals, surroundings.albedo, mesh), _sources(surroundings)
-        sums, moments, times, turn = 0.0, np.zeros(2), 0, 0
+        sums, total, squares, times, turn = 0.0, 0.0, 0.0, 0, 0
         while True:
             more = max(times, 1)
             each = Seen(*(np.tile(values, (more, 1)[: np.ndim(values)]) for values in vars(seen).values()))
             positions, light, even = _traced(medium, sources, each, seed * _MOST_TURNS + turn, device)
             sums = sums + _by_voxel(grid, each, positions, light, even)
             brightness = light.sum(axis=1, dtype=np.float64)
-            moments += brightness.sum(), np.square(brightness).sum()
+            total, squares = total + float(brightness.sum()), squares + float(np.square(brightness).sum())
             times, turn = times + more, turn + 1
             taken = times * count
-            if not count or 2 * taken > most_paths or _standard_error(*moments, taken) < _KNOWN:
+            if not count or 2 * taken > most_paths or _standard_error(total, squares, taken) < _KNOWN:
                 return sums, taken
 
 
