@@ -9,6 +9,7 @@
 const float NEAREST = 0.015;
 const float FARTHEST = 0.45;
 const float TURNS = 2.5;
+const int PLACES = 4;  // of each sample
 // Distance of neighbors that tell the slope of the hair's lit side, as a part of the map; and the largest difference of
 // their depths: beyond it they are of different locks.
 const float SLOPE_REACH = 0.012;
@@ -45,16 +46,14 @@ vec3 lit_side_normal(vec3 place, float front, float extent, float meters, Across
   return normalize(L + slope.x * across.right + slope.y * across.up);
 }
 
-// Irradiance of a surface with a normal N by light that hair beside it reflects, as a part of the light's on a small ball:
-// of one place of the map, another in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`.
-vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn)
+// Irradiance of a surface with a normal N by light from one place of the map, as a part of the light's on a small ball.
+// turn: the direction of the place from this one, in the map; part: how far it is, from 0 to 1; the rest as below.
+vec3 reflection_of_place(
+    Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn, float part)
 {
-  if (view.hair_reflectance.rgb == vec3(0.0)) {
-    return vec3(0.0);  // a model without light between strands
-  }
   // As many places at each distance as light that falls with its square needs.
   float range = log(FARTHEST / NEAREST);
-  float away = NEAREST * light.extent * exp(range * fract(TURNS * atan(turn.y, turn.x) / PI));
+  float away = NEAREST * light.extent * exp(range * part);
   vec2 offset = turn * away;
   float map_meters = across.w / across.scale;
   vec3 place = at + vec3(offset / map_meters, 0.0);
@@ -73,7 +72,24 @@ vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, v
   float squared = dot(way, way);
   float weight = 2.0 * range * away * away / squared;  // over the density of the places, and pi
   float count = textureLod(hair_layers, place, 0.0)[layer_of(ends.y - ends.x)];
+  return reflected_by_hair(count) * (facing * sent * weight / squared);
+}
+
+// The same of all hair beside it: of places in four directions and at four distances of their range, which are
+// others in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`.
+vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn)
+{
+  if (view.hair_reflectance.rgb == vec3(0.0)) {
+    return vec3(0.0);  // a model without light between strands
+  }
+  float part = TURNS * atan(turn.y, turn.x) / PI;
+  vec3 light_there = vec3(0.0);
+  for (int place = 0; place < PLACES; place++) {
+    light_there += reflection_of_place(light, across, at, depth, N, L, turn, fract(part));
+    turn = vec2(-turn.y, turn.x);
+    part += 1.0 / float(PLACES);
+  }
   // Where hair shades a surface, its lit side is on the other side.
   float open = exp(-crossed_before_surface(at, depth));
-  return reflected_by_hair(count) * (open * facing * sent * weight / squared);
+  return light_there * (open / float(PLACES));
 }
