@@ -55,7 +55,7 @@ def _read_light(light, matrix):
     record["casts_shadow"] = light.use_shadow
     if light.type == "SUN":
         record["radius"] = np.tan(0.5 * min(light.angle, 3.0))
-        # Its strength is what a plane across it receives. A small ball receives more; surface.frag takes that off again.
+        # Its strength is what a plane across it receives. A small ball receives more; surface.frag takes it off again.
         record["power"][:3] /= 1.0 - 0.25 * min(float(record["radius"]) ** 2, 1.0)
     elif light.type == "AREA":
         record["cos_cone"] = np.cos(0.5 * light.spread)
