@@ -8,7 +8,7 @@ import pytest
 from hair_addon.blender.gpu import (
     drawing,
     hair_shading,
-    shaders,
+    scene_programs,
     strand_textures,
     surface_textures,
     uniforms,
@@ -38,8 +38,8 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
     buffer = visibility_buffer.VisibilityBuffer(*SIZE)
     view = drawing.pass_record(np.eye(4), view_to_clip, SIZE)
     lights = uniforms.LIGHTS.record()
-    none = {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in shaders.SHADOW_SAMPLERS}
-    none |= {name: gpu.types.GPUTexture((1, 1), format="RGBA16F") for name in shaders.VISIBILITY_SAMPLERS}
+    none = {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in scene_programs.SHADOW_SAMPLERS}
+    none |= {name: gpu.types.GPUTexture((1, 1), format="RGBA16F") for name in scene_programs.VISIBILITY_SAMPLERS}
     with buffer.surfaces(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         if hiding_at is not None:
             corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
