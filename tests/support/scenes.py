@@ -62,7 +62,8 @@ def add_hair():
 def scene_files(blender, tmp_path_factory):
     """{stage or "empty": a file}: to be read in 8 ms, where Blender and the add-on take up to 40 ms to make it.
 
-    All have the nodes that carry hair, which take Blender 0.1 s.
+    All have the nodes that carry hair, which take Blender 0.1 s. Pictures are drawn with dual scattering, which takes less
+    time: tests of the light grid ask for it.
     """
     folder, files = tmp_path_factory.mktemp("scenes"), {}
 
@@ -73,6 +74,7 @@ def scene_files(blender, tmp_path_factory):
         bpy.ops.wm.save_as_mainfile(filepath=str(files[stage]), copy=True)
 
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.vellus.multiple_scattering = "DUAL"
     bpy.ops.mesh.primitive_plane_add()
     bpy.ops.vellus.distribute_guides(guide_count=3)
     for made in (*bpy.data.objects, *bpy.data.meshes, *bpy.data.hair_curves):
