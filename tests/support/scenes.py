@@ -62,8 +62,8 @@ def add_hair():
 def scene_files(blender, tmp_path_factory):
     """{stage or "empty": a file}: to be read in 8 ms, where Blender and the add-on take up to 40 ms to make it.
 
-    All have the nodes that carry hair, which take Blender 0.1 s. Pictures are drawn with dual scattering, which takes less
-    time: tests of the light grid ask for it.
+    All have the nodes that carry hair, which take Blender 0.1 s. Their pictures are drawn with dual scattering, which
+    takes less time: tests of the light grid ask for it.
     """
     folder, files = tmp_path_factory.mktemp("scenes"), {}
 
