@@ -18,7 +18,7 @@ from . import grid_walk, light_cache, start_places
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
-from .light_cache import Cache, cached
+from .light_cache import Cache, cached, layer_at
 from .light_sources import Sources, on_disk, world_radiance
 from .start_places import HIDDEN, StartsOnDevice, start
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
@@ -60,7 +60,7 @@ class Seen:
     """Strands that a viewer sees, in N rays: where paths start."""
 
     segments: np.ndarray  # (N,) of a grid
-    positions: np.ndarray  # (N, 3) [m] of any points of the rays
+    positions: np.ndarray  # (N, 3) [m] of points of the rays, beyond which nothing hides the strands
     directions: np.ndarray  # (N, 3) unit vectors towards the viewer
     areas: np.ndarray  # (N,) [m²] across each ray, where it meets its segment, that it stands for
     drawn: np.ndarray  # (N, 3) radiance that is drawn of them without paths
@@ -85,6 +85,7 @@ def _gather(
     out_position: wp.array2d[wp.vec3],
     out_light: wp.array2d[wp.vec3],
     out_even: wp.array2d[wp.vec3],
+    out_layer: wp.array2d[int],
     first: int,
 ):
     path = first + wp.tid()
@@ -100,8 +101,9 @@ def _gather(
             light += wp.cw_mul(weight, world_radiance(sources, direction))
             event = _MOST_EVENTS
         elif met.kind == STRAND and on_strands == cache.events:
-            even = even_return(fibre_of(medium, met.index), -direction)
-            ratio = cached(cache, cache.systems[medium.strands[met.index]], met.position)
+            fibre = fibre_of(medium, met.index)
+            even = even_return(fibre, -direction)
+            ratio = cached(cache, medium.strands[met.index], -wp.dot(direction, fibre.tangent), met.position)
             light += wp.cw_mul(weight, wp.cw_mul(even, ratio))
             event = _MOST_EVENTS
         else:
@@ -120,6 +122,7 @@ def _gather(
                     out_position[on_strands, path] = met.position
                     out_even[on_strands, path] = wp.cw_mul(weight, even_return(here.fibre, here.facing))
                     out_light[on_strands, path] = -light
+                    out_layer[on_strands, path] = layer_at(cache, here.own, wp.dot(here.facing, here.fibre.tangent))
                 if event == 0:
                     light_there, lamp_state = light_at_once(medium, sources, here, lamp_state)
                 else:
@@ -170,7 +173,8 @@ def gather(
     require_indices("segments", seen.segments, len(grid.points) - 1)
     for name in ("positions", "directions", "areas", "drawn"):
         require_count(name, len(getattr(seen, name)), count)
-    drawn = _by_voxel(grid, grid.points[seen.segments], seen.segments, seen.drawn)
+    systems = grid.systems[grid.strands]
+    drawn = _by_voxel(grid, _places(grid, seen), systems[seen.segments], len(grid.kept), seen.drawn)
     if not count:
         return np.concatenate([np.zeros((*drawn.shape[:-1], 6)), drawn], axis=-1), 0
     with wp.ScopedDevice(device):
@@ -181,10 +185,10 @@ def gather(
         while True:
             more = max(tried, path_count)
             starts = start_places.of_seen(grid, seen, more, seed * _MOST_TURNS + turn)
-            positions, light, even = (found[0] for found in _traced(medium, sources, starts, cache, 1, device))
+            positions, light, even, _layers = (found[0] for found in _traced(medium, sources, starts, cache, 1, device))
             is_seen = even.max(axis=-1) > 0.0
             found = np.concatenate([light, even], axis=-1)[is_seen]
-            sums = sums + _by_voxel(grid, positions[is_seen], starts.segments[is_seen], found)
+            sums = sums + _by_voxel(grid, positions[is_seen], systems[starts.segments[is_seen]], len(grid.kept), found)
             brightness = found[:, :3].sum(axis=1, dtype=np.float64)
             total, squares = total + float(brightness.sum()), squares + float(np.square(brightness).sum())
             taken += len(found)
@@ -196,20 +200,21 @@ def gather(
 def _cache(grid, medium, sources, path_count, seed, device):
     """`light_cache.Cache` of light among all strands, those that nobody sees as well."""
     starts = start_places.anywhere(grid, max(int(_CACHE_PATHS * path_count), _LEAST_CACHE_PATHS), seed)
-    nothing = light_cache.none(grid)
-    found = _traced(medium, sources, starts, nothing, _CACHE_EVENTS, device)
+    found = _traced(medium, sources, starts, light_cache.none(grid), _CACHE_EVENTS, device)
     is_event = found[2].max(axis=-1) > 0.0
-    segments = np.broadcast_to(starts.segments, is_event.shape)  # any one of the same hair
-    positions, light, even = (values[is_event] for values in found)
-    sums = _by_voxel(grid, positions, segments[is_event], np.concatenate([light, even], axis=-1))
+    positions, light, even, layers = (values[is_event] for values in found)
+    count = len(grid.kept) * light_cache.SINES
+    sums = _by_voxel(grid, positions, layers, count, np.concatenate([light, even], axis=-1))
     return light_cache.of(grid, sums, len(positions), _EVENTS)
 
 
 def _traced(medium, sources, starts, cache, kept, device):
     """Of paths, at each of the first `kept` strands that they meet: places, light from there on, and what even light
-    would give, both by the path's weight there; (kept, N, 3) each, without even light where there is no such strand.
+    would give, both by the path's weight there, (kept, N, 3) each, without even light where there is no such strand;
+    and the layers of the cache, (kept, N).
     """
-    found = [wp.zeros((kept, len(starts.segments)), dtype=wp.vec3) for _ in range(3)]
+    shape = (kept, len(starts.segments))
+    found = [*(wp.zeros(shape, dtype=wp.vec3) for _ in range(3)), wp.zeros(shape, dtype=int)]
     inputs = [medium, sources, start_places.on_device(starts), cache, *found]
     launch(_gather, len(starts.segments), inputs, device)
     return [array.numpy() for array in found]
@@ -220,15 +225,23 @@ def _standard_error(total, squares, count):
     return np.sqrt(max(squares - total * total / count, 0.0)) / total if total > 0.0 else np.inf
 
 
-def _by_voxel(grid, positions, segments, values):
-    """(systems, Z, Y, X, C) sums of values (N, C) at positions (N, 3) of segments."""
+def _places(grid, seen):
+    """(N, 3) points of segments that are nearest to the rays that see them."""
+    start, end = grid.points[seen.segments].astype(np.float64), grid.points[seen.segments + 1]
+    along = end - start
+    normal = np.cross(seen.directions, along)
+    squared = np.maximum((normal**2).sum(axis=1, keepdims=True), 1e-30)
+    beside = np.cross(start - seen.positions, seen.directions)
+    return start + np.clip((beside * normal).sum(axis=1, keepdims=True) / squared, 0.0, 1.0) * along
+
+
+def _by_voxel(grid, positions, layers, layer_count, values):
+    """(layers, Z, Y, X, C) sums of values (N, C) at positions (N, 3) of layers (N,), such as of each hair."""
     x, y, z = grid.voxels
     at = ((positions - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(int).clip(0, np.array([x, y, z]) - 1)
-    system = grid.systems[grid.strands[segments]]
-    voxel = ((system * z + at[:, 2]) * y + at[:, 1]) * x + at[:, 0]
-    most = len(grid.kept) * x * y * z
-    sums = [np.bincount(voxel, weights=column, minlength=most) for column in values.T]
-    return np.stack(sums, axis=-1).reshape(len(grid.kept), z, y, x, -1)
+    voxel = ((layers * z + at[:, 2]) * y + at[:, 1]) * x + at[:, 0]
+    sums = [np.bincount(voxel, weights=column, minlength=layer_count * x * y * z) for column in values.T]
+    return np.stack(sums, axis=-1).reshape(layer_count, z, y, x, -1)
 
 
 def launch(kernel, count, inputs, device):

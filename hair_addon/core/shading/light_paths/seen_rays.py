@@ -60,14 +60,15 @@ def _find(
     out_viewer[path] = -direction
 
 
-def seen_by(
-    grid: StrandGrid, corners: np.ndarray, rays: Rays, path_count: int, seed: int = 0, device: wp.DeviceLike = "cpu"
-) -> Seen:
-    """The strands that rays meet before a surface, triangles of corners (3 F, 3): nothing is drawn of them yet.
+def met_by(
+    grid: StrandGrid, corners: np.ndarray, rays: Rays, ray_count: int, seed: int = 0, device: wp.DeviceLike = "cpu"
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(segments (N,), places (N, 3), unit directions to the viewer) where rays meet strands before a surface, triangles
+    of corners (3 F, 3).
 
-    path_count: of rays over the picture, rounded to a square; those that meet no strand are left out.
+    ray_count: of rays over the picture, rounded to a square; those that meet no strand are left out.
     """
-    side = max(1, round(path_count**0.5))
+    side = max(1, round(ray_count**0.5))
     with wp.ScopedDevice(device):
         mesh = mesh_of(corners)
         medium = medium_of(grid, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)), mesh)
@@ -77,13 +78,21 @@ def seen_by(
         for name in ("near", "near_x", "near_y", "far", "far_x", "far_y"):
             setattr(lens, name, wp.vec3(*map(float, getattr(rays, name))))
         lens.side = side
-        inputs = [medium, lens, seed, segments, positions, viewers]
-        launch(_find, side * side, inputs, device)
+        launch(_find, side * side, [medium, lens, seed, segments, positions, viewers], device)
         found, positions, viewers = (array.numpy() for array in (segments, positions, viewers))
     is_hair = found >= 0
-    count = int(is_hair.sum())
-    shown = found[is_hair], positions[is_hair], viewers[is_hair]
-    return Seen(*shown, _areas(rays, *shown[1:]) / side**2, np.zeros((count, 3), np.float32))
+    return found[is_hair], positions[is_hair], viewers[is_hair]
+
+
+def seen_by(
+    grid: StrandGrid, corners: np.ndarray, rays: Rays, ray_count: int, seed: int = 0, device: wp.DeviceLike = "cpu"
+) -> Seen:
+    """`Seen` of `met_by`: nothing is drawn of the strands yet."""
+    segments, places, viewers = met_by(grid, corners, rays, ray_count, seed, device)
+    normal = np.cross(rays.near_x, rays.near_y)
+    before = ((places - rays.near) @ normal / (viewers @ normal))[:, None]
+    areas = _areas(rays, places, viewers) / max(1, round(ray_count**0.5)) ** 2
+    return Seen(segments, places - before * viewers, viewers, areas, np.zeros((len(segments), 3), np.float32))
 
 
 def _areas(rays, positions, viewers):
