@@ -14,12 +14,14 @@ import warp as wp
 
 from ...kernels import parallel
 from ...kernels.checks import require_count, require_indices
+from ..tables import surface_albedo
 from . import grid_walk
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, seen_place, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
-from .light_sources import Sources, on_disk, world_radiance
+from .light_sources import Sources, across, world_radiance
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
+from .surface_walk import surface_of, surface_turn
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -36,9 +38,10 @@ class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
     corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own;
-    albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
+    albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
     importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude
-    and latitude as core/imaging/environment.py takes it apart.
+    and latitude as core/imaging/environment.py takes it apart; gloss: (F, 3) of triangles, roughness, metallic, and
+    reflectance at normal incidence, without it all are matt.
     """
 
     corners: np.ndarray
@@ -47,6 +50,7 @@ class Surroundings:
     lamps: np.ndarray
     importance: np.ndarray
     world: np.ndarray
+    gloss: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,16 +110,6 @@ def _find(
     out_viewer[path] = -direction
 
 
-@wp.func
-def _off_surface(normal: wp.vec3, random: wp.uint32):
-    """(direction of light that a diffuse surface sends back, random state)."""
-    state = random
-    squared = wp.randf(state)
-    turned = wp.randf(state)
-    direction = on_disk(normal, 1.0, squared, turned) + wp.sqrt(wp.max(0.0, 1.0 - squared)) * normal
-    return wp.normalize(direction), state
-
-
 @wp.kernel
 def _gather(
     medium: Medium,
@@ -160,13 +154,13 @@ def _gather(
                 direction, weight, after = turn(here.fibre, here.facing, weight, here.offset, state)
                 state = after
             else:
-                here.facing = met.normal
+                here.facing = -direction
                 here.position = met.position - direction * (1e-4 * medium.least_cell)
-                weight = wp.cw_mul(weight, medium.albedo[met.index])
-                here.weight = weight
+                color, gloss = medium.albedo[met.index], medium.gloss[met.index]
+                here.surface = surface_of(met.normal, here.facing, color, gloss, medium.reflected)
                 light_there, after = light_by_share(medium, sources, here, state)
                 state = after
-                direction, after = _off_surface(met.normal, state)
+                direction, weight, after = surface_turn(here.surface, across(met.normal), weight, state)
                 state = after
             light += light_there
             event += 1
@@ -193,7 +187,7 @@ def seen_by(
     side = max(1, round(path_count**0.5))
     with wp.ScopedDevice(device):
         mesh = _mesh(corners)
-        medium = _medium(grid, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)), mesh)
+        medium = _medium(grid, mesh, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)))
         segments = wp.full(side * side, -1, dtype=int)
         positions, viewers = (wp.zeros(side * side, dtype=wp.vec3) for _ in range(2))
         lens = _Rays()
@@ -228,7 +222,8 @@ def gather(
         require_count(name, len(getattr(seen, name)), count)
     with wp.ScopedDevice(device):
         mesh = _mesh(surroundings.corners)
-        medium, sources = _medium(grid, surroundings.normals, surroundings.albedo, mesh), _sources(surroundings)
+        medium = _medium(grid, mesh, surroundings.normals, surroundings.albedo, surroundings.gloss)
+        sources = _sources(surroundings)
         sums, total, squares, times, turn = 0.0, 0.0, 0.0, 0, 0
         while True:
             more = max(times, 1)
@@ -282,8 +277,10 @@ def _mesh(corners):
     return wp.Mesh(wp.array(corners, dtype=wp.vec3), wp.array(np.arange(len(corners), dtype=np.int32), dtype=int))
 
 
-def _medium(grid, normals, albedo, mesh):
+def _medium(grid, mesh, normals, albedo, gloss=None):
     corner_count = 0 if mesh is None else len(mesh.indices)
+    gloss = np.zeros((corner_count // 3, 3)) if gloss is None else gloss
+    require_count("surface gloss", len(gloss), corner_count // 3)
     require_count("surface normals", len(normals), corner_count)
     require_count("surface colors", len(albedo), corner_count // 3)
     medium = Medium()
@@ -295,7 +292,8 @@ def _medium(grid, normals, albedo, mesh):
     medium.strands, medium.fibres = wp.array(grid.strands, dtype=int), wp.array(grid.fibres, dtype=int)
     medium.fibre_rows = wp.array(grid.fibre_rows, dtype=float)
     medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
-    medium.normals, medium.albedo = _vectors(normals), _vectors(albedo)
+    medium.normals, medium.albedo, medium.gloss = (_vectors(values) for values in (normals, albedo, gloss))
+    medium.reflected = wp.array(surface_albedo.table(), dtype=wp.vec4)
     return medium
 
 

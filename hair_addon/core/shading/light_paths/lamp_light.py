@@ -7,9 +7,10 @@ a strand nor narrow lobes give few paths much light.
 
 import warp as wp
 
-from .fibre_walk import PI, Fibre, value
+from .fibre_walk import Fibre, value
 from .grid_walk import PASSED, Medium, Met, walk
 from .light_sources import Lit, Sources, choose, lit_by, lit_from
+from .surface_walk import Surface, surface_value
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -21,10 +22,10 @@ _LEAST = wp.constant(0.5)  # of the smallest cell: distance below which no lamp'
 
 @wp.struct
 class Event:
-    """A place on strand `own`, or where that is below zero on a diffuse surface.
+    """A place on strand `own`, or where that is below zero on a surface.
 
-    facing: unit vector towards the path's last place, or the surface's normal; offset: in the strand's width, from -1
-    to 1; weight: of light from there to the viewer, with the surface's color.
+    facing: unit vector towards the path's last place; offset: in the strand's width, from -1 to 1; weight: of light from
+    there to the viewer.
     """
 
     position: wp.vec3
@@ -33,6 +34,18 @@ class Event:
     offset: float
     own: int
     fibre: Fibre
+    surface: Surface
+
+
+@wp.func
+def turn_density(here: Event, direction: wp.vec3):
+    """The density [1/sr] with which a path leaves an event in a direction."""
+    density = float(0.0)
+    if here.own >= 0:
+        _found, density = value(here.fibre, here.facing, direction, here.offset, here.weight)
+    else:
+        _found, density = surface_value(here.surface, direction, here.weight)
+    return density
 
 
 @wp.func
@@ -77,8 +90,8 @@ def _scattered(here: Event, lit: Lit, shift: float):
     """Light of a point of a lamp that goes to the viewer, by its share of densities: the mean around an offset."""
     light = wp.vec3(0.0, 0.0, 0.0)
     if here.own < 0:
-        density = wp.max(wp.dot(here.facing, lit.direction), 0.0) / PI
-        light = wp.cw_mul(here.weight, lit.irradiance) * (density * lit.density / (lit.density + density))
+        light, density = surface_value(here.surface, lit.direction, here.weight)
+        light = wp.cw_mul(here.weight, wp.cw_mul(lit.irradiance, light)) * (lit.density / (lit.density + density))
     else:
         for step in range(_OFFSETS_AT_ONCE):
             h = _offset_at(here, step, shift)
@@ -143,8 +156,6 @@ def light_met(medium: Medium, sources: Sources, here: Event, direction: wp.vec3,
         if wp.max(lit.irradiance) > 0.0:
             end = wp.dot(met.position - here.position, direction)
             if met.kind == PASSED or lit.casts_shadow == 0 or lit.distance < end:
-                density = wp.max(wp.dot(here.facing, direction), 0.0) / PI
-                if here.own >= 0:
-                    _found, density = value(here.fibre, here.facing, direction, here.offset, here.weight)
+                density = turn_density(here, direction)
                 light += lit.irradiance * (share * lit.density * density / (lit.density + density))
     return light, state
