@@ -6,6 +6,16 @@ from typing import TYPE_CHECKING
 from ...lazy import submodules
 
 if TYPE_CHECKING:
-    from . import fibre_walk, gather, grid_walk, lamp_light, light_sources, strand_grid, surface_walk, voxel_means
+    from . import (
+        fibre_walk,
+        gather,
+        grid_walk,
+        lamp_light,
+        light_sources,
+        strand_grid,
+        surface_walk,
+        voxel_means,
+        world_light,
+    )
 else:
     __getattr__ = submodules(__name__)

@@ -19,9 +19,10 @@ from . import grid_walk
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, seen_place, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
-from .light_sources import Sources, across, world_radiance
+from .light_sources import Sources, across
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
 from .surface_walk import surface_of, surface_turn
+from .world_light import world_of
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -39,7 +40,7 @@ class Surroundings:
 
     corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own;
     albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
-    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude
+    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance, a picture of longitude
     and latitude as core/imaging/environment.py takes it apart; gloss: (F, 3) of triangles, roughness, metallic, and
     reflectance at normal incidence, without it all are matt.
     """
@@ -133,7 +134,6 @@ def _gather(
     event = int(0)
     while event < _MOST_EVENTS:
         if met.kind == PASSED:
-            light += wp.cw_mul(weight, world_radiance(sources, direction))
             event = _MOST_EVENTS
         else:
             here = Event()
@@ -312,7 +312,7 @@ def _sources(surroundings):
     importance = np.asarray(surroundings.importance, float)
     chance = importance + 0.1 * importance.mean() + 1e-12 if len(lamps) else importance
     sources.chance = wp.array((chance / max(chance.sum(), 1e-30)).astype(np.float32), dtype=float)
-    sources.world = wp.array(np.ascontiguousarray(surroundings.world, np.float32), dtype=wp.vec3)
+    sources.world = world_of(surroundings.world)
     return sources
 
 
