@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light at the events of a path: of random points of lamps and of the world, and of those that the path meets [Veach95].
+"""Light at the events of a path: of random points of lamps and the world, and of those that the path meets [Veach95].
 
 Both find the same light: each counts by its share of both densities (the balance heuristic), so that neither lamps near
 a strand nor narrow lobes give few paths much light.
@@ -26,8 +26,8 @@ _LEAST = wp.constant(0.5)  # of the smallest cell: distance below which no lamp'
 class Event:
     """A place on strand `own`, or where that is below zero on a surface.
 
-    facing: unit vector towards the path's last place; offset: in the strand's width, from -1 to 1; weight: of light from
-    there to the viewer.
+    facing: unit vector towards the path's last place; offset: in the strand's width, from -1 to 1; weight: of light
+    from there to the viewer.
     """
 
     position: wp.vec3

@@ -21,8 +21,8 @@ _GRAZING = wp.constant(50.0)  # one over the reflectance below which less is ref
 class Surface:
     """A surface's material where a path meets it; of Principled BSDF, as `SurfaceMaterial` has it.
 
-    alpha: the square of the roughness; diffuse, metal, reflected: parts of light that leave it in each way, RGB; gain: of
-    one reflection, for those after it.
+    alpha: the square of the roughness; diffuse, reflected: parts of even light that it sends to the viewer in each way,
+    RGB; gain: of one reflection, for those after it.
     """
 
     normal: wp.vec3
