@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hair_addon.core.imaging import lamps
-from hair_addon.core.shading.light_paths import gather
+from hair_addon.core.shading.light_paths import seen_rays
 from hair_addon.core.shading.tables import lookup_tables
 from tests.core.shading.light_paths.test_gather import (
     ALONG_Y,
@@ -43,7 +43,7 @@ def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
     if kind == lamps.SUN:  # even light over its disk, not over its angles
         radiance = radiance / cosine**3
     world = replace(surroundings(), world=np.repeat(radiance[..., None], 3, axis=-1))
-    found = [ratio(found_by(grid, light, ALONG_Y, 60_000)) for light in (surroundings(lamps=wide), world)]
+    found = [ratio(found_by(grid, light, ALONG_Y, 120_000)) for light in (surroundings(lamps=wide), world)]
     np.testing.assert_allclose(found[0], found[1], rtol=0.04)
 
 
@@ -52,7 +52,7 @@ def light_on_a_strand(light, path_count=20_000):
     thin = np.stack([np.linspace(-0.02, 0.02, 3), np.zeros(3), np.zeros(3)], axis=-1)[None]
     grid = grid_of(thin, (0.05, 0.3, 1.0), 0.002, cell_count=1_000)
     sides = np.array([0.02, 0.0, 0.0]), np.array([0.0, 0.0, 0.004])
-    rays = gather.Rays(np.array([-0.01, -0.1, -0.002]), *sides, np.array([-0.01, 0.1, -0.002]), *sides)
+    rays = seen_rays.Rays(np.array([-0.01, -0.1, -0.002]), *sides, np.array([-0.01, 0.1, -0.002]), *sides)
     return ratio(found_by(grid, surroundings(lamps=light), rays, path_count))
 
 
@@ -104,7 +104,7 @@ def test_a_lamp_among_hair_is_found_by_few_paths(rng):
     """A disk of 6 cm amid strands: means of few paths differ little, as no path has too much light."""
     grid = grid_of(strands_in_a_box(rng, 4_000), (0.02, 0.04, 0.06), 0.004, cell_count=50_000)
     sides = np.array([0.3, 0.0, 0.0]), np.array([0.0, 0.0, 0.3])
-    near = gather.Rays(np.array([-0.15, -0.3, -0.15]), *sides, np.array([-0.15, 4.0, -0.15]), *sides)
+    near = seen_rays.Rays(np.array([-0.15, -0.3, -0.15]), *sides, np.array([-0.15, 4.0, -0.15]), *sides)
     up = lamp(lamps.AREA, 0.0, 0.06)
     up["axis"][0, :3] = 0.0, 0.0, 1.0
     means = [ratio(found_by(grid, surroundings(lamps=up), near, 4_000, seed)).mean() for seed in range(6)]
