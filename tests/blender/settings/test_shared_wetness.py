@@ -19,8 +19,8 @@ def guide_curves(hair):
 
 
 def wet(hair, amount):
-    """A Wet style of an amount."""
-    api.add_style(hair, api.Wet(amount=amount, lock=0.1))
+    """A Wet style of an amount, in few locks."""
+    api.add_style(hair, api.Wet(amount=amount, lock=0.5))
     return hair.data.vellus.styles[-1].wet
 
 

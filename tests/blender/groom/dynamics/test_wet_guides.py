@@ -47,7 +47,7 @@ def sides(guides):
 def test_guides_are_wet_where_the_mask_is(hair, swung):
     wet_side, dry_side = sides(swung)
     dry = baked(swung)
-    api.add_style(hair, api.Wet(lock=0.1))
+    api.add_style(hair, api.Wet(lock=0.4))
     wet = baked(swung)
     paint(1.0)
     hair.data.vellus.styles[0].wet.mask = "rain"
@@ -68,7 +68,7 @@ def test_guides_are_as_wet_as_their_strands_on_the_mean(hair, swung):
     half = baked(swung)
     swung.data.vellus.dynamics.wetness = 0.0
     dry = baked(swung)
-    api.add_style(hair, api.Wet(lock=0.1, vary=1.0))
+    api.add_style(hair, api.Wet(lock=0.4, vary=1.0))
     np.testing.assert_array_equal(baked(swung), half)
     paint(1.0)
     style = hair.data.vellus.styles[0].wet
@@ -97,7 +97,7 @@ def test_draped_guides_are_as_wet_as_the_mask_says(hair, swung):
         return found
 
     dry = draped()
-    api.add_style(hair, api.Wet(lock=0.1))
+    api.add_style(hair, api.Wet(lock=0.4))
     wet = draped()
     paint(1.0)
     hair.data.vellus.styles[0].wet.mask = "rain"
@@ -111,11 +111,11 @@ def test_baked_frames_follow_from_the_mask(hair, swung):
     """Also where keys move its amount, and where only a lesser style changes."""
     scene = bpy.context.scene
     paint(1.0)
-    api.add_style(hair, api.Wet(lock=0.1, mask="rain"))
+    api.add_style(hair, api.Wet(lock=0.4, mask="rain"))
     first = guide_baking.key_of(swung.data, scene)
     paint(0.5)
     painted = guide_baking.key_of(swung.data, scene)
-    api.add_style(hair, api.Wet(lock=0.1, mask="rain", amount=0.2, invert_mask=True))
+    api.add_style(hair, api.Wet(lock=0.4, mask="rain", amount=0.2, invert_mask=True))
     lesser = guide_baking.key_of(swung.data, scene)
     assert len({tuple(sorted(key.items())) for key in (first, painted, lesser)}) == 3
     style = hair.data.vellus.styles[1].wet
@@ -140,7 +140,7 @@ def test_baking_goes_on_to_the_same_bits_with_keyed_weight(hair, swung):
         dynamics.weight = weight
         dynamics.keyframe_insert("weight", frame=frame)
     paint(1.0)
-    api.add_style(hair, api.Wet(lock=0.1, mask="rain"))
+    api.add_style(hair, api.Wet(lock=0.4, mask="rain"))
     bpy.context.scene.frame_set(1)
     whole = baked(swung, 30)
     folder = frame_folders.folder_of(swung.data)
