@@ -17,6 +17,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import hair_addon
+from blend_samples.heads import portrait
 from blend_samples.pictures import styles
 from blend_samples.sheets import picture_files
 from hair_addon import api
@@ -35,6 +36,7 @@ def main():
     gpu.init()
     hair = styles.build(STRAND_COUNT)
     hair_object = bpy.data.objects["Hair"]
+    portrait.dress(hair_object.data.surface, portrait.AHEAD)
     clump = api.Clump(size=SIZE, levels=1, thickness=0.03, shape=SHAPE, crossover=0.0, stray=0.0)
     curl = api.Curl(radius=RADIUS, pitch=PITCH, coherence=1.0, seed=1)
     hair.vellus.hair.point_count = POINT_COUNT

@@ -15,7 +15,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import hair_addon
-from blend_samples.heads import head
+from blend_samples.heads import head, portrait
 from blend_samples.sheets import picture_files
 from hair_addon.blender.data.strands import curves
 
@@ -40,6 +40,7 @@ def main():
     """Comb, use each tool on the combed guides, and draw."""
     hair_addon.register()
     skull = head.build()
+    portrait.dress(skull, portrait.AHEAD)
     guides, hair = head.grow(skull, guide_count=240, strand_count=12_000)
     hair.data.vellus.hair.radius = 1.6e-4
     hair.data.vellus.marschner.size = 64
