@@ -3,9 +3,10 @@
 
 Each movement begins at rest and is drawn with one pass a frame, as a viewport does while it lasts, alone and with what
 was shown before, and as pictures that have come to rest. Printed are display levels of 255, where hair is: the 99th
-percentile of how far a pixel changes from one frame to the next, for the three; the largest change; how far the means
-of the moving picture and of a pass alone are from that of the resting one, over all frames and in the worst of them;
-and the 99th percentile of the moving picture's distance from it.
+percentile of how far a pixel changes from one frame to the next, for the three; the largest change; the 99th percentile
+of how far means of 12 × 12 pixels change, in which flicker is seen that single pixels hide; how far the means of the
+moving picture and of a pass alone are from that of the resting one, over all frames and in the worst of them; and the
+99th percentile of the moving picture's distance from it.
 
 .venv/bin/python tests/benchmarks/stable_pictures.py --strands 10000 --size 240 180
 """
@@ -34,6 +35,7 @@ from hair_addon.blender.render import drawn_scene, offscreen
 from hair_addon.blender.render.viewport import hair_picture, view_film
 
 BEHIND = 0.05  # scene-linear grey behind the hair
+BLOCK = 12  # pixels along each side of a block
 
 
 class Movement:
@@ -188,8 +190,9 @@ MOVEMENTS = {one.__name__: one for one in _OF_ALL}
 class HairFrames:
     """Pictures of hair alone, as a viewport lays them over what Blender draws."""
 
-    def __init__(self, size, per_side):
+    def __init__(self, size, per_side, rests):
         self._picture = hair_picture.HairPicture(size, per_side)
+        self._rests = rests
 
     def moved(self, drawn, camera):
         """(H, W, 3) scene-linear light of the first pass after a movement."""
@@ -206,16 +209,16 @@ class HairFrames:
     def rested(self, drawn, camera):
         """The same of a picture at rest."""
         self._picture.restart()
-        while not self._picture.is_fine:
-            self._picture.add_pass(drawn, *camera)
+        _finish(self._picture, drawn, camera, self._rests)
         return _over_grey(self._picture.read())
 
 
 class FilmFrames:
     """Pictures of hair and surfaces, as in Rendered view."""
 
-    def __init__(self, size, per_side):
+    def __init__(self, size, per_side, rests):
         self._film = view_film.ViewFilm(size, per_side, False)
+        self._rests = rests
 
     def moved(self, drawn, camera):
         """(H, W, 3) scene-linear light of the first pass after a movement."""
@@ -232,12 +235,21 @@ class FilmFrames:
     def rested(self, drawn, camera):
         """The same of a picture at rest."""
         self._film.restart()
-        while not self._film.is_fine:
-            self._film.add_pass(drawn, *camera)
+        _finish(self._film, drawn, camera, self._rests)
         return self._film.read()[..., :3]
 
 
 KINDS = {"hair": HairFrames, "film": FilmFrames}
+
+
+def _finish(picture, drawn, camera, times):
+    """Add passes until a picture is fine, and times - 1 as many."""
+    count = 0
+    while not picture.is_fine:
+        picture.add_pass(drawn, *camera)
+        count += 1
+    for _ in range((times - 1) * count):
+        picture.add_pass(drawn, *camera)
 
 
 def _over_grey(light):
@@ -253,10 +265,11 @@ def levels(light):
 
 def measure(movement, kind, options):
     """(alone, moved, rested) scene-linear light of the frames after those of the warm-up."""
-    moving, resting = (KINDS[kind](tuple(options.size), options.per_side) for _ in range(2))
+    sides = (options.per_side, options.per_side, options.rest_per_side or options.per_side)
+    moving, alone, resting = (KINDS[kind](tuple(options.size), side, options.rests) for side in sides)
     found, drawn = ([], [], []), None
     for frame in range(options.frames):
-        movement.step(frame)
+        movement.step(options.first + frame)
         bpy.context.view_layer.update()
         depsgraph = bpy.context.evaluated_depsgraph_get()
         if drawn is None or not movement.is_of_camera:
@@ -264,7 +277,7 @@ def measure(movement, kind, options):
         camera = scene.read_camera(bpy.context.scene, depsgraph, *options.size)
         moved = moving.moved(drawn, camera) if frame else moving.rested(drawn, camera)
         if frame >= options.warm_up:
-            for of, light in zip(found, (resting.alone(drawn, camera), moved), strict=False):
+            for of, light in zip(found, (alone.alone(drawn, camera), moved), strict=False):
                 of.append(light)
             found[2].append(resting.rested(drawn, camera))
     movement.end()
@@ -278,15 +291,29 @@ def report(name, kind, alone, moved, rested):
     is_hair = np.abs(still - levels(np.full((1, 1, 3), BEHIND))).max(axis=-1) > 2.0
     is_hair = is_hair[1:] | is_hair[:-1]
     changes = [np.abs(np.diff(of, axis=0)).max(axis=-1)[is_hair] for of in (single, shown, still)]
+    of_blocks = [_of_blocks(of, is_hair) for of in (single, shown, still)]
     errors = np.abs(shown - still).max(axis=-1)[1:][is_hair]
     steps = [np.quantile(of, 0.99) for of in changes]
     print(
         f"{kind:5}{name:12} change alone {steps[0]:6.2f}, with history {steps[1]:6.2f}, at rest {steps[2]:6.2f}, "
         f"ratio {steps[1] / steps[2]:5.2f}; most {' '.join(f'{of.max():6.1f}' for of in changes)}; "
+        f"blocks {' '.join(f'{of:5.2f}' for of in of_blocks)}; "
         f"mean {_of_means(moved, rested)}, alone {_of_means(alone, rested)}; "
         f"error {np.quantile(errors, 0.99):6.2f}",
         flush=True,
     )
+
+
+def _of_blocks(pictures, is_hair):
+    """99th percentile of how far means of blocks change that have hair in a quarter of their pixels."""
+    height, width = (length // BLOCK * BLOCK for length in pictures.shape[1:3])
+
+    def means(of):
+        blocks = of[:, :height, :width].reshape(len(of), height // BLOCK, BLOCK, width // BLOCK, BLOCK, -1)
+        return blocks.mean(axis=(2, 4))
+
+    counted = means(is_hair.astype(float))[..., 0] > 0.25
+    return np.quantile(np.abs(np.diff(means(pictures), axis=0)).max(axis=-1)[counted], 0.99) if counted.any() else 0.0
 
 
 def _of_means(light, rested):
@@ -301,6 +328,10 @@ def main():
     parser.add_argument("--size", type=int, nargs=2, default=[240, 180], metavar=("WIDTH", "HEIGHT"))
     parser.add_argument("--per-side", type=int, default=1, help="samples along each side of a pixel")
     parser.add_argument("--frames", type=int, default=12)
+    parser.add_argument("--first", type=int, default=0, help="step of the first frame")
+    parser.add_argument("--rest-per-side", type=int, help="the same of pictures at rest")
+    parser.add_argument("--rests", type=int, default=1, help="pictures at rest have so many times their passes")
+    parser.add_argument("--look", help="a preset, with dual scattering, in place of the sample head's")
     parser.add_argument("--warm-up", type=int, default=8, help="frames that are not counted")
     parser.add_argument("--movements", nargs="+", choices=MOVEMENTS, default=list(MOVEMENTS))
     parser.add_argument("--kinds", nargs="+", choices=KINDS, default=list(KINDS))
@@ -311,6 +342,9 @@ def main():
     wp.config.log_level = wp.LOG_WARNING
     head.grow(head.build(), strand_count=options.strands)
     head.light()
+    if options.look is not None:
+        api.shade(bpy.data.objects["Hair"].data, options.look, mode="energy")
+        bpy.context.view_layer.update()
     for name in options.movements:
         for kind in options.kinds:
             alone, moved, rested = measure(MOVEMENTS[name](), kind, options)

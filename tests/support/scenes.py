@@ -34,8 +34,12 @@ def blender():
 
 @pytest.fixture(scope="session")
 def home_file(blender, tmp_path_factory):
-    """An empty scene with the nodes that carry hair: Blender takes 0.1 s to make them, and no time to read them."""
+    """An empty scene with the nodes that carry hair: Blender takes 0.1 s to make them, and no time to read them.
+
+    Its pictures are drawn with dual scattering, which takes less time: tests of the light grid ask for it.
+    """
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    bpy.context.scene.vellus.multiple_scattering = "DUAL"
     bpy.ops.mesh.primitive_plane_add()
     bpy.ops.vellus.distribute_guides(guide_count=3)
     for made in (*bpy.data.objects, *bpy.data.meshes, *bpy.data.hair_curves):

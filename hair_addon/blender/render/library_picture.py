@@ -55,6 +55,7 @@ def _studio(hair_object, points) -> Generator[bpy.types.Scene]:
     low, high = points.min(axis=0), points.max(axis=0)
     middle, radius = Vector((0.5 * (low + high)).tolist()), 0.5 * float(np.linalg.norm(high - low))
     studio = bpy.data.scenes.new("Vellus picture")
+    studio.vellus.multiple_scattering = "DUAL"  # a thumbnail, drawn while its groom is saved
     made = []
     try:
         surface = hair_object.data.surface

@@ -34,12 +34,22 @@ class RenderSettings(Settings):
         soft_high=64,
     )
     multiple_scattering: str = param(
-        "DUAL",
-        "How renders find light that comes to a strand from other strands and from surfaces",
+        "GRID",
+        "How renders find light that comes to hair from other hair and from surfaces",
         label="Multiple Scattering",
-        choices=(
-            ("DUAL", "Dual", "As in the viewport: by how many strands are before and behind each"),
-            ("GRID", "Light Grid", "Paths of light through a grid of strands; takes some seconds more for each frame"),
+        choices=(  # files keep the place of a choice
+            (
+                "DUAL",
+                "Dual Scattering",
+                "As in the viewport: by how much hair is before and behind each strand. Fast and without noise: for "
+                "previews, and for animations on slow computers",
+            ),
+            (
+                "GRID",
+                "Light Grid",
+                "By paths of light through hair, closest to Cycles. Takes seconds longer for each frame; viewports "
+                "do not have it",
+            ),
         ),
     )
     is_hair_only: bool = param(

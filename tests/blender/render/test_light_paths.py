@@ -63,6 +63,19 @@ def mean_color(drawn):
     return drawn[..., :3].sum(axis=(0, 1)) / drawn[..., 3].sum()
 
 
+def test_scenes_without_a_setting_take_the_light_grid(scene, rng):
+    """Also those of files; and what files have stored means the same as ever."""
+    hair_of(scene, rng.uniform(-0.5, 0.5, (50, 3)), BROWN)
+    light(scene, world=0.3, sun=2.0)
+    dual, wanted = (picture(scene, scattering) for scattering in ("DUAL", "GRID"))
+    assert not np.array_equal(dual, wanted)
+    scene.vellus.property_unset("multiple_scattering")
+    drawn = api.draw(width=64, height=64, samples_per_side=2, is_transparent=True)
+    np.testing.assert_array_equal(drawn, wanted)
+    stored = {item.identifier: item.value for item in scene.vellus.bl_rna.properties["multiple_scattering"].enum_items}
+    assert stored == {"DUAL": 0, "GRID": 1}
+
+
 def test_white_hair_in_a_white_world_is_white(scene, rng):
     hair_of(scene, rng.uniform(-0.5, 0.5, (600, 3)), WHITE)
     light(scene, world=0.8)

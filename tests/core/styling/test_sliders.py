@@ -19,7 +19,7 @@ from tests.support.dynamics.slid import Slid, steepest_moves
 from tests.support.strands import styled
 
 PLACES = 32  # along the slider, at first
-FEWEST_HALVINGS, MOST_HALVINGS = 5, 14
+FEWEST_HALVINGS, MOST_HALVINGS = 5, 16
 ROUNDING = 2e-5  # [m]: what moves strands less is no jump
 
 # Where sliders are tried other than from their lowest to their highest value; lengths by even ratios.

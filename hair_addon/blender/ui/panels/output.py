@@ -26,7 +26,8 @@ class VELLUS_PT_output(HairTab, bpy.types.Panel):
         is_on = state.hair_scene is not None
         layout.operator("vellus.toggle_composite", icon="NODE_COMPOSITING", depress=is_on)
         if is_on:
-            setting_rows.rows(layout, state, RenderSettings, ("composite_shadow", "sample_count"))
+            names = ("composite_shadow", "sample_count", "multiple_scattering")
+            setting_rows.rows(layout, state, RenderSettings, names)
         layout.operator("vellus.export_groom", icon="FILE_3D", text="Export Groom…")
         column = layout.column(align=True)
         column.operator_context = "INVOKE_DEFAULT"

@@ -12,7 +12,7 @@ from ..base.file_browser import BrowsedOperator
 
 
 class VELLUS_OT_render_picture(BrowsedOperator, bpy.types.Operator):
-    """Draw the scene's hair from its camera to a file, shaded as in the viewport"""
+    """Draw the scene's hair and meshes from its camera to a file"""
 
     bl_idname = "vellus.render_picture"
     bl_label = "Render Picture"
