@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The face of the head in the manual's pictures of the window: skin, eyes, and a bust below the cut of the neck."""
+
+import bpy
+
+from blend_samples.heads import bust, eyes
+
+_SKIN = (0.52, 0.31, 0.22, 1.0)
+
+
+def dress(head, target):
+    """Give an imported head what a portrait has without hair; target: what its eyes look at [m]."""
+    material = bpy.data.materials.new("Skin")
+    material.diffuse_color = _SKIN
+    principled = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
+    principled.inputs["Base Color"].default_value = _SKIN
+    principled.inputs["Roughness"].default_value = 0.55
+    head.data.materials.clear()
+    head.data.materials.append(material)
+    _balls, corneas, _lids = eyes.build(head, target)
+    corneas.hide_set(True)  # Solid shows glass as opaque
+    bust.build(head)
