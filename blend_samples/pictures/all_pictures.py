@@ -56,6 +56,32 @@ COPIED = {
     "composite_engines": {"composite.png": "manual/composite.png"},
 }
 
+# Name → the pictures of docs/ that it draws beside those.
+OTHERS = {
+    "grooms": ("grooms.png", "manual/groom_library.png"),
+    "styles": ("styles.png", "wet.png"),
+    "transfer": ("transfer.png", "manual/transfer_groom.png"),
+    "style_pictures": ("manual/style_*.png",),
+    "guide_tools": ("manual/guide_tools.png",),
+    "use_as_hair": ("manual/use_as_hair.png",),
+    "placements": ("guide_placement.png",),
+    "parting": ("parting.png",),
+    "clump": ("clump_beside_blender.png",),
+    "dynamics_settings": ("manual/dynamics_*.png",),
+    "cards": ("manual/cards.jpg",),
+    "dynamics": ("dynamics_*.png",),
+    "five_minutes": ("five_minutes/*.png",),
+    "curly_hair": ("manual/curly_*.png",),
+    "panels": tuple(
+        f"manual/{name}.png"
+        for name in (
+            *("systems", "surface", "guides", "strands", "dynamics", "styles", "shading", "lookup_tables", "output"),
+            *("hair", "looks", "redo", "rendering", "use_as_guides"),
+        )
+    ),
+}
+ELSEWHERE = ("scenes.png", "scenes_worst.png")
+
 
 def main():
     """Draw what is asked for; the exit status is 0 only if all of it was drawn."""
