@@ -11,7 +11,7 @@ _SKIN = (0.52, 0.31, 0.22, 1.0)
 def dress(head, target):
     """Give an imported head what a portrait has without hair; target: what its eyes look at [m]."""
     material = bpy.data.materials.new("Skin")
-    material.diffuse_color = _SKIN
+    material.diffuse_color, material.roughness = _SKIN, 0.6  # of Solid view
     principled = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     principled.inputs["Base Color"].default_value = _SKIN
     principled.inputs["Roughness"].default_value = 0.55
