@@ -5,7 +5,6 @@ import argparse
 import sys
 from pathlib import Path
 
-import bmesh
 import bpy
 import numpy as np
 
@@ -125,11 +124,11 @@ def _picture(places):
 
 def _ball():
     """(V, 3) vertices and (F, 3) triangles of a ball of radius 1."""
-    ball = bmesh.new()
-    bmesh.ops.create_icosphere(ball, subdivisions=2, radius=1.0)
-    vertices = np.array([vertex.co for vertex in ball.verts])
-    triangles = np.array([[vertex.index for vertex in face.verts] for face in ball.faces])
-    ball.free()
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=1.0)
+    ball = bpy.context.object
+    vertices = np.array([vertex.co for vertex in ball.data.vertices])
+    triangles = np.array([polygon.vertices for polygon in ball.data.polygons])
+    bpy.data.objects.remove(ball)
     return vertices, triangles
 
 
