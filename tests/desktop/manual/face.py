@@ -8,6 +8,12 @@ from blend_samples.heads import bust, eyes
 _SKIN = (0.52, 0.31, 0.22, 1.0)
 
 
+def light():
+    """Move the light of Blender's first scene, which is for a cube of two meters, near a head."""
+    lamp = bpy.data.objects["Light"]
+    lamp.location, lamp.data.energy = (1.1, -1.0, 1.6), 150.0  # [m], [W]
+
+
 def dress(head, target):
     """Give an imported head what a portrait has without hair; target: what its eyes look at [m]."""
     material = bpy.data.materials.new("Skin")

@@ -121,6 +121,7 @@ def open_head():
     mask_scalp(head)
     if MORE:
         face.dress(head, (1.0, -0.7, 0.8))
+        face.light()
     look_at(head, (1.0, -0.7, 0.3), 0.55)
     yield
 
