@@ -35,6 +35,12 @@ void main()
   float sine = length(cross(normalize(tangent), normalize(to_view)));
   strand_rise = true_half_width * view.pixels_per_unit * view.depth_rise / max(depth * depth, 1e-20);
   strand_rise /= max(sine, LEAST_SINE);
-  vec3 offset = strip_side(normalize(tangent), normalize(to_view)) * (side * half_width);
+  vec3 beside = strip_side(normalize(tangent), normalize(to_view));
+  vec3 offset = beside * (side * half_width);
+  if (drawn_point == 0 || drawn_point == view.drawn_points - 1) {
+    // As far beyond the end as half a disk covers, which a strand ends with.
+    float beyond = (drawn_point == 0) ? -FOURTH_OF_PI : FOURTH_OF_PI;
+    offset += cross(normalize(to_view), beside) * (beyond * true_half_width);
+  }
   gl_Position = view.world_to_clip * vec4(drawn_position + offset, 1.0);
 }

@@ -9,6 +9,7 @@ const int RUNS_IN_ROW = 16384;  // of `seen_runs`
 
 vec2 end_depths;  // of the axis
 vec2 end_rises;  // from there to the side that faces the viewer
+vec2 round_rises;  // the same of the spheres that a strand ends with
 uint this_index;
 bool is_seen = false;
 
@@ -35,6 +36,7 @@ void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
 {
   end_depths = vec2(segment.start.z, segment.end.z);
   end_rises = depth_rises(segment, distance(first.xyz, second.xyz));
+  round_rises = segment.half_width / segment.w * view.depth_rise;
   this_index = uint(first_segment + strand * (view.drawn_points - 1) + piece);
 }
 
@@ -44,7 +46,8 @@ bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
   if (are_tiles_known == 0) {
     return false;
   }
-  vec2 ends = vec2(mix(end_depths.x, end_depths.y, first_along), mix(end_depths.x, end_depths.y, last_along));
+  vec2 alongs = clamp(vec2(first_along, last_along), vec2(0.0), vec2(1.0));
+  vec2 ends = mix(end_depths.xx, end_depths.yy, alongs);
   float rise = max(end_rises.x, end_rises.y);
   uint nearest = floatBitsToUint(max(min(ends.x, ends.y) - rise - 1e-6, 0.0));
   for (int y = low.y / TILE; y <= high.y / TILE; y++) {
@@ -60,8 +63,10 @@ bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
 void meet(ivec2 place, float along, float across, float coverage)
 {
   // The bits of non-negative floats sort like their values.
-  float rise = mix(end_rises.x, end_rises.y, along) * sqrt(max(1.0 - across * across, 0.0));
-  uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, along) - rise, 0.0));
+  float within = clamp(along, 0.0, 1.0);
+  vec2 rises = (within == along) ? end_rises : round_rises;
+  float rise = mix(rises.x, rises.y, within) * sqrt(max(1.0 - across * across, 0.0));
+  uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, within) - rise, 0.0));
   uint nearest = imageLoad(depths, place).r;
   if (is_depth != 0) {
     is_seen = is_seen || depth <= nearest;
@@ -75,7 +80,7 @@ void meet(ivec2 place, float along, float across, float coverage)
   }
 }
 
-const bool FILLS_BENDS = true;
+const bool IS_ROUND = true;
 
 #include "include/walk_segment.glsl"
 

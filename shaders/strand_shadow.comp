@@ -57,7 +57,7 @@ void meet(ivec2 place, float along, float across, float coverage)
   }
 }
 
-const bool FILLS_BENDS = false;
+const bool IS_ROUND = false;
 
 #include "include/walk_segment.glsl"
 

@@ -4,6 +4,8 @@
 #include "include/drawn_strand.glsl"
 #include "include/packed_strand.glsl"
 
+const float FOURTH_OF_PI = 0.785398163;  // a half disk's area by its width and its radius
+
 // Index of the strand point at which a segment starts.
 int piece_start(int piece)
 {

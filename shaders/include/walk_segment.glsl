@@ -6,13 +6,14 @@
 #include "include/segment.glsl"
 #include "include/tile.glsl"
 
-// A program defines whether bends are filled, for what is seen; without, strands cover their length times their width.
-// const bool FILLS_BENDS
+// A program defines whether bends are filled and ends are round, for what is seen; without, strands cover their length times
+// their width.
+// const bool IS_ROUND
 
 // Consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;
 
-// Half width [samples] from which bends are filled: gaps of thinner strands are smaller than a sample.
+// Half width [samples] from which bends are filled and ends drawn as disks: of thinner strands these are smaller than a sample.
 const float LEAST_BEND = 1.0;
 
 // Functions that a program defines before it includes this:
@@ -25,8 +26,8 @@ const float LEAST_BEND = 1.0;
 // bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
 //     whether none of the samples from `low` to `high` need be met, of a part between two parameters along the segment
 // void meet(ivec2 place, float along, float across, float coverage)
-//     a covered sample: its parameter along the segment, its offset from the axis as a part of the drawn half width, and
-//     the coverage of the drawn width by the strand
+//     a covered sample: its parameter along the segment, outside [0, 1] in a round end; its offset from the axis as a part
+//     of the drawn half width, and the coverage of the drawn width by the strand
 
 // The first of the samples, counted from -1, whose center lies beyond a place.
 int first_sample(float place)
@@ -34,21 +35,36 @@ int first_sample(float place)
   return int(ceil(clamp(place, -1.0, 1e6) - 0.5));
 }
 
+// How far a segment goes on beyond its start and its end [samples], to cover what the half disks of its round ends add to its
+// length times its width. Those of a cone that points at the viewer are more than half of a disk at its wide end.
+vec2 end_lengths(Segment segment)
+{
+  float narrowing = segment.half_width.x - segment.half_width.y;
+  float angle = asin(clamp(narrowing / max(distance(segment.start.xy, segment.end.xy), 1e-6), -1.0, 1.0));
+  float more = 0.5 * angle - 0.5 * tan(0.5 * angle);
+  return segment.half_width * max(FOURTH_OF_PI + vec2(more, -more), vec2(0.0));
+}
+
 // Samples that lie in the segment, column by column along the axis on which it is longer. Across the columns, samples may
-// lie off their centers.
-void walk(Segment segment, ivec2 size)
+// lie off their centers. beyond_ends: of `end_lengths`, zero where other segments go on.
+void walk(Segment segment, vec2 beyond_ends, ivec2 size)
 {
   vec2 extent = abs(segment.end.xy - segment.start.xy);
   bool is_steep = extent.y > extent.x;
   vec2 start = is_steep ? segment.start.yx : segment.start.xy;
   vec2 end = is_steep ? segment.end.yx : segment.end.xy;
+  vec2 way = end - start;
+  vec2 columns = vec2(start.x, end.x);
+  if (beyond_ends != vec2(0.0)) {
+    way.x = (abs(way.x) < 1e-4) ? 1e-4 : way.x;  // of one that points at the viewer
+    columns += vec2(-1.0, 1.0) * beyond_ends * way.x / length(way);
+  }
   ivec2 last_place = (is_steep ? size.yx : size) - 1;
-  int first_column = max(first_sample(min(start.x, end.x)), 0);
-  int last_column = min(first_sample(max(start.x, end.x)) - 1, last_place.x);
+  int first_column = max(first_sample(min(columns.x, columns.y)), 0);
+  int last_column = min(first_sample(max(columns.x, columns.y)) - 1, last_place.x);
   if (last_column < first_column) {
     return;
   }
-  vec2 way = end - start;
   float slope = way.y / way.x;
   float per_column = 1.0 / way.x;
   // Width across the columns, of a strip that is as wide as the strand across its own axis.
@@ -74,7 +90,7 @@ void walk(Segment segment, ivec2 size)
     }
     for (; column <= end_column; column++) {
       float along = beyond * per_column;
-      float true_half_width = mix(segment.half_width.x, segment.half_width.y, along);
+      float true_half_width = mix(segment.half_width.x, segment.half_width.y, clamp(along, 0.0, 1.0));
       float half_width = max(true_half_width, least_half_width);
       float middle = start.y + beyond * slope;
       float reach = half_width * widening;
@@ -121,6 +137,39 @@ void fill_bend(vec2 start, vec2 end, vec2 next, float half_width, ivec2 size)
   }
 }
 
+// Samples of the disk at the end of a strand; along: outside [0, 1].
+void fill_end(vec2 end, float half_width, float along, ivec2 size)
+{
+  ivec2 low = max(ivec2(first_sample(end.x - half_width), first_sample(end.y - half_width)), ivec2(0));
+  ivec2 high = min(ivec2(first_sample(end.x + half_width), first_sample(end.y + half_width)), size) - 1;
+  for (int row = low.y; row <= high.y; row++) {
+    for (int column = low.x; column <= high.x; column++) {
+      float away = distance(vec2(column, row) + 0.5, end) / half_width;
+      if (away < 1.0) {
+        meet(ivec2(column, row), along, away, 1.0);
+      }
+    }
+  }
+}
+
+// Walk along a segment that may begin and end a strand.
+void walk_to_ends(Segment segment, bvec2 are_ends, ivec2 size)
+{
+  vec2 beyond_ends = vec2(0.0);
+  if (are_ends.x || are_ends.y) {
+    beyond_ends = end_lengths(segment) * vec2(are_ends);
+    bvec2 are_wide = greaterThanEqual(segment.half_width, vec2(LEAST_BEND));
+    beyond_ends *= vec2(not(are_wide));
+    if (are_ends.x && are_wide.x) {
+      fill_end(segment.start.xy, segment.half_width.x, -1.0, size);
+    }
+    if (are_ends.y && are_wide.y) {
+      fill_end(segment.end.xy, segment.half_width.y, 2.0, size);
+    }
+  }
+  walk(segment, beyond_ends, size);
+}
+
 // The turn of a strand among all that are drawn, of which one in FIRST_SHARE comes before the others.
 const int FIRST_SHARE = 8;
 const int WALK_ALL = 0;
@@ -161,8 +210,10 @@ void walk_run(ivec2 size)
     Segment segment;
     if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), axis, segment)) {
       begin(strand, piece, segment, first, second);
-      walk(segment, size);
-      if (FILLS_BENDS && piece + 1 < pieces && segment.part.y == 1.0 && segment.half_width.y >= LEAST_BEND) {
+      bool is_first = IS_ROUND && piece == 0 && segment.part.x == 0.0;
+      bool is_last = IS_ROUND && piece + 1 == pieces && segment.part.y == 1.0;
+      walk_to_ends(segment, bvec2(is_first, is_last), size);
+      if (IS_ROUND && piece + 1 < pieces && segment.part.y == 1.0 && segment.half_width.y >= LEAST_BEND) {
         vec4 third = to_clip(strand_point(strand, texel, head, piece_start(piece + 2)));
         if (third.z + third.w > 0.0) {
           vec2 next = sample_place(third, vec2(size)).xy;

@@ -45,6 +45,7 @@ def grown(array):
     return growing
 
 
+@pytest.mark.usefixtures("made_anew")
 @pytest.mark.parametrize("reader", ["save", "render", "interaction", "points"])
 def test_other_hair_is_written(two, reader, tmp_path, capfd):
     bad, good = two

@@ -331,7 +331,7 @@ def break_shader():
     file = shaders.FOLDER / "include" / "display_place.glsl"
     text = file.read_text()
     file.write_text(text.replace("return log2", "return nonsense + log2"))
-    shaders.program_cache.invalidate((shaders.display_program.__wrapped__, ()))
+    shaders.program_cache.invalidate((addon().gpu.scene_programs.display_program.__wrapped__, ()))
     screen("broken")
     screen("broken_again")
     file.write_text(text)

@@ -2,6 +2,8 @@
 """Fixtures: Blender without a window, the registered add-on, and scenes for hair."""
 
 import math
+from functools import partial
+from itertools import takewhile
 from types import SimpleNamespace
 
 import bpy
@@ -32,32 +34,73 @@ def blender():
         hair_addon.unregister()
 
 
-@pytest.fixture(scope="session")
-def home_file(blender, tmp_path_factory):
-    """An empty scene with the nodes that carry hair: Blender takes 0.1 s to make them, and no time to read them.
+# What most tests begin with; each stands on those before it.
+STAGES = ("sphere", "guides", "hair")
 
-    Its pictures are drawn with dual scattering, which takes less time: tests of the light grid ask for it.
+
+def add_sphere():
+    """Make a sphere of one metre with a UV map and a vertex group `top` on its upper half."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=1.0)
+    sphere = bpy.context.object
+    sphere.name = "Sphere"
+    group = sphere.vertex_groups.new(name="top")
+    group.add([int(i) for i in np.flatnonzero(vertex_positions(sphere)[:, 2] > 0.0)], 1.0, "REPLACE")
+
+
+def add_guides(relax_iterations):
+    """Distribute 60 guides over the active sphere."""
+    bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5, relax_iterations=relax_iterations)
+
+
+def add_hair():
+    """Interpolate 500 strands between the guides."""
+    bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
+    bpy.ops.vellus.interpolate_hair(strand_count=500, radius=0.004, influence_distance=0.03)
+
+
+@pytest.fixture(scope="session")
+def scene_files(blender, tmp_path_factory):
+    """{stage or "empty": a file}: to be read in 8 ms, where Blender and the add-on take up to 40 ms to make it.
+
+    All have the nodes that carry hair, which take Blender 0.1 s. Their pictures are drawn with dual scattering, which
+    takes less time: tests of the light grid ask for it.
     """
+    folder, files = tmp_path_factory.mktemp("scenes"), {}
+
+    def save(stage):
+        for group in bpy.data.node_groups:
+            group.use_fake_user = True  # to be written
+        files[stage] = folder / f"{stage}.blend"
+        bpy.ops.wm.save_as_mainfile(filepath=str(files[stage]), copy=True)
+
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.vellus.multiple_scattering = "DUAL"
     bpy.ops.mesh.primitive_plane_add()
     bpy.ops.vellus.distribute_guides(guide_count=3)
     for made in (*bpy.data.objects, *bpy.data.meshes, *bpy.data.hair_curves):
         bpy.data.batch_remove([made])
-    for group in bpy.data.node_groups:
-        group.use_fake_user = True  # to be written
-    path = tmp_path_factory.mktemp("home") / "home.blend"
-    bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
-    return path
+    save("empty")
+    for stage, add in zip(STAGES, (add_sphere, partial(add_guides, 0), add_hair), strict=True):
+        bpy.ops.wm.read_homefile(filepath=str(list(files.values())[-1]))
+        bpy.context.view_layer.objects.active = bpy.data.objects.get("Sphere")
+        add()
+        save(stage)
+    return files
 
 
 @pytest.fixture
-def scene(home_file):
+def scene(scene_files, request):
     """An empty scene, undo ready; of Blender's settings, which take longer to read, those of the process stay.
 
     The nodes that carry hair are in memory, as where hair was deleted: `read_homefile` is for a scene without them.
+    What the test's other fixtures of this file would make is there already, as in a file that was opened.
     """
-    bpy.ops.wm.read_homefile(filepath=str(home_file))
+    wanted = [*takewhile(request.fixturenames.__contains__, STAGES)]
+    if "made_anew" in request.fixturenames:
+        wanted = []
+    elif "guides" in wanted and request.getfixturevalue("relax_iterations"):
+        wanted = ["sphere"]
+    bpy.ops.wm.read_homefile(filepath=str(scene_files[wanted[-1] if wanted else "empty"]))
     for group in bpy.data.node_groups:
         group.use_fake_user = False
     bpy.context.preferences.edit.use_global_undo = True
@@ -65,16 +108,18 @@ def scene(home_file):
 
 
 @pytest.fixture
+def made_anew():
+    """For what Blender and the add-on remember of what they have just made: nothing of the scene is from a file."""
+
+
+@pytest.fixture
 def sphere(scene):
     """A sphere of one metre with a UV map and a vertex group `top` on its upper half; active."""
-    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=4, radius=1.0)
-    sphere = bpy.context.object
-    sphere.name = "Sphere"
-    group = sphere.vertex_groups.new(name="top")
-    positions = vertex_positions(sphere)
-    group.add([int(i) for i in np.flatnonzero(positions[:, 2] > 0.0)], 1.0, "REPLACE")
+    if "Sphere" not in bpy.data.objects:
+        add_sphere()
+    sphere = bpy.context.view_layer.objects.active = bpy.data.objects["Sphere"]
     bpy.ops.ed.undo_push(message="sphere")
-    return bpy.context.object
+    return sphere
 
 
 @pytest.fixture
@@ -90,7 +135,8 @@ even_guides = pytest.mark.parametrize("relax_iterations", [GuideSettings().relax
 @pytest.fixture
 def guides(sphere, relax_iterations):
     """60 guides on the sphere; their object is active."""
-    bpy.ops.vellus.distribute_guides(guide_count=60, length=0.5, relax_iterations=relax_iterations)
+    if "Guides" not in bpy.data.objects:
+        add_guides(relax_iterations)
     bpy.context.view_layer.objects.active = bpy.data.objects["Guides"]
     return bpy.data.objects["Guides"]
 
@@ -98,7 +144,8 @@ def guides(sphere, relax_iterations):
 @pytest.fixture
 def hair(guides):
     """500 strands between the guides; their object is active."""
-    bpy.ops.vellus.interpolate_hair(strand_count=500, radius=0.004, influence_distance=0.03)
+    if "Hair" not in bpy.data.objects:
+        add_hair()
     bpy.context.view_layer.objects.active = bpy.data.objects["Hair"]
     return bpy.data.objects["Hair"]
 

@@ -9,7 +9,7 @@ import gpu
 import numpy as np
 
 from ...core.imaging import ambient_cube
-from . import drawing, seen_programs, shaders, shadows, uniforms
+from . import drawing, scene_programs, seen_programs, shadows, uniforms
 from .strand_textures import seen_points
 
 # Environment light is soft: its maps are coarser than a lamp's, and drawn from as many strands as they can resolve.
@@ -147,7 +147,7 @@ class _Target:
     def __init__(self, place, is_in_bytes=False):
         self.view, self.places = place
         self.size, self._format = _size_of(*place), seen_programs.BYTES if is_in_bytes else seen_programs.SUMS
-        self.take({name: _texture(self.size, self._format) for name in shaders.VISIBILITY_SAMPLERS})
+        self.take({name: _texture(self.size, self._format) for name in scene_programs.VISIBILITY_SAMPLERS})
 
     def take(self, textures):
         """Add up in these textures {sampler: texture}, from zero."""

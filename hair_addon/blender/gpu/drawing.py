@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from . import shaders, uniforms
+from . import scene_programs, shaders, uniforms
 from .strand_textures import bare_vertices, run_for_each, vertex_count
 
 
@@ -165,7 +165,7 @@ def _parts(strand_count):
 
 
 def draw_strands(strands, program, view, lights, object_to_world, samplers=None, steps=_ALL):
-    """Draw `StrandsOnGPU` as strips into the bound framebuffer, by a program of `shaders.strip_program`.
+    """Draw `StrandsOnGPU` as strips into the bound framebuffer, by a program of `scene_programs.strip_program`.
 
     view, lights: records of `uniforms`; samplers: {sampler: texture} that the program reads beside the strands; steps:
     for pictures too coarse to show all.
@@ -187,7 +187,7 @@ def strand_samplers(strands):
 
 def runs_of_strand(record):
     """How many runs of segments each strand of a record of `strand_record` is walked along in."""
-    return -(-(int(record["drawn_points"]) - 1) // shaders.RUN_LENGTH)
+    return -(-(int(record["drawn_points"]) - 1) // scene_programs.RUN_LENGTH)
 
 
 # Which of the strands are walked along, and how many in how many: WALK_ALL and the like of
@@ -213,12 +213,12 @@ def walk_strands(strands, program, record, blocks, samplers, images, constants, 
             program.image(name, texture)
         for name, value in (constants | {"walked_part": part}).items():
             program.uniform_int(name, value)
-        run_for_each(program, walked * runs_of_strand(record), shaders.RUN_GROUP_SIZE)
+        run_for_each(program, walked * runs_of_strand(record), scene_programs.RUN_GROUP_SIZE)
 
 
 def dispatch_over(program, size):
     """Run a bound compute program once for every texel of a picture of this size."""
-    width, height = (-(-length // shaders.PICTURE_GROUP_SIZE) for length in size)
+    width, height = (-(-length // scene_programs.PICTURE_GROUP_SIZE) for length in size)
     gpu.compute.dispatch(program, width, height, 1)
 
 
@@ -251,7 +251,7 @@ def draw_cover(program, blocks, samplers):
 
 def resolve(picture, samples_per_side):
     """Fill the bound framebuffer with the mean of each block of samples_per_side² texels of a texture."""
-    program = shaders.resolve_program()
+    program = scene_programs.resolve_program()
     program.bind()
     program.uniform_int("samples_per_side", samples_per_side)
     program.uniform_sampler("picture", picture)

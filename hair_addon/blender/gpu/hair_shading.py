@@ -11,7 +11,7 @@ import numpy as np
 from ...core.shading.appearance import wet_share
 from ...core.shading.fibre import kajiya_kay, strand_variation
 from ...core.shading.tables import albedo, dual_scattering
-from . import shaders, uniforms
+from . import scene_programs, uniforms
 
 # What the two modes of the Marschner model read; in the energy-conserving one M is evaluated.
 _TABLES = {
@@ -26,7 +26,7 @@ class Shading:
     """Inputs of a strand shader, apart from the scene."""
 
     program: gpu.types.GPUShader
-    variant: Callable[..., gpu.types.GPUShader]  # the same with options of `shaders.shading_program`; compiled if used
+    variant: Callable[..., gpu.types.GPUShader]  # the same with options of `shading_program`; compiled if used
     blocks: dict = field(default_factory=dict)  # {instance: GPUUniformBuf}
     samplers: dict = field(default_factory=dict)
     forward: np.ndarray = field(default_factory=lambda: np.zeros(3))  # passed on to strands behind
@@ -153,8 +153,8 @@ def _shading(file, blocks, arrays, forward, reflectance=(0.0, 0.0, 0.0), is_vari
         kinds.append(("strand_randoms", "FLOAT_2D"))
     classes = tuple((instance, type(settings)) for instance, settings in blocks.items())
     wanted = file, classes, tuple(kinds)
-    program = shaders.shading_program(*wanted)
-    variant = partial(shaders.shading_program, *wanted)
+    program = scene_programs.shading_program(*wanted)
+    variant = partial(scene_programs.shading_program, *wanted)
     buffers = {instance: uniforms.uniform_buffer(uniforms.fill(settings)) for instance, settings in blocks.items()}
     textures = {name: _table_texture(array) for name, array in arrays.items()}
     return Shading(program, variant, buffers, textures, forward, np.array(reflectance), is_varied)

@@ -3,7 +3,7 @@
 
 import gpu
 
-from . import shaders, uniforms
+from . import scene_programs, shaders, uniforms
 
 FILM_FORMAT = "RGBA32F"  # of sums of samples
 
@@ -23,7 +23,7 @@ def film_depth_program():
 
 def _film(file, samplers, constants=()):
     info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     for slot, (name, kind) in enumerate((("filter_weights", "FLOAT_2D"), *samplers)):
         info.sampler(slot, kind, name)
     for kind, name in (("INT", "samples_per_side"), ("INT", "margin"), *constants):
@@ -35,13 +35,13 @@ def _film(file, samplers, constants=()):
 @shaders.kept
 def strand_arrival_program():
     """The compute program of light visibility from strands: see strand_arrival.comp."""
-    return shaders.compile_compute(shaders.strand_samples_info(), "strand_arrival.comp")
+    return shaders.compile_compute(scene_programs.strand_samples_info(), "strand_arrival.comp")
 
 
 @shaders.kept
 def lit_surface_program(fragment):
     """The program of how much light reaches surfaces, by a .frag."""
-    return shaders.compile_drawing(shaders.lit_surface_info(), "lit_surface.vert", fragment)
+    return shaders.compile_drawing(scene_programs.lit_surface_info(), "lit_surface.vert", fragment)
 
 
 MOTION_FORMAT = "RGBA32F"  # of how far things move
@@ -52,7 +52,7 @@ def strand_motion_program():
     """The compute program of motion vectors of strands: see strand_motion.comp."""
     names = ("strands_before", "strands_after", "moved_rows", "moved_points")
     samplers = tuple((name, "FLOAT_2D") for name in names)
-    info = shaders.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT)
+    info = scene_programs.strand_samples_info(uniforms.MOTION.source, samplers, MOTION_FORMAT)
     info.uniform_buf(2, "Motion", "motion")
     return shaders.compile_compute(info, "strand_motion.comp")
 

@@ -6,9 +6,15 @@ They are compute programs: graphics cards made for computing draw with few of th
 
 import gpu
 
-from . import shaders
+from . import scene_programs, shaders
 
-IMAGES = ("seen_x_y", "seen_z", "seen_surface", "seen_channels", "seen_color")  # as `shaders.VISIBILITY_SAMPLERS`
+IMAGES = (
+    "seen_x_y",
+    "seen_z",
+    "seen_surface",
+    "seen_channels",
+    "seen_color",
+)  # as VISIBILITY_SAMPLERS
 BYTES = "RGBA8"  # of textures that strands' visibility is kept in
 SUMS = "RGBA16F"  # and of those in which sums are added up
 
@@ -22,8 +28,8 @@ def visibility_program(texture_format):
     texture_format: `SUMS`, to which directions are added; else all are added at once, and kept as `BYTES`.
     """
     info = _program(texture_format)
-    shaders.declare_scene(info, is_lit=False)
-    for slot, name in enumerate(("places", "strand_radii"), start=len(shaders.SHADOW_SAMPLERS)):
+    scene_programs.declare_scene(info, is_lit=False)
+    for slot, name in enumerate(("places", "strand_radii"), start=len(scene_programs.SHADOW_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
     if texture_format != SUMS:
         return shaders.compile_compute(info, "world_visibility.comp", _PUT)
@@ -35,14 +41,14 @@ def visibility_program(texture_format):
 def bytes_program():
     """The program that keeps what strands see in fewer bytes."""
     info = _program(BYTES)
-    for slot, name in enumerate(shaders.VISIBILITY_SAMPLERS):
+    for slot, name in enumerate(scene_programs.VISIBILITY_SAMPLERS):
         info.sampler(slot, "FLOAT_2D", name)
     return shaders.compile_compute(info, "visibility_bytes.comp")
 
 
 def _program(texture_format):
     info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     qualifiers = {"READ", "WRITE"} if texture_format == SUMS else {"WRITE"}
     for slot, name in enumerate(IMAGES):
         info.image(slot, texture_format, "FLOAT_2D", name, qualifiers=qualifiers)

@@ -6,7 +6,7 @@ They are compute programs: graphics cards made for computing draw with few of th
 
 import gpu
 
-from . import shaders, uniforms
+from . import scene_programs, shaders, uniforms
 
 _READ_WRITE = {"READ", "WRITE"}
 
@@ -47,7 +47,7 @@ def moments_program():
 def _filter(file, texture_format, samplers, constants=(), in_layer=False, images=None):
     """The program of a file; texture_format: of `filtered`, an array with `in_layer`; images: of integers."""
     info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.typedef_source(uniforms.LIGHT.source)
     for constant in (*constants, *((("INT", "layer"),) if in_layer else ())):
         info.push_constant(*constant)

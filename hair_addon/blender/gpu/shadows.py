@@ -4,7 +4,7 @@
 import gpu
 import numpy as np
 
-from . import drawing, shaders, shadow_programs, surface_textures, uniforms
+from . import drawing, scene_programs, shadow_programs, surface_textures, uniforms
 
 SUN = 0  # LIGHT_SUN of shaders/include/lights.glsl
 
@@ -39,7 +39,7 @@ class ShadowMaps:
         self._hair_front = _array(size, layer_count, "RG32F")
         self._hair_layers = _array(size, layer_count, "RGBA16F")
         self._surface_moments = _array(size, layer_count, "RGBA32F")
-        self._in_compute = shaders.has_image_atomics() if in_compute is None else in_compute
+        self._in_compute = scene_programs.has_image_atomics() if in_compute is None else in_compute
         self._sphere = None  # that maps were aimed at last
         self._views = {}  # index of a light not near hair → (what it was aimed by, view, what `_aim` wrote)
         self._surfaces = {}  # layer → (what its surfaces were drawn with, texture of the depth that they hide behind)
@@ -59,7 +59,7 @@ class ShadowMaps:
     def samplers(self):
         """{sampler: texture} for the shaders that receive shadows."""
         textures = (self._hair_front, self._hair_layers, self._surface_moments)
-        return dict(zip(shaders.SHADOW_SAMPLERS, textures, strict=True))
+        return dict(zip(scene_programs.SHADOW_SAMPLERS, textures, strict=True))
 
     def draw(self, lights, hair, surfaces, steps=_ALL, casters=None, is_steady=False, chosen=None):
         """Draw the maps and write each light's part in them into its record.
@@ -135,7 +135,7 @@ class ShadowMaps:
 
     def _walk(self, layer, placed, lights, hidden):
         """Draw a map of strands by compute programs: integer sums are independent of the order."""
-        program = shaders.strand_shadow_program()
+        program = scene_programs.strand_shadow_program()
         samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
         if not self._is_empty:
@@ -158,8 +158,8 @@ class ShadowMaps:
     def _draw_strips(self, layer, placed, lights, hidden):
         """Draw the same map with triangle strips."""
         self._clear_ends()
-        end = shaders.strip_program("shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden))
-        layers = shaders.strip_program("shadow_layers.frag", ("hair_front",), samplers=tuple(hidden))
+        end = scene_programs.strip_program("shadow_front.frag", targets=(("front", "UINT"),), samplers=tuple(hidden))
+        layers = scene_programs.strip_program("shadow_layers.frag", ("hair_front",), samplers=tuple(hidden))
         for texture, depth, test in ((self._fronts, 1.0, "LESS_EQUAL"), (self._backs, 0.0, "GREATER_EQUAL")):
             target = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=self._depth)
             with target.bind(), drawing.gpu_state(test, depth_writes=True):

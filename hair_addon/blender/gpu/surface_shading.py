@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core.shading.tables import surface_albedo
 from ..host.caches import Cache
-from . import drawing, shaders, uniforms
+from . import drawing, scene_programs, uniforms
 
 texture_cache = Cache()  # of the textures that all surfaces are drawn with
 
@@ -18,9 +18,9 @@ def draw(surface, parts, view, lights, scene_samplers):
     scene_samplers: {sampler: texture} of shadows and of the world's visibility.
     """
     blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
-    program = shaders.surface_program()
+    program = scene_programs.surface_program()
     for first, count, material in parts:
-        images = {name: _texture(getattr(material, name)) for name in shaders.SURFACE_IMAGES}
+        images = {name: _texture(getattr(material, name)) for name in scene_programs.SURFACE_IMAGES}
         blocks["surface"] = uniforms.uniform_buffer(_record(material, images))
         samplers = {"surface_albedo": _albedo_texture()}
         samplers |= {name: _white() if texture is None else texture for name, texture in images.items()}
@@ -63,7 +63,7 @@ def _record(material, images):
     record["color"][:3] = material.color
     for name in ("roughness", "metallic", "reflectance", "normal_strength", "is_clear"):
         record[name] = getattr(material, name)
-    for index, name in enumerate(shaders.SURFACE_IMAGES):
+    for index, name in enumerate(scene_programs.SURFACE_IMAGES):
         record[f"has_{name}"] = images[name] is not None
         if images[name] is not None:
             record["image_rows"][2 * index : 2 * index + 2, :3] = getattr(material, name).rows

@@ -14,7 +14,7 @@ import numpy as np
 from ...core import geometry
 from ...core.kernels.checks import require_count, require_indices
 from ..host.caches import Cache
-from . import drawing, shaders, uniforms
+from . import drawing, scene_programs, uniforms
 from .strand_textures import TEXTURE_WIDTH
 
 _ROW_VERTICES = TEXTURE_WIDTH // 3  # at most; each is three texels
@@ -161,7 +161,7 @@ _COLORED = "shadow_surface.frag"  # the only one that a material's color matters
 
 def draw_depth(surface, view, lights, fragment=_COLORED):
     """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surface_hides.frag."""
-    program = shaders.surface_depth_program(fragment)
+    program = scene_programs.surface_depth_program(fragment)
     placed, light_block = surface.placed(view), uniforms.uniform_buffer(lights)
     first, has_color = 0, fragment == _COLORED
     for color, parts in groupby(surface.corners.colors, key=lambda part: part[1] if has_color else 0.0):
@@ -174,7 +174,7 @@ def draw_depth(surface, view, lights, fragment=_COLORED):
 
 
 def draw_lit(surface, program, view, lights, samplers):
-    """Draw all corners of a `SurfaceOnGPU` with a program of `shaders.lit_surface_info`."""
+    """Draw all corners of a `SurfaceOnGPU` with a program of `scene_programs.lit_surface_info`."""
     blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
     with drawing.bound(program, blocks, surface.samplers | samplers):
         surface.corners.lit.draw(program)

@@ -11,7 +11,7 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from . import drawing, light_grid, shaders, uniforms, visibility_programs
+from . import drawing, light_grid, scene_programs, uniforms, visibility_programs
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
@@ -54,7 +54,7 @@ class VisibilityBuffer:
 
     def __init__(self, width, height):
         self.size = (width, height)
-        self.color = gpu.types.GPUTexture(self.size, format=shaders.PICTURE_FORMAT)
+        self.color = gpu.types.GPUTexture(self.size, format=scene_programs.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
         tiles = tuple(-(-length // visibility_programs.TILE) for length in self.size)
@@ -94,7 +94,7 @@ class VisibilityBuffer:
         """
         self._hair = self._placed(hair, lights, view)
         is_refused = bool(self._hair) and self._hair[-1].first + self._hair[-1].segment_count > NO_SEGMENT
-        if not is_refused and (shaders.has_image_atomics() if in_compute is None else in_compute):
+        if not is_refused and (scene_programs.has_image_atomics() if in_compute is None else in_compute):
             self._find()
             return
         self._clear()
@@ -137,7 +137,7 @@ class VisibilityBuffer:
         """[(first, count)] of the segments of each hair that was found last."""
         return [(placed.first, placed.segment_count) for placed in self._hair]
 
-    def surfaces_of_part(self, texture_format=shaders.PICTURE_FORMAT, background=_NOTHING):
+    def surfaces_of_part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
         """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`, `part`."""
         # Each background has a texture of its own: a software driver now and then loses the clearing of one that
         # compute programs have filled, if nothing is drawn into it.
@@ -149,11 +149,11 @@ class VisibilityBuffer:
             self._parts[texture_format, background] = framebuffer, texture, depth
         return drawing.cleared(self._parts[texture_format, background][0], background)
 
-    def part(self, texture_format=shaders.PICTURE_FORMAT, background=_NOTHING):
+    def part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
         """The texture of `surfaces_of_part`."""
         return self._parts[texture_format, background][1]
 
-    def part_by(self, program, texture_format=shaders.PICTURE_FORMAT, inputs=None):
+    def part_by(self, program, texture_format=scene_programs.PICTURE_FORMAT, inputs=None):
         """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.
 
         inputs: of each hair ({instance: record}, {sampler: texture}) that the program reads beside the scene.
@@ -171,7 +171,7 @@ class VisibilityBuffer:
         """
         with self.surfaces_of_part():
             pass
-        texture = self._parts[shaders.PICTURE_FORMAT, _NOTHING][1]
+        texture = self._parts[scene_programs.PICTURE_FORMAT, _NOTHING][1]
         for placed in self._hair:
             self._shade(placed, texture, {"drawn_lobes": lobes, "drawn_world": world})
         return texture
@@ -216,7 +216,7 @@ class VisibilityBuffer:
             drawing.dispatch_over(program, (self._farthest.width, self._farthest.height))
 
     def _walk(self, all_blocks, part, is_depth, are_tiles_known=False):
-        program = shaders.segments_program()
+        program = scene_programs.segments_program()
         images = {"depths": self.depths, "segments": self.segments, "seen_runs": self._seen_runs}
         samplers, first_run = {"farthest_depths": self._farthest}, 0
         for placed, blocks in zip(self._hair, all_blocks, strict=True):
@@ -247,7 +247,7 @@ class VisibilityBuffer:
 
     def _draw_strips(self):
         """The nearest segments, as strips of triangles that the graphics driver draws."""
-        program = shaders.strip_segments_program()
+        program = scene_programs.strip_segments_program()
         with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             for placed in self._hair:
                 program.bind()

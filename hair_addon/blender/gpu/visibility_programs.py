@@ -3,7 +3,7 @@
 
 import gpu
 
-from . import shaders
+from . import scene_programs, shaders
 
 RUNS_IN_ROW = 16384  # RUNS_IN_ROW of shaders/strand_segments.comp
 TILE = 8  # samples along each side of a tile: TILE of shaders/include/tile.glsl
@@ -13,7 +13,7 @@ TILE = 8  # samples along each side of a tile: TILE of shaders/include/tile.glsl
 def farthest_depths_program():
     """The compute program that finds the farthest depth in each tile: see farthest_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.sampler(0, "UINT_2D", "depths")
     info.image(0, "R32UI", "UINT_2D", "farthest_depths", qualifiers={"WRITE"})
     return shaders.compile_compute(info, "farthest_depths.comp")
@@ -23,11 +23,11 @@ def farthest_depths_program():
 def surface_depths_program():
     """The compute program that converts depth to integers, and clears all else: see surface_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()
-    info.local_group_size(shaders.PICTURE_GROUP_SIZE, shaders.PICTURE_GROUP_SIZE)
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     info.sampler(0, "FLOAT_2D", "surface_depth")
     for slot, name in enumerate(("depths", "segments")):
         info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"WRITE"})
-    info.image(2, shaders.PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    info.image(2, scene_programs.PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
     for name in ("is_start", "is_blank"):
         info.push_constant("INT", name)
     return shaders.compile_compute(info, "surface_depths.comp")

@@ -10,7 +10,7 @@ from ...core import geometry
 from ...core.errors import HairError
 from ...core.imaging import environment
 from ..host.caches import Cache
-from . import drawing, shaders, uniforms
+from . import drawing, scene_programs, uniforms
 
 _HEIGHT = 64  # of the picture that is taken apart
 _MOST_TAPS = 32
@@ -95,4 +95,4 @@ def _draw(fragment, world, record):
         picture = gpu.texture.from_image(world.image)
     except RuntimeError as error:
         raise HairError(f'The world\'s image "{world.image.name}" cannot be read: {error}.') from error
-    drawing.draw_cover(shaders.environment_program(fragment), {"environment": record}, {"surroundings": picture})
+    drawing.draw_cover(scene_programs.environment_program(fragment), {"environment": record}, {"surroundings": picture})

@@ -15,6 +15,7 @@ from . import seen_strands
 
 _PATHS_A_PIXEL = 8
 _LEAST_PATHS, _MOST_PATHS = 20_000, 300_000  # over the part of the picture that holds the hair
+_SAMPLES_A_PATH = 4  # in which strands are drawn: those that are seen hardly change from frame to frame
 _MOST_TIMES = 4  # where that part is mostly empty, or few of its paths find light
 
 
@@ -45,12 +46,13 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
         return drawn
     device = preferences.device()
     grid = light_paths.strand_grid.build(systems, fibres, device=device)
-    seen = seen_strands.find(drawn, grid, (world_to_view, view_to_clip), window, count, seed)
+    seen = seen_strands.find(drawn, grid, (world_to_view, view_to_clip), window, _SAMPLES_A_PATH * count, seed)
     if not len(seen.segments):
         return drawn
     most = _MOST_TIMES * count
-    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, seed, device, most)
-    means = [light_paths.voxel_means.shares(of_hair, taken) for of_hair in sums]
+    starting = -(-len(seen.segments) // _SAMPLES_A_PATH)
+    sums, taken = light_paths.gather.gather(grid, _surroundings(drawn), seen, starting, seed, device, most)
+    means = [light_paths.voxel_means.shares(of_hair, taken, grid.origin) for of_hair in sums]
     visibility = [
         {**textures, "light_grid": light_grid.upload(of_hair)}
         for textures, of_hair in zip(drawn.hair_visibility, means, strict=True)

@@ -37,8 +37,9 @@ def find(drawn, grid, camera, window, count, turn):
         rows.append(row)
         columns.append(column)
     row, column = np.concatenate(rows), np.concatenate(columns)
-    near, directions = _rays(view, tile, row, column)
-    return light_paths.gather.Seen(np.concatenate(segments), near, -directions, color[row, column])
+    shown = np.concatenate(segments)
+    near, directions, areas = _rays(view, tile, (row, column), grid.points[shown])
+    return light_paths.gather.Seen(shown, near, -directions, areas, color[row, column])
 
 
 def _samples(view_to_clip, window, count):
@@ -55,13 +56,25 @@ def _samples(view_to_clip, window, count):
     return tuple(whole.tolist()), (*low.tolist(), *(high - low).tolist())
 
 
-def _rays(view, tile, row, column):
-    """(points on the near plane (N, 3), unit directions) of rays through samples of a tile."""
+def _rays(view, tile, at, places):
+    """(points on the near plane (N, 3), unit directions, areas [m²] of samples near places (N, 3)) of rays through
+    samples of a tile; at: their (rows, columns).
+    """
     to_world = np.linalg.inv(view["world_to_clip"].T.astype(np.float64))
-    x, y = (column + 0.5) / tile[2] * 2.0 - 1.0, (row + 0.5) / tile[3] * 2.0 - 1.0
+    row, column = at
+    near, way = _lines(to_world, (column + 0.5) / tile[2], (row + 0.5) / tile[3])
+    right, up = (_lines(to_world, (column + x) / tile[2], (row + y) / tile[3]) for x, y in ((1.5, 0.5), (0.5, 1.5)))
+    length = np.linalg.norm(way, axis=1, keepdims=True)
+    directions = way / length
+    part = ((places - near) * directions).sum(axis=1, keepdims=True) / length
+    sides = [start + part * other - near - part * way for start, other in (right, up)]
+    return near, directions, np.abs((np.cross(*sides) * directions).sum(axis=1))
+
+
+def _lines(to_world, x, y):
+    """(points on the near plane (N, 3), ways to the far plane) of rays through a picture, x and y (N,) from 0 to 1."""
     ends = []
     for depth in (-1.0, 1.0):
-        clip = np.stack([x, y, np.full(len(x), depth), np.ones(len(x))], axis=-1) @ to_world.T
+        clip = np.stack([2.0 * x - 1.0, 2.0 * y - 1.0, np.full(len(x), depth), np.ones(len(x))], axis=-1) @ to_world.T
         ends.append(clip[:, :3] / clip[:, 3:])
-    way = ends[1] - ends[0]
-    return ends[0], way / np.linalg.norm(way, axis=1, keepdims=True)
+    return ends[0], ends[1] - ends[0]

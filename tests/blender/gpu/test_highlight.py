@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from mathutils import Vector
 
-from hair_addon.blender.gpu import drawing, hair_shading, shaders, strand_textures, uniforms, visibility_buffer
+from hair_addon.blender.gpu import drawing, hair_shading, scene_programs, strand_textures, uniforms, visibility_buffer
 from hair_addon.core.shading.fibre import kajiya_kay
 from hair_addon.core.shading.fibre.angles import FibreAngles
 from hair_addon.core.shading.tables import lookup_tables
@@ -29,7 +29,7 @@ def strand():
 @pytest.fixture(scope="module")
 def no_shadow_maps():
     """Textures for the samplers of shadow maps, which no light of these tests has."""
-    return {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in shaders.SHADOW_SAMPLERS}
+    return {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in scene_programs.SHADOW_SAMPLERS}
 
 
 def towards(theta, phi=0.0):

@@ -8,7 +8,7 @@ import pytest
 from hair_addon.blender.gpu import (
     drawing,
     hair_shading,
-    shaders,
+    scene_programs,
     strand_textures,
     surface_textures,
     uniforms,
@@ -38,8 +38,8 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
     buffer = visibility_buffer.VisibilityBuffer(*SIZE)
     view = drawing.pass_record(np.eye(4), view_to_clip, SIZE)
     lights = uniforms.LIGHTS.record()
-    none = {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in shaders.SHADOW_SAMPLERS}
-    none |= {name: gpu.types.GPUTexture((1, 1), format="RGBA16F") for name in shaders.VISIBILITY_SAMPLERS}
+    none = {name: gpu.types.GPUTexture((1, 1), layers=2, format="R32F") for name in scene_programs.SHADOW_SAMPLERS}
+    none |= {name: gpu.types.GPUTexture((1, 1), format="RGBA16F") for name in scene_programs.VISIBILITY_SAMPLERS}
     with buffer.surfaces(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         if hiding_at is not None:
             corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
@@ -163,6 +163,43 @@ def test_thin_strands_in_one_line_cover_what_one_of_them_does(shading, in_comput
         found, _depths = drawn([(points, radii, np.eye(4))], PARALLEL, shading, in_compute)
         hits, columns = hits + (found >= 0).sum(), columns + SIZE[0]
     assert hits / columns == pytest.approx(0.2, rel=0.1)
+
+
+def test_wide_strands_end_with_disks(shading):
+    """In a parallel view: the distance of a center from the segment between the strand's ends decides."""
+    height, width = np.indices(SIZE[::-1])
+    centres = np.stack([(width + 0.5) / SIZE[0] * 2 - 1, (height + 0.5) / SIZE[1] * 2 - 1], axis=-1)
+    centres *= [HALF_WIDTH, 0.2]
+    for end, radius in (((0.1, 0.03), 0.03), ((-0.02, 0.1), 0.05), ((0.0, 0.0), 0.04)):
+        points = np.linspace([0.004, -0.003, -2.0], [*end, -2.4], 5, dtype=np.float32)[None]
+        found, depths = drawn([(points, np.full((1, 5), radius, np.float32), np.eye(4))], PARALLEL, shading, True)
+        start, way = points[0, 0, :2], points[0, -1, :2] - points[0, 0, :2]
+        along = np.clip((centres - start) @ way / max(way @ way, 1e-12), 0.0, 1.0)
+        distance = np.linalg.norm(centres - start - along[..., None] * way, axis=-1)
+        sure = np.abs(distance - radius) > 1e-4
+        # All but slivers where the last segment is cut off along a column.
+        assert ((found >= 0) != (distance < radius))[sure].sum() < 0.02 * (distance < radius).sum()
+        # Beside the near end they are spheres, but for what the segment reaches of them.
+        beside = (along == 0.0) & (found >= 0) & (distance < radius)
+        sphere = 0.2 - 0.5 * abs(PARALLEL[2, 2]) * np.sqrt(radius**2 - distance[beside] ** 2)
+        assert (depths[beside] < sphere + 2e-5).all()
+        assert np.isclose(depths[beside], sphere, rtol=0.0, atol=2e-5).mean() > 0.8
+
+
+@pytest.mark.parametrize("in_compute", [True, False])
+@pytest.mark.parametrize("turn", [1.2, 0.2, 0.0])
+def test_thin_strands_cover_what_spheres_along_them_cover(rng, shading, in_compute, turn):
+    """Strands that point at the viewer, and beside: length times width, and half a disk at either end."""
+    sample, length = 2.0 * HALF_WIDTH / SIZE[0], 0.006
+    start = rng.uniform([-0.3, -0.18, -2.0], [0.3, 0.18, -2.0], (400, 1, 3))
+    azimuth = rng.uniform(0.0, 2.0 * np.pi, (400, 1))
+    beside = np.concatenate([np.cos(azimuth), np.sin(azimuth), np.zeros((400, 1))], axis=-1)
+    way = (np.sin(turn) * beside + np.cos(turn) * np.array([0.0, 0.0, 1.0]))[:, None]
+    points = (start + np.linspace(0.0, length, 5)[:, None] * way).astype(np.float32)
+    radius = 0.4 * sample
+    found, _depths = drawn([(points, np.full((400, 5), radius, np.float32), np.eye(4))], PARALLEL, shading, in_compute)
+    expected = 400 * (2.0 * radius * length * np.sin(turn) + np.pi * radius**2) / sample**2
+    assert (found >= 0).sum() == pytest.approx(expected, rel=0.1)
 
 
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])

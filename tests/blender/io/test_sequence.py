@@ -52,7 +52,7 @@ def turning(tmp_path_factory):
     scene = bpy.context.scene
     scene.camera = bpy.context.object
     scene.frame_end, scene.render.resolution_x, scene.render.resolution_y = COUNT, 64, 48
-    scene.vellus.sample_count = 4
+    scene.vellus.sample_count, scene.vellus.multiple_scattering = 4, "DUAL"
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
     return path
 

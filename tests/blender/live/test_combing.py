@@ -20,6 +20,8 @@ from tests.support import drawn_strands
 from tests.support.counting import counts_of
 from tests.support.reading import attribute, points, write_points
 
+pytestmark = pytest.mark.usefixtures("made_anew")
+
 
 @pytest.fixture
 def window(monkeypatch):

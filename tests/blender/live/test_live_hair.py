@@ -44,6 +44,7 @@ def test_a_changed_guide_setting_makes_guides_and_their_hair_again(hair):
     assert not np.array_equal(points(hair), before)
 
 
+@pytest.mark.usefixtures("made_anew")
 def test_radii_are_written_where_they_are_others(hair, monkeypatch):
     """Again where somebody has changed them, and not while they are what was written."""
     written = []

@@ -23,7 +23,7 @@ from hair_addon.core.grooming import following
 from tests.blender.render.test_hair_places import view3d
 from tests.support import drawn_strands
 from tests.support.counting import counts_of
-from tests.support.made_strands import CLOSE, comb, drawn, grown
+from tests.support.made_strands import CLOSE, comb, drawn, grown, prepare
 from tests.support.reading import points
 
 
@@ -182,6 +182,7 @@ def test_nothing_is_measured_without_a_window(monkeypatch):
     assert not made_strands.are_wanted()
 
 
+@pytest.mark.usefixtures("made_anew")
 def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkeypatch):
     """It is measured when hair is drawn first; every edit of bound hair is then made there."""
     viewport.view_cache.clear()
@@ -197,6 +198,7 @@ def test_a_viewport_that_draws_hair_chooses(hair, window, coarse_shadows, monkey
 
     before = view()
     assert asked
+    prepare()
     for _ in range(3):
         comb(20)
         after = view()

@@ -119,6 +119,7 @@ def test_a_jump_simulates_nothing(swung, monkeypatch):
     assert np.array_equal(shown(guides), sixth)
 
 
+@pytest.mark.usefixtures("made_anew")
 def test_the_start_frame_begins_again(swung):
     guides, hair = swung
     before = drawn(hair)
@@ -169,6 +170,7 @@ def test_a_part_line_takes_effect_with_the_next_frame(swung):
     assert dynamics_state.state_of(guides.data)[0].startswith("Simulated up to frame")
 
 
+@pytest.mark.usefixtures("made_anew")
 def test_switched_off_guides_are_as_combed(swung):
     guides, hair = swung
     before = drawn(hair)

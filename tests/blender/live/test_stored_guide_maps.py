@@ -12,6 +12,8 @@ from hair_addon.core.grooming import following
 from tests.support.dynamics.following import update
 from tests.support.reading import guide_map, points, write_points
 
+pytestmark = pytest.mark.usefixtures("made_anew")
+
 
 def named_attribute(tree, name):
     """A node that reads an attribute into a value that moves points: so the tree is evaluated."""

@@ -6,7 +6,7 @@ import functools
 import gpu
 import numpy as np
 
-from ...gpu import drawing, shaders
+from ...gpu import drawing, scene_programs
 from ...gpu.visibility_buffer import VisibilityBuffer
 from .. import scene_drawing
 from . import picture_detail
@@ -103,7 +103,7 @@ class HairPicture:
             self._pass = VisibilityBuffer(*detail.buffer_size)
 
     def _accumulate(self):
-        program = shaders.accumulate_program()
+        program = scene_programs.accumulate_program()
         program.bind()
         program.uniform_int("samples_per_side", self._detail.per_side)
         program.uniform_int("first_place", self._detail.corner)
@@ -122,7 +122,7 @@ class HairPicture:
         display_table: texture of a `DisplayTransform`'s table; exposure: what light is multiplied by; depth_test:
         against what the viewport holds.
         """
-        program = shaders.display_program()
+        program = scene_programs.display_program()
         x, y, _width, _height = gpu.state.viewport_get()
         program.bind()
         program.uniform_float("origin", (x, y))

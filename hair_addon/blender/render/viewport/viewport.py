@@ -14,7 +14,7 @@ import numpy as np
 from ....core.errors import HairError
 from ...data import scene
 from ...data.strands import curves_objects
-from ...gpu import drawing, shaders
+from ...gpu import drawing, scene_programs
 from ...gpu.display_transform import DisplayTransform
 from ...groom import bindings, paused_hair
 from ...host import scene_time
@@ -250,6 +250,6 @@ def _draw_guide_object(guide_object, view, lights):
         hair_cache.refuse(guide_object.data, error)
         return
     if guides is not None:
-        program = shaders.strip_program("guides.frag")
+        program = scene_programs.strip_program("guides.frag")
         with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             drawing.draw_strands(guides, program, view, lights, np.array(guide_object.matrix_world, np.float64))

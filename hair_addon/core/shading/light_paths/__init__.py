@@ -6,6 +6,17 @@ from typing import TYPE_CHECKING
 from ...lazy import submodules
 
 if TYPE_CHECKING:
-    from . import fibre_walk, gather, grid_walk, lamp_light, light_sources, strand_grid, voxel_means
+    from . import (
+        fibre_walk,
+        gather,
+        grid_walk,
+        lamp_light,
+        light_cache,
+        light_sources,
+        seen_rays,
+        start_places,
+        strand_grid,
+        voxel_means,
+    )
 else:
     __getattr__ = submodules(__name__)

@@ -14,11 +14,13 @@ import warp as wp
 
 from ...kernels import parallel
 from ...kernels.checks import require_count, require_indices
-from . import grid_walk
+from . import grid_walk, light_cache, start_places
 from .fibre_walk import even_return, turn
-from .grid_walk import PASSED, STRAND, Medium, fibre_of, seen_place, walk
+from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
+from .light_cache import Cache, cached, layer_at
 from .light_sources import Sources, on_disk, world_radiance
+from .start_places import HIDDEN, StartsOnDevice, start
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -27,6 +29,10 @@ _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _LEAST_PATHS = 4096  # fewer are not worth a thread
+_EVENTS = 3  # on strands that a path has of its own before the rest of its light is that of the cache
+_CACHE_PATHS = 0.2  # for each path of what is seen
+_LEAST_CACHE_PATHS = 8192
+_CACHE_EVENTS = 8  # of a path that count as places where others could start
 _KNOWN = 0.015  # standard error of the mean light, as a part of it, below which no more paths are taken
 _MOST_TURNS = 64  # of paths from the same places, each as many as all before
 
@@ -50,60 +56,14 @@ class Surroundings:
 
 
 @dataclass(frozen=True, eq=False)
-class Rays:
-    """Rays of a picture: near + x near_x + y near_y to far + x far_x + y far_y, x and y from 0 to 1; (3,) each [m]."""
-
-    near: np.ndarray
-    near_x: np.ndarray
-    near_y: np.ndarray
-    far: np.ndarray
-    far_x: np.ndarray
-    far_y: np.ndarray
-
-
-@dataclass(frozen=True, eq=False)
 class Seen:
     """Strands that a viewer sees, in N rays: where paths start."""
 
     segments: np.ndarray  # (N,) of a grid
-    positions: np.ndarray  # (N, 3) [m] of any points of the rays
+    positions: np.ndarray  # (N, 3) [m] of points of the rays, beyond which nothing hides the strands
     directions: np.ndarray  # (N, 3) unit vectors towards the viewer
+    areas: np.ndarray  # (N,) [m²] across each ray, where it meets its segment, that it stands for
     drawn: np.ndarray  # (N, 3) radiance that is drawn of them without paths
-
-
-@wp.struct
-class _Rays:
-    near: wp.vec3
-    near_x: wp.vec3
-    near_y: wp.vec3
-    far: wp.vec3
-    far_x: wp.vec3
-    far_y: wp.vec3
-    side: int  # rays along each of x and y
-
-
-@wp.kernel
-def _find(
-    medium: Medium,
-    rays: _Rays,
-    seed: int,
-    out_segment: wp.array[int],
-    out_position: wp.array[wp.vec3],
-    out_viewer: wp.array[wp.vec3],
-    first: int,
-):
-    path = first + wp.tid()
-    state = wp.rand_init(seed, path)
-    x = (float(path % rays.side) + wp.randf(state)) / float(rays.side)
-    y = (float(path / rays.side) + wp.randf(state)) / float(rays.side)
-    position = rays.near + x * rays.near_x + y * rays.near_y
-    direction = wp.normalize(rays.far + x * rays.far_x + y * rays.far_y - position)
-    met = walk(medium, position, direction, _FAR, -1)
-    out_segment[path] = -1
-    if met.kind == STRAND:
-        out_segment[path] = met.index
-    out_position[path] = met.position
-    out_viewer[path] = -direction
 
 
 @wp.func
@@ -120,52 +80,62 @@ def _off_surface(normal: wp.vec3, random: wp.uint32):
 def _gather(
     medium: Medium,
     sources: Sources,
-    seen_segments: wp.array[int],
-    seen_positions: wp.array[wp.vec3],
-    seen_viewers: wp.array[wp.vec3],
-    seed: int,
-    out_position: wp.array[wp.vec3],
-    out_light: wp.array[wp.vec3],
-    out_even: wp.array[wp.vec3],
+    starts: StartsOnDevice,
+    cache: Cache,
+    out_position: wp.array2d[wp.vec3],
+    out_light: wp.array2d[wp.vec3],
+    out_even: wp.array2d[wp.vec3],
+    out_layer: wp.array2d[int],
     first: int,
 ):
     path = first + wp.tid()
-    state = wp.rand_init(seed, path)
-    direction = -seen_viewers[path]
-    met = seen_place(medium, seen_segments[path], seen_positions[path], direction, 2.0 * wp.randf(state) - 1.0)
-    out_position[path] = met.position
+    met, direction, state = start(medium, starts, path)
     weight = wp.vec3(1.0, 1.0, 1.0)
     light = wp.vec3(0.0, 0.0, 0.0)
     event = int(0)
+    on_strands = int(0)
     while event < _MOST_EVENTS:
-        if met.kind == PASSED:
+        if met.kind == HIDDEN:
+            event = _MOST_EVENTS
+        elif met.kind == PASSED:
             light += wp.cw_mul(weight, world_radiance(sources, direction))
+            event = _MOST_EVENTS
+        elif met.kind == STRAND and on_strands == cache.events:
+            fibre = fibre_of(medium, met.index)
+            even = even_return(fibre, -direction)
+            ratio = cached(cache, medium.strands[met.index], -wp.dot(direction, fibre.tangent), met.position)
+            light += wp.cw_mul(weight, wp.cw_mul(even, ratio))
             event = _MOST_EVENTS
         else:
             here = Event()
             here.position = met.position
             here.own = -1
             here.weight = weight
+            # Numbers of their own: with other lamps a path goes the same way.
+            lamp_state = wp.rand_init(1 + event, starts.keys[path])
             if met.kind == STRAND:
                 here.fibre = fibre_of(medium, met.index)
                 here.facing = -direction
                 here.own = medium.strands[met.index]
                 here.offset = -met.offset
+                if on_strands < out_even.shape[0]:
+                    out_position[on_strands, path] = met.position
+                    out_even[on_strands, path] = wp.cw_mul(weight, even_return(here.fibre, here.facing))
+                    out_light[on_strands, path] = -light
+                    out_layer[on_strands, path] = layer_at(cache, here.own, wp.dot(here.facing, here.fibre.tangent))
                 if event == 0:
-                    out_even[path] = even_return(here.fibre, here.facing)
-                    light_there, after = light_at_once(medium, sources, here, state)
+                    light_there, lamp_state = light_at_once(medium, sources, here, lamp_state)
                 else:
-                    light_there, after = light_by_share(medium, sources, here, state)
-                state = after
+                    light_there, lamp_state = light_by_share(medium, sources, here, lamp_state)
                 direction, weight, after = turn(here.fibre, here.facing, weight, here.offset, state)
                 state = after
+                on_strands += 1
             else:
                 here.facing = met.normal
                 here.position = met.position - direction * (1e-4 * medium.least_cell)
                 weight = wp.cw_mul(weight, medium.albedo[met.index])
                 here.weight = weight
-                light_there, after = light_by_share(medium, sources, here, state)
-                state = after
+                light_there, lamp_state = light_by_share(medium, sources, here, lamp_state)
                 direction, after = _off_surface(met.normal, state)
                 state = after
             light += light_there
@@ -177,41 +147,17 @@ def _gather(
                 weight = weight * (_DIM / wp.max(brightest, 1e-12))
             if event < _MOST_EVENTS:
                 met = walk(medium, here.position, direction, _FAR, here.own)
-                light_there, after = light_met(medium, sources, here, direction, met, state)
-                state = after
+                light_there, lamp_state = light_met(medium, sources, here, direction, met, lamp_state)
                 light += wp.cw_mul(weight, light_there)
-    out_light[path] = light
-
-
-def seen_by(
-    grid: StrandGrid, corners: np.ndarray, rays: Rays, path_count: int, seed: int = 0, device: wp.DeviceLike = "cpu"
-) -> Seen:
-    """The strands that rays meet before a surface, triangles of corners (3 F, 3): nothing is drawn of them yet.
-
-    path_count: of rays over the picture, rounded to a square; those that meet no strand are left out.
-    """
-    side = max(1, round(path_count**0.5))
-    with wp.ScopedDevice(device):
-        mesh = _mesh(corners)
-        medium = _medium(grid, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)), mesh)
-        segments = wp.full(side * side, -1, dtype=int)
-        positions, viewers = (wp.zeros(side * side, dtype=wp.vec3) for _ in range(2))
-        lens = _Rays()
-        for name in ("near", "near_x", "near_y", "far", "far_x", "far_y"):
-            setattr(lens, name, wp.vec3(*map(float, getattr(rays, name))))
-        lens.side = side
-        inputs = [medium, lens, seed, segments, positions, viewers]
-        _launch(_find, side * side, inputs, device)
-        found, positions, viewers = (array.numpy() for array in (segments, positions, viewers))
-    is_hair = found >= 0
-    count = int(is_hair.sum())
-    return Seen(found[is_hair], positions[is_hair], viewers[is_hair], np.zeros((count, 3), np.float32))
+    for known in range(wp.min(on_strands, out_light.shape[0])):
+        out_light[known, path] = out_light[known, path] + light
 
 
 def gather(
     grid: StrandGrid,
     surroundings: Surroundings,
     seen: Seen,
+    path_count: int,
     seed: int = 0,
     device: wp.DeviceLike = "cpu",
     most_paths: int = 0,
@@ -219,36 +165,58 @@ def gather(
     """(systems, Z, Y, X, 9) float64 by voxel: sums over paths of RGB, their light, what even light would give, and what
     is drawn without paths; and how many paths.
 
-    One starts at each place that is seen. As many as there were follow again and again, until the standard error of
-    their mean light is 1.5 % of it, or there would be more than `most_paths`: few paths of dark hair find a lamp.
+    About `path_count` start on the segments that are seen, those of them that are in sight. As many as there were
+    follow again and again, until the standard error of their mean light is 1.5 % of it, or there would be more than
+    `most_paths`: few paths of dark hair find a lamp.
     """
     count = len(seen.segments)
     require_indices("segments", seen.segments, len(grid.points) - 1)
-    for name in ("positions", "directions", "drawn"):
+    for name in ("positions", "directions", "areas", "drawn"):
         require_count(name, len(getattr(seen, name)), count)
+    systems = grid.systems[grid.strands]
+    drawn = _by_voxel(grid, _places(grid, seen), systems[seen.segments], len(grid.kept), seen.drawn)
+    if not count:
+        return np.concatenate([np.zeros((*drawn.shape[:-1], 6)), drawn], axis=-1), 0
     with wp.ScopedDevice(device):
-        mesh = _mesh(surroundings.corners)
-        medium, sources = _medium(grid, surroundings.normals, surroundings.albedo, mesh), _sources(surroundings)
-        sums, total, squares, times, turn = 0.0, 0.0, 0.0, 0, 0
+        mesh = mesh_of(surroundings.corners)
+        medium, sources = medium_of(grid, surroundings.normals, surroundings.albedo, mesh), _sources(surroundings)
+        cache = _cache(grid, medium, sources, path_count, seed, device)
+        sums, total, squares, taken, tried, turn = 0.0, 0.0, 0.0, 0, 0, 0
         while True:
-            more = max(times, 1)
-            each = Seen(*(np.tile(values, (more, 1)[: np.ndim(values)]) for values in vars(seen).values()))
-            positions, light, even = _traced(medium, sources, each, seed * _MOST_TURNS + turn, device)
-            sums = sums + _by_voxel(grid, each, positions, light, even)
-            brightness = light.sum(axis=1, dtype=np.float64)
+            more = max(tried, path_count)
+            starts = start_places.of_seen(grid, seen, more, seed * _MOST_TURNS + turn)
+            positions, light, even, _layers = (found[0] for found in _traced(medium, sources, starts, cache, 1, device))
+            is_seen = even.max(axis=-1) > 0.0
+            found = np.concatenate([light, even], axis=-1)[is_seen]
+            sums = sums + _by_voxel(grid, positions[is_seen], systems[starts.segments[is_seen]], len(grid.kept), found)
+            brightness = found[:, :3].sum(axis=1, dtype=np.float64)
             total, squares = total + float(brightness.sum()), squares + float(np.square(brightness).sum())
-            times, turn = times + more, turn + 1
-            taken = times * count
-            if not count or 2 * taken > most_paths or _standard_error(total, squares, taken) < _KNOWN:
-                return sums, taken
+            taken += len(found)
+            tried, turn = tried + more, turn + 1
+            if 2 * tried > most_paths or _standard_error(total, squares, taken) < _KNOWN:
+                return np.concatenate([sums, drawn * (taken / count)], axis=-1), taken
 
 
-def _traced(medium, sources, seen, seed, device):
-    """Of paths that start at what is seen: places there, light, and what even light would give, (N, 3) each."""
-    places = [wp.array(seen.segments.astype(np.int32), dtype=int)]
-    places += [_vectors(values) for values in (seen.positions, seen.directions)]
-    found = [wp.zeros(len(seen.segments), dtype=wp.vec3) for _ in range(3)]
-    _launch(_gather, len(seen.segments), [medium, sources, *places, seed, *found], device)
+def _cache(grid, medium, sources, path_count, seed, device):
+    """`light_cache.Cache` of light among all strands, those that nobody sees as well."""
+    starts = start_places.anywhere(grid, max(int(_CACHE_PATHS * path_count), _LEAST_CACHE_PATHS), seed)
+    found = _traced(medium, sources, starts, light_cache.none(grid), _CACHE_EVENTS, device)
+    is_event = found[2].max(axis=-1) > 0.0
+    positions, light, even, layers = (values[is_event] for values in found)
+    count = len(grid.kept) * light_cache.SINES
+    sums = _by_voxel(grid, positions, layers, count, np.concatenate([light, even], axis=-1))
+    return light_cache.of(grid, sums, len(positions), _EVENTS)
+
+
+def _traced(medium, sources, starts, cache, kept, device):
+    """Of paths, at each of the first `kept` strands that they meet: places, light from there on, and what even light
+    would give, both by the path's weight there, (kept, N, 3) each, without even light where there is no such strand;
+    and the layers of the cache, (kept, N).
+    """
+    shape = (kept, len(starts.segments))
+    found = [*(wp.zeros(shape, dtype=wp.vec3) for _ in range(3)), wp.zeros(shape, dtype=int)]
+    inputs = [medium, sources, start_places.on_device(starts), cache, *found]
+    launch(_gather, len(starts.segments), inputs, device)
     return [array.numpy() for array in found]
 
 
@@ -257,24 +225,32 @@ def _standard_error(total, squares, count):
     return np.sqrt(max(squares - total * total / count, 0.0)) / total if total > 0.0 else np.inf
 
 
-def _by_voxel(grid, seen, positions, light, even):
-    """(systems, Z, Y, X, 9) sums over paths."""
+def _places(grid, seen):
+    """(N, 3) points of segments that are nearest to the rays that see them."""
+    start, end = grid.points[seen.segments].astype(np.float64), grid.points[seen.segments + 1]
+    along = end - start
+    normal = np.cross(seen.directions, along)
+    squared = np.maximum((normal**2).sum(axis=1, keepdims=True), 1e-30)
+    beside = np.cross(start - seen.positions, seen.directions)
+    return start + np.clip((beside * normal).sum(axis=1, keepdims=True) / squared, 0.0, 1.0) * along
+
+
+def _by_voxel(grid, positions, layers, layer_count, values):
+    """(layers, Z, Y, X, C) sums of values (N, C) at positions (N, 3) of layers (N,), such as of each hair."""
     x, y, z = grid.voxels
     at = ((positions - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(int).clip(0, np.array([x, y, z]) - 1)
-    system = grid.systems[grid.strands[seen.segments]]
-    voxel = ((system * z + at[:, 2]) * y + at[:, 1]) * x + at[:, 0]
-    most = len(grid.kept) * x * y * z
-    sums = [np.bincount(voxel, weights=values, minlength=most) for values in (*light.T, *even.T, *seen.drawn.T)]
-    return np.stack(sums, axis=-1).reshape(len(grid.kept), z, y, x, 9)
+    voxel = ((layers * z + at[:, 2]) * y + at[:, 1]) * x + at[:, 0]
+    sums = [np.bincount(voxel, weights=column, minlength=layer_count * x * y * z) for column in values.T]
+    return np.stack(sums, axis=-1).reshape(layer_count, z, y, x, -1)
 
 
-def _launch(kernel, count, inputs, device):
+def launch(kernel, count, inputs, device):
     shares = parallel.share_count(count, wp.get_device(device), _LEAST_PATHS)
     if count:
         parallel.launch_shares(kernel, count, inputs, [[] for _ in range(shares)], device)
 
 
-def _mesh(corners):
+def mesh_of(corners):
     """A `wp.Mesh` of triangles, None without."""
     corners = np.ascontiguousarray(corners, np.float32).reshape(-1, 3)
     if not len(corners):
@@ -282,7 +258,7 @@ def _mesh(corners):
     return wp.Mesh(wp.array(corners, dtype=wp.vec3), wp.array(np.arange(len(corners), dtype=np.int32), dtype=int))
 
 
-def _medium(grid, normals, albedo, mesh):
+def medium_of(grid, normals, albedo, mesh):
     corner_count = 0 if mesh is None else len(mesh.indices)
     require_count("surface normals", len(normals), corner_count)
     require_count("surface colors", len(albedo), corner_count // 3)

@@ -209,26 +209,39 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
 
 
 @wp.func
-def seen_place(medium: Medium, segment: int, position: wp.vec3, direction: wp.vec3, spare: float):
-    """`Met` of a ray through a position with a segment that it is known to meet, nearest to its axis.
-
-    spare: the offset of a ray that passes beside it, as one does where thin strands are drawn wider.
+def place_on(medium: Medium, segment: int, part: float, offset: float, direction: wp.vec3):
+    """`Met` of a ray of a direction with a segment, at a part of it and an offset from its axis, on the side that faces
+    the ray: as `walk` finds it.
     """
-    start = medium.points[segment] - position
-    along = medium.points[segment + 1] - medium.points[segment]
-    normal = wp.cross(direction, along)
-    squared = wp.max(wp.dot(normal, normal), 1e-30)
-    part = wp.clamp(wp.dot(wp.cross(start, direction), normal) / squared, 0.0, 1.0)
+    start = medium.points[segment]
+    along = medium.points[segment + 1] - start
+    sideways = wp.normalize(wp.cross(direction, along))
+    inwards = wp.normalize(wp.cross(along, sideways))
     radius = medium.radii[segment] + part * (medium.radii[segment + 1] - medium.radii[segment])
+    rise = wp.sqrt(wp.max(0.0, 1.0 - offset * offset))
     met = Met()
     met.kind = STRAND
     met.index = segment
-    met.offset = -wp.dot(start, normal) / (wp.sqrt(squared) * wp.max(radius, 1e-12))
-    if wp.abs(met.offset) > 1.0:
-        met.offset = spare
-    # From the axis to the side that faces the viewer, across: where a ray along a strand enters it cannot be told.
-    inwards = wp.normalize(wp.cross(along, normal))
-    rise = wp.sqrt(wp.max(0.0, 1.0 - met.offset * met.offset))
-    side = normal * (met.offset / wp.sqrt(squared))
-    met.position = position + start + part * along + radius * (side - rise * inwards)
+    met.offset = offset
+    met.position = start + part * along + radius * (offset * sideways - rise * inwards)
     return met
+
+
+@wp.func
+def direction_of_hair(medium: Medium, segment: int, first: float, second: float):
+    """A direction that rays meet a segment in, at random by two numbers from 0 to 1, which turns with the hair."""
+    tangent = wp.normalize(medium.points[segment + 1] - medium.points[segment])
+    # Any other point of the hair: half of all points away, mostly on another strand.
+    count = medium.points.shape[0]
+    x = wp.cross(tangent, medium.points[(segment + count / 2) % count] - medium.points[segment])
+    if wp.length(x) < 1e-9:
+        x = wp.cross(tangent, wp.vec3(0.3, 0.5, 0.8))
+    x = wp.normalize(x)
+    y = wp.cross(tangent, x)
+    # A strand's width across a direction is as its sine: density sin² of the angle to the tangent.
+    angle = first * wp.pi
+    for _step in range(8):
+        angle -= (angle - 0.5 * wp.sin(2.0 * angle) - first * wp.pi) / wp.max(1.0 - wp.cos(2.0 * angle), 0.05)
+    angle = wp.clamp(angle, 0.0, wp.pi)
+    around = 2.0 * wp.pi * second
+    return wp.cos(angle) * tangent + wp.sin(angle) * (wp.cos(around) * x + wp.sin(around) * y)

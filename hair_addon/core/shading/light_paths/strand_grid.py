@@ -23,6 +23,7 @@ SEGMENT_COUNT = 3_000_000  # at most, of all strands
 CELL_COUNT = 3_000_000
 MOST_CELLS = 400  # along a side
 CELLS_A_VOXEL = 2  # along a side of the voxels that light is averaged in
+_SIZES_AN_OCTAVE = 4  # of cells
 _LEAST_SEGMENTS = 8  # of a strand, that it can bend
 _MOST_PARTS = wp.constant(2 * MOST_CELLS)  # of a segment, each about as long as a cell
 
@@ -69,6 +70,12 @@ class StrandGrid:
     systems: np.ndarray  # (S,) int32: which hair
     fibre_rows: np.ndarray  # (F, 5) float32: ior, azimuthal scale, tilt, shift of TRT in tilts, coat
     kept: tuple[Kept, ...]  # of each system
+
+    @property
+    def origin(self) -> tuple[int, int, int]:
+        """Numbers along X, Y, Z of the first voxel, of all that fill the world."""
+        first = np.rint(self.corner / (self.cell * CELLS_A_VOXEL)).astype(int)
+        return tuple(first.tolist())
 
     @property
     def voxels(self) -> tuple[int, int, int]:
@@ -226,13 +233,20 @@ def _thinned(strands, share):
 
 
 def _cells(places, radius, cell_count):
-    """(corner, sides, numbers along X, Y, Z) of cells that fill the box around all strands; nearly cubes."""
+    """(corner, sides, numbers along X, Y, Z) of cells around all strands: cubes.
+
+    They stay where they are in the world while hair moves, and their size is one of a few: what is averaged by voxel
+    changes no more than the hair does.
+    """
     low, high = places.min(axis=0).astype(np.float64) - radius, places.max(axis=0).astype(np.float64) + radius
     least = 1e-6 * max(float((high - low).max()), 1e-6)
     size = np.maximum(high - low, least)
-    cell = max(float(np.prod(size) / cell_count) ** (1.0 / 3.0), float(size.max()) / MOST_CELLS, radius)
-    shape = np.maximum(np.ceil(size / (cell * CELLS_A_VOXEL)).astype(int), 1) * CELLS_A_VOXEL
-    return low, size / shape, tuple(shape.tolist())
+    cell = max(float(np.prod(size) / cell_count) ** (1.0 / 3.0), float(size.max()) / (MOST_CELLS - 4), radius)
+    cell = 2.0 ** (np.ceil(_SIZES_AN_OCTAVE * np.log2(cell)) / _SIZES_AN_OCTAVE)
+    voxel = cell * CELLS_A_VOXEL
+    first = np.floor(low / voxel)
+    shape = (np.floor(high / voxel) - first + 1.0).astype(int) * CELLS_A_VOXEL
+    return first * voxel, np.full(3, cell), tuple(shape.tolist())
 
 
 def _registered(points, radii, strands, cells, device):

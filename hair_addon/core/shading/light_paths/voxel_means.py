@@ -6,7 +6,7 @@ import numpy as np
 _PRIOR = 512.0  # paths that the ratio of the voxels around stands for
 
 
-def shares(sums: np.ndarray, path_count: int) -> np.ndarray:
+def shares(sums: np.ndarray, path_count: int, origin: tuple[int, int, int] = (0, 0, 0)) -> np.ndarray:
     """(Z, Y, X, 9) sums of `gather` over some paths → (Z, Y, X, 4): RGB in parts of what even light gives, and how much
     of what is drawn is kept.
 
@@ -15,7 +15,7 @@ def shares(sums: np.ndarray, path_count: int) -> np.ndarray:
     """
     even = sums[..., 3:6]
     pairs = [np.concatenate([found, even], axis=-1) for found in (sums[..., :3], sums[..., 6:])]
-    light, drawn = (smooth_ratios(pair, path_count) for pair in pairs)
+    light, drawn = (smooth_ratios(pair, path_count, origin) for pair in pairs)
     most = explained_part(sums)
     kept = np.clip((light / np.maximum(drawn, 1e-12)).min(axis=-1, keepdims=True), 0.0, most)
     return np.concatenate([light - kept * drawn, kept], axis=-1)
@@ -32,35 +32,42 @@ def explained_part(sums: np.ndarray) -> float:
     return float(np.clip((share * light * drawn).sum() / max(float((share * drawn**2).sum()), 1e-30), 0.0, 1.0))
 
 
-def smooth_ratios(sums: np.ndarray, path_count: int) -> np.ndarray:
+def smooth_ratios(
+    sums: np.ndarray, path_count: int, origin: tuple[int, int, int] = (0, 0, 0), prior: float = _PRIOR
+) -> np.ndarray:
     """(Z, Y, X, 6) sums of light RGB and of even light RGB over some paths → (Z, Y, X, 3) ratios of both.
 
-    From large voxels to small ones each ratio is drawn to that of the voxel around it, by a fixed number of average
-    paths. Black where there is no light at all.
+    From large voxels to small ones each ratio is drawn to that of the voxel around it, by `prior` average paths.
+    origin: number of the first voxel along X, Y, Z: those of even numbers share a larger one with the next.
+    Black where there is no light at all.
     """
-    levels = [np.asarray(sums, np.float64)]
+    levels, shifts, first = [np.asarray(sums, np.float64)], [], np.array(origin[::-1])
     while max(levels[-1].shape[:3]) > 1:
-        levels.append(_halved(levels[-1]))
+        # Two on both sides of the world's origin would never become one.
+        shifts.append(np.where(np.array(levels[-1].shape[:3]) > 2, first % 2, 0))
+        first = first // 2
+        levels.append(_halved(levels[-1], shifts[-1]))
     total = levels.pop()
     ratios = total[..., :3] / np.maximum(total[..., 3:], 1e-12)
-    prior = np.maximum(_PRIOR / max(path_count, 1) * total[0, 0, 0, 3:], 1e-12)
-    for level in reversed(levels):
-        around = _doubled(ratios, level.shape)
-        ratios = (level[..., :3] + prior * around) / (level[..., 3:] + prior)
+    weight = np.maximum(prior / max(path_count, 1) * total[0, 0, 0, 3:], 1e-12)
+    for level, shift in zip(reversed(levels), reversed(shifts), strict=True):
+        around = _doubled(ratios, level.shape, shift)
+        ratios = (level[..., :3] + weight * around) / (level[..., 3:] + weight)
     return ratios
 
 
-def _halved(sums):
-    """Sums over blocks of 2 × 2 × 2 voxels."""
-    padded = np.pad(sums, [(0, length % 2) for length in sums.shape[:3]] + [(0, 0)])
+def _halved(sums, shift):
+    """Sums over blocks of 2 × 2 × 2 voxels, the first of them without its lower half along axes whose shift is 1."""
+    ends = [(before, (length + before) % 2) for length, before in zip(sums.shape, shift.tolist(), strict=False)]
+    padded = np.pad(sums, [*ends, (0, 0)])
     z, y, x = (length // 2 for length in padded.shape[:3])
     return padded.reshape(z, 2, y, 2, x, 2, -1).sum(axis=(1, 3, 5))
 
 
-def _doubled(values, shape):
-    """Values (..., 3) of voxels at the centres of those of half the size, linear between them."""
+def _doubled(values, shape, shift):
+    """Values (..., 3) of voxels at the centers of those of half the size, linear between them; shift: of `_halved`."""
     for axis in range(3):
-        places = 0.5 * (np.arange(shape[axis]) + 0.5) - 0.5
+        places = 0.5 * (np.arange(shape[axis]) + shift[axis] + 0.5) - 0.5
         below = np.clip(np.floor(places).astype(int), 0, values.shape[axis] - 1)
         above = np.minimum(below + 1, values.shape[axis] - 1)
         part = np.clip(places - below, 0.0, 1.0).reshape([-1 if axis == one else 1 for one in range(4)])

@@ -160,6 +160,7 @@ def test_baking_ends_with_a_sentence_and_keeps_its_frames(guides, disturb, sente
     assert sorted(path.name for path in folder.glob("+*.npz")) == [f"+{frame:08d}.npz" for frame in range(1, 5)]
 
 
+@pytest.mark.usefixtures("made_anew")
 def test_a_keyed_setting_that_becomes_no_number_is_told_and_hair_stays(guides, hair, monkeypatch):
     """While it plays: baked frames are shown, and others as combed, until the setting is a number again."""
     combed = points(hair)

@@ -171,6 +171,7 @@ def seen(drawn, view):
     return record, buffer
 
 
+@pytest.mark.usefixtures("made_anew")
 def test_combed_strands_know_where_they_were(lit, monkeypatch):
     """Where some strands are brought to their places, motion vectors are those of strands that are all uploaded."""
     monkeypatch.setattr(strand_textures, "MOST_GROUPS", 7)

@@ -16,7 +16,7 @@ from scipy.ndimage import map_coordinates
 from hair_addon.blender.data import scene
 from hair_addon.blender.data.pictures import drawn_meshes
 from hair_addon.blender.data.strands import curves_objects
-from hair_addon.blender.gpu import display_transform, shaders
+from hair_addon.blender.gpu import display_transform, scene_programs, shaders
 from hair_addon.blender.host import notices
 from hair_addon.blender.host.caches import Cache
 from hair_addon.blender.live import invalidation
@@ -293,8 +293,8 @@ def test_meshes_that_are_no_surface_in_the_viewport_hide_nothing(sphere):
 
 
 PROGRAMS = {
-    "guides.frag": lambda: shaders.strip_program.__wrapped__("guides.frag"),
-    "strand_segments.comp": lambda: shaders.segments_program.__wrapped__(),
+    "guides.frag": lambda: scene_programs.strip_program.__wrapped__("guides.frag"),
+    "strand_segments.comp": lambda: scene_programs.segments_program.__wrapped__(),
 }
 
 

@@ -2,12 +2,13 @@
 """Lamps as paths see them: as bright as the world where they fill a part of it, and found by few paths."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from hair_addon.core.imaging import lamps
-from hair_addon.core.shading.light_paths import gather
+from hair_addon.core.shading.light_paths import seen_rays
 from hair_addon.core.shading.tables import lookup_tables
 from tests.core.shading.light_paths.test_gather import (
     ALONG_Y,
@@ -42,28 +43,68 @@ def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
     if kind == lamps.SUN:  # even light over its disk, not over its angles
         radiance = radiance / cosine**3
     world = replace(surroundings(), world=np.repeat(radiance[..., None], 3, axis=-1))
-    found = [ratio(found_by(grid, light, ALONG_Y, 60_000)) for light in (surroundings(lamps=wide), world)]
+    found = [ratio(found_by(grid, light, ALONG_Y, 120_000)) for light in (surroundings(lamps=wide), world)]
     np.testing.assert_allclose(found[0], found[1], rtol=0.04)
 
 
-def test_near_a_lamp_light_grows_as_its_disk_does(rng):
-    """Strands at a quarter of a lamp's radius: one that shines all around turns its disk to them."""
+def light_on_a_strand(light, path_count=20_000):
+    """`ratio` of a thin strand at the origin that a lamp lights, seen along y."""
     thin = np.stack([np.linspace(-0.02, 0.02, 3), np.zeros(3), np.zeros(3)], axis=-1)[None]
     grid = grid_of(thin, (0.05, 0.3, 1.0), 0.002, cell_count=1_000)
     sides = np.array([0.02, 0.0, 0.0]), np.array([0.0, 0.0, 0.004])
-    rays = gather.Rays(np.array([-0.01, -0.1, -0.002]), *sides, np.array([-0.01, 0.1, -0.002]), *sides)
+    rays = seen_rays.Rays(np.array([-0.01, -0.1, -0.002]), *sides, np.array([-0.01, 0.1, -0.002]), *sides)
+    return ratio(found_by(grid, surroundings(lamps=light), rays, path_count))
+
+
+def test_near_a_lamp_light_grows_as_its_disk_does():
+    """Strands at a quarter of a lamp's radius: one that shines all around turns its disk to them."""
     around, forward = (
-        ratio(found_by(grid, surroundings(lamps=lamp(kind, 0.1, 0.4, power)), rays, 20_000))
-        for kind, power in ((lamps.POINT, 4.0), (lamps.AREA, 1.0))
+        light_on_a_strand(lamp(kind, 0.1, 0.4, power)) for kind, power in ((lamps.POINT, 4.0), (lamps.AREA, 1.0))
     )
     np.testing.assert_allclose(around, forward, rtol=0.03)
+
+
+def turned(light, angle):
+    """A lamp that shines aside of y by an angle [rad]."""
+    light["axis"][0, :3] = 0.0, np.cos(angle), np.sin(angle)
+    return light
+
+
+def test_a_spot_is_a_point_within_its_cone():
+    """Nothing beyond it, half of the light halfway between the cosines of the cone and of its soft edge's beginning."""
+    cos_cone, blend = np.cos(0.6), 0.4
+    cosines = {"inside": 1.0, "halfway": cos_cone + 0.5 * blend * (1.0 - cos_cone), "beyond": cos_cone - 0.01}
+    found = {}
+    for place, cosine in cosines.items():
+        spot = turned(lamp(lamps.SPOT, 5.0, 0.01, 300.0), np.arccos(cosine))
+        spot["cos_cone"], spot["blend"] = cos_cone, blend
+        found[place] = light_on_a_strand(spot, 4_000)
+    point = light_on_a_strand(lamp(lamps.POINT, 5.0, 0.01, 300.0), 4_000)
+    np.testing.assert_allclose(found["inside"], point, rtol=1e-4)
+    np.testing.assert_allclose(found["halfway"], 0.5 * point, rtol=1e-3)
+    assert not found["beyond"].any()
+
+
+def test_an_area_lamp_of_less_spread_gives_as_much_light():
+    """In a narrower cone: the sum over all directions is that of a lamp without a cone."""
+    edges = np.linspace(0.0, 0.75, 13)
+    sums = []
+    for cos_cone in (0.0, np.cos(0.7)):
+        total = 0.0
+        for low, high in pairwise(edges):
+            narrow = turned(lamp(lamps.AREA, 5.0, 0.01, 100.0), 0.5 * (low + high))
+            narrow["cos_cone"] = cos_cone
+            total += light_on_a_strand(narrow, 1_000) * (np.cos(low) - np.cos(high))
+        sums.append(total)
+    wide, narrow = sums
+    np.testing.assert_allclose(narrow * np.sin(edges[-1]) ** 2, wide, rtol=0.02)
 
 
 def test_a_lamp_among_hair_is_found_by_few_paths(rng):
     """A disk of 6 cm amid strands: means of few paths differ little, as no path has too much light."""
     grid = grid_of(strands_in_a_box(rng, 4_000), (0.02, 0.04, 0.06), 0.004, cell_count=50_000)
     sides = np.array([0.3, 0.0, 0.0]), np.array([0.0, 0.0, 0.3])
-    near = gather.Rays(np.array([-0.15, -0.3, -0.15]), *sides, np.array([-0.15, 4.0, -0.15]), *sides)
+    near = seen_rays.Rays(np.array([-0.15, -0.3, -0.15]), *sides, np.array([-0.15, 4.0, -0.15]), *sides)
     up = lamp(lamps.AREA, 0.0, 0.06)
     up["axis"][0, :3] = 0.0, 0.0, 1.0
     means = [ratio(found_by(grid, surroundings(lamps=up), near, 4_000, seed)).mean() for seed in range(6)]

@@ -1,0 +1,250 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""GPU programs that draw a scene's hair and surfaces, its surroundings and its pictures, and what they read."""
+
+import gpu
+
+from . import uniforms
+from .shaders import COLOR, compile_compute, compile_drawing, kept
+
+SHADOW_SAMPLERS = ("hair_front", "hair_layers", "surface_moments")
+# See shaders/world_visibility.comp.
+VISIBILITY_SAMPLERS = (
+    "visibility_x_y",
+    "visibility_z",
+    "visibility_surface",
+    "visibility_channels",
+    "visibility_color",
+)
+STRAND_SAMPLERS = ("strands", "strand_radii")  # see shaders/include/segment.glsl
+
+
+def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True):
+    """Declare the inputs of all scene shaders: camera, lights, shadow maps, world lighting."""
+    info.typedef_source(uniforms.VIEW.source + uniforms.LIGHT.source + uniforms.LIGHTS.source + structs)
+    info.uniform_buf(0, "View", "view")
+    info.uniform_buf(1, "Lights", "lights")
+    for slot, name in enumerate(shadow_samplers):
+        info.sampler(slot, "FLOAT_2D_ARRAY", name)
+    if is_lit:
+        for slot, name in enumerate(VISIBILITY_SAMPLERS, start=len(SHADOW_SAMPLERS)):
+            info.sampler(slot, "FLOAT_2D", name)
+
+
+def has_image_atomics():
+    """Whether image atomics are available: Metal has none that Python can declare."""
+    return gpu.platform.backend_type_get() in {"OPENGL", "VULKAN"}
+
+
+@kept
+def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=()):
+    """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it.
+
+    samplers: of other textures that it reads.
+    """
+    info = gpu.types.GPUShaderCreateInfo()
+    _strip(info, shadow_samplers)
+    for slot, name in enumerate(samplers, start=len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
+    return compile_drawing(info, "strand.vert", fragment, targets)
+
+
+@kept
+def strip_segments_program():
+    """The program that draws strips of strands as samples of a picture: see strand_segments.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    _strip(info, ())
+    info.push_constant("INT", "first_segment")
+    info.depth_write("ANY")
+    return compile_drawing(info, "strand.vert", "strand_segments.frag", (("segment", "UINT"), ("depth", "UINT")))
+
+
+def _strip(info, shadow_samplers):
+    declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
+    for slot, name in enumerate(STRAND_SAMPLERS, start=len(SHADOW_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
+    varying = gpu.types.GPUStageInterfaceInfo("strand_varying")
+    varying.smooth("VEC3", "drawn_position")
+    varying.smooth("FLOAT", "strand_coverage")
+    varying.smooth("FLOAT", "strand_offset_part")
+    varying.smooth("FLOAT", "strand_rise")  # of depth, from the axis to the side that faces the viewer
+    varying.smooth("FLOAT", "strand_side_place")  # across the strip, from -1 to 1
+    varying.smooth("FLOAT", "strand_place")  # in points that are drawn
+    varying.flat("INT", "strand_index")
+    info.vertex_out(varying)
+
+
+RUN_GROUP_SIZE = 64  # runs of segments that one work group of a program that walks along strands takes
+RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.glsl
+
+
+@kept
+def segments_program():
+    """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
+    constants = ("first_segment", "first_run", "is_depth", "are_tiles_known")
+    samplers = (("farthest_depths", "UINT_2D"),)
+    return _walk("strand_segments.comp", ("depths", "segments", "seen_runs"), constants, samplers=samplers)
+
+
+@kept
+def strand_shadow_program():
+    """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
+    samplers = (("hidden_depth", "FLOAT_2D"),)
+    return _walk("strand_shadow.comp", ("fronts", "backs", "counts"), ("is_front",), ("hair_front",), samplers)
+
+
+def _walk(file, images, constants, shadow_samplers=(), samplers=()):
+    info = gpu.types.GPUShaderCreateInfo()
+    declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
+    info.local_group_size(RUN_GROUP_SIZE)
+    own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
+    for slot, (name, kind) in enumerate((*own, *samplers), start=len(SHADOW_SAMPLERS)):
+        info.sampler(slot, kind, name)
+    for slot, name in enumerate(images):
+        info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
+    for name in (*constants, "walked_part"):
+        info.push_constant("INT", name)
+    return compile_compute(info, file)
+
+
+PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
+PICTURE_GROUP_SIZE = 8  # samples along each side of what one work group of a picture's programs fills
+
+
+@kept
+def shading_program(file, blocks=(), tables=(), in_parts=False, is_mixed=False):
+    """The compute program that shades strands: a model's .comp, its blocks and its samplers of tables.
+
+    blocks: (instance, class of settings), ...; tables: (sampler, type), ...; in_parts: whether just a part of the light
+    is drawn, by the constants of include/drawn_light.glsl; is_mixed: whether strands take just their share of it, by
+    the constants of include/mixed_samples.glsl.
+    """
+    structs = [uniforms.settings_block(settings_class, instance) for instance, settings_class in blocks]
+    structs_source = "".join(block.source for block in structs)
+    info = strand_samples_info(
+        structs_source, (*tables, ("strand_wetness", "FLOAT_2D")) if is_mixed else tables, is_mixed=is_mixed
+    )
+    for slot, ((instance, _class), block) in enumerate(zip(blocks, structs, strict=True), start=2):
+        info.uniform_buf(slot, block.type_name, instance)
+    replaced = {}
+    if in_parts:
+        replaced["include/drawn_light.glsl"] = None
+        info.push_constant("VEC4", "drawn_lobes")
+        info.push_constant("FLOAT", "drawn_world")
+    if is_mixed:
+        replaced["include/whole_samples.glsl"] = "include/mixed_samples.glsl"
+        info.push_constant("VEC2", "wetness_range")
+        info.push_constant("INT", "is_wet")
+    return compile_compute(info, file, replaced)
+
+
+def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, is_mixed=False):
+    """Info of a program that includes strand_samples.glsl.
+
+    samplers: (name, type), ... beside the scene's; texture_format: of what it fills; is_mixed: whether it reads that
+    too.
+    """
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(PICTURE_GROUP_SIZE, PICTURE_GROUP_SIZE)
+    declare_scene(info, structs)
+    first = len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)
+    own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
+    read = (("segments", "UINT_2D"), *own, ("light_grid", "FLOAT_3D"), *samplers)
+    for slot, (name, kind) in enumerate(read, start=first):
+        info.sampler(slot, kind, name)
+    info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"} if is_mixed else {"WRITE"})
+    for name in ("first_segment", "segment_count", "window_left", "window_bottom"):
+        info.push_constant("INT", name)
+    return info
+
+
+SURFACE_IMAGES = ("color_image", "roughness_image", "normal_image")  # of a `SurfaceMaterial`
+
+
+@kept
+def surface_program():
+    """The program that draws a lit surface: the block of its material, its images."""
+    info = lit_surface_info(uniforms.SURFACE.source)
+    info.uniform_buf(2, "Surface", "surface")
+    names = (*SURFACE_IMAGES, "surface_albedo")
+    for slot, name in enumerate(names, start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS) + 2):
+        info.sampler(slot, "FLOAT_2D", name)
+    return compile_drawing(info, "lit_surface.vert", "surface.frag")
+
+
+@kept
+def surface_depth_program(fragment="shadow_surface.frag"):
+    """The program that draws a surface into a shadow map, or one that only hides."""
+    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
+    declare_scene(info, shadow_samplers=(), is_lit=False)
+    info.sampler(0, "FLOAT_2D", "places")
+    varying.smooth("VEC3", "drawn_position")
+    info.vertex_out(varying)
+    return compile_drawing(info, "surface_place.vert", fragment)
+
+
+def lit_surface_info(structs=""):
+    """Info of a program of lit_surface.vert: its attributes, and the samplers of the scene and of `SurfaceOnGPU`."""
+    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
+    declare_scene(info, structs)
+    for slot, name in enumerate(("places", "normals"), start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)):
+        info.sampler(slot, "FLOAT_2D", name)
+    for slot, (kind, name) in enumerate((("INT", "corner_vertex"), ("INT", "corner_normal"), ("VEC2", "uv"))):
+        info.vertex_in(slot, kind, name)
+    for kind, name in (
+        ("VEC3", "drawn_position"),
+        ("VEC3", "surface_normal"),
+        ("VEC4", "corner_seen_x_y"),
+        ("VEC4", "corner_seen_z"),
+        ("VEC2", "surface_uv"),
+    ):
+        varying.smooth(kind, name)
+    info.vertex_out(varying)
+    return info
+
+
+@kept
+def environment_program(fragment):
+    """The program that draws a picture of the surroundings."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.typedef_source(uniforms.ENVIRONMENT.source)
+    info.uniform_buf(0, "Environment", "environment")
+    info.sampler(0, "FLOAT_2D", "surroundings")
+    return compile_drawing(info, "cover.vert", fragment)
+
+
+@kept
+def resolve_program():
+    """The program that averages blocks of samples_per_side² texels of `picture`."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("INT", "samples_per_side")
+    info.sampler(0, "FLOAT_2D", "picture")
+    return compile_drawing(info, "cover.vert", "resolve.frag")
+
+
+@kept
+def accumulate_program():
+    """The program that adds a pass to the picture of a viewport: see accumulate.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("INT", "samples_per_side")
+    info.push_constant("IVEC2", "first_place")  # [samples] of the textures in the picture
+    info.push_constant("FLOAT", "weight")
+    info.sampler(0, "FLOAT_2D", "picture")
+    info.sampler(1, "UINT_2D", "depths")
+    info.sampler(2, "FLOAT_2D", "surface_depth")
+    info.depth_write("ANY")
+    return compile_drawing(info, "cover.vert", "accumulate.frag")
+
+
+@kept
+def display_program():
+    """The program that shows hair over a viewport: see display.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("VEC2", "origin")  # [pixels] of the picture in the framebuffer
+    info.push_constant("FLOAT", "exposure")
+    info.push_constant("FLOAT", "opacity")
+    info.push_constant("INT", "pass_count")
+    info.sampler(0, "FLOAT_2D", "passes")
+    info.sampler(1, "FLOAT_2D", "depths")
+    info.sampler(2, "FLOAT_3D", "display_table")
+    info.depth_write("ANY")
+    return compile_drawing(info, "cover.vert", "display.frag")
