@@ -44,6 +44,7 @@ PURE = {
     "core/shading/appearance.py: strand_settings",
     "core/shading/appearance.py: table_settings",
     "core/shading/appearance.py: wetted",
+    "core/shading/tables/surface_albedo.py: table",
 }
 
 _DISPLAYS = (ast.Dict, ast.DictComp, ast.List, ast.ListComp, ast.Set, ast.SetComp)

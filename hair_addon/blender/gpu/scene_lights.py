@@ -29,13 +29,14 @@ class SceneLights:
 
     record: `uniforms.LIGHTS`, to which `ShadowMaps.draw` adds its part; links: of each of its lights, as
     `light_linking.read_links` returns them; rest, rest_links: `uniforms.LIGHT` records of the light that there is no
-    room for, and their links.
+    room for, and their links; lamps: those of all lamps, without bright parts of the world.
     """
 
     record: np.ndarray
     links: list
     rest: np.ndarray
     rest_links: list
+    lamps: np.ndarray
 
     def lit(self, receivers):
         """(R,) `uniforms.LIGHTS` of each `Receiver`: without lights that are not linked to it, and with the others'."""
@@ -78,6 +79,7 @@ def gather(found, links, world, receivers):
     receivers: of the hair, which decide what is important.
     """
     lobes, sides = world_texture.light_of(world)
+    own = found
     suns = np.zeros(len(lobes), uniforms.LIGHT.dtype)
     for sun, lobe in zip(suns, lobes, strict=True):
         sun["kind"], sun["casts_shadow"] = lamps.SUN, True
@@ -98,7 +100,7 @@ def gather(found, links, world, receivers):
     record = uniforms.LIGHTS.record()
     record["light"][:count], record["count"] = found[:count], count
     record["world"][:, :3] = sides
-    return SceneLights(record, links[:count], rest, rest_links)
+    return SceneLights(record, links[:count], rest, rest_links, own)
 
 
 def _importance(found, links, receivers):

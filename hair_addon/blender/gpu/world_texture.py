@@ -42,10 +42,10 @@ def light_of(world):
 
 
 def picture_of(world):
-    """(H, W, 3) radiance of a `lights.World` without its lobes, in pictures as core/imaging/environment.py has them."""
+    """(H, W, 3) radiance of a `lights.World`, in pictures as core/imaging/environment.py has them."""
     if world.image is None:
         return np.asarray(world.color, float).reshape(1, 1, 3)
-    return environment.without_lobes(_unrolled(world))
+    return _unrolled(world)
 
 
 def check_image():

@@ -42,7 +42,8 @@ class DrawnScene:
     selected: tuple = ()  # whether that object is selected
     instances: tuple = ()  # of hair, as `hair_places.read_instances` found them
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
-    meshes: tuple = ()  # (corner positions, normals, RGB of triangles) of each of `surfaces`, of a render
+    # (corner positions, their normals, `triangle_materials`) of each of `surfaces`, of a render
+    meshes: tuple = ()
     clear: tuple = ()  # as `surfaces`, of those that hide nothing
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
@@ -207,7 +208,7 @@ def read_unlit(depsgraph, known, refused):
 
 def _corners_of(meshes):
     """`DrawnScene.meshes`."""
-    return tuple((mesh.positions, mesh.corner_normals, mesh.triangle_colors) for mesh in meshes if not mesh.is_clear)
+    return tuple((mesh.positions, mesh.corner_normals, mesh.triangle_materials) for mesh in meshes if not mesh.is_clear)
 
 
 def _upload(meshes, is_shaded):

@@ -108,18 +108,18 @@ def _strands_of(strands, shading, to_world, first):
 
 def _surroundings(drawn):
     """`gather.Surroundings` of a `DrawnScene`."""
-    record = drawn.lights
-    drawn_count = int(record["count"])
-    found = np.concatenate([record["light"][:drawn_count], drawn.lamps.rest])
+    found = drawn.lamps.lamps
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in drawn.hair])
     places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     importance = lamps.irradiance(found, places).mean(axis=(1, 2)) if len(found) else np.zeros(0)
-    corners, normals, colors = ([mesh[index] for mesh in drawn.meshes] for index in range(3))
+    corners, normals, materials = ([mesh[index] for mesh in drawn.meshes] for index in range(3))
+    colors, gloss = np.split(np.concatenate([np.zeros((0, 6)), *materials]), 2, axis=1)
     return light_paths.gather.Surroundings(
         np.concatenate([np.zeros((0, 3), np.float32), *corners]),
         np.concatenate([np.zeros((0, 3), np.float32), *normals]),
-        np.concatenate([np.zeros((0, 3)), *colors]),
+        colors,
         found,
         importance,
         world_texture.picture_of(drawn.world),
+        gloss,
     )

@@ -33,18 +33,6 @@ class Lobe:
 
 def split(radiance: np.ndarray) -> tuple[list[Lobe], np.ndarray]:
     """([`Lobe`, ...], (6, 3) mean radiance of the sides without them) of a picture of the surroundings."""
-    lobes, left = _without_lobes(radiance)
-    directions, solid_angles = _texels(*radiance.shape[:2])
-    return lobes, ambient_cube.side_means(left, directions, solid_angles / (4.0 * np.pi))
-
-
-def without_lobes(radiance: np.ndarray) -> np.ndarray:
-    """(H, W, 3): the same picture less the light of its lobes."""
-    return _without_lobes(radiance)[1].reshape(radiance.shape)
-
-
-def _without_lobes(radiance):
-    """Lobes, and the radiance (H W, 3) that they leave."""
     directions, solid_angles = _texels(*radiance.shape[:2])
     left = np.maximum(radiance.reshape(-1, 3), 0.0).astype(float)
     least = _LEAST_PART * float((left @ _LUMINANCE) @ solid_angles)
@@ -59,7 +47,7 @@ def _without_lobes(radiance):
         direction = moment / np.linalg.norm(moment)
         lobes.append(Lobe(direction, np.maximum(power, 0.0), 1.0 - float(closeness)))
         left[window] -= excess
-    return lobes, left
+    return lobes, ambient_cube.side_means(left, directions, solid_angles / (4.0 * np.pi))
 
 
 def _brightest(radiance, directions, solid_angles):

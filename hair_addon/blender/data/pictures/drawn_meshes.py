@@ -30,7 +30,7 @@ class DrawnMesh:
     uvs: np.ndarray | None
     parts: tuple | None
     owner: tuple = ()
-    colors: tuple = ()  # (number of corners, linear RGB) of each material, in the corners' order
+    materials: tuple = ()  # (number of corners, `SurfaceMaterial`), in the corners' order: of a holdout too
 
     @property
     def positions(self):
@@ -48,10 +48,18 @@ class DrawnMesh:
         return placed[self.triangles] if self.has_vertex_normals else placed
 
     @property
-    def triangle_colors(self):
-        """(F, 3) float32: linear RGB of each triangle's material."""
-        colors = np.array([color for _count, color in self.colors], np.float32)
-        return colors.repeat([count // 3 for count, _color in self.colors], axis=0)
+    def colors(self):
+        """(number of corners, linear RGB) of each material, in the corners' order."""
+        return tuple((count, material.color) for count, material in self.materials)
+
+    @property
+    def triangle_materials(self):
+        """(F, 6) float32 of each triangle's material: linear RGB, roughness, metallic, reflectance."""
+        rows = [
+            (*material.color, material.roughness, material.metallic, material.reflectance)
+            for _count, material in self.materials
+        ]
+        return np.array(rows, np.float32).repeat([count // 3 for count, _material in self.materials], axis=0)
 
     @property
     def is_clear(self):
@@ -131,7 +139,7 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
         uvs = _read_uvs(mesh, layout.loops, () if is_holdout else parts)
     finally:
         mesh_object.to_mesh_clear()
-    colors = tuple((count, material.color) for _first, count, material in parts)
+    materials = tuple((count, material) for _first, count, material in parts)
     return DrawnMesh(
         vertices,
         layout.vertices,
@@ -140,7 +148,7 @@ def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
         has_vertex_normals,
         uvs,
         None if is_holdout else parts,
-        colors=colors,
+        materials=materials,
     )
 
 

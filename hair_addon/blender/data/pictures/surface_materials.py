@@ -62,9 +62,12 @@ class SurfaceMaterial:
 
 
 def read_material(material):
-    """The `SurfaceMaterial` of a Blender material; without Principled BSDF it is matt, of its color in the viewport."""
+    """The `SurfaceMaterial` of a Blender material; without Principled BSDF it is matt, of its color in the viewport.
+
+    Without a material a surface has a Principled BSDF as it is added, as in EEVEE and Cycles.
+    """
     if material is None:
-        return SurfaceMaterial()
+        return SurfaceMaterial(roughness=0.5, reflectance=_reflectance(1.5, 0.5))
     principled = _principled(material.node_tree)
     if principled is None:
         return SurfaceMaterial(tuple(material.diffuse_color[:3]))

@@ -16,7 +16,9 @@ if TYPE_CHECKING:
         seen_rays,
         start_places,
         strand_grid,
+        surface_walk,
         voxel_means,
+        world_light,
     )
 else:
     __getattr__ = submodules(__name__)

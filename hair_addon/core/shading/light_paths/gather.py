@@ -14,14 +14,17 @@ import warp as wp
 
 from ...kernels import parallel
 from ...kernels.checks import require_count, require_indices
+from ..tables import surface_albedo
 from . import grid_walk, light_cache, start_places
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
 from .light_cache import Cache, cached, layer_at
-from .light_sources import Sources, on_disk, world_radiance
+from .light_sources import Sources, across
 from .start_places import HIDDEN, StartsOnDevice, start
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
+from .surface_walk import surface_of, surface_turn
+from .world_light import world_of
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -42,9 +45,10 @@ class Surroundings:
     """What lights hair beside itself: surfaces, lamps and the world.
 
     corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own;
-    albedo: (F, 3) of them, diffuse; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
-    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance without lamps, a picture of longitude
-    and latitude as core/imaging/environment.py takes it apart.
+    albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
+    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance, a picture of longitude
+    and latitude as core/imaging/environment.py takes it apart; gloss: (F, 3) of triangles, roughness, metallic, and
+    reflectance at normal incidence, without it all are matt.
     """
 
     corners: np.ndarray
@@ -53,6 +57,7 @@ class Surroundings:
     lamps: np.ndarray
     importance: np.ndarray
     world: np.ndarray
+    gloss: np.ndarray | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,16 +69,6 @@ class Seen:
     directions: np.ndarray  # (N, 3) unit vectors towards the viewer
     areas: np.ndarray  # (N,) [m²] across each ray, where it meets its segment, that it stands for
     drawn: np.ndarray  # (N, 3) radiance that is drawn of them without paths
-
-
-@wp.func
-def _off_surface(normal: wp.vec3, random: wp.uint32):
-    """(direction of light that a diffuse surface sends back, random state)."""
-    state = random
-    squared = wp.randf(state)
-    turned = wp.randf(state)
-    direction = on_disk(normal, 1.0, squared, turned) + wp.sqrt(wp.max(0.0, 1.0 - squared)) * normal
-    return wp.normalize(direction), state
 
 
 @wp.kernel
@@ -95,10 +90,7 @@ def _gather(
     event = int(0)
     on_strands = int(0)
     while event < _MOST_EVENTS:
-        if met.kind == HIDDEN:
-            event = _MOST_EVENTS
-        elif met.kind == PASSED:
-            light += wp.cw_mul(weight, world_radiance(sources, direction))
+        if met.kind == HIDDEN or met.kind == PASSED:
             event = _MOST_EVENTS
         elif met.kind == STRAND and on_strands == cache.events:
             fibre = fibre_of(medium, met.index)
@@ -131,12 +123,12 @@ def _gather(
                 state = after
                 on_strands += 1
             else:
-                here.facing = met.normal
+                here.facing = -direction
                 here.position = met.position - direction * (1e-4 * medium.least_cell)
-                weight = wp.cw_mul(weight, medium.albedo[met.index])
-                here.weight = weight
+                color, gloss = medium.albedo[met.index], medium.gloss[met.index]
+                here.surface = surface_of(met.normal, here.facing, color, gloss, medium.reflected)
                 light_there, lamp_state = light_by_share(medium, sources, here, lamp_state)
-                direction, after = _off_surface(met.normal, state)
+                direction, weight, after = surface_turn(here.surface, across(met.normal), weight, state)
                 state = after
             light += light_there
             event += 1
@@ -179,7 +171,8 @@ def gather(
         return np.concatenate([np.zeros((*drawn.shape[:-1], 6)), drawn], axis=-1), 0
     with wp.ScopedDevice(device):
         mesh = mesh_of(surroundings.corners)
-        medium, sources = medium_of(grid, surroundings.normals, surroundings.albedo, mesh), _sources(surroundings)
+        medium = medium_of(grid, mesh, surroundings.normals, surroundings.albedo, surroundings.gloss)
+        sources = _sources(surroundings)
         cache = _cache(grid, medium, sources, path_count, seed, device)
         sums, total, squares, taken, tried, turn = 0.0, 0.0, 0.0, 0, 0, 0
         while True:
@@ -258,8 +251,10 @@ def mesh_of(corners):
     return wp.Mesh(wp.array(corners, dtype=wp.vec3), wp.array(np.arange(len(corners), dtype=np.int32), dtype=int))
 
 
-def medium_of(grid, normals, albedo, mesh):
+def medium_of(grid, mesh, normals, albedo, gloss=None):
     corner_count = 0 if mesh is None else len(mesh.indices)
+    gloss = np.zeros((corner_count // 3, 3)) if gloss is None else gloss
+    require_count("surface gloss", len(gloss), corner_count // 3)
     require_count("surface normals", len(normals), corner_count)
     require_count("surface colors", len(albedo), corner_count // 3)
     medium = Medium()
@@ -271,7 +266,8 @@ def medium_of(grid, normals, albedo, mesh):
     medium.strands, medium.fibres = wp.array(grid.strands, dtype=int), wp.array(grid.fibres, dtype=int)
     medium.fibre_rows = wp.array(grid.fibre_rows, dtype=float)
     medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
-    medium.normals, medium.albedo = _vectors(normals), _vectors(albedo)
+    medium.normals, medium.albedo, medium.gloss = (_vectors(values) for values in (normals, albedo, gloss))
+    medium.reflected = wp.array(surface_albedo.table(), dtype=wp.vec4)
     return medium
 
 
@@ -290,7 +286,7 @@ def _sources(surroundings):
     importance = np.asarray(surroundings.importance, float)
     chance = importance + 0.1 * importance.mean() + 1e-12 if len(lamps) else importance
     sources.chance = wp.array((chance / max(chance.sum(), 1e-30)).astype(np.float32), dtype=float)
-    sources.world = wp.array(np.ascontiguousarray(surroundings.world, np.float32), dtype=wp.vec3)
+    sources.world = world_of(surroundings.world)
     return sources
 
 

@@ -38,7 +38,9 @@ class Medium:
     mesh: wp.uint64
     has_mesh: int
     normals: wp.array[wp.vec3]  # of each triangle's corners
-    albedo: wp.array[wp.vec3]  # of each triangle
+    albedo: wp.array[wp.vec3]  # base color of each triangle
+    gloss: wp.array[wp.vec3]  # of each triangle: roughness, metallic, reflectance at normal incidence
+    reflected: wp.array2d[wp.vec4]  # `surface_albedo.table`
 
 
 @wp.struct

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Light of lamps at the events of a path: of random points of lamps, and of lamps that the path meets [Veach95].
+"""Light at the events of a path: of random points of lamps and the world, and of those that the path meets [Veach95].
 
 Both find the same light: each counts by its share of both densities (the balance heuristic), so that neither lamps near
 a strand nor narrow lobes give few paths much light.
@@ -7,13 +7,16 @@ a strand nor narrow lobes give few paths much light.
 
 import warp as wp
 
-from .fibre_walk import PI, Fibre, value
+from .fibre_walk import Fibre, value
 from .grid_walk import PASSED, Medium, Met, walk
-from .light_sources import Lit, Sources, choose, lit_by, lit_from
+from .light_sources import Lit, Sources, choose, lit_by, lit_by_world, lit_from
+from .surface_walk import Surface, surface_value
+from .world_light import world_density, world_radiance
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 _LAMPS_AT_ONCE = wp.constant(8)  # that light an event
+_WORLD_AT_ONCE = wp.constant(4)  # directions of the world that light a seen place
 _OFFSETS_AT_ONCE = wp.constant(4)  # over the part of a strand's width around the one that is met
 _AROUND = wp.constant(0.25)  # half that part, of the radius
 _LEAST = wp.constant(0.5)  # of the smallest cell: distance below which no lamp's light grows
@@ -21,10 +24,10 @@ _LEAST = wp.constant(0.5)  # of the smallest cell: distance below which no lamp'
 
 @wp.struct
 class Event:
-    """A place on strand `own`, or where that is below zero on a diffuse surface.
+    """A place on strand `own`, or where that is below zero on a surface.
 
-    facing: unit vector towards the path's last place, or the surface's normal; offset: in the strand's width, from -1
-    to 1; weight: of light from there to the viewer, with the surface's color.
+    facing: unit vector towards the path's last place; offset: in the strand's width, from -1 to 1; weight: of light
+    from there to the viewer.
     """
 
     position: wp.vec3
@@ -33,6 +36,18 @@ class Event:
     offset: float
     own: int
     fibre: Fibre
+    surface: Surface
+
+
+@wp.func
+def turn_density(here: Event, direction: wp.vec3):
+    """The density [1/sr] with which a path leaves an event in a direction."""
+    density = float(0.0)
+    if here.own >= 0:
+        _found, density = value(here.fibre, here.facing, direction, here.offset, here.weight)
+    else:
+        _found, density = surface_value(here.surface, direction, here.weight)
+    return density
 
 
 @wp.func
@@ -56,9 +71,16 @@ def _one_of(sources: Sources, index: int, random: wp.uint32):
 
 @wp.func
 def _lamp_at(medium: Medium, sources: Sources, index: int, here: Event, random: wp.uint32):
-    """(`Lit` of `_one_of` the lamps with its share, that share, random state)."""
-    chosen, share, after = _one_of(sources, index, random)
-    lit, state = lit_by(sources, chosen, here.position, _LEAST * medium.least_cell, after)
+    """(`Lit` of `_one_of` the lamps with its share, or of the world after them; that share; random state)."""
+    state = random
+    lit = Lit()
+    share = float(1.0)
+    if index < wp.min(sources.count, _LAMPS_AT_ONCE):
+        chosen, of_one, after = _one_of(sources, index, state)
+        share = of_one
+        lit, state = lit_by(sources, chosen, here.position, _LEAST * medium.least_cell, after)
+    else:
+        lit, state = lit_by_world(sources, state)
     return lit, share, state
 
 
@@ -77,8 +99,8 @@ def _scattered(here: Event, lit: Lit, shift: float):
     """Light of a point of a lamp that goes to the viewer, by its share of densities: the mean around an offset."""
     light = wp.vec3(0.0, 0.0, 0.0)
     if here.own < 0:
-        density = wp.max(wp.dot(here.facing, lit.direction), 0.0) / PI
-        light = wp.cw_mul(here.weight, lit.irradiance) * (density * lit.density / (lit.density + density))
+        light, density = surface_value(here.surface, lit.direction, here.weight)
+        light = wp.cw_mul(here.weight, wp.cw_mul(lit.irradiance, light)) * (lit.density / (lit.density + density))
     else:
         for step in range(_OFFSETS_AT_ONCE):
             h = _offset_at(here, step, shift)
@@ -90,12 +112,15 @@ def _scattered(here: Event, lit: Lit, shift: float):
 
 @wp.func
 def light_at_once(medium: Medium, sources: Sources, here: Event, random: wp.uint32):
-    """(radiance of lamps' light that an event sends to the viewer, random state): all lamps are traced."""
+    """(radiance of light that an event sends to the viewer, random state): all lamps are traced."""
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)
-    for index in range(wp.min(sources.count, _LAMPS_AT_ONCE)):
+    lamp_count = wp.min(sources.count, _LAMPS_AT_ONCE)
+    for index in range(lamp_count + _WORLD_AT_ONCE * sources.world.is_uneven):
         lit, share, after = _lamp_at(medium, sources, index, here, state)
         state = after
+        if index >= lamp_count:
+            share = share / float(_WORLD_AT_ONCE)
         if wp.max(lit.irradiance) > 0.0 and not _is_shadowed(medium, lit, here):
             light += share * _scattered(here, lit, wp.randf(state))
     return light, state
@@ -110,7 +135,7 @@ def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uin
     total = float(0.0)
     kept = wp.vec3(0.0, 0.0, 0.0)
     kept_lit = Lit()
-    for index in range(wp.min(sources.count, _LAMPS_AT_ONCE)):
+    for index in range(wp.min(sources.count, _LAMPS_AT_ONCE) + sources.world.is_uneven):
         lit, share, after = _lamp_at(medium, sources, index, here, state)
         state = after
         light = wp.vec3(0.0, 0.0, 0.0)
@@ -130,7 +155,7 @@ def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uin
 
 @wp.func
 def light_met(medium: Medium, sources: Sources, here: Event, direction: wp.vec3, met: Met, random: wp.uint32):
-    """(radiance of lamps in the direction in which a path leaves an event, by its share of densities, random state).
+    """(radiance from the direction in which a path leaves an event, by its share of densities, random state).
 
     met: what the path meets there.
     """
@@ -143,8 +168,12 @@ def light_met(medium: Medium, sources: Sources, here: Event, direction: wp.vec3,
         if wp.max(lit.irradiance) > 0.0:
             end = wp.dot(met.position - here.position, direction)
             if met.kind == PASSED or lit.casts_shadow == 0 or lit.distance < end:
-                density = wp.max(wp.dot(here.facing, direction), 0.0) / PI
-                if here.own >= 0:
-                    _found, density = value(here.fibre, here.facing, direction, here.offset, here.weight)
+                density = turn_density(here, direction)
                 light += lit.irradiance * (share * lit.density * density / (lit.density + density))
+    if met.kind == PASSED:
+        of_turn = float(1.0)
+        if sources.world.is_uneven > 0:
+            density = turn_density(here, direction)
+            of_turn = density / wp.max(density + world_density(sources.world, direction), 1e-30)
+        light += of_turn * world_radiance(sources.world, direction)
     return light, state

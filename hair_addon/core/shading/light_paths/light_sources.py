@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Lamps and the world as paths see them: shaders/include/lights.glsl, at a point of each lamp."""
+"""Lamps as paths see them: shaders/include/lights.glsl, at a point of each lamp; and the world beside them."""
 
 import warp as wp
 
 from .fibre_walk import PI
 from .grid_walk import FAR
+from .world_light import World, world_direction
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -14,7 +15,7 @@ SUN, POINT, SPOT, AREA = (wp.constant(kind) for kind in range(4))  # as `core.im
 
 @wp.struct
 class Sources:
-    """Lamps, and a picture of the world without them."""
+    """Lamps, and the world."""
 
     count: int
     kind: wp.array[int]
@@ -23,7 +24,7 @@ class Sources:
     power: wp.array[wp.vec3]
     shape: wp.array[wp.vec4]  # radius, cos_cone, blend, whether it casts shadows
     chance: wp.array[float]  # of being chosen
-    world: wp.array2d[wp.vec3]  # rows of latitude, columns from pi to -pi
+    world: World
 
 
 @wp.struct
@@ -56,17 +57,6 @@ def on_disk(normal: wp.vec3, radius: float, first: float, second: float):
     y = wp.cross(normal, x)
     distance = radius * wp.sqrt(first)
     return distance * (wp.cos(2.0 * PI * second) * x + wp.sin(2.0 * PI * second) * y)
-
-
-@wp.func
-def world_radiance(sources: Sources, direction: wp.vec3):
-    """Radiance of the world from a direction."""
-    height = sources.world.shape[0]
-    width = sources.world.shape[1]
-    u = 0.5 - wp.atan2(direction[1], direction[0]) / (2.0 * PI)
-    v = 0.5 + wp.asin(wp.clamp(direction[2], -1.0, 1.0)) / PI
-    row = wp.clamp(int(v * float(height)), 0, height - 1)
-    return sources.world[row, wp.clamp(int(u * float(width)), 0, width - 1)]
 
 
 @wp.func
@@ -154,6 +144,20 @@ def lit_by(sources: Sources, chosen: int, position: wp.vec3, least: float, rando
         lit.distance = wp.max(wp.length(to_point), 1e-6)
         lit.direction = to_point / lit.distance
     return _sent(sources, chosen, offset, lit, least), state
+
+
+@wp.func
+def lit_by_world(sources: Sources, random: wp.uint32):
+    """(`Lit` by a direction of the world, random state)."""
+    state = random
+    lit = Lit()
+    direction, radiance, density, after = world_direction(sources.world, state)
+    lit.direction = direction
+    lit.distance = FAR
+    lit.density = wp.max(density, 1e-12)
+    lit.irradiance = radiance / lit.density
+    lit.casts_shadow = 1
+    return lit, after
 
 
 @wp.func

@@ -71,7 +71,7 @@ def met_by(
     side = max(1, round(ray_count**0.5))
     with wp.ScopedDevice(device):
         mesh = mesh_of(corners)
-        medium = medium_of(grid, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)), mesh)
+        medium = medium_of(grid, mesh, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)))
         segments = wp.full(side * side, -1, dtype=int)
         positions, viewers = (wp.zeros(side * side, dtype=wp.vec3) for _ in range(2))
         lens = _Rays()

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Part of uniform light that a rough surface reflects towards the eye: the microfacets of [Walter07] and [Heitz14]."""
 
+from functools import cache
+
 import numpy as np
 
 SIZE = 32
@@ -8,6 +10,7 @@ _SAMPLE_COUNT = 512  # of microfacets' normals, for each texel
 _REFRACTIVE_INDEX = 1.5  # of the dielectric whose Fresnel reflectance is scaled to all others
 
 
+@cache
 def table() -> np.ndarray:
     """(SIZE, SIZE, 4) float32: what microfacets reflect, at any Fresnel reflectance F0 of normal incidence.
 
