@@ -1,7 +1,7 @@
 # make demo and make test work from a fresh clone: dependencies are installed into .venv first.
 # ARGS goes to pytest or to the script:  make test ARGS="-k cvt -x"
 
-.PHONY: help demo compare turntable dynamics test farm desktop bench build lint lock samples clean
+.PHONY: help demo compare turntable dynamics pictures test farm desktop bench build lint lock samples clean
 .DELETE_ON_ERROR:
 
 # Let uv use the system's certificates, as pip does: some networks have their own.
@@ -42,6 +42,9 @@ turntable: $(installed) ## a turntable of the head, 24 frames by the command lin
 
 dynamics: $(installed) ## hair that moves: strips, plots and a film in out/dynamics; ARGS="shaking plots" for some
 	$(python) blend_samples/dynamics/dynamics.py --out out/dynamics $(ARGS)
+
+pictures: $(installed) ## the pictures of README and manual, in docs; ARGS="styles grooms" for some, and for slow ones
+	$(python) blend_samples/pictures/all_pictures.py $(ARGS)
 
 build: $(installed) ## dist/vellus-VERSION-PLATFORM.zip; PLATFORM=linux-x64, windows-x64, macos-arm64 or all
 	$(python) tools/build_extension.py $(PLATFORM)

@@ -140,7 +140,7 @@ def write(path, pixels, size=None):
 
 
 def save_sample(path):
-    """Grow hair on the head, draw hair.png, and save the scene with less hair, which a window draws quickly."""
+    """Draw hair.png, and save the head with little hair, which a window draws quickly."""
     sys.path.insert(0, str(ROOT))
     import bpy
 
@@ -148,20 +148,28 @@ def save_sample(path):
     from blend_samples.heads import head
 
     hair_addon.register()
-    head_object = head.build()
-    _guides, hair = head.grow(head_object)
+    draw_portrait(MANUAL / "hair.png")
+    bpy.context.view_layer.objects.active = head.build()
     head.light()
-    bpy.context.view_layer.objects.active = hair
-    bpy.ops.vellus.apply_preset(preset="AUBURN")
-    hair.data.vellus.appearance.mode = "energy"
-    bpy.ops.vellus.render_picture(filepath=str(MANUAL / "hair.png"), width=400, height=270)
-    bpy.ops.vellus.delete_hair()
     bpy.ops.vellus.add_hair(density_group="scalp", length=0.1, gravity=0.8, strand_count=5000)
     bpy.data.hair_curves["Hair"].vellus.marschner.size = 64
     bpy.data.hair_curves["Guides"].vellus.simulates = True  # else its panel is gray
     for style in ("CLUMP", "CURL"):
         bpy.ops.vellus.add_style(style=style)
     bpy.ops.wm.save_as_mainfile(filepath=str(path))
+
+
+def draw_portrait(path):
+    """Write a picture of the demo's portrait."""
+    import bpy
+
+    from blend_samples.heads import portrait
+
+    _head, _guides, hair = portrait.build()
+    portrait.light()
+    portrait.make_auburn(hair.data)
+    bpy.context.scene.camera.data.sensor_fit = "VERTICAL"
+    bpy.ops.vellus.render_picture(filepath=str(path), width=400, height=300)
 
 
 class Window:

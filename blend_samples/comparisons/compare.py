@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """make compare: the same head, hair, lights and settings by Cycles and by Vellus, as numbers and side by side.
 
-Prints the mean colour of the hair in every picture and the ratio of the two, channel by channel; writes compare.png,
-the pictures with Cycles above Vellus, and ratios.png, the ratios as a plot, to a folder.
+Vellus renders as F12 does. Prints the mean colour of the hair in every picture and the ratio of the two, channel by
+channel; writes compare.png, the pictures with Cycles above Vellus, and ratios.png, the ratios as a plot, to a folder.
 """
 
 import argparse
@@ -21,12 +21,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import hair_addon
 from blend_samples.heads import head
 from blend_samples.sheets import ratio_plot
-from hair_addon.blender.data import scene
-from hair_addon.blender.render import drawn_scene, offscreen
-from hair_addon.blender.render.viewport import hair_picture
+from hair_addon import api
+from hair_addon.blender.render import offscreen
 
 WIDTH, HEIGHT = 400, 225
-CYCLES_SAMPLES = 128
+CYCLES_SAMPLES = 128  # by default
+SAMPLES_PER_SIDE = 4  # of a pixel by Vellus
 _SHOWN = slice(110, 310)  # columns of a picture that hair is in
 
 # (melanin, redness) of Principled Hair.
@@ -54,10 +54,11 @@ def main():
     parser.add_argument("--out", type=Path, default=Path("out/compare"))
     parser.add_argument("--reuse", type=Path, help="folder with images by Cycles from an earlier run")
     parser.add_argument("--strands", type=int, default=30_000)
+    parser.add_argument("--cycles-samples", type=int, default=CYCLES_SAMPLES, help="of each pixel by Cycles")
     parser.add_argument("--colors", nargs="+", choices=COLORS, default=list(COLORS))
     options = parser.parse_args()
     options.out.mkdir(parents=True, exist_ok=True)
-    stage = Stage(options.strands)
+    stage = Stage(options.strands, options.cycles_samples)
     print(f"{'hair':8}{'light':8}{'Cycles':>26}{'Vellus':>26}{'ratio':>24}")
     rows, ratios = [], {}
     for color in options.colors:
@@ -92,7 +93,7 @@ def ratio(by_cycles, by_vellus):
 class Stage:
     """The head with hair, a camera, a sun and a world, set for one comparison after the other."""
 
-    def __init__(self, strand_count):
+    def __init__(self, strand_count, cycles_samples):
         hair_addon.register()
         gpu.init()
         wp.config.log_level = wp.LOG_WARNING
@@ -109,7 +110,7 @@ class Stage:
         self.background = next(node for node in self.world.nodes if node.type == "BACKGROUND")
         self.studio = self.world.nodes.new("ShaderNodeTexEnvironment")
         self.studio.image = studio_image()
-        self._prepare_cycles(head_object)
+        self._prepare_cycles(head_object, cycles_samples)
 
     def set(self, color, light):
         """Colour the hair and light the scene, by names of `COLORS` and `LIGHTS`."""
@@ -127,7 +128,7 @@ class Stage:
             self.background.inputs["Color"].default_value = (grey, grey, grey, 1.0)
         bpy.context.view_layer.update()
 
-    def _prepare_cycles(self, head_object):
+    def _prepare_cycles(self, head_object, sample_count):
         blender_scene = bpy.context.scene
         blender_scene.render.engine = "CYCLES"
         blender_scene.render.resolution_x, blender_scene.render.resolution_y = WIDTH, HEIGHT
@@ -136,7 +137,7 @@ class Stage:
         blender_scene.render.image_settings.color_mode = "RGBA"
         blender_scene.render.image_settings.color_depth = "32"
         cycles = blender_scene.cycles
-        cycles.samples, cycles.use_denoising, cycles.seed = CYCLES_SAMPLES, False, 1
+        cycles.samples, cycles.use_denoising, cycles.seed = sample_count, False, 1
         cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = 64
         cycles.sample_clamp_indirect = 0.0
         # The head shades and hides, but only hair is measured.
@@ -157,14 +158,8 @@ class Stage:
         return pixels.reshape(HEIGHT, WIDTH, 4)
 
     def by_vellus(self):
-        """(H, W, 4) linear premultiplied pixels of the hair, as a viewport that is at rest shows it."""
-        context = bpy.context
-        depsgraph = context.evaluated_depsgraph_get()
-        drawn = drawn_scene.read(context.scene, context.view_layer, depsgraph)
-        picture = hair_picture.HairPicture((WIDTH, HEIGHT), per_side=2)
-        while not picture.is_fine:
-            picture.add_pass(drawn, *scene.read_camera(context.scene, depsgraph, WIDTH, HEIGHT))
-        return picture.read()
+        """(H, W, 4) linear premultiplied pixels of the hair, as a render has them."""
+        return api.draw(width=WIDTH, height=HEIGHT, samples_per_side=SAMPLES_PER_SIDE, is_transparent=True)
 
 
 def studio_image(width=512, height=256):

@@ -44,7 +44,8 @@ def main():
     pictures = [_picture(places) for places in ways.values()]
     words = [(f"{name}, {len(places)} guides", SIDE * i + 14, 28) for i, (name, places) in enumerate(ways.items())]
     caption = np.full((CAPTION, SIDE * len(ways), 3), 24, np.uint8)
-    picture_files.write(np.concatenate([caption, np.concatenate(pictures, axis=1)]), out, words)
+    sheet = np.concatenate([caption, np.concatenate(pictures, axis=1)])
+    picture_files.write(sheet, out, words, picture_files.PAGE_BITS)
 
 
 def _poisson_disks(skull):
@@ -96,7 +97,7 @@ def _light():
     bpy.context.scene.collection.objects.link(lamp)
     drawn = bpy.context.scene
     drawn.camera = camera
-    drawn.render.engine, drawn.cycles.samples, drawn.cycles.use_denoising = "CYCLES", 24, False
+    drawn.render.engine, drawn.cycles.samples, drawn.cycles.use_denoising = "CYCLES", 24, True
     drawn.render.resolution_x = drawn.render.resolution_y = SIDE
     drawn.render.image_settings.file_format = "PNG"
     drawn.view_settings.view_transform = "Standard"
@@ -104,14 +105,12 @@ def _light():
 
 def _picture(places):
     """(SIDE, SIDE, 3) uint8, the top row first: the head with a dot at each place."""
+    corners, faces = _ball()
+    vertices = (places[:, None] + DOT * corners).reshape(-1, 3)
+    every = (np.arange(len(places))[:, None, None] * len(corners) + faces).reshape(-1, 3)
     cloud = bpy.data.meshes.new("Dots")
-    around = np.linspace(0.0, 2.0 * np.pi, 7)[:-1]
-    ring = [(np.cos(a), np.sin(a), 0.0) for a in around]
-    corners = DOT * np.array([(0, 0, 1), (0, 0, -1), *ring])
-    faces = [(0, 2 + i, 2 + (i + 1) % 6) for i in range(6)] + [(1, 2 + (i + 1) % 6, 2 + i) for i in range(6)]
-    vertices = (places[:, None] + corners).reshape(-1, 3)
-    every = (np.arange(len(places))[:, None, None] * len(corners) + np.array(faces)).reshape(-1, 3)
     cloud.from_pydata(vertices.tolist(), [], every.tolist())
+    cloud.shade_smooth()
     material = bpy.data.materials.new("Dots")
     node = next(n for n in material.node_tree.nodes if n.type == "BSDF_PRINCIPLED")
     node.inputs["Base Color"].default_value = (0.02, 0.05, 0.25, 1.0)
@@ -121,6 +120,16 @@ def _picture(places):
     pixels = picture_files.rendered()
     bpy.data.objects.remove(dots)
     return pixels
+
+
+def _ball():
+    """(V, 3) vertices and (F, 3) triangles of a ball of radius 1."""
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=2, radius=1.0)
+    ball = bpy.context.object
+    vertices = np.array([vertex.co for vertex in ball.data.vertices])
+    triangles = np.array([polygon.vertices for polygon in ball.data.polygons])
+    bpy.data.objects.remove(ball)
+    return vertices, triangles
 
 
 if __name__ == "__main__":

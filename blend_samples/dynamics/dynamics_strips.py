@@ -90,7 +90,7 @@ def blow():
     for frame in range(1, RESTED + 1):
         across.field.strength = WIND * gust(dynamics_scene.time_of(frame))
         across.field.keyframe_insert("strength", frame=frame)
-    dynamics_scene.see_from(dynamics_scene.CAMERA, dynamics_scene.SEEN + 0.045 * SCREEN_RIGHT, 68.0)
+    dynamics_scene.see_from(dynamics_scene.CAMERA, dynamics_scene.SEEN + 0.065 * SCREEN_RIGHT, 58.0)
 
 
 def gust(time):

@@ -61,7 +61,7 @@ def build(head_object):
 def _jersey():
     material = bpy.data.materials.new("Jersey")
     color = (0.045, 0.050, 0.060, 1.0)
-    material.diffuse_color = color
+    material.diffuse_color, material.roughness, material.specular_intensity = color, 0.9, 0.1  # of Solid view
     principled = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
     principled.inputs["Base Color"].default_value = color
     principled.inputs["Roughness"].default_value = 0.85

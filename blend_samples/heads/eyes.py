@@ -20,6 +20,7 @@ _IRIS_PART = 0.8  # of the image's radius: the rest is the sclera
 
 _IRIS_RINGS = np.array([0.0, 0.19, 0.38, 0.41, 0.46, 0.55, 0.7, 0.85, 0.95, 1.0])  # of the iris' radius
 _SCLERA_RINGS = 24
+_WHITE, _DARK = (0.74, 0.70, 0.67), (0.07, 0.085, 0.075)  # in Solid view, which has no images
 _CORNEA_RINGS = np.linspace(0.0, 1.25, 12)
 
 
@@ -65,7 +66,9 @@ def build(head_object, target):
         balls.append(_ball(center, axes))
         corneas.append(_cornea(center, axes))
         lids.append(_lid(opening, center))
-    eyes = _object("Eyes", balls, head_object, [_eye_material("Sclera", 0.25, 0.5), _eye_material("Iris", 0.6, 0.1)])
+    eyes = _object(
+        "Eyes", balls, head_object, [_eye_material("Sclera", _WHITE, 0.25, 0.5), _eye_material("Iris", _DARK, 0.6, 0.1)]
+    )
     cornea = _object("Corneas", corneas, head_object, [_cornea_material()])
     return eyes, cornea, _object("Lids", lids, head_object, [_lid_material()])
 
@@ -170,8 +173,9 @@ def _object(name, parts, head_object, materials):
     return placed
 
 
-def _eye_material(name, roughness, specular):
+def _eye_material(name, solid_color, roughness, specular):
     material = bpy.data.materials.new(name)
+    material.diffuse_color = *solid_color, 1.0
     tree = material.node_tree
     principled = next(node for node in tree.nodes if node.type == "BSDF_PRINCIPLED")
     principled.inputs["Roughness"].default_value = roughness

@@ -25,6 +25,7 @@ from blend_samples.sheets import picture_files
 from hair_addon import api
 
 ROOT = Path(__file__).resolve().parents[2]
+PAGE, PAGE_WIDTH = ROOT / "docs" / "manual" / "groom_library.png", 560  # pixels
 SIZE = 288, 340  # pixels of a picture
 SAMPLE_COUNT = 24  # of a pixel
 COLUMNS = 5
@@ -71,6 +72,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("names", nargs="*", help="grooms such as Pixie; all by default")
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "grooms.png")
+    parser.add_argument("--page", type=Path, default=PAGE, help="a smaller copy, for the manual")
     parser.add_argument("--library", type=Path, help="folder of an asset library that the grooms are saved to")
     parser.add_argument("--strands", type=float, default=1.0, help="factor of the numbers of strands")
     parser.add_argument("--samples", type=int, default=SAMPLE_COUNT)
@@ -85,6 +87,8 @@ def main():
             save(name, hair, given.library.resolve(), pictures[-1])
     sheet = picture_files.rows(pictures, min(COLUMNS, len(pictures)))
     picture_files.write(sheet, given.out.resolve(), kept_bits=picture_files.PAGE_BITS)
+    small = picture_files.scaled(sheet, PAGE_WIDTH)
+    picture_files.write(small, given.page.resolve(), kept_bits=picture_files.PAGE_BITS)
 
 
 def build_library(folder):

@@ -44,11 +44,10 @@ def main():
 def build(strand_count, sample_count):
     """The head in warm light from behind, rendered without a background and with all passes."""
     head_object = head.build()
-    _guides, hair = head.grow(head_object, strand_count=strand_count)
     portrait.dress(head_object)
+    _guides, hair = portrait.grow(head_object, strand_count=strand_count)
+    portrait.make_auburn(hair.data)
     head.light()
-    look = hair.data.vellus.appearance
-    look.mode, look.absorption, look.roughness = "energy", (0.19, 0.40, 0.88), 0.28
     bpy.data.lights["Key"].energy, bpy.data.lights["Key"].color = 20.0, (1.0, 0.86, 0.74)
     bpy.data.lights["Rim"].energy, bpy.data.lights["Rim"].color = 75.0, (1.0, 0.72, 0.46)
     bpy.data.lights["Fill"].color = (0.55, 0.70, 1.0)

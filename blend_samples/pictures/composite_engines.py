@@ -49,11 +49,10 @@ def main():
 def build(options):
     """The head in light from beside and above, which throws the shadow of its hair on cheek and neck."""
     head_object = head.build()
-    _guides, hair = head.grow(head_object, strand_count=options.strands)
     portrait.dress(head_object)
+    _guides, hair = portrait.grow(head_object, strand_count=options.strands)
+    portrait.make_auburn(hair.data)
     head.light()
-    look = hair.data.vellus.appearance
-    look.mode, look.absorption = "energy", head.AUBURN
     for name, watts, location in (("Key", 34.0, (0.75, 0.15, 1.75)), ("Rim", 18.0, (-0.35, 1.05, 1.25))):
         bpy.data.lights[name].energy, bpy.data.lights[name].size = watts, 0.15
         bpy.data.objects[name].location = location
@@ -64,7 +63,7 @@ def build(options):
     scene.render.engine = options.engine
     scene.render.resolution_x, scene.render.resolution_y = SIZE
     scene.cycles.samples, scene.eevee.taa_render_samples = options.samples, options.samples
-    scene.cycles.use_denoising = False
+    scene.cycles.use_denoising = True
     scene.vellus.sample_count = options.samples
     bpy.context.view_layer.update()
 

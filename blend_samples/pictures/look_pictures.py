@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The pictures of the looks' menu: `python blend_samples/pictures/look_pictures.py` draws a lock of hair in each look.
 
-Writes hair_addon/blender/look_pictures/PRESET.png, drawn by Vellus with a transparent background.
+Writes hair_addon/blender/ui/look_pictures/PRESET.png, drawn by Vellus with a transparent background.
 """
 
 import math
@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import hair_addon
 from hair_addon.core.shading.presets import PRESETS
 
-OUT = Path(hair_addon.__file__).parent / "blender" / "look_pictures"
+OUT = Path(hair_addon.__file__).parent / "blender" / "ui" / "look_pictures"
 SIZE = 96  # pixels
 LENGTH = 0.1  # [m]
 

@@ -12,20 +12,23 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 import hair_addon
 from blend_samples.heads import head
-from blend_samples.pictures.transfer_picture import WIDTH, drawn, light
+from blend_samples.pictures.transfer_picture import SIZE, drawn, dressed_head, light
 from blend_samples.sheets import picture_files
 from hair_addon import api
 
 OUT = Path(__file__).resolve().parents[2] / "docs" / "manual" / "use_as_hair.png"
 STRANDS = 9000
 CUT = 16  # pixels off either side of a picture
+WIDTH = SIZE[0] - 2 * CUT
+SAMPLE_COUNT = 16  # of a pixel
 COUNTS = (None, 400, 60)  # of guides; None: the strands themselves
 
 
 def main():
     """Grow hair with styles, take it for curves of somebody else, use them, and draw."""
     hair_addon.register()
-    skull = head.build()
+    skull = dressed_head()
+    own = {*bpy.context.scene.objects}
     guides, hair = head.grow(skull, guide_count=260, strand_count=STRANDS)
     api.add_style(hair, "CLUMP", size=0.02, amount=0.6)
     api.add_style(hair, "WAVE", radius=0.006, pitch=0.06)
@@ -43,10 +46,10 @@ def main():
         api.shade(used.hair, look)
         error = f"{100.0 * used.mean_error:.1f}% (95%: {100.0 * used.high_error:.1f}%)"
         words.append(f"{STRANDS} strands, as they came" if count is None else f"{count} guides: {error}")
-        pictures.append(drawn((skull, came))[:, CUT:-CUT])
+        pictures.append(drawn(own | {came}, SAMPLE_COUNT)[:, CUT:-CUT])
         print(words[-1])
         bpy.data.objects.remove(came)
-    titles = [(word, (WIDTH - 2 * CUT) * place + 8, picture_files.BASELINE) for place, word in enumerate(words)]
+    titles = [(word, WIDTH * place + 8, picture_files.BASELINE) for place, word in enumerate(words)]
     picture_files.write(np.concatenate(pictures, axis=1), OUT, titles, picture_files.FEW_BITS)
 
 

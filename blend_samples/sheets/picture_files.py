@@ -76,6 +76,18 @@ def rows(pictures, columns):
     return np.concatenate([np.concatenate(line, axis=1) for line in lines if len(line) == len(lines[0])])
 
 
+def scaled(picture, width):
+    """A picture at another width [pixels] with the same proportions."""
+    height = round(picture.shape[0] * width / picture.shape[1])
+    image = bpy.data.images.new("Scaled", picture.shape[1], picture.shape[0])
+    opaque = np.dstack([picture / np.float32(255.0), np.ones(picture.shape[:2], np.float32)])
+    image.pixels.foreach_set(opaque[::-1].ravel())
+    image.scale(width, height)
+    pixels = np.array(image.pixels, np.float32).reshape(height, width, 4)
+    bpy.data.images.remove(image)
+    return np.round(255.0 * pixels[::-1, :, :3]).astype(np.uint8)
+
+
 def write(pixels, path, words=(), kept_bits=0xFF):
     """Write a picture with words [(text, left, base from the top)] as .png or .jpg.
 

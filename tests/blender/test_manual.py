@@ -10,6 +10,7 @@ import bpy
 import pytest
 from bl_operators import wm
 
+from blend_samples.pictures import all_pictures
 from hair_addon.blender import manual
 from tests.support.interface import spoken
 from tools import manual_pages
@@ -107,3 +108,18 @@ def test_the_installed_pages_have_the_same_anchors_and_their_links_lead_somewher
             file, _, fragment = link.partition("#")
             assert (page.parent / (file or page.name)).is_file(), link
             assert not fragment or fragment in ids[file or page.name], link
+
+
+def test_every_picture_has_one_script_that_draws_it():
+    """What no script of `make pictures` draws would show an earlier version for ever."""
+    docs = manual_pages.SOURCE.parent
+    drawn = {name: tuple(found.values()) for name, found in all_pictures.COPIED.items()} | all_pictures.OTHERS
+    drawn["elsewhere"] = all_pictures.ELSEWHERE
+    pictures = [path.relative_to(docs) for path in docs.rglob("*") if path.suffix in {".png", ".jpg"}]
+    assert pictures
+    scripts = {
+        str(picture): [name for name, globs in drawn.items() if any(picture.full_match(glob) for glob in globs)]
+        for picture in pictures
+    }
+    assert {picture: names for picture, names in scripts.items() if len(names) != 1} == {}
+    assert set(drawn) - {"elsewhere"} <= set(all_pictures.SCRIPTS | all_pictures.SLOW)

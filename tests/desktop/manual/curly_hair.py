@@ -17,6 +17,7 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
+from tests.desktop.manual import face  # noqa: E402
 from tests.desktop.steps import MORE, OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
@@ -129,6 +130,8 @@ def bare_head():
     with in_viewport():
         bpy.ops.object.shade_smooth()
     above, positions = mask_scalp(head)
+    if MORE:
+        face.dress(head, (0.55, -1.0, 0.85))
     fringe = head.vertex_groups.new(name="fringe")
     is_front = above & (positions[:, 1] < -0.085) & (np.abs(positions[:, 0]) < 0.075)
     fringe.add(np.flatnonzero(is_front).tolist(), 1.0, "REPLACE")

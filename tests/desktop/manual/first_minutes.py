@@ -15,6 +15,7 @@ from mathutils import Vector
 
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT))
+from tests.desktop.manual import face  # noqa: E402
 from tests.desktop.steps import MORE, OUT, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     click,
@@ -118,6 +119,9 @@ def open_head():
     with in_viewport():
         bpy.ops.object.shade_smooth()
     mask_scalp(head)
+    if MORE:
+        face.dress(head, (1.0, -0.7, 0.8))
+        face.light()
     look_at(head, (1.0, -0.7, 0.3), 0.55)
     yield
 
@@ -133,7 +137,7 @@ def grow_on_the_head():
     guides.guides.length = 0.12
     guides.guides.gravity = 0.75
     guides.guides.drape = True
-    hair.vellus.hair.thickness = 0.15
+    hair.vellus.hair.thickness = 0.25
     yield from wait_for(lambda: len(hair.curves) == STRAND_COUNT)
     step("head")
     group = hair.surface.vertex_groups["scalp"].index

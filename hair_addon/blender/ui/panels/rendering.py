@@ -3,10 +3,11 @@
 
 import bpy
 
-from ....core.imaging.pixel_sampling import PassSettings
+from ....core.imaging.pixel_sampling import PassSettings, RenderSettings
 from ...render.frames.engine import NAME
 from ...settings.setting_properties import names_of
 from ...settings.translations import CONTEXT
+from .. import setting_rows
 from .tab import split
 
 
@@ -29,9 +30,8 @@ class VELLUS_PT_sampling(_OfEngine, bpy.types.Panel):
     bl_idname = "VELLUS_PT_sampling"
 
     def draw(self, context):
-        layout, state = split(self.layout), context.scene.vellus
-        layout.prop(state, "sample_count")
-        layout.prop(state, "multiple_scattering")
+        names = ("sample_count", "multiple_scattering")
+        setting_rows.rows(self.layout, context.scene.vellus, RenderSettings, names)
 
 
 class VELLUS_PT_film(_OfEngine, bpy.types.Panel):
