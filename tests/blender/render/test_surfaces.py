@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 import pytest
 
-from hair_addon.blender.data.pictures import surface_materials
+from hair_addon.blender.data.pictures import drawn_meshes, surface_materials
 from hair_addon.blender.data.scene import read_camera
 from hair_addon.blender.gpu import drawing, visibility_buffer
 from hair_addon.blender.host import notices
@@ -59,6 +59,27 @@ def stage(scene):
     scene.collection.objects.link(camera)
     scene.camera = camera
     return scene
+
+
+def test_a_surface_without_a_material_is_as_with_a_new_one(stage):
+    """As in EEVEE and Cycles."""
+    sun(math.radians(70.0), 0.0, 0.0)
+    placed = ball()
+    with_one = picture()
+    placed.data.materials.clear()
+    np.testing.assert_array_equal(picture(), with_one)
+
+
+def test_triangles_know_their_materials(stage):
+    """What paths of light meet: color, roughness, metal and reflectance of each triangle."""
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=2, y_subdivisions=1)
+    placed = bpy.context.object
+    material_of(placed, Base_Color=(0.2, 0.4, 0.6, 1.0), Roughness=0.3, IOR=1.5)
+    material_of(placed, Base_Color=(0.9, 0.8, 0.7, 1.0), Roughness=0.6, Metallic=1.0, Specular_IOR_Level=0.0)
+    placed.data.polygons[1].material_index = 1
+    (mesh,) = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get())
+    expected = [[0.2, 0.4, 0.6, 0.3, 0.0, 0.04]] * 2 + [[0.9, 0.8, 0.7, 0.6, 1.0, 0.0]] * 2
+    np.testing.assert_allclose(mesh.triangle_materials, expected, rtol=1e-6)
 
 
 def sun(*angles, strength=3.0):
