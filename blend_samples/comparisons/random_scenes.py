@@ -44,6 +44,7 @@ def main():
     parser.add_argument("--seeds", type=int, nargs="+", default=(0, 30), help="FIRST END, and any number of such pairs")
     parser.add_argument("--size", type=int, default=144, help="pixels along a side")
     parser.add_argument("--samples", type=int, default=48, help="samples a pixel, of Cycles")
+    parser.add_argument("--device", default="CPU", choices=("CPU", "CUDA", "OPTIX", "METAL"), help="of Cycles")
     parser.add_argument("--scattering", default="GRID", choices=("GRID", "DUAL"), help="of the scene's render settings")
     parser.add_argument("--dual", type=Path, help="scenes.json of a run with --scattering DUAL, for the plot")
     options = parser.parse_args()
@@ -51,6 +52,7 @@ def main():
     for folder in filter(None, (options.out, options.references, options.pictures)):
         folder.mkdir(parents=True, exist_ok=True)
     prepare()
+    choose_device(options.device)
     rows, pairs = [], []
     ranges = zip(options.seeds[::2], options.seeds[1::2], strict=True)
     for seed in (seed for first, end in ranges for seed in range(first, end)):
@@ -96,6 +98,16 @@ def prepare():
     wp.config.log_level = wp.LOG_WARNING
 
 
+def choose_device(name):
+    """Let Cycles render on all devices of a kind; on the processor if there are none."""
+    preferences = bpy.context.preferences.addons["cycles"].preferences
+    if name != "CPU":
+        preferences.compute_device_type = name
+        preferences.refresh_devices()
+        for device in preferences.devices:
+            device.use = device.type == name
+
+
 def by_cycles(values, curves, options):
     """(H, W, 4) linear premultiplied pixels of the hair, path traced, or kept from an earlier run."""
     path = options.references / f"{values['seed']}_{key(values, options)}.npy"
@@ -120,6 +132,7 @@ def path_traced(path, options):
     render.resolution_x = render.resolution_y = options.size
     render.image_settings.file_format = "OPEN_EXR"
     render.image_settings.color_mode, render.image_settings.color_depth = "RGBA", "32"
+    cycles.device = "CPU" if options.device == "CPU" else "GPU"
     cycles.samples, cycles.seed = options.samples, 1
     cycles.use_denoising = cycles.use_adaptive_sampling = False
     cycles.max_bounces = cycles.glossy_bounces = cycles.transmission_bounces = cycles.diffuse_bounces = 64

@@ -104,5 +104,5 @@ def test_a_look_is_saved_as_it_is_set(hair):
     api.add_style(hair, "WET", fit=True)
     assert api.settings_of(hair).appearance.wetness == 0.5
     api.shade(hair, roughness=0.5)
-    assert api.settings_of(hair).appearance.roughness == 0.5 and properties.look_of(hair.data.vellus).roughness == 0.16
+    assert api.settings_of(hair).appearance.roughness == 0.5 and properties.look_of(hair.data.vellus).roughness == 0.14
     assert api.table_settings(replace(api.settings_of(hair), appearance=Appearance(wetness=1.0))).eta == 1.38
