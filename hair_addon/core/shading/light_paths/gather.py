@@ -19,7 +19,7 @@ from . import grid_walk, light_cache, start_places
 from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
-from .light_cache import Cache, cached, layer_at
+from .light_cache import LightCache, cached, layer_at
 from .light_sources import Sources, across
 from .start_places import HIDDEN, StartsOnDevice, start
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
@@ -76,7 +76,7 @@ def _gather(
     medium: Medium,
     sources: Sources,
     starts: StartsOnDevice,
-    cache: Cache,
+    cache: LightCache,
     out_position: wp.array2d[wp.vec3],
     out_light: wp.array2d[wp.vec3],
     out_even: wp.array2d[wp.vec3],
@@ -191,7 +191,7 @@ def gather(
 
 
 def _cache(grid, medium, sources, path_count, seed, device):
-    """`light_cache.Cache` of light among all strands, those that nobody sees as well."""
+    """`LightCache` of light among all strands, those that nobody sees as well."""
     starts = start_places.anywhere(grid, max(int(_CACHE_PATHS * path_count), _LEAST_CACHE_PATHS), seed)
     found = _traced(medium, sources, starts, light_cache.none(grid), _CACHE_EVENTS, device)
     is_event = found[2].max(axis=-1) > 0.0

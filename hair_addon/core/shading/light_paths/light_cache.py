@@ -19,7 +19,7 @@ _PRIOR = 32.0  # events that the ratio of the voxels around stands for: such lig
 
 
 @wp.struct
-class Cache:
+class LightCache:
     """Ratios to even light at the centers of voxels, (systems × inclinations, Z Y X)."""
 
     corner: wp.vec3
@@ -31,13 +31,13 @@ class Cache:
 
 
 @wp.func
-def layer_at(cache: Cache, strand: int, sine: float):
+def layer_at(cache: LightCache, strand: int, sine: float):
     """The layer of light that goes out from a strand, by the sine of its inclination."""
     return cache.systems[strand] * SINES + wp.clamp(int(0.5 * (sine + 1.0) * float(SINES)), 0, SINES - 1)
 
 
 @wp.func
-def cached(cache: Cache, strand: int, sine: float, position: wp.vec3):
+def cached(cache: LightCache, strand: int, sine: float, position: wp.vec3):
     """The ratio of light that goes out from a strand at a place, linear between inclinations."""
     at = wp.clamp(0.5 * (sine + 1.0) * float(SINES) - 0.5, 0.0, float(SINES - 1))
     low = wp.min(int(at), SINES - 2)
@@ -48,7 +48,7 @@ def cached(cache: Cache, strand: int, sine: float, position: wp.vec3):
 
 
 @wp.func
-def _in_layer(cache: Cache, layer: int, position: wp.vec3):
+def _in_layer(cache: LightCache, layer: int, position: wp.vec3):
     """The ratio at a place, linear between voxels."""
     at = wp.cw_div(position - cache.corner, cache.voxel) - wp.vec3(0.5, 0.5, 0.5)
     low = wp.vec3i(0, 0, 0)
@@ -74,15 +74,15 @@ def _in_layer(cache: Cache, layer: int, position: wp.vec3):
 
 
 def none(grid):
-    """A `Cache` that no path ends in."""
-    cache = Cache()
+    """A `LightCache` that no path ends in."""
+    cache = LightCache()
     cache.systems, cache.events = wp.array(grid.systems, dtype=int), -1
     cache.ratios = wp.zeros((1, 1), dtype=wp.vec3)
     return cache
 
 
 def of(grid, sums, count, events):
-    """The `Cache` of sums (layers, Z, Y, X, 6) over a number of events: RGB, their light and that of even light.
+    """The `LightCache` of sums (layers, Z, Y, X, 6) over a number of events: RGB, their light and that of even light.
 
     events: that paths have on strands before they end in it.
     """
