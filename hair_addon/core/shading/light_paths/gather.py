@@ -8,6 +8,7 @@ the paths.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -237,13 +238,13 @@ def _by_voxel(grid, positions, layers, layer_count, values):
     return np.stack(sums, axis=-1).reshape(layer_count, z, y, x, -1)
 
 
-def launch(kernel, count, inputs, device):
+def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: wp.DeviceLike) -> None:
     shares = parallel.share_count(count, wp.get_device(device), _LEAST_PATHS)
     if count:
         parallel.launch_shares(kernel, count, inputs, [[] for _ in range(shares)], device)
 
 
-def mesh_of(corners):
+def mesh_of(corners: np.ndarray) -> wp.Mesh | None:
     """A `wp.Mesh` of triangles, None without."""
     corners = np.ascontiguousarray(corners, np.float32).reshape(-1, 3)
     if not len(corners):
@@ -251,7 +252,9 @@ def mesh_of(corners):
     return wp.Mesh(wp.array(corners, dtype=wp.vec3), wp.array(np.arange(len(corners), dtype=np.int32), dtype=int))
 
 
-def medium_of(grid, mesh, normals, albedo, gloss=None):
+def medium_of(
+    grid: StrandGrid, mesh: wp.Mesh | None, normals: np.ndarray, albedo: np.ndarray, gloss: np.ndarray | None = None
+) -> Medium:
     corner_count = 0 if mesh is None else len(mesh.indices)
     gloss = np.zeros((corner_count // 3, 3)) if gloss is None else gloss
     require_count("surface gloss", len(gloss), corner_count // 3)

@@ -10,7 +10,7 @@ import numpy as np
 import warp as wp
 
 from . import voxel_means
-from .strand_grid import CELLS_A_VOXEL
+from .strand_grid import CELLS_A_VOXEL, StrandGrid
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -73,7 +73,7 @@ def _in_layer(cache: LightCache, layer: int, position: wp.vec3):
     return found
 
 
-def none(grid):
+def none(grid: StrandGrid) -> LightCache:
     """A `LightCache` that no path ends in."""
     cache = LightCache()
     cache.systems, cache.events = wp.array(grid.systems, dtype=int), -1
@@ -81,7 +81,7 @@ def none(grid):
     return cache
 
 
-def of(grid, sums, count, events):
+def of(grid: StrandGrid, sums: np.ndarray, count: int, events: int) -> LightCache:
     """The `LightCache` of sums (layers, Z, Y, X, 6) over a number of events: RGB, their light and that of even light.
 
     events: that paths have on strands before they end in it.

@@ -7,11 +7,16 @@ same paths begin at the same places, and their light changes by as little.
 """
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
 
 from .grid_walk import PASSED, Medium, direction_of_hair, place_on, walk
+from .strand_grid import StrandGrid
+
+if TYPE_CHECKING:
+    from .gather import Seen
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -56,7 +61,7 @@ def start(medium: Medium, starts: StartsOnDevice, path: int):
     return met, direction, state
 
 
-def of_seen(grid, seen, count, seed=0):
+def of_seen(grid: StrandGrid, seen: "Seen", count: int, seed: int = 0) -> Starts:
     """`Starts` of about `count` paths on segments of a `gather.Seen`: on each as many as it is large in the picture.
 
     Which of them are in sight only rays can tell.
@@ -81,7 +86,7 @@ def of_seen(grid, seen, count, seed=0):
     )
 
 
-def anywhere(grid, count, seed=0):
+def anywhere(grid: StrandGrid, count: int, seed: int = 0) -> Starts:
     """`Starts` of about `count` paths on all strands of a grid, by their area, in any direction."""
     is_segment = grid.strands[:-1] == grid.strands[1:]
     along = np.diff(grid.points.astype(np.float64), axis=0)
@@ -95,7 +100,7 @@ def anywhere(grid, count, seed=0):
     )
 
 
-def on_device(starts):
+def on_device(starts: Starts) -> StartsOnDevice:
     """`StartsOnDevice` of `Starts`."""
     found = StartsOnDevice()
     found.segments, found.keys = wp.array(starts.segments, dtype=int), wp.array(starts.keys, dtype=int)
@@ -110,7 +115,7 @@ def _numbered(wanted, randoms):
     return each, np.arange(len(each)) - np.repeat(np.cumsum(numbers) - numbers, numbers)
 
 
-def hashed(values, seed, number=0):
+def hashed(values: np.ndarray, seed: int, number: np.ndarray | int = 0) -> np.ndarray:
     """(N,) uint32 of (N,) whole numbers, a seed and a second (N,) [Steele14, the finalizer of their generator]."""
     bits = np.asarray(values).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     bits = bits + np.asarray(number).astype(np.uint64) * np.uint64(0xD1B54A32D192ED03)
@@ -120,6 +125,6 @@ def hashed(values, seed, number=0):
     return (bits ^ (bits >> np.uint64(31))).astype(np.uint32)
 
 
-def unit(bits):
+def unit(bits: np.ndarray) -> np.ndarray:
     """uint32 → [0, 1)."""
     return bits.astype(np.float64) / 2.0**32
