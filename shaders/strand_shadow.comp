@@ -33,7 +33,7 @@ bool is_hidden(ivec2 low, ivec2 high, float first_along, float last_along)
 
 void meet(ivec2 place, float along, float across, float coverage)
 {
-  float depth = mix(end_depths.x, end_depths.y, along);
+  float depth = mix(end_depths.x, end_depths.y, clamp(along, 0.0, 1.0));
   float hidden = texelFetch(hidden_depth, place, 0).r;
   if (is_front != 0) {
     if (depth > hidden) {

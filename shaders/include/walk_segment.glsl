@@ -6,8 +6,8 @@
 #include "include/segment.glsl"
 #include "include/tile.glsl"
 
-// A program defines whether bends are filled and ends are round, for what is seen; without, strands cover their length times
-// their width.
+// A program defines whether bends are filled and wide ends are disks, for what is seen; without, strands cover their length
+// times their width, and as far beyond either end as half a disk covers.
 // const bool IS_ROUND
 
 // Consecutive segments per thread: their points are read and projected once.
@@ -158,7 +158,7 @@ void walk_to_ends(Segment segment, bvec2 are_ends, ivec2 size)
   vec2 beyond_ends = vec2(0.0);
   if (are_ends.x || are_ends.y) {
     beyond_ends = end_lengths(segment) * vec2(are_ends);
-    bvec2 are_wide = greaterThanEqual(segment.half_width, vec2(LEAST_BEND));
+    bvec2 are_wide = greaterThanEqual(segment.half_width, vec2(IS_ROUND ? LEAST_BEND : 1e9));
     beyond_ends *= vec2(not(are_wide));
     if (are_ends.x && are_wide.x) {
       fill_end(segment.start.xy, segment.half_width.x, -1.0, size);
@@ -210,8 +210,8 @@ void walk_run(ivec2 size)
     Segment segment;
     if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), axis, segment)) {
       begin(strand, piece, segment, first, second);
-      bool is_first = IS_ROUND && piece == 0 && segment.part.x == 0.0;
-      bool is_last = IS_ROUND && piece + 1 == pieces && segment.part.y == 1.0;
+      bool is_first = piece == 0 && segment.part.x == 0.0;
+      bool is_last = piece + 1 == pieces && segment.part.y == 1.0;
       walk_to_ends(segment, bvec2(is_first, is_last), size);
       if (IS_ROUND && piece + 1 < pieces && segment.part.y == 1.0 && segment.half_width.y >= LEAST_BEND) {
         vec4 third = to_clip(strand_point(strand, texel, head, piece_start(piece + 2)));

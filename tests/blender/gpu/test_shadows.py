@@ -78,6 +78,27 @@ def test_triangles_and_the_computed_make_the_same_map(scene, rng, radius, steps)
     np.testing.assert_allclose(layers.mean(axis=(0, 1)), triangle_layers.mean(axis=(0, 1)), rtol=0.03)
 
 
+@pytest.mark.parametrize("in_compute", [True, False])
+@pytest.mark.parametrize("turn", [1.2, 0.2, 0.0])
+@pytest.mark.parametrize("radius", [0.0015, 0.012], ids=["thin", "thick"])
+def test_short_strands_shade_what_spheres_along_them_shade(scene, rng, radius, turn, in_compute):
+    """Strands that point at the sun, and beside: length times width, and half a disk at either end."""
+    count, length = 2000, 0.006
+    start = rng.uniform(-0.3, 0.3, (count, 1, 3))
+    azimuth = rng.uniform(0.0, 2.0 * np.pi, (count, 1))
+    beside = np.concatenate([np.cos(azimuth), np.sin(azimuth), np.zeros((count, 1))], axis=-1)
+    way = (np.sin(turn) * beside + np.cos(turn) * np.array([0.0, 0.0, 1.0]))[:, None]
+    points = (start + np.linspace(0.0, length, 5)[:, None] * way).astype(np.float32)
+    radii = np.full(points.shape[:2], radius, np.float32)
+    hair = [(strand_textures.upload_strands(points, radii), np.eye(4))]
+    maps = shadows.ShadowMaps(256, 1, in_compute)
+    maps.draw(sun(0.0, 0.5 * np.pi), hair, [])
+    shaded = np.array(maps.samplers["hair_layers"].read()).reshape(-1, 4)[:, 3].mean()
+    side = 2.0 * drawing.bounding_sphere(hair)[1]
+    expected = count * (2.0 * radius * length * np.sin(turn) + np.pi * radius**2)
+    assert shaded * side**2 == pytest.approx(expected, rel=0.06)
+
+
 def test_turning_past_the_pole_keeps_the_shadow(scene, rng):
     """A light from almost straight above has its map turned the other way round."""
     points, radii = tuft(rng)
