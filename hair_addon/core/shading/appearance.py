@@ -34,9 +34,9 @@ TABLE_FIELDS = ("mode", "eta", "sigma_a", "tilt", "roughness", "radial_roughness
 # What differs along strands and between them.
 STRAND_FIELDS = ("random_color", "random_roughness", "tip_absorption", "tip_tint", "gradient_start", "gradient_end")
 
-# A film of water fills the gaps between the cuticle's scales, which gives a smooth surface (narrow highlights, no tilt),
-# and lowers the index of refraction that sends back as much light. Pigment stays as it is. Cycles takes the directions of
-# its Coat by another roughness than it weights them by, so water is none (DECISIONS.md, 256).
+# A film of water fills the gaps between the cuticle's scales, which gives a smooth surface (narrow highlights, no
+# tilt), and lowers the index of refraction that sends back as much light. Pigment stays as it is. Cycles takes the
+# directions of its Coat by another roughness than it weights them by, so water is none (DECISIONS.md, 256).
 _WET = {"roughness": 0.14, "cuticle_angle": math.radians(0.5), "ior": 1.38}
 
 # Fibres whose index is that of air reflect nothing.
