@@ -16,7 +16,7 @@ from ..settings.translations import interface_text
 NAME_SHARE = 0.54
 
 # Too long for one line: the name is above the value.
-WIDE = ("neighbour_limit", "mode")
+WIDE = ("neighbour_limit", "mode", "multiple_scattering")
 
 _GROWTH = ("length_variation", "tilt", "gravity", "drape")
 _FLOW = ("flow_lines", "lift")
