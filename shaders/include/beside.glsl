@@ -6,24 +6,22 @@
 
 struct Beside {
   float lead;  // [m] that the strand is ahead along the centre of where it would be, had they begun together
-  int at;  // segment of the centre beside the strand, which ends at point at + 1
-  vec3 axis;
-  vec3 frame;
-  vec3 end;
-  float arc;  // at its end
-  vec3 place;  // of the strand
+  int at;  // point of the centre where `segment_below` ends and `segment` begins: between their middles is the strand
+  vec3 segment;
+  vec3 segment_below;
+  vec3 frame;  // at `segment_below`
+  vec3 away;  // from the point to the strand's place
+  float arc;  // at the point
   vec2 turn;  // cosine and sine, from the frames of the strand to those of the centre
 };
 
-// The direction of the segment that ends at point at + 1; that of the one before where it has no length.
-vec3 read_segment(inout Beside beside)
+// Read the segment that begins at point `at`; one without length has a nanometre in the direction of the one before.
+void read_segment(inout Beside beside, vec3 axis_before)
 {
-  vec4 point = centre_point(beside.at + 1);
-  float range = point.w - beside.arc;
-  vec3 axis = (range > 1e-12) ? (point.xyz - beside.end) / range : beside.axis;
-  beside.end = point.xyz;
-  beside.arc = point.w;
-  return axis;
+  vec4 start = centre_point(beside.at);
+  vec4 end = centre_point(beside.at + 1);
+  beside.arc = start.w;
+  beside.segment = (end.w - start.w > 1e-12) ? end.xyz - start.xyz : axis_before * 1e-9;
 }
 
 // A part of the turn to the centre's frame, carried over to the strand's.
@@ -38,19 +36,17 @@ void turn_by(inout Beside beside, float part, vec3 carried, vec3 u, vec3 v)
 Beside begin_beside(vec3 at_centre, vec3 u_first)
 {
   Beside beside;
-  vec4 centre_root = centre_point(0);
   beside.at = 0;
-  beside.end = centre_root.xyz;
-  beside.arc = centre_root.w;
-  beside.place = strand_root;
   beside.turn = vec2(1.0, 0.0);
-  beside.axis = centre_normal;
-  beside.axis = read_segment(beside);
-  beside.frame = turned(at_centre, centre_normal, beside.axis);
+  beside.away = strand_root - centre_point(0).xyz;
+  read_segment(beside, centre_normal);
+  beside.segment_below = beside.segment;
+  vec3 axis = beside.segment / length(beside.segment);
+  beside.frame = turned(at_centre, centre_normal, axis);
   vec3 first = segment_at(1).xyz;
-  float facing = in_lock * smoothstep(0.0, 1.0, dot(first, beside.axis));
-  beside.lead = facing * dot(strand_root - centre_root.xyz, beside.axis);
-  turn_by(beside, facing, turned(beside.frame, beside.axis, first), u_first, cross(first, u_first));
+  float facing = in_lock * smoothstep(0.0, 1.0, dot(first, axis));
+  beside.lead = facing * dot(beside.away, axis);
+  turn_by(beside, facing, turned(beside.frame, axis, first), u_first, cross(first, u_first));
   return beside;
 }
 
@@ -60,18 +56,29 @@ void keep_beside(
 )
 {
   float ahead = progress + beside.lead;
-  while (beside.arc <= ahead && beside.at < POINTS - 2) {
+  beside.away += forwards * forward;
+  float size = length(beside.segment);
+  float size_below = length(beside.segment_below);
+  vec3 axis_above = beside.segment / size;
+  vec3 axis_below = beside.segment_below / size_below;
+  while (beside.arc + 0.5 * size <= ahead && beside.at < POINTS - 2) {
     beside.at++;
-    vec3 next_axis = read_segment(beside);
-    beside.frame = turned(beside.frame, beside.axis, next_axis);
-    beside.axis = next_axis;
+    beside.frame = turned(beside.frame, axis_below, axis_above);
+    beside.away -= beside.segment;
+    beside.segment_below = beside.segment;
+    size_below = size;
+    axis_below = axis_above;
+    read_segment(beside, axis_below);
+    size = length(beside.segment);
+    axis_above = beside.segment / size;
   }
-  beside.place += forwards * forward;
-  float facing = in_lock * smoothstep(0.0, 1.0, dot(forwards, beside.axis));
+  float between = clamp((ahead - beside.arc + 0.5 * size_below) / (0.5 * (size_below + size)), 0.0, 1.0);
+  vec3 axis = unit_or(mix(axis_below, axis_above, between), 1e-6, axis_below);
+  float facing = in_lock * smoothstep(0.0, 1.0, dot(forwards, axis));
   float part = facing * min(forward * per_settling, 0.45);
-  float off = dot(beside.place - beside.end, beside.axis) + beside.arc - ahead;
+  float off = dot(beside.away, axis) + beside.arc - ahead;
   beside.lead += clamp(part * off, -0.5 * forward, 0.5 * forward);
-  turn_by(beside, part, turned(beside.frame, beside.axis, forwards), u, v);
+  turn_by(beside, part, turned(turned(beside.frame, axis_below, axis), axis, forwards), u, v);
 }
 
 // An offset in the centre's frame, in the strand's.
