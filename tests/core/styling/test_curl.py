@@ -177,6 +177,22 @@ def test_a_clumped_lock_is_one_ringlet(normal, rng):
     assert spreads[1] < 1.4 * spreads[0]
 
 
+def test_strands_that_slide_along_a_crooked_centre_change_by_degrees():
+    """Beside one segment of the centre as beside the next, though these differ by ten degrees."""
+    bend = np.linspace(0.0, 1.0, 40)
+    crooked = bend + 0.1 * (-1.0) ** np.arange(40)
+    centre, smooth = (
+        np.cumsum([[0.0, 0.0, 0.0], *(0.005 * np.array([np.sin(a), 0.0, np.cos(a)]) for a in angles)], axis=0)
+        for angles in (crooked, bend)
+    )
+    step = 2.5e-5
+    slid = np.arange(400)[:, None] * np.array([0.0, 0.0, step]) + np.array([0.01, 0.01, 0.0])
+    beside = (smooth + slid[:, None]).astype(np.float32)
+    styles = clump.Settings(thickness=1.0), helix()
+    made = stepped(beside, *styles, centres=centre[None], identities=np.zeros(400)).astype(np.float64)
+    assert np.linalg.norm(np.diff(made - made[:, :1], axis=0), axis=2).max() < 2.0 * step
+
+
 def test_strands_of_a_lock_that_are_cut_wind_as_the_others(rng):
     """A turn is at its place along the lock, not along the strand: also for strands that are shorter."""
     strands, centre, normals = bent_lock(rng)
