@@ -233,9 +233,13 @@ def test_a_part_line_that_the_deformed_surface_leaves_behind_outdates_nothing(sw
 @even_guides
 @pytest.mark.parametrize("is_parted", [True, False])
 def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
-    """Where these are combed does not matter, but for the rounding of sums in mean masses."""
+    """Where these are combed does not matter, but for the rounding of sums in mean masses.
+
+    Without contact: guides that a surface pushes buckle, by which rounding grows threefold in a frame.
+    """
     guides, hair = swung
-    guides.data.vellus.dynamics.hair_friction, guides.data.vellus.dynamics.hair_pressure = 50.0, 0.0
+    settings = guides.data.vellus.dynamics
+    settings.hair_friction, settings.hair_pressure, settings.collides_with_surface = 50.0, 0.0, False
     draw_line((0.0, -0.9, 1.2), (0.0, 0.9, 1.2))
     hair.data.vellus.hair.part_lines = "Line" if is_parted else ""
     bpy.context.view_layer.update()
@@ -254,7 +258,7 @@ def test_guides_do_not_feel_those_beyond_a_part_line(swung, is_parted):
         comb_tips(guides, ~is_left)
     moved = np.linalg.norm(ends[1] - ends[0], axis=2).max(axis=1)
     assert moved[~is_left].min() > 0.01
-    assert (moved[is_left].max() < 2e-4) == is_parted
+    assert (moved[is_left].max() < 2e-5) == is_parted
 
 
 def comb_tips(guides, chosen):
