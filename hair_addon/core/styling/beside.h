@@ -19,7 +19,7 @@ const bool is_beside = level >= 0 && first_centre < centre_points.shape[0];
 lanes lead = 0.0f;
 const float* centre_rows[LANES];
 ints centre_at = 0;
-// What is known of the centre and of the strand, from one segment of it to the next: too much for the registers of a GPU.
+// What is known of the centre and of the strand, from one segment of it to the next: too much for a GPU's registers.
 // SEGMENT [m] begins at point `centre_at`, where the arc length is ARC and from where AWAY leads to the strand's place;
 // SEGMENT_BELOW ends there, with the frame FRAME.
 enum { SEGMENT = 0, SEGMENT_BELOW = 3, FRAME = 6, AWAY = 9, ARC = 12, COSINE = 13, SINE = 14 };
