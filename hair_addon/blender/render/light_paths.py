@@ -15,7 +15,7 @@ from . import seen_strands
 
 _PATHS_A_PIXEL = 8
 _LEAST_PATHS, _MOST_PATHS = 20_000, 300_000  # over the part of the picture that holds the hair
-_SAMPLES_A_PATH = 4  # in which strands are drawn: those that are seen hardly change from frame to frame
+_SAMPLES_A_PATH = 2  # in which strands are drawn
 _MOST_TIMES = 4  # where that part is mostly empty, or few of its paths find light
 
 
@@ -107,14 +107,14 @@ def _strands_of(strands, shading, to_world, first):
 
 
 def _surroundings(drawn):
-    """`gather.Surroundings` of a `DrawnScene`."""
+    """`media.Surroundings` of a `DrawnScene`."""
     found = drawn.lamps.lamps
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in drawn.hair])
     places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     importance = lamps.irradiance(found, places).mean(axis=(1, 2)) if len(found) else np.zeros(0)
     corners, normals, materials = ([mesh[index] for mesh in drawn.meshes] for index in range(3))
     colors, gloss = np.split(np.concatenate([np.zeros((0, 6)), *materials]), 2, axis=1)
-    return light_paths.gather.Surroundings(
+    return light_paths.media.Surroundings(
         np.concatenate([np.zeros((0, 3), np.float32), *corners]),
         np.concatenate([np.zeros((0, 3), np.float32), *normals]),
         colors,

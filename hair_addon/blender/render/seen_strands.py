@@ -12,7 +12,7 @@ _MOST_SAMPLES = 4096  # along a side
 
 
 def find(drawn, grid, camera, window, count, turn):
-    """`gather.Seen` of a `DrawnScene` in a window of a camera's picture, at about `count` places.
+    """`seen_rays.Seen` of a `DrawnScene` in a window of a camera's picture, at about `count` places.
 
     grid: `StrandGrid` of the scene's hair; camera: (4, 4) world to view and view to clip; window: (low, high) corners
     (2,) in clip space; turn: which of several for the same picture.
@@ -37,9 +37,12 @@ def find(drawn, grid, camera, window, count, turn):
         rows.append(row)
         columns.append(column)
     row, column = np.concatenate(rows), np.concatenate(columns)
-    shown = np.concatenate(segments)
-    near, directions, areas = _rays(view, tile, (row, column), grid.points[shown])
-    return light_paths.gather.Seen(shown, near, -directions, areas, color[row, column])
+    shown = np.concatenate(segments).astype(np.int32)
+    seen_in = light_paths.view.View(view["world_to_clip"].T.astype(np.float64))
+    at = np.stack([(2 * column + 1) / tile[2] - 1.0, (2 * row + 1) / tile[3] - 1.0], axis=-1)
+    places = light_paths.seen_rays.places_at(grid, seen_in, shown, at)
+    area = light_paths.view.AREA / (tile[2] * tile[3])
+    return light_paths.seen_rays.Seen(seen_in, shown, places, color[row, column], area)
 
 
 def _samples(view_to_clip, window, count):
@@ -54,27 +57,3 @@ def _samples(view_to_clip, window, count):
     high = np.minimum(np.maximum(np.ceil((0.5 * window[1] + 0.5) * whole).astype(int), low + 1), whole)
     low = np.minimum(low, high - 1)
     return tuple(whole.tolist()), (*low.tolist(), *(high - low).tolist())
-
-
-def _rays(view, tile, at, places):
-    """(points on the near plane (N, 3), unit directions, areas [m²] of samples near places (N, 3)) of rays through
-    samples of a tile; at: their (rows, columns).
-    """
-    to_world = np.linalg.inv(view["world_to_clip"].T.astype(np.float64))
-    row, column = at
-    near, way = _lines(to_world, (column + 0.5) / tile[2], (row + 0.5) / tile[3])
-    right, up = (_lines(to_world, (column + x) / tile[2], (row + y) / tile[3]) for x, y in ((1.5, 0.5), (0.5, 1.5)))
-    length = np.linalg.norm(way, axis=1, keepdims=True)
-    directions = way / length
-    part = ((places - near) * directions).sum(axis=1, keepdims=True) / length
-    sides = [start + part * other - near - part * way for start, other in (right, up)]
-    return near, directions, np.abs((np.cross(*sides) * directions).sum(axis=1))
-
-
-def _lines(to_world, x, y):
-    """(points on the near plane (N, 3), ways to the far plane) of rays through a picture, x and y (N,) from 0 to 1."""
-    ends = []
-    for depth in (-1.0, 1.0):
-        clip = np.stack([2.0 * x - 1.0, 2.0 * y - 1.0, np.full(len(x), depth), np.ones(len(x))], axis=-1) @ to_world.T
-        ends.append(clip[:, :3] / clip[:, 3:])
-    return ends[0], ends[1] - ends[0]

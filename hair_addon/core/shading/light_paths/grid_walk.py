@@ -227,23 +227,3 @@ def place_on(medium: Medium, segment: int, part: float, offset: float, direction
     met.offset = offset
     met.position = start + part * along + radius * (offset * sideways - rise * inwards)
     return met
-
-
-@wp.func
-def direction_of_hair(medium: Medium, segment: int, first: float, second: float):
-    """A direction that rays meet a segment in, at random by two numbers from 0 to 1, which turns with the hair."""
-    tangent = wp.normalize(medium.points[segment + 1] - medium.points[segment])
-    # Any other point of the hair: half of all points away, mostly on another strand.
-    count = medium.points.shape[0]
-    x = wp.cross(tangent, medium.points[(segment + count / 2) % count] - medium.points[segment])
-    if wp.length(x) < 1e-9:
-        x = wp.cross(tangent, wp.vec3(0.3, 0.5, 0.8))
-    x = wp.normalize(x)
-    y = wp.cross(tangent, x)
-    # A strand's width across a direction is as its sine: density sin² of the angle to the tangent.
-    angle = first * wp.pi
-    for _step in range(8):
-        angle -= (angle - 0.5 * wp.sin(2.0 * angle) - first * wp.pi) / wp.max(1.0 - wp.cos(2.0 * angle), 0.05)
-    angle = wp.clamp(angle, 0.0, wp.pi)
-    around = 2.0 * wp.pi * second
-    return wp.cos(angle) * tangent + wp.sin(angle) * (wp.cos(around) * x + wp.sin(around) * y)

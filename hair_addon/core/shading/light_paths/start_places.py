@@ -1,121 +1,170 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Where paths start: places that keep to their strands from frame to frame, and random numbers of paths from there.
 
-A path is known by its segment and by its number there. All its random numbers follow
-from these, and its directions are taken in the frame of what it meets. So while a camera or hair moves a little, the
-same paths begin at the same places, and their light changes by as little.
+Each segment is taken as often as it is large in the picture, in sight or not; of its places those count that rays from
+the viewer meet first. A path is known by its segment and by its number there. All its random numbers follow from these,
+and its directions are taken in the frame of what it meets. So while a camera or hair moves a little, the same paths
+begin at the same places, and their light changes by as little.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
 
-from .grid_walk import PASSED, Medium, direction_of_hair, place_on, walk
-from .strand_grid import StrandGrid
-
-if TYPE_CHECKING:
-    from .gather import Seen
+from .grid_walk import PASSED, STRAND, Medium, place_on, walk
+from .media import launch
+from .seen_rays import Seen
+from .strand_grid import CELLS_A_VOXEL, StrandGrid
+from .view import ViewOnDevice, on_device, ray_at, seen_at
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 HIDDEN = wp.constant(3)  # kind of a place that is not in sight, beside what ends a path's way
+_MOST_TRIES = 32  # places for each path that is wanted, in deep hair that few of are seen
+_MOST_OF_ONE = wp.constant(1_000_000)  # of a segment
+_MOST_PLACES = wp.constant(64)  # along a segment, where its cells are looked up
 
 
 @dataclass(frozen=True, eq=False)
 class Starts:
-    """N paths: where they start on strands, and in which direction light is wanted from there."""
+    """N places in sight where paths begin, on segments."""
 
     segments: np.ndarray  # (N,) int32 of a grid
-    viewers: np.ndarray  # (N, 3) unit vectors towards the viewer
-    reaches: np.ndarray  # (N,) float32 [m] towards the viewer that must be free; below zero: any direction
     keys: np.ndarray  # (N,) int32 of random numbers
 
 
-@wp.struct
-class StartsOnDevice:
-    """`Starts` on a device."""
-
-    segments: wp.array[int]
-    viewers: wp.array[wp.vec3]
-    reaches: wp.array[float]
-    keys: wp.array[int]
-
-
 @wp.func
-def start(medium: Medium, starts: StartsOnDevice, path: int):
+def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
     """(`Met` where a path starts, `HIDDEN` where that is not in sight; direction there; random state)."""
-    state = wp.rand_init(0, starts.keys[path])
-    segment = starts.segments[path]
-    direction = -starts.viewers[path]
-    if starts.reaches[path] < 0.0:
-        first = wp.randf(state)
-        direction = direction_of_hair(medium, segment, first, wp.randf(state))
+    state = wp.rand_init(0, key)
     part = wp.randf(state)
-    met = place_on(medium, segment, part, 2.0 * wp.randf(state) - 1.0, direction)
-    if starts.reaches[path] > 0.0:
-        before = walk(medium, met.position, -direction, starts.reaches[path], medium.strands[segment])
-        if before.kind != PASSED:
-            met.kind = HIDDEN
+    x, y, area = seen_at(view, (1.0 - part) * medium.points[segment] + part * medium.points[segment + 1])
+    near, direction = ray_at(view, x, y)
+    place = place_on(medium, segment, part, 2.0 * wp.randf(state) - 1.0, direction)
+    x, y, area = seen_at(view, place.position)
+    met = place
+    met.kind = HIDDEN
+    if area > 0.0 and wp.abs(x) < 1.0 and wp.abs(y) < 1.0:
+        near, direction = ray_at(view, x, y)
+        reach = wp.dot(place.position - near, direction)
+        own = medium.strands[segment]
+        if reach > 0.0:
+            # What is hidden is mostly so by the next strand, which is found soon from here.
+            before = walk(medium, place.position, -direction, reach, own)
+            if before.kind == PASSED:
+                # A place inside of another strand is hidden by its side towards the viewer, which no ray from inside meets.
+                radius = medium.radii[segment]
+                met = walk(medium, near, direction, reach + radius, -1)
+                if met.kind == STRAND:
+                    if medium.strands[met.index] != own or wp.length(met.position - place.position) > radius:
+                        met.kind = HIDDEN
+                else:
+                    met.kind = HIDDEN
     return met, direction, state
 
 
-def of_seen(grid: StrandGrid, seen: "Seen", count: int, seed: int = 0) -> Starts:
-    """`Starts` of about `count` paths on segments of a `gather.Seen`: on each as many as it is large in the picture.
+@wp.func
+def _is_near_seen(medium: Medium, is_seen: wp.array3d[wp.uint8], start: wp.vec3, end: wp.vec3):
+    """Whether a segment is in any of the voxels of `voxels_of`."""
+    places = 2 + wp.clamp(int(wp.length(end - start) / medium.least_cell), 0, _MOST_PLACES)
+    found = int(0)
+    for step in range(places):
+        place = start + (end - start) * (float(step) / float(places - 1))
+        at = wp.cw_div(place - medium.corner, medium.cell) / float(CELLS_A_VOXEL)
+        x = wp.clamp(int(at[0]), 0, is_seen.shape[2] - 1)
+        y = wp.clamp(int(at[1]), 0, is_seen.shape[1] - 1)
+        z = wp.clamp(int(at[2]), 0, is_seen.shape[0] - 1)
+        found += int(is_seen[z, y, x])
+    return found > 0
 
-    Which of them are in sight only rays can tell.
+
+@wp.kernel
+def _count(
+    medium: Medium,
+    view: ViewOnDevice,
+    is_seen: wp.array3d[wp.uint8],
+    density: float,
+    seed: int,
+    out_count: wp.array[int],
+    first: int,
+):
+    """How many paths start on each segment, `density` for the picture's unit of area."""
+    segment = first + wp.tid()
+    start = medium.points[segment]
+    end = medium.points[segment + 1]
+    count = int(0)
+    if medium.strands[segment] == medium.strands[segment + 1] and _is_near_seen(medium, is_seen, start, end):
+        x, y, area = seen_at(view, 0.5 * (start + end))
+        _near, direction = ray_at(view, x, y)
+        width = medium.radii[segment] + medium.radii[segment + 1]
+        wanted = wp.length(wp.cross(end - start, direction)) * width * area * density
+        if wanted < float(_MOST_OF_ONE):
+            state = wp.rand_init(seed, segment)
+            count = int(wanted + wp.randf(state))
+        else:
+            count = _MOST_OF_ONE
+    out_count[segment] = count
+
+
+def voxels_of(grid: StrandGrid, places: np.ndarray) -> np.ndarray:
+    """(Z, Y, X) uint8: one in voxels in which places (N, 3) are, and in all that touch these.
+
+    Thin hair is missed by samples, and may be in sight beside them.
     """
-    segments, first, which, counts = np.unique(
-        seen.segments, return_index=True, return_inverse=True, return_counts=True
-    )
-    towards = np.stack([np.bincount(which, weights=axis) for axis in seen.directions.T], axis=-1)
-    towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-12)
-    start = grid.points[segments].astype(np.float64)
-    along = grid.points[segments + 1].astype(np.float64) - start
-    width = grid.radii[segments] + grid.radii[segments + 1]
-    size = np.linalg.norm(np.cross(along, towards), axis=1) * width * counts / np.bincount(which, weights=seen.areas)
-    wanted = size * (count / size.sum())
-    reach = ((seen.positions[first] - start) * towards).sum(axis=1)
-    each, number = _numbered(wanted, unit(hashed(segments, seed)))
-    return Starts(
-        segments[each].astype(np.int32),
-        towards[each].astype(np.float32),
-        np.maximum(reach[each], 0.0).astype(np.float32),
-        hashed(segments[each], seed + 1, number).astype(np.int32),
-    )
-
-
-def anywhere(grid: StrandGrid, count: int, seed: int = 0) -> Starts:
-    """`Starts` of about `count` paths on all strands of a grid, by their area, in any direction."""
-    is_segment = grid.strands[:-1] == grid.strands[1:]
-    along = np.diff(grid.points.astype(np.float64), axis=0)
-    area = np.linalg.norm(along, axis=1) * (grid.radii[1:] + grid.radii[:-1]) * is_segment
-    each, number = _numbered(area * (count / area.sum()), unit(hashed(np.arange(len(area)), seed + 2)))
-    return Starts(
-        each.astype(np.int32),
-        np.zeros((len(each), 3), np.float32),
-        np.full(len(each), -1.0, np.float32),
-        hashed(each, seed + 3, number).astype(np.int32),
-    )
-
-
-def on_device(starts: Starts) -> StartsOnDevice:
-    """`StartsOnDevice` of `Starts`."""
-    found = StartsOnDevice()
-    found.segments, found.keys = wp.array(starts.segments, dtype=int), wp.array(starts.keys, dtype=int)
-    found.viewers, found.reaches = wp.array(starts.viewers, dtype=wp.vec3), wp.array(starts.reaches, dtype=float)
+    x, y, z = grid.voxels
+    at = ((places - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(np.int64).clip(0, np.array([x, y, z]) - 1)
+    found = np.zeros((z, y, x), np.uint8)
+    found[at[:, 2], at[:, 1], at[:, 0]] = 1
+    for axis in range(3):
+        line = np.moveaxis(found, axis, 0)
+        before = line.copy()
+        line[1:] |= before[:-1]
+        line[:-1] |= before[1:]
     return found
 
 
-def _numbered(wanted, randoms):
-    """(indices, numbers from 0 on) of things of which (N,) are wanted, rounded by random numbers of each."""
-    numbers = np.floor(wanted + randoms).astype(int)
-    each = np.repeat(np.arange(len(numbers)), numbers)
-    return each, np.arange(len(each)) - np.repeat(np.cumsum(numbers) - numbers, numbers)
+@wp.kernel
+def _see(
+    medium: Medium,
+    view: ViewOnDevice,
+    segments: wp.array[int],
+    keys: wp.array[int],
+    out_is_seen: wp.array[wp.uint8],
+    first: int,
+):
+    place = first + wp.tid()
+    met, _direction, _state = start(medium, view, segments[place], keys[place])
+    if met.kind == STRAND:
+        out_is_seen[place] = wp.uint8(1)
 
 
-def hashed(values: np.ndarray, seed: int, number: np.ndarray | int = 0) -> np.ndarray:
+def of_seen(
+    medium: Medium, grid: StrandGrid, seen: Seen, voxels: np.ndarray, count: int, seed: int, device: wp.DeviceLike
+) -> Starts:
+    """About `count` `Starts`; voxels: of what is seen, by `voxels_of`."""
+    density = count / (len(seen.segments) * seen.area)
+    counts = wp.zeros(len(grid.points) - 1, dtype=int)
+    seen_in, is_seen = on_device(seen.view), wp.array(voxels, dtype=wp.uint8)
+    for _try in range(2):
+        launch(_count, len(counts), [medium, seen_in, is_seen, density, seed, counts], device)
+        numbers = counts.numpy()
+        tries = int(numbers.sum(dtype=np.int64))
+        if tries <= _MOST_TRIES * count:
+            break
+        density *= 0.9 * _MOST_TRIES * count / tries
+    segments = np.flatnonzero(numbers)
+    each = np.repeat(segments, numbers[segments])
+    firsts = np.cumsum(numbers[segments]) - numbers[segments]
+    keys = hashed(each, seed + 1, np.arange(len(each)) - np.repeat(firsts, numbers[segments])).astype(np.int32)
+    each = each.astype(np.int32)
+    in_sight = wp.zeros(len(each), dtype=wp.uint8)
+    launch(_see, len(each), [medium, seen_in, wp.array(each), wp.array(keys), in_sight], device)
+    is_start = in_sight.numpy().astype(bool)
+    return Starts(each[is_start], keys[is_start])
+
+
+def hashed(values: np.ndarray, seed: int, number: int | np.ndarray = 0) -> np.ndarray:
     """(N,) uint32 of (N,) whole numbers, a seed and a second (N,) [Steele14, the finalizer of their generator]."""
     bits = np.asarray(values).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
     bits = bits + np.asarray(number).astype(np.uint64) * np.uint64(0xD1B54A32D192ED03)
@@ -123,8 +172,3 @@ def hashed(values: np.ndarray, seed: int, number: np.ndarray | int = 0) -> np.nd
     for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
         bits = (bits ^ (bits >> np.uint64(shift))) * np.uint64(factor)
     return (bits ^ (bits >> np.uint64(31))).astype(np.uint32)
-
-
-def unit(bits: np.ndarray) -> np.ndarray:
-    """uint32 → [0, 1)."""
-    return bits.astype(np.float64) / 2.0**32

@@ -7,15 +7,13 @@ _PRIOR = 512.0  # paths that the ratio of the voxels around stands for
 
 
 def shares(sums: np.ndarray, path_count: int, origin: tuple[int, int, int] = (0, 0, 0)) -> np.ndarray:
-    """(Z, Y, X, 9) sums of `gather` over some paths → (Z, Y, X, 4): RGB in parts of what even light gives, and how much
+    """(Z, Y, X, 12) sums of `gather` over some paths → (Z, Y, X, 4): RGB in parts of what even light gives, and how much
     of what is drawn is kept.
 
     Both together are the paths' light. What is drawn tells apart strands and places that the paths' mean is too coarse
     for; as much is kept as explains the paths best, but where that is more than they find in any channel.
     """
-    even = sums[..., 3:6]
-    pairs = [np.concatenate([found, even], axis=-1) for found in (sums[..., :3], sums[..., 6:])]
-    light, drawn = (smooth_ratios(pair, path_count, origin) for pair in pairs)
+    light, drawn = (smooth_ratios(pair, path_count, origin) for pair in (sums[..., :6], sums[..., 6:]))
     most = explained_part(sums)
     kept = np.clip((light / np.maximum(drawn, 1e-12)).min(axis=-1, keepdims=True), 0.0, most)
     return np.concatenate([light - kept * drawn, kept], axis=-1)
@@ -23,9 +21,11 @@ def shares(sums: np.ndarray, path_count: int, origin: tuple[int, int, int] = (0,
 
 def explained_part(sums: np.ndarray) -> float:
     """The part of what is drawn, from 0 to 1, with the least squared difference from the paths' light over all voxels
-    of (Z, Y, X, 9) sums, beside any part of even light in each channel.
+    of (Z, Y, X, 12) sums, beside any part of even light in each channel.
     """
-    light, even, drawn = (values[sums[..., 3] > 0.0] for values in np.split(np.asarray(sums, np.float64), 3, axis=-1))
+    is_known = (sums[..., 3] > 0.0) & (sums[..., 9] > 0.0)
+    light, even, drawn, there = np.split(np.asarray(sums[is_known], np.float64), 4, axis=-1)
+    drawn = drawn * (even / np.maximum(there, 1e-12))
     share = 1.0 / np.maximum(even, 1e-12)  # a voxel counts by its paths, not by their square
     total = np.maximum(even.sum(axis=0), 1e-12)
     light, drawn = (values - values.sum(axis=0) / total * even for values in (light, drawn))

@@ -1,0 +1,101 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands, surfaces and lamps on a device, as kernels of paths take them."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+from ...kernels import parallel
+from ...kernels.checks import require_count
+from ..tables import surface_albedo
+from .grid_walk import Medium
+from .light_sources import Sources
+from .strand_grid import StrandGrid
+from .world_light import world_of
+
+_LEAST_PATHS = 4096  # fewer are not worth a thread
+
+
+@dataclass(frozen=True, eq=False)
+class Surroundings:
+    """What lights hair beside itself: surfaces, lamps and the world.
+
+    corners: (3 F, 3) of triangles [m]; normals: (3 F, 3) there, unit, or zero where they are the triangles' own;
+    albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
+    importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance, a picture of longitude
+    and latitude as core/imaging/environment.py takes it apart; gloss: (F, 3) of triangles, roughness, metallic, and
+    reflectance at normal incidence, without it all are matt.
+    """
+
+    corners: np.ndarray
+    normals: np.ndarray
+    albedo: np.ndarray
+    lamps: np.ndarray
+    importance: np.ndarray
+    world: np.ndarray
+    gloss: np.ndarray | None = None
+
+
+def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: wp.DeviceLike) -> None:
+    """Run a kernel of `count` paths on all cores; its last argument is the first path of a share."""
+    shares = parallel.share_count(count, wp.get_device(device), _LEAST_PATHS)
+    if count:
+        parallel.launch_shares(kernel, count, inputs, [[] for _ in range(shares)], device)
+
+
+def mesh_of(corners: np.ndarray) -> wp.Mesh | None:
+    """A `wp.Mesh` of triangles, None without."""
+    corners = np.ascontiguousarray(corners, np.float32).reshape(-1, 3)
+    if not len(corners):
+        return None
+    return wp.Mesh(wp.array(corners, dtype=wp.vec3), wp.array(np.arange(len(corners), dtype=np.int32), dtype=int))
+
+
+def medium_of(
+    grid: StrandGrid, mesh: wp.Mesh | None, normals: np.ndarray, albedo: np.ndarray, gloss: np.ndarray | None = None
+) -> Medium:
+    """A grid and the triangles of a mesh on the current device, as `Surroundings` has their values."""
+    corner_count = 0 if mesh is None else len(mesh.indices)
+    gloss = np.zeros((corner_count // 3, 3)) if gloss is None else gloss
+    require_count("surface gloss", len(gloss), corner_count // 3)
+    require_count("surface normals", len(normals), corner_count)
+    require_count("surface colors", len(albedo), corner_count // 3)
+    medium = Medium()
+    medium.corner, medium.cell = wp.vec3(*grid.corner.tolist()), wp.vec3(*grid.cell.tolist())
+    medium.shape, medium.least_cell = wp.vec3i(*grid.shape), float(grid.cell.min())
+    medium.starts, medium.segments = wp.array(grid.starts, dtype=int), wp.array(grid.segments, dtype=int)
+    medium.points, medium.sigma_a = vectors(grid.points), vectors(grid.sigma_a)
+    medium.radii, medium.roughness = wp.array(grid.radii, dtype=float), wp.array(grid.roughness, dtype=float)
+    medium.strands, medium.fibres = wp.array(grid.strands, dtype=int), wp.array(grid.fibres, dtype=int)
+    medium.fibre_rows = wp.array(grid.fibre_rows, dtype=float)
+    medium.mesh, medium.has_mesh = wp.uint64(0) if mesh is None else mesh.id, int(mesh is not None)
+    medium.normals, medium.albedo, medium.gloss = (vectors(values) for values in (normals, albedo, gloss))
+    medium.reflected = wp.array(surface_albedo.table(), dtype=wp.vec4)
+    return medium
+
+
+def sources_of(surroundings: Surroundings) -> Sources:
+    """Lamps and world on the current device."""
+    lamps = surroundings.lamps
+    require_count("lamps", len(surroundings.importance), len(lamps))
+    sources = Sources()
+    sources.count = len(lamps)
+    sources.kind = wp.array(lamps["kind"].astype(np.int32), dtype=int)
+    sources.position, sources.axis, sources.power = (
+        vectors(lamps[name][:, :3]) for name in ("position", "axis", "power")
+    )
+    shape = np.stack([lamps[name] for name in ("radius", "cos_cone", "blend", "casts_shadow")], axis=-1)
+    sources.shape = wp.array(shape.astype(np.float32).reshape(-1, 4), dtype=wp.vec4)
+    # None without a chance: the irradiance elsewhere may be another.
+    importance = np.asarray(surroundings.importance, float)
+    chance = importance + 0.1 * importance.mean() + 1e-12 if len(lamps) else importance
+    sources.chance = wp.array((chance / max(chance.sum(), 1e-30)).astype(np.float32), dtype=float)
+    sources.world = world_of(surroundings.world)
+    return sources
+
+
+def vectors(values: np.ndarray) -> wp.array:
+    """Numbers (..., 3) as an array of vectors."""
+    return wp.array(np.ascontiguousarray(values, np.float32).reshape(-1, 3), dtype=wp.vec3)

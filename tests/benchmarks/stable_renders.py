@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""How steady rendered hair is while the scene turns under fixed lights, by dual scattering and by Light Grid.
+
+Scenes of `random_scene` turn by a quarter of a degree with each frame. Printed are display levels of 255, where hair is:
+how far means of 12 × 12 pixels change from one frame to the next, in the mean and at the 99th percentile, in which
+flicker is seen that single pixels hide; the same with `--converged` times as many paths; and how far frames are from
+those, the root mean square of blocks.
+
+.venv/bin/python tests/benchmarks/stable_renders.py --seeds 36 45 41 --converged 16
+"""
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+
+import bpy
+import numpy as np
+from mathutils import Matrix
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+
+from blend_samples.comparisons import random_scene, random_scenes
+from hair_addon import api
+from hair_addon.blender.gpu import display_transform
+from hair_addon.blender.render import light_paths
+
+BLOCK = 12  # pixels along each side
+
+
+def levels(picture):
+    """(H, W, 4) premultiplied light → (H, W, 3), what the scene's view transform shows of it, from 0 to 255."""
+    transform = display_transform.DisplayTransform.of(bpy.context.scene)
+    shown = display_transform.apply(transform, np.ascontiguousarray(picture[..., :3], np.float32).reshape(-1, 3))
+    return 255.0 * np.clip(shown, 0.0, 1.0).reshape(*picture.shape[:2], 3)
+
+
+def block_means(values):
+    """(H, W, C) → (H / 12, W / 12, C)."""
+    height, width = (length // BLOCK for length in values.shape[:2])
+    cut = values[: height * BLOCK, : width * BLOCK].reshape(height, BLOCK, width, BLOCK, -1)
+    return cut.mean(axis=(1, 3))
+
+
+def frames(options, scattering, times=1):
+    """(frames, H, W, 4) of a scene that turns; processor seconds a frame."""
+    blender_scene = bpy.context.scene
+    blender_scene.vellus.multiple_scattering = scattering
+    kept = light_paths._PATHS_A_PIXEL, light_paths._LEAST_PATHS, light_paths._MOST_PATHS
+    names = ("_PATHS_A_PIXEL", "_LEAST_PATHS", "_MOST_PATHS")
+    for name, value in zip(names, kept, strict=True):
+        setattr(light_paths, name, value * times)
+    turned = [placed for placed in bpy.data.objects if placed.parent is None and placed.type in {"MESH", "CAMERA"}]
+    turned = [placed for placed in turned if placed.type == "CAMERA"] if options.camera else turned[:0] + [
+        placed for placed in turned if placed.type == "MESH"
+    ]
+    starts = [placed.matrix_world.copy() for placed in turned]
+    found, started = [], time.process_time()
+    for frame in range(options.frames):
+        for placed, start in zip(turned, starts, strict=True):
+            placed.matrix_world = Matrix.Rotation(np.radians(0.25 * frame), 4, "Z") @ start
+        bpy.context.view_layer.update()
+        found.append(
+            api.draw(width=options.size, height=options.size, samples_per_side=options.per_side, is_transparent=True)
+        )
+    for placed, start in zip(turned, starts, strict=True):
+        placed.matrix_world = start
+    bpy.context.view_layer.update()
+    for name, value in zip(names, kept, strict=True):
+        setattr(light_paths, name, value)
+    return np.stack(found), (time.process_time() - started) / options.frames
+
+
+def report(seed, name, pictures, seconds, converged=None):
+    """Print a row of figures."""
+    shown = [block_means(levels(picture)) for picture in pictures]
+    is_hair = block_means(pictures.mean(axis=0)[..., 3:])[..., 0] > 0.25
+    change = np.abs(np.diff(shown, axis=0)).max(axis=-1)[:, is_hair]
+    error = ""
+    if converged is not None:
+        still = [block_means(levels(picture)) for picture in converged]
+        off = np.sqrt(np.mean(np.square(np.array(shown) - still).max(axis=-1)[:, is_hair]))
+        error = f", error {off:5.2f}"
+    print(
+        f"{seed:4} {name:16} blocks change {change.mean():5.2f}, 99 % {np.quantile(change, 0.99):6.2f}{error}; "
+        f"{seconds:6.2f} s of processor time",
+        flush=True,
+    )
+
+
+def main():
+    """Print rows of each scene."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--seeds", type=int, nargs="+", default=[36, 45, 41])
+    parser.add_argument("--size", type=int, default=360, help="pixels along a side")
+    parser.add_argument("--per-side", type=int, default=4, help="samples along each side of a pixel")
+    parser.add_argument("--frames", type=int, default=5)
+    parser.add_argument("--camera", action="store_true", help="the camera turns, not body and hair")
+    parser.add_argument("--converged", type=int, default=0, help="so many times the paths, for comparison")
+    options = parser.parse_args()
+    random_scenes.prepare()
+    for seed in options.seeds:
+        random_scene.build(random_scene.recipe(seed))
+        converged = None
+        report(seed, "dual scattering", *frames(options, "DUAL"))
+        if options.converged:
+            converged, seconds = frames(options, "GRID", options.converged)
+            report(seed, f"{options.converged} × the paths", converged, seconds)
+        report(seed, "light grid", *frames(options, "GRID"), converged)
+
+
+if __name__ == "__main__":
+    main()
+    sys.stdout.flush()
+    # Blender's module may crash while it is torn down after drawing.
+    os._exit(0)
