@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """How steady rendered hair is while the scene turns under fixed lights, by dual scattering and by Light Grid.
 
-Scenes of `random_scene` turn by a quarter of a degree with each frame. Printed are display levels of 255, where hair is:
-how far means of 12 × 12 pixels change from one frame to the next, in the mean and at the 99th percentile, in which
+Scenes of `random_scene` turn by a quarter of a degree with each frame. Printed are display levels of 255, where hair
+is: how far means of 12 × 12 pixels change from one frame to the next, in the mean and at the 99th percentile, in which
 flicker is seen that single pixels hide; the same with `--converged` times as many paths; and how far frames are from
 those, the root mean square of blocks.
 
@@ -51,10 +51,8 @@ def frames(options, scattering, times=1):
     names = ("_PATHS_A_PIXEL", "_LEAST_PATHS", "_MOST_PATHS")
     for name, value in zip(names, kept, strict=True):
         setattr(light_paths, name, value * times)
-    turned = [placed for placed in bpy.data.objects if placed.parent is None and placed.type in {"MESH", "CAMERA"}]
-    turned = [placed for placed in turned if placed.type == "CAMERA"] if options.camera else turned[:0] + [
-        placed for placed in turned if placed.type == "MESH"
-    ]
+    kind = "CAMERA" if options.camera else "MESH"
+    turned = [placed for placed in bpy.data.objects if placed.parent is None and placed.type == kind]
     starts = [placed.matrix_world.copy() for placed in turned]
     found, started = [], time.process_time()
     for frame in range(options.frames):

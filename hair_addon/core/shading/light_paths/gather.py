@@ -117,8 +117,9 @@ def gather(
     device: wp.DeviceLike = "cpu",
     most_paths: int = 0,
 ) -> tuple[np.ndarray, int]:
-    """(systems, Z, Y, X, 12) float64 by voxel, sums of RGB: over paths their light, and what even light would give; over
-    samples, which are others, what is drawn without paths, and what even light would give there; and how many paths.
+    """(systems, Z, Y, X, 12) float64 by voxel, sums of RGB: over paths their light, and what even light would give;
+    over samples, which are others, what is drawn without paths, and what even light would give there; and how many
+    paths.
 
     About `path_count` start on hair that is in sight. As many as there were follow again and again, until the standard
     error of their mean light is 1.5 % of it, or there would be more than `most_paths`: few paths of dark hair find a

@@ -53,7 +53,7 @@ def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
             # What is hidden is mostly so by the next strand, which is found soon from here.
             before = walk(medium, place.position, -direction, reach, own)
             if before.kind == PASSED:
-                # A place inside of another strand is hidden by its side towards the viewer, which no ray from inside meets.
+                # A place inside of another strand is hidden by its side that no ray from inside meets.
                 radius = medium.radii[segment]
                 met = walk(medium, near, direction, reach + radius, -1)
                 if met.kind == STRAND:

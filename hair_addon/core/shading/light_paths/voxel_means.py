@@ -7,8 +7,8 @@ _PRIOR = 512.0  # paths that the ratio of the voxels around stands for
 
 
 def shares(sums: np.ndarray, path_count: int, origin: tuple[int, int, int] = (0, 0, 0)) -> np.ndarray:
-    """(Z, Y, X, 12) sums of `gather` over some paths → (Z, Y, X, 4): RGB in parts of what even light gives, and how much
-    of what is drawn is kept.
+    """(Z, Y, X, 12) sums of `gather` over some paths → (Z, Y, X, 4): RGB in parts of what even light gives, and how
+    much of what is drawn is kept.
 
     Both together are the paths' light. What is drawn tells apart strands and places that the paths' mean is too coarse
     for; as much is kept as explains the paths best, but where that is more than they find in any channel.

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from hair_addon.core.imaging import lamps
-from hair_addon.core.shading.light_paths import seen_rays
 from hair_addon.core.shading.tables import lookup_tables
 from tests.core.shading.light_paths.test_gather import (
     ALONG_Y,
     LAMP,
     found_by,
     grid_of,
+    level_view,
     ratio,
     strands_in_a_box,
     surroundings,
@@ -51,9 +51,8 @@ def light_on_a_strand(light, path_count=20_000):
     """`ratio` of a thin strand at the origin that a lamp lights, seen along y."""
     thin = np.stack([np.linspace(-0.02, 0.02, 3), np.zeros(3), np.zeros(3)], axis=-1)[None]
     grid = grid_of(thin, (0.05, 0.3, 1.0), 0.002, cell_count=1_000)
-    sides = np.array([0.02, 0.0, 0.0]), np.array([0.0, 0.0, 0.004])
-    rays = seen_rays.Rays(np.array([-0.01, -0.1, -0.002]), *sides, np.array([-0.01, 0.1, -0.002]), *sides)
-    return ratio(found_by(grid, surroundings(lamps=light), rays, path_count))
+    seen_in = level_view((0.0, -0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.02, 0.004), 0.2)
+    return ratio(found_by(grid, surroundings(lamps=light), seen_in, path_count))
 
 
 def test_near_a_lamp_light_grows_as_its_disk_does():
@@ -103,8 +102,7 @@ def test_an_area_lamp_of_less_spread_gives_as_much_light():
 def test_a_lamp_among_hair_is_found_by_few_paths(rng):
     """A disk of 6 cm amid strands: means of few paths differ little, as no path has too much light."""
     grid = grid_of(strands_in_a_box(rng, 4_000), (0.02, 0.04, 0.06), 0.004, cell_count=50_000)
-    sides = np.array([0.3, 0.0, 0.0]), np.array([0.0, 0.0, 0.3])
-    near = seen_rays.Rays(np.array([-0.15, -0.3, -0.15]), *sides, np.array([-0.15, 4.0, -0.15]), *sides)
+    near = level_view((0.0, -0.3, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.3, 0.3), 4.3)
     up = lamp(lamps.AREA, 0.0, 0.06)
     up["axis"][0, :3] = 0.0, 0.0, 1.0
     means = [ratio(found_by(grid, surroundings(lamps=up), near, 4_000, seed)).mean() for seed in range(6)]
