@@ -104,8 +104,7 @@ def _even(
 ):
     sample = first + wp.tid()
     x, y, _area = view.seen_at(seen_in, places[sample])
-    _near, direction = view.ray_at(seen_in, x, y)
-    out_even[sample] = even_return(fibre_of(medium, segments[sample]), -direction)
+    out_even[sample] = even_return(fibre_of(medium, segments[sample]), -view.direction_at(seen_in, x, y))
 
 
 def gather(

@@ -16,7 +16,7 @@ from .grid_walk import PASSED, STRAND, Medium, place_on, walk
 from .media import launch
 from .seen_rays import Seen
 from .strand_grid import CELLS_A_VOXEL, StrandGrid
-from .view import ViewOnDevice, on_device, ray_at, seen_at
+from .view import ViewOnDevice, depth_at, direction_at, on_device, seen_at
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -40,14 +40,14 @@ def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
     state = wp.rand_init(0, key)
     part = wp.randf(state)
     x, y, area = seen_at(view, (1.0 - part) * medium.points[segment] + part * medium.points[segment + 1])
-    near, direction = ray_at(view, x, y)
+    direction = direction_at(view, x, y)
     place = place_on(medium, segment, part, 2.0 * wp.randf(state) - 1.0, direction)
     x, y, area = seen_at(view, place.position)
     met = place
     met.kind = HIDDEN
     if area > 0.0 and wp.abs(x) < 1.0 and wp.abs(y) < 1.0:
-        near, direction = ray_at(view, x, y)
-        reach = wp.dot(place.position - near, direction)
+        direction = direction_at(view, x, y)
+        reach = depth_at(view, place.position, direction)
         own = medium.strands[segment]
         if reach > 0.0:
             # What is hidden is mostly so by the next strand, which is found soon from here.
@@ -55,7 +55,7 @@ def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
             if before.kind == PASSED:
                 # A place inside of another strand is hidden by its side that no ray from inside meets.
                 radius = medium.radii[segment]
-                met = walk(medium, near, direction, reach + radius, -1)
+                met = walk(medium, place.position - reach * direction, direction, reach + radius, -1)
                 if met.kind == STRAND:
                     if medium.strands[met.index] != own or wp.length(met.position - place.position) > radius:
                         met.kind = HIDDEN
@@ -96,7 +96,7 @@ def _count(
     count = int(0)
     if medium.strands[segment] == medium.strands[segment + 1] and _is_near_seen(medium, is_seen, start, end):
         x, y, area = seen_at(view, 0.5 * (start + end))
-        _near, direction = ray_at(view, x, y)
+        direction = direction_at(view, x, y)
         width = medium.radii[segment] + medium.radii[segment + 1]
         wanted = wp.length(wp.cross(end - start, direction)) * width * area * density
         if wanted < float(_MOST_OF_ONE):

@@ -17,47 +17,67 @@ class View:
 
     world_to_clip: np.ndarray  # (4, 4), of the part
 
-    def ends(self, x: float, y: float) -> tuple[np.ndarray, np.ndarray]:
-        """Points (3,) of the near and the far plane that are seen at x and y, from -1 to 1."""
-        clip = np.array([[x, y, depth, 1.0] for depth in (-1.0, 1.0)])
-        found = clip @ np.linalg.inv(self.world_to_clip).T
-        near, far = found[:, :3] / found[:, 3:]
-        return near, far
+    def near(self, x: float, y: float) -> np.ndarray:
+        """The point (3,) of the near plane that is seen at x and y, from -1 to 1."""
+        found = np.linalg.inv(self.world_to_clip) @ [x, y, -1.0, 1.0]
+        return found[:3] / found[3]
 
 
 @wp.struct
 class ViewOnDevice:
-    """`View`: rays from near + x near_x + y near_y to far + x far_x + y far_y, and rows of the matrix."""
+    """`View`: rays from near + x near_x + y near_y, and rows of the matrix; row_near: zero on the near plane."""
 
     near: wp.vec3
     near_x: wp.vec3
     near_y: wp.vec3
-    far: wp.vec3
-    far_x: wp.vec3
-    far_y: wp.vec3
     row_x: wp.vec4
     row_y: wp.vec4
     row_w: wp.vec4
+    row_near: wp.vec4
 
 
 def on_device(view: View) -> ViewOnDevice:
     """Return a view's struct."""
     found = ViewOnDevice()
-    middle, right, top = view.ends(0.0, 0.0), view.ends(1.0, 0.0), view.ends(0.0, 1.0)
-    for end, name in enumerate(("near", "far")):
-        setattr(found, name, wp.vec3(*middle[end].tolist()))
-        setattr(found, f"{name}_x", wp.vec3(*(right[end] - middle[end]).tolist()))
-        setattr(found, f"{name}_y", wp.vec3(*(top[end] - middle[end]).tolist()))
-    x, y, _z, w = (wp.vec4(*row) for row in np.asarray(view.world_to_clip, float).tolist())
-    found.row_x, found.row_y, found.row_w = x, y, w
+    middle = view.near(0.0, 0.0)
+    found.near = wp.vec3(*middle.tolist())
+    found.near_x = wp.vec3(*(view.near(1.0, 0.0) - middle).tolist())
+    found.near_y = wp.vec3(*(view.near(0.0, 1.0) - middle).tolist())
+    x, y, z, w = np.asarray(view.world_to_clip, float)
+    found.row_x, found.row_y, found.row_w = wp.vec4(*x.tolist()), wp.vec4(*y.tolist()), wp.vec4(*w.tolist())
+    found.row_near = wp.vec4(*(z + w).tolist())
     return found
+
+
+@wp.func
+def _across(view: ViewOnDevice, x: float, y: float):
+    """Along the ray at a place of the picture: the line of all points that are seen there."""
+    of_w = wp.vec3(view.row_w[0], view.row_w[1], view.row_w[2])
+    of_x = wp.vec3(view.row_x[0], view.row_x[1], view.row_x[2]) - x * of_w
+    of_y = wp.vec3(view.row_y[0], view.row_y[1], view.row_y[2]) - y * of_w
+    return wp.cross(of_x, of_y)
+
+
+@wp.func
+def direction_at(view: ViewOnDevice, x: float, y: float):
+    """The unit direction of the ray at a place of the picture, away from the viewer."""
+    direction = wp.normalize(_across(view, x, y))
+    if direction[0] * view.row_near[0] + direction[1] * view.row_near[1] + direction[2] * view.row_near[2] < 0.0:
+        direction = -direction
+    return direction
 
 
 @wp.func
 def ray_at(view: ViewOnDevice, x: float, y: float):
     """(point of the near plane, unit direction) of the ray at a place of the picture."""
-    near = view.near + x * view.near_x + y * view.near_y
-    return near, wp.normalize(view.far + x * view.far_x + y * view.far_y - near)
+    return view.near + x * view.near_x + y * view.near_y, direction_at(view, x, y)
+
+
+@wp.func
+def depth_at(view: ViewOnDevice, place: wp.vec3, direction: wp.vec3):
+    """The distance [m] from the near plane to a place, along the ray through it."""
+    along = direction[0] * view.row_near[0] + direction[1] * view.row_near[1] + direction[2] * view.row_near[2]
+    return wp.dot(view.row_near, wp.vec4(place[0], place[1], place[2], 1.0)) / along
 
 
 @wp.func
@@ -71,8 +91,5 @@ def seen_at(view: ViewOnDevice, place: wp.vec3):
     if w > 0.0:
         x = wp.dot(view.row_x, point) / w
         y = wp.dot(view.row_y, point) / w
-        of_w = wp.vec3(view.row_w[0], view.row_w[1], view.row_w[2])
-        of_x = (wp.vec3(view.row_x[0], view.row_x[1], view.row_x[2]) - x * of_w) / w
-        of_y = (wp.vec3(view.row_y[0], view.row_y[1], view.row_y[2]) - y * of_w) / w
-        area = wp.length(wp.cross(of_x, of_y))
+        area = wp.length(_across(view, x, y)) / (w * w)
     return x, y, area
