@@ -10,7 +10,7 @@ from mathutils.bvhtree import BVHTree
 
 from hair_addon import api
 
-BROWN, BLACK = (0.6, 1.15, 2.1), (2.2, 2.9, 3.8)  # absorption per fibre radius: of brows, of lashes
+BROWN, BLACK = (1.1, 1.8, 2.9), (2.2, 2.9, 3.8)  # absorption per fibre radius: of brows, of lashes
 _DEPTH = 0.0003  # [m] of the patches below the skin
 
 # Of the left brow, from the nose outward: place along X and height [m], half width [m], direction of its hair [rad]
@@ -42,7 +42,7 @@ def build(head_object, openings):
             "Brows", brows, head_object, strand_count=1500, radius=4.2e-5, tip_taper=0.3, color=BROWN, roughness=0.35
         ),
         _hair(
-            "Lashes", lashes, head_object, strand_count=900, radius=6.5e-5, tip_taper=0.3, color=BLACK, roughness=0.7
+            "Lashes", lashes, head_object, strand_count=420, radius=1.3e-4, tip_taper=0.1, color=BLACK, roughness=0.7
         ),
     )
 

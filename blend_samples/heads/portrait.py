@@ -67,7 +67,7 @@ def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
     look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", CHESTNUT
     look.cuticle_angle, look.roughness = math.radians(5.0), roughness_from_beta_r(math.radians(7.5))
     look.random_color = 0.2
-    look.tip_absorption, look.gradient_start, look.gradient_end = _CHESTNUT_TIP, 0.05, 0.42
+    look.tip_absorption, look.gradient_start, look.gradient_end = _CHESTNUT_TIP, 0.10, 0.42
     return guides, hair
 
 
@@ -88,10 +88,10 @@ def set_styles(hair):
     api.set_styles(
         hair,
         [
-            api.Trim(random=0.14, undercoat=0.02, undercoat_length=0.45, seed=1),
-            api.Clump(size=0.020, amount=0.7, fine_amount=0.6, thickness=0.32, shape=0.25, stray=0.06, seed=2),
-            api.Curl(radius=0.0085, pitch=0.085, flatness=0.45, coherence=0.85, vary=0.3, root=0.0, tip=1.0, seed=3),
-            api.Frizz(amplitude=0.0006, wavelength=0.08, stray=0.06, stray_gain=20.0, shape=0.35, tip=0.8, seed=4),
+            api.Trim(random=0.10, undercoat=0.02, undercoat_length=0.55, seed=1),
+            api.Clump(size=0.020, amount=0.65, fine_amount=0.6, thickness=0.40, shape=0.25, stray=0.06, seed=2),
+            api.Curl(radius=0.0105, pitch=0.085, flatness=0.45, coherence=0.85, vary=0.3, root=0.0, tip=1.0, seed=3),
+            api.Frizz(amplitude=0.0006, wavelength=0.08, stray=0.07, stray_gain=20.0, shape=0.35, tip=0.8, seed=4),
         ],
     )
 

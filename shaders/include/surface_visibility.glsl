@@ -26,11 +26,20 @@ float disk_cosine(float cosine, float sine)
   return (cosine >= sine) ? cosine : 0.25 * above * above / max(sine, 1e-4);
 }
 
-// A direction for the samples of a place in the picture, another one in each pass.
+// Noise from 0 to 1 without any order, of a part of the picture.
+float part_noise(ivec2 part)
+{
+  uint bits = uint(part.x) * 1597334677u ^ uint(part.y) * 3812015801u;
+  bits = (bits ^ (bits >> 15u)) * 747796405u;
+  return float(bits >> 8u) / 16777216.0;
+}
+
+// A direction for the samples of a place in the picture, another one in each pass: parts of 4 × 4 samples have even noise,
+// moved at random from part to part, as noise that is even everywhere leaves stripes where passes have several samples.
 vec2 sample_turn()
 {
-  vec2 place = gl_FragCoord.xy + vec2(view.first_column, view.first_row);
-  float angle = 2.0 * PI * fract(gradient_noise(place) + view.coverage_turn);
+  ivec2 place = ivec2(gl_FragCoord.xy + vec2(view.first_column, view.first_row));
+  float angle = 2.0 * PI * fract(gradient_noise(vec2(place & 3)) + part_noise(place >> 2) + view.coverage_turn);
   return vec2(cos(angle), sin(angle));
 }
 

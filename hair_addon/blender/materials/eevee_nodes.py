@@ -1,22 +1,25 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Shader nodes of hair for EEVEE, which does not support hair's own: light scattered around strands, and a highlight.
 
-EEVEE gives strips of hair the normals of cylinders, so that a glossy surface has the highlight of a fibre; a
-translucent one shows light from all sides, as hair does. Colors are fitted to Cycles' light of the sample head with
-dark, brown and blond hair, by suns in front, beside and behind and by a grey world.
+EEVEE gives strips of hair the normals of cylinders, so that a glossy surface has the highlight of a fibre; one that is
+as diffuse as translucent shows light from all sides alike, as light that hair scatters. Colors are fitted to Cycles'
+light of the sample head with dark, brown and blond hair, by suns in front, beside and behind and by a grey world.
 """
+
+import math
 
 import numpy as np
 
 from ...core.shading import appearance
 from ...core.shading.fibre.pigment import color_from_falloff
+from ...core.shading.fibre.principled import beta_r_from_roughness
 
 _PREFIX = "EEVEE "  # of the names of our nodes, by which they are found again
 
 # Of ln(colour) with sqrt(sigma_a), relative to a groom's in diffuse light: lamps light strands that are seen.
 _FALLOFF = 0.63
-_GAIN = 1.5
-_SURFACE = 0.02  # what reflections send around a strand that absorbs all light inside
+_GAIN = 0.62  # of either side
+_SURFACE = 0.01  # what reflections send around a strand that absorbs all light inside
 _GLOSS = 0.05  # reflectance of the highlight, of fibres as reflective as those of Principled Hair
 
 # Name: (type, {property: value}, place from the hair node).
@@ -24,17 +27,23 @@ _NODES = {
     "Color": ("ShaderNodeVectorMath", {"operation": "MULTIPLY_ADD"}, (200, -160)),
     # EEVEE multiplies light by the color of a translucent surface where it enters and where it leaves.
     "Entering": ("ShaderNodeVectorMath", {"operation": "POWER"}, (380, -160)),
-    "Around": ("ShaderNodeBsdfTranslucent", {}, (560, -160)),
-    "Highlight": ("ShaderNodeBsdfAnisotropic", {}, (560, -300)),
-    "Sum": ("ShaderNodeAddShader", {}, (740, -160)),
+    "Through": ("ShaderNodeBsdfTranslucent", {}, (560, -160)),
+    "Back": ("ShaderNodeBsdfDiffuse", {}, (560, -300)),
+    # Not mixed: EEVEE multiplies a translucent surface's share twice, too.
+    "Around": ("ShaderNodeAddShader", {}, (740, -160)),
+    "Highlight": ("ShaderNodeBsdfAnisotropic", {}, (740, -300)),
+    "Sum": ("ShaderNodeAddShader", {}, (920, -160)),
     # Without it EEVEE takes translucent hair to be as thick as its bounds are wide, and finds shadows beyond.
-    "Strand": ("ShaderNodeHairInfo", {}, (740, -300)),
-    "Output": ("ShaderNodeOutputMaterial", {"target": "EEVEE"}, (920, -160)),
+    "Strand": ("ShaderNodeHairInfo", {}, (920, -300)),
+    "Output": ("ShaderNodeOutputMaterial", {"target": "EEVEE"}, (1100, -160)),
 }
 
 _LINKS = (
     ("Color", 0, "Entering", 0),
-    ("Entering", 0, "Around", "Color"),
+    ("Entering", 0, "Through", "Color"),
+    ("Color", 0, "Back", "Color"),
+    ("Through", 0, "Around", 0),
+    ("Back", 0, "Around", 1),
     ("Around", 0, "Sum", 0),
     ("Highlight", 0, "Sum", 1),
     ("Sum", 0, "Output", "Surface"),
@@ -73,7 +82,9 @@ def write(tree, hair_node, look, varied_color=None):
     color[1].default_value, color[2].default_value = (_GAIN,) * 3, (_SURFACE,) * 3
     nodes["Entering"].inputs[1].default_value = (0.5, 0.5, 0.5)
     nodes["Highlight"].inputs["Color"].default_value = (gloss, gloss, gloss, 1.0)
-    nodes["Highlight"].inputs["Roughness"].default_value = (1.0 - strands.coat) * strands.roughness
+    # The lobe of a fibre in half angles is as wide as GGX's of slopes √2 times its deviation, its roughness squared.
+    slope = math.sqrt(2.0) * beta_r_from_roughness((1.0 - strands.coat) * strands.roughness)
+    nodes["Highlight"].inputs["Roughness"].default_value = min(math.sqrt(slope), 1.0)
 
 
 def _has_others(tree):

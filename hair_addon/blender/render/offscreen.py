@@ -8,6 +8,7 @@ import gpu
 
 from ...core.errors import HairError
 from ...core.files.whole_file import whole_file
+from ...core.imaging import pixel_sampling
 from ...core.imaging.pixel_sampling import MOST_DRAWN
 from ...core.long_work import Stage, run_now
 from ..data import scene
@@ -16,16 +17,17 @@ from ..gpu import drawing, world_texture
 from . import drawn_scene, film, light_paths
 
 
-def draw_picture(settings, drawn=None):
+def draw_picture(settings, drawn=None, lens_passes=None):
     """(height, width, 4) float32 of the context's scene: scene-linear, premultiplied, first row at the bottom.
 
-    settings: `PictureSettings`, but `FRAME_FIELDS`; drawn: the `DrawnScene` of the context's scene, None: read it here.
+    settings: `PictureSettings`, but `FRAME_FIELDS`; drawn: the `DrawnScene` of the context's scene, None: read it here;
+    lens_passes: with depth of field, through how many points of the lens it looks at least, None: one for each sample.
     Raises `HairError`.
     """
-    return run_now(drawing_picture(settings, drawn))
+    return run_now(drawing_picture(settings, drawn, lens_passes))
 
 
-def drawing_picture(settings, drawn=None):
+def drawing_picture(settings, drawn=None, lens_passes=None):
     """`draw_picture` as work in stages (core/long_work.py), all of which run where the graphics are."""
     if max(settings.width, settings.height) > MOST_DRAWN:
         raise HairError(
@@ -37,7 +39,9 @@ def drawing_picture(settings, drawn=None):
     lens = camera_lens.read_lens(context.scene, depsgraph)
     per_side, pass_count = settings.samples_per_side, 1
     if lens is not None:  # a pass for each of its points
-        per_side, pass_count = 1, per_side**2
+        sample_count = per_side**2
+        per_side = pixel_sampling.samples_per_side(sample_count, lens_passes or sample_count)
+        pass_count = sample_count // per_side**2
     width, height = size = settings.width, settings.height
     largest = gpu.capabilities.max_texture_size_get()
     if max(size) * per_side > largest:
