@@ -22,7 +22,6 @@ wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 HIDDEN = wp.constant(3)  # kind of a place that is not in sight, beside what ends a path's way
 _MOST_TRIES = 32  # places for each path that is wanted, in deep hair that few of are seen
-_MOST_OF_ONE = wp.constant(1_000_000)  # of a segment
 _MOST_PLACES = wp.constant(64)  # along a segment, where its cells are looked up
 
 
@@ -85,11 +84,12 @@ def _count(
     view: ViewOnDevice,
     is_seen: wp.array3d[wp.uint8],
     density: float,
+    most: int,
     seed: int,
     out_count: wp.array[int],
     first: int,
 ):
-    """How many paths start on each segment, `density` for the picture's unit of area."""
+    """How many places are tried on each segment: `density` for the picture's unit of area, no more than `most`."""
     segment = first + wp.tid()
     start = medium.points[segment]
     end = medium.points[segment + 1]
@@ -99,11 +99,11 @@ def _count(
         direction = direction_at(view, x, y)
         width = medium.radii[segment] + medium.radii[segment + 1]
         wanted = wp.length(wp.cross(end - start, direction)) * width * area * density
-        if wanted < float(_MOST_OF_ONE):
+        if wanted < float(most):
             state = wp.rand_init(seed, segment)
             count = int(wanted + wp.randf(state))
         else:
-            count = _MOST_OF_ONE
+            count = most
     out_count[segment] = count
 
 
@@ -146,13 +146,12 @@ def of_seen(
     density = count / (len(seen.segments) * seen.area)
     counts = wp.zeros(len(grid.points) - 1, dtype=int)
     seen_in, is_seen = on_device(seen.view), wp.array(voxels, dtype=wp.uint8)
-    for _try in range(2):
-        launch(_count, len(counts), [medium, seen_in, is_seen, density, seed, counts], device)
-        numbers = counts.numpy()
+    tries = np.inf
+    while tries > _MOST_TRIES * count:
+        launch(_count, len(counts), [medium, seen_in, is_seen, density, count, seed, counts], device)
+        numbers = counts.numpy().clip(0, count)
         tries = int(numbers.sum(dtype=np.int64))
-        if tries <= _MOST_TRIES * count:
-            break
-        density *= 0.9 * _MOST_TRIES * count / tries
+        density *= 0.9 * _MOST_TRIES * count / max(tries, 1)
     segments = np.flatnonzero(numbers)
     each = np.repeat(segments, numbers[segments])
     firsts = np.cumsum(numbers[segments]) - numbers[segments]
