@@ -139,19 +139,24 @@ def _see(
         out_is_seen[place] = wp.uint8(1)
 
 
+def _tries(medium, view, is_seen, density, count, seed, device):
+    """(segments,) how often each is tried, less often where there would be too many for `count` paths."""
+    counts = wp.zeros(len(medium.points) - 1, dtype=int)
+    while True:
+        launch(_count, len(counts), [medium, view, is_seen, density, count, seed, counts], device)
+        numbers = counts.numpy().clip(0, count)
+        tries = int(numbers.sum(dtype=np.int64))
+        if tries <= _MOST_TRIES * count:
+            return numbers
+        density *= 0.9 * _MOST_TRIES * count / tries
+
+
 def of_seen(
     medium: Medium, grid: StrandGrid, seen: Seen, voxels: np.ndarray, count: int, seed: int, device: wp.DeviceLike
 ) -> Starts:
     """About `count` `Starts`; voxels: of what is seen, by `voxels_of`."""
-    density = count / (len(seen.segments) * seen.area)
-    counts = wp.zeros(len(grid.points) - 1, dtype=int)
     seen_in, is_seen = on_device(seen.view), wp.array(voxels, dtype=wp.uint8)
-    tries = np.inf
-    while tries > _MOST_TRIES * count:
-        launch(_count, len(counts), [medium, seen_in, is_seen, density, count, seed, counts], device)
-        numbers = counts.numpy().clip(0, count)
-        tries = int(numbers.sum(dtype=np.int64))
-        density *= 0.9 * _MOST_TRIES * count / max(tries, 1)
+    numbers = _tries(medium, seen_in, is_seen, count / (len(seen.segments) * seen.area), count, seed, device)
     segments = np.flatnonzero(numbers)
     each = np.repeat(segments, numbers[segments])
     firsts = np.cumsum(numbers[segments]) - numbers[segments]
