@@ -21,7 +21,8 @@ from .view import ViewOnDevice, depth_at, direction_at, on_device, seen_at
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
 HIDDEN = wp.constant(3)  # kind of a place that is not in sight, beside what ends a path's way
-_MOST_TRIES = 32  # places for each path that is wanted, in deep hair that few of are seen
+_LEAST_SHARE = 0.005  # of all paths that a segment may have, where there are too many tries
+_MOST_TRIES = 32  # places for each path: in deep hair few are in sight
 _MOST_PLACES = wp.constant(64)  # along a segment, where its cells are looked up
 
 
@@ -52,7 +53,7 @@ def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
             # What is hidden is mostly so by the next strand, which is found soon from here.
             before = walk(medium, place.position, -direction, reach, own)
             if before.kind == PASSED:
-                # A place inside of another strand is hidden by its side that no ray from inside meets.
+                # A place inside another strand is hidden by that strand's side, which rays from inside do not meet.
                 radius = medium.radii[segment]
                 met = walk(medium, place.position - reach * direction, direction, reach + radius, -1)
                 if met.kind == STRAND:
@@ -95,8 +96,11 @@ def _count(
     end = medium.points[segment + 1]
     count = int(0)
     if medium.strands[segment] == medium.strands[segment + 1] and _is_near_seen(medium, is_seen, start, end):
-        x, y, area = seen_at(view, 0.5 * (start + end))
+        middle = 0.5 * (start + end)
+        x, y, area = seen_at(view, middle)
         direction = direction_at(view, x, y)
+        if depth_at(view, middle, direction) <= 0.0:
+            area = 0.0  # before the near plane it has no bound
         width = medium.radii[segment] + medium.radii[segment + 1]
         wanted = wp.length(wp.cross(end - start, direction)) * width * area * density
         if wanted < float(most):
@@ -141,14 +145,17 @@ def _see(
 
 def _tries(medium, view, is_seen, density, count, seed, device):
     """(segments,) how often each is tried, less often where there would be too many for `count` paths."""
-    counts = wp.zeros(len(medium.points) - 1, dtype=int)
+    counts, most = wp.zeros(len(medium.points) - 1, dtype=int), count
     while True:
-        launch(_count, len(counts), [medium, view, is_seen, density, count, seed, counts], device)
-        numbers = counts.numpy().clip(0, count)
+        launch(_count, len(counts), [medium, view, is_seen, density, most, seed, counts], device)
+        numbers = counts.numpy().clip(0, most)
         tries = int(numbers.sum(dtype=np.int64))
         if tries <= _MOST_TRIES * count:
             return numbers
-        density *= 0.9 * _MOST_TRIES * count / tries
+        if most > _LEAST_SHARE * count:
+            most //= 4  # of strands next the camera, nearly all of which are beside the picture
+        else:
+            density *= 0.9 * _MOST_TRIES * count / tries
 
 
 def of_seen(

@@ -184,6 +184,20 @@ def test_paths_start_as_often_as_rays_meet_strands(rng):
     assert even[middles < 0.0].sum() / even.sum() == pytest.approx(expected, abs=0.03)
 
 
+def test_strands_next_to_the_camera_leave_paths_for_others(rng):
+    """Most of them is beside the picture or before its near plane, where nothing is seen of them."""
+    points = strands_in_a_box(rng, 3_000)
+    points[:20] -= points[:20].mean(axis=1, keepdims=True)
+    points[:20] += rng.uniform(-0.05, 0.05, (20, 1, 3))
+    grid = grid_of(points, WHITE, 0.002, cell_count=20_000)
+    to_clip = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, 1.00002, 0, -0.0200002], [0, 1.0, 0, 0]])
+    seen = seen_rays.seen_by(grid, np.zeros((0, 3)), view.View(to_clip), 40_000)
+    assert (seen.places[:, 1] > 0.0099).all()
+    sums, taken = gather.gather(grid, surroundings(world=1.0), seen, 10_000)
+    assert 2_500 < taken < 11_000
+    np.testing.assert_allclose(ratio(sums), 1.0, rtol=1e-3)
+
+
 def test_bent_strands_have_no_gaps():
     """A thick ring across the rays: as much is seen as its area says."""
     turn = np.linspace(0.0, 1.9 * np.pi, 12)
@@ -287,7 +301,7 @@ def test_white_fur_sends_back_what_a_random_walk_finds(rng):
     up = np.array([np.sin(view_angle), 0.0, np.cos(view_angle)])
     seen_in = level_view(middle, -towards, up, (0.5, 0.25 * np.sin(view_angle)), 8.0)
     floor = np.array([(-19, -19, -0.001), (19, -19, -0.001), (0, 38, -0.001)])
-    found = found_by(grid, surroundings(floor, [(0.0, 0.0, 0.0)], lamp), seen_in, 40_000)
+    found = found_by(grid, surroundings(floor, [(0.0, 0.0, 0.0)], lamp), seen_in, 120_000)
     seen = found[..., 3:6].sum() / 3.0 / mean_even(settings, view_angle)
     assert found[..., 0].sum() / seen == pytest.approx(expected, rel=0.15)  # both are noisy so far off the cone
 
