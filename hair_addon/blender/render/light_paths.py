@@ -58,7 +58,7 @@ def with_grid(drawn, world_to_view, view_to_clip, count, seed=0):
         for textures, of_hair in zip(drawn.hair_visibility, means, strict=True)
     ]
     lights = drawn.lights.copy()
-    lights["grid_corner"][:3], lights["grid_scale"][:3] = grid.corner, 1.0 / (grid.cell * grid.shape)
+    lights["grid_corner"][:3], lights["grid_scale"][:3] = grid.corner, 1.0 / (grid.voxel * np.array(grid.shape))
     return replace(drawn, lights=lights, hair_lights=None, hair_visibility=visibility)
 
 

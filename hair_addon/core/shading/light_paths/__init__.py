@@ -15,6 +15,7 @@ if TYPE_CHECKING:
         media,
         seen_rays,
         start_places,
+        strand_cells,
         strand_grid,
         surface_walk,
         view,

@@ -18,8 +18,8 @@ from .lamp_light import Event, light_at_once, light_by_share, light_met
 from .light_sources import Sources, across
 from .media import Surroundings, launch, medium_of, mesh_of, sources_of
 from .seen_rays import Seen
-from .start_places import HIDDEN, start
-from .strand_grid import CELLS_A_VOXEL, StrandGrid
+from .start_places import start
+from .strand_grid import StrandGrid
 from .surface_walk import surface_of, surface_turn
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
@@ -49,7 +49,7 @@ def _gather(
     light = wp.vec3(0.0, 0.0, 0.0)
     event = int(0)
     while event < _MOST_EVENTS:
-        if met.kind == HIDDEN or met.kind == PASSED:
+        if met.kind == PASSED:
             event = _MOST_EVENTS
         else:
             here = Event()
@@ -73,7 +73,7 @@ def _gather(
                 state = after
             else:
                 here.facing = -direction
-                here.position = met.position - direction * (1e-4 * medium.least_cell)
+                here.position = met.position - direction * (5e-5 * medium.voxel)
                 color, gloss = medium.albedo[met.index], medium.gloss[met.index]
                 here.surface = surface_of(met.normal, here.facing, color, gloss, medium.reflected)
                 light_there, lamp_state = light_by_share(medium, sources, here, lamp_state)
@@ -130,7 +130,7 @@ def gather(
         require_count(name, len(getattr(seen, name)), count)
     systems = grid.systems[grid.strands]
     if not count:
-        x, y, z = grid.voxels
+        x, y, z = grid.shape
         return np.zeros((len(grid.kept), z, y, x, 12)), 0
     voxels = start_places.voxels_of(grid, seen.places)
     with wp.ScopedDevice(device):
@@ -178,10 +178,8 @@ def _standard_error(total, squares, count):
 
 def _by_voxel(grid, positions, systems, values):
     """(systems, Z, Y, X, C) sums of values (N, C) at positions (N, 3) of hairs (N,)."""
-    x, y, z = grid.voxels
-    scale = (1.0 / (grid.cell * CELLS_A_VOXEL)).astype(np.float32)
-    at = (positions - grid.corner.astype(np.float32)) * scale
-    column, row, layer = (np.clip(at[:, axis].astype(np.int32), 0, most - 1) for axis, most in enumerate((x, y, z)))
+    x, y, z = grid.shape
+    column, row, layer = grid.voxels_at(positions).T
     voxel = ((systems * z + layer) * y + row) * x + column
     sums = np.empty((len(grid.kept) * x * y * z, values.shape[1]))
     for channel in range(values.shape[1]):

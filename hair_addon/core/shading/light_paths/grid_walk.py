@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A path's way to the next strand or surface: through a grid of segments, cell by cell [Amanatides87].
+"""A path's way to the next strand or surface: through voxels, and in those that hold hair through the cells of segments
+that they are divided into [Amanatides87].
 
 Strands are round, as Cycles takes hair of straight segments: a segment is a cylinder around its axis, and the wedge
 that two of them leave open on the outside of a bend is of a sphere around the point between them. A path meets the side
@@ -10,6 +11,7 @@ on from where it has met the strand, on that side. The strand that it leaves it 
 import warp as wp
 
 from .fibre_walk import Fibre
+from .strand_cells import LINE_ERROR, line_from
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
@@ -20,14 +22,17 @@ PASSED, STRAND, SURFACE = (wp.constant(kind) for kind in range(3))  # what ends 
 
 @wp.struct
 class Medium:
-    """A `StrandGrid` and triangles on a device."""
+    """A `StrandGrid` and triangles on a device; lines: two words for each of `segments`."""
 
     corner: wp.vec3
-    cell: wp.vec3
-    least_cell: float
+    voxel: float
     shape: wp.vec3i
+    along_voxel: int
+    widths: wp.vec4  # of segments: the largest radius and its halves [m]
+    bricks: wp.array[int]
     starts: wp.array[int]
     segments: wp.array[int]
+    lines: wp.array[wp.uint32]
     points: wp.array[wp.vec3]
     radii: wp.array[float]
     sigma_a: wp.array[wp.vec3]
@@ -139,13 +144,131 @@ def _shading_normal(medium: Medium, face: int, u: float, v: float, flat: wp.vec3
 
 
 @wp.func
+def _inverse_of(direction: wp.vec3):
+    """One over each component of a direction, which is as good as none below a limit."""
+    inverse = wp.vec3(FAR, FAR, FAR)
+    for axis in range(3):
+        if wp.abs(direction[axis]) >= _LEAST:
+            inverse[axis] = 1.0 / direction[axis]
+    return inverse
+
+
+@wp.func
+def _first_cell(inside: wp.vec3, shape: wp.vec3i):
+    """The cell of a grid that a place, in cells from its corner, is in."""
+    cell = wp.vec3i(0, 0, 0)
+    for axis in range(3):
+        cell[axis] = wp.clamp(int(wp.floor(inside[axis])), 0, shape[axis] - 1)
+    return cell
+
+
+@wp.func
+def _leaves(corner: wp.vec3, cell: wp.vec3i, side: float, position: wp.vec3, direction: wp.vec3, inverse: wp.vec3):
+    """Where a ray leaves a cell along each axis [m]."""
+    leave = wp.vec3(FAR, FAR, FAR)
+    for axis in range(3):
+        if wp.abs(direction[axis]) >= _LEAST:
+            far_side = float(cell[axis])
+            if direction[axis] > 0.0:
+                far_side += 1.0
+            leave[axis] = (corner[axis] + far_side * side - position[axis]) * inverse[axis]
+    return leave
+
+
+@wp.func
+def _comes_near(medium: Medium, turn: int, from_centre: wp.vec3, side: float, direction: wp.vec3):
+    """Whether a ray, from a place away from a cell's centre, may come into one of the cell's segments within the cell.
+
+    It does if the line that is kept of the segment is as near as the radius, or beyond that by what it is off.
+    """
+    point, along, halvings = line_from(medium.lines[2 * turn], medium.lines[2 * turn + 1], side)
+    normal = wp.cross(direction, along)
+    beside = wp.dot(point - from_centre, normal)
+    radius = medium.widths[halvings] + LINE_ERROR * side
+    return beside * beside < radius * radius * wp.dot(normal, normal)
+
+
+@wp.func
 def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own: int):
     """`Met` within a distance [m] of a ray; own: the strand that it leaves, -1: none."""
     met = Met()
     met.kind = PASSED
-    end = most
+    end = float(most)
+
+    # The part of the ray in the grid, and its first voxel.
+    inverse = _inverse_of(direction)
+    here = float(0.0)
+    last = float(most)
+    for axis in range(3):
+        size = float(medium.shape[axis]) * medium.voxel
+        if wp.abs(direction[axis]) < _LEAST:
+            if position[axis] < medium.corner[axis] or position[axis] > medium.corner[axis] + size:
+                last = -1.0
+        else:
+            one = (medium.corner[axis] - position[axis]) * inverse[axis]
+            other = (medium.corner[axis] + size - position[axis]) * inverse[axis]
+            here = wp.max(here, wp.min(one, other))
+            last = wp.min(last, wp.max(one, other))
+    step = wp.vec3i(1, 1, 1)
+    across = wp.vec3(0.0, 0.0, 0.0)  # length of a voxel along the ray
+    for axis in range(3):
+        across[axis] = wp.abs(inverse[axis]) * medium.voxel
+        if direction[axis] < 0.0:
+            step[axis] = -1
+    along = medium.along_voxel
+    side = medium.voxel / float(along)
+    cells = wp.vec3i(along, along, along)
+    voxel = _first_cell((position + direction * here - medium.corner) / medium.voxel, medium.shape)
+    leave = _leaves(medium.corner, voxel, medium.voxel, position, direction, inverse)
+
+    going = medium.shape[0] + medium.shape[1] + medium.shape[2]  # more voxels are on no ray, whatever its numbers are
+    if here >= last:
+        going = 0
+    while going > 0:
+        going -= 1
+        to = wp.min(leave[0], wp.min(leave[1], leave[2]))
+        brick = medium.bricks[(voxel[2] * medium.shape[1] + voxel[1]) * medium.shape[0] + voxel[0]]
+        if brick >= 0:
+            corner = medium.corner + medium.voxel * wp.vec3(float(voxel[0]), float(voxel[1]), float(voxel[2]))
+            cell = _first_cell((position + direction * here - corner) / side, cells)
+            leave_cell = _leaves(corner, cell, side, position, direction, inverse)
+            staying = 3 * along
+            while staying > 0:
+                staying -= 1
+                to_cell = wp.min(leave_cell[0], wp.min(leave_cell[1], leave_cell[2]))
+                centre = corner + side * wp.vec3(float(cell[0]) + 0.5, float(cell[1]) + 0.5, float(cell[2]) + 0.5)
+                index = ((brick * along + cell[2]) * along + cell[1]) * along + cell[0]
+                for turn in range(medium.starts[index], medium.starts[index + 1]):
+                    if _comes_near(medium, turn, position - centre, side, direction):
+                        segment = medium.segments[turn]
+                        if medium.strands[segment] != own:
+                            distance, offset = crossing(medium, segment, position, direction)
+                            if distance < end:
+                                end = distance
+                                met.kind = STRAND
+                                met.index = segment
+                                met.offset = offset
+                if to_cell >= wp.min(end, wp.min(to, last)):
+                    staying = 0
+                for axis in range(3):
+                    if staying > 0 and to_cell == leave_cell[axis]:
+                        cell[axis] = cell[axis] + step[axis]
+                        leave_cell[axis] = leave_cell[axis] + across[axis] / float(along)
+                        if cell[axis] < 0 or cell[axis] >= along:
+                            staying = 0
+        if to >= wp.min(end, last):
+            going = 0
+        here = to
+        for axis in range(3):
+            if going > 0 and to == leave[axis]:
+                voxel[axis] = voxel[axis] + step[axis]
+                leave[axis] = leave[axis] + across[axis]
+                if voxel[axis] < 0 or voxel[axis] >= medium.shape[axis]:
+                    going = 0
+
+    # Behind the strand no surface is looked for.
     if medium.has_mesh > 0:
-        found = wp.mesh_query_ray(medium.mesh, position, direction, most)
+        found = wp.mesh_query_ray(medium.mesh, position, direction, end)
         if found.result:
             end = found.t
             met.kind = SURFACE
@@ -153,59 +276,6 @@ def walk(medium: Medium, position: wp.vec3, direction: wp.vec3, most: float, own
             met.normal = _shading_normal(medium, found.face, found.u, found.v, found.normal)
             if wp.dot(found.normal, direction) > 0.0:
                 met.normal = -met.normal
-
-    # The part of the ray in the grid, and its first cell.
-    here = float(0.0)
-    last = end
-    for axis in range(3):
-        size = float(medium.shape[axis]) * medium.cell[axis]
-        if wp.abs(direction[axis]) < _LEAST:
-            if position[axis] < medium.corner[axis] or position[axis] > medium.corner[axis] + size:
-                last = -1.0
-        else:
-            one = (medium.corner[axis] - position[axis]) / direction[axis]
-            other = (medium.corner[axis] + size - position[axis]) / direction[axis]
-            here = wp.max(here, wp.min(one, other))
-            last = wp.min(last, wp.max(one, other))
-    cell = wp.vec3i(0, 0, 0)
-    step = wp.vec3i(1, 1, 1)
-    across = wp.vec3(FAR, FAR, FAR)  # length of a cell along the ray
-    leave = wp.vec3(FAR, FAR, FAR)  # where the ray leaves the cell
-    for axis in range(3):
-        inside = (position[axis] + direction[axis] * here - medium.corner[axis]) / medium.cell[axis]
-        cell[axis] = wp.clamp(int(wp.floor(inside)), 0, medium.shape[axis] - 1)
-        if wp.abs(direction[axis]) >= _LEAST:
-            across[axis] = medium.cell[axis] / wp.abs(direction[axis])
-            far_side = float(cell[axis] + 1)
-            if direction[axis] < 0.0:
-                step[axis] = -1
-                far_side = float(cell[axis])
-            leave[axis] = (medium.corner[axis] + far_side * medium.cell[axis] - position[axis]) / direction[axis]
-
-    going = medium.shape[0] + medium.shape[1] + medium.shape[2]  # more cells are on no ray, whatever its numbers are
-    if here >= last:
-        going = 0
-    while going > 0:
-        going -= 1
-        to = wp.min(leave[0], wp.min(leave[1], leave[2]))
-        index = (cell[2] * medium.shape[1] + cell[1]) * medium.shape[0] + cell[0]
-        for turn in range(medium.starts[index], medium.starts[index + 1]):
-            segment = medium.segments[turn]
-            if medium.strands[segment] != own:
-                distance, offset = crossing(medium, segment, position, direction)
-                if distance < end:
-                    end = distance
-                    met.kind = STRAND
-                    met.index = segment
-                    met.offset = offset
-        if to >= wp.min(end, last):
-            going = 0
-        for axis in range(3):
-            if going > 0 and to == leave[axis]:
-                cell[axis] = cell[axis] + step[axis]
-                leave[axis] = leave[axis] + across[axis]
-                if cell[axis] < 0 or cell[axis] >= medium.shape[axis]:
-                    going = 0
     met.position = position + direction * end
     return met
 

@@ -19,7 +19,7 @@ _LAMPS_AT_ONCE = wp.constant(8)  # that light an event
 _WORLD_AT_ONCE = wp.constant(4)  # directions of the world that light a seen place
 _OFFSETS_AT_ONCE = wp.constant(4)  # over the part of a strand's width around the one that is met
 _AROUND = wp.constant(0.25)  # half that part, of the radius
-_LEAST = wp.constant(0.5)  # of the smallest cell: distance below which no lamp's light grows
+_LEAST = wp.constant(0.25)  # of a voxel: distance below which no lamp's light grows
 
 
 @wp.struct
@@ -78,7 +78,7 @@ def _lamp_at(medium: Medium, sources: Sources, index: int, here: Event, random: 
     if index < wp.min(sources.count, _LAMPS_AT_ONCE):
         chosen, of_one, after = _one_of(sources, index, state)
         share = of_one
-        lit, state = lit_by(sources, chosen, here.position, _LEAST * medium.least_cell, after)
+        lit, state = lit_by(sources, chosen, here.position, _LEAST * medium.voxel, after)
     else:
         lit, state = lit_by_world(sources, state)
     return lit, share, state
@@ -164,7 +164,7 @@ def light_met(medium: Medium, sources: Sources, here: Event, direction: wp.vec3,
     for index in range(wp.min(sources.count, _LAMPS_AT_ONCE)):
         chosen, share, after = _one_of(sources, index, state)
         state = after
-        lit = lit_from(sources, chosen, here.position, direction, _LEAST * medium.least_cell)
+        lit = lit_from(sources, chosen, here.position, direction, _LEAST * medium.voxel)
         if wp.max(lit.irradiance) > 0.0:
             end = wp.dot(met.position - here.position, direction)
             if met.kind == PASSED or lit.casts_shadow == 0 or lit.distance < end:

@@ -63,9 +63,13 @@ def medium_of(
     require_count("surface normals", len(normals), corner_count)
     require_count("surface colors", len(albedo), corner_count // 3)
     medium = Medium()
-    medium.corner, medium.cell = wp.vec3(*grid.corner.tolist()), wp.vec3(*grid.cell.tolist())
-    medium.shape, medium.least_cell = wp.vec3i(*grid.shape), float(grid.cell.min())
-    medium.starts, medium.segments = wp.array(grid.starts, dtype=int), wp.array(grid.segments, dtype=int)
+    medium.corner, medium.voxel, medium.shape = wp.vec3(*grid.corner.tolist()), grid.voxel, wp.vec3i(*grid.shape)
+    cells = grid.cells
+    medium.along_voxel = cells.along_voxel
+    medium.widths = wp.vec4(*(cells.radius * 0.5 ** np.arange(4)).tolist())
+    medium.bricks, medium.starts = wp.array(cells.bricks, dtype=int), wp.array(cells.starts, dtype=int)
+    medium.segments = wp.array(cells.segments, dtype=int)
+    medium.lines = wp.array(cells.lines.reshape(-1), dtype=wp.uint32)
     medium.points, medium.sigma_a = vectors(grid.points), vectors(grid.sigma_a)
     medium.radii, medium.roughness = wp.array(grid.radii, dtype=float), wp.array(grid.roughness, dtype=float)
     medium.strands, medium.fibres = wp.array(grid.strands, dtype=int), wp.array(grid.fibres, dtype=int)

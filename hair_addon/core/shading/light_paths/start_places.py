@@ -12,15 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 import warp as wp
 
-from .grid_walk import PASSED, STRAND, Medium, place_on, walk
+from .grid_walk import PASSED, STRAND, Medium, Met, place_on, walk
 from .media import launch
 from .seen_rays import Seen
-from .strand_grid import CELLS_A_VOXEL, StrandGrid
+from .strand_grid import StrandGrid
 from .view import ViewOnDevice, depth_at, direction_at, on_device, seen_at
 
 wp.set_module_options({"enable_backward": False, "fast_math": True})
 
-HIDDEN = wp.constant(3)  # kind of a place that is not in sight, beside what ends a path's way
 _LEAST_SHARE = 0.005  # of all paths that a segment may have, where there are too many tries
 _MOST_TRIES = 32  # places for each path: in deep hair few are in sight
 _MOST_PLACES = wp.constant(64)  # along a segment, where its cells are looked up
@@ -36,42 +35,45 @@ class Starts:
 
 @wp.func
 def start(medium: Medium, view: ViewOnDevice, segment: int, key: int):
-    """(`Met` where a path starts, `HIDDEN` where that is not in sight; direction there; random state)."""
+    """(`Met` where a path starts, in sight or not; direction there; random state)."""
     state = wp.rand_init(0, key)
     part = wp.randf(state)
-    x, y, area = seen_at(view, (1.0 - part) * medium.points[segment] + part * medium.points[segment + 1])
-    direction = direction_at(view, x, y)
-    place = place_on(medium, segment, part, 2.0 * wp.randf(state) - 1.0, direction)
+    x, y, _area = seen_at(view, (1.0 - part) * medium.points[segment] + part * medium.points[segment + 1])
+    place = place_on(medium, segment, part, 2.0 * wp.randf(state) - 1.0, direction_at(view, x, y))
+    x, y, _area = seen_at(view, place.position)
+    return place, direction_at(view, x, y), state
+
+
+@wp.func
+def _is_in_sight(medium: Medium, view: ViewOnDevice, place: Met, direction: wp.vec3):
+    """Whether the ray through a place on a strand meets that first."""
     x, y, area = seen_at(view, place.position)
-    met = place
-    met.kind = HIDDEN
-    if area > 0.0 and wp.abs(x) < 1.0 and wp.abs(y) < 1.0:
-        direction = direction_at(view, x, y)
-        reach = depth_at(view, place.position, direction)
-        own = medium.strands[segment]
-        if reach > 0.0:
-            # What is hidden is mostly so by the next strand, which is found soon from here.
-            before = walk(medium, place.position, -direction, reach, own)
-            if before.kind == PASSED:
-                # A place inside another strand is hidden by that strand's side, which rays from inside do not meet.
-                radius = medium.radii[segment]
-                met = walk(medium, place.position - reach * direction, direction, reach + radius, -1)
-                if met.kind == STRAND:
-                    if medium.strands[met.index] != own or wp.length(met.position - place.position) > radius:
-                        met.kind = HIDDEN
-                else:
-                    met.kind = HIDDEN
-    return met, direction, state
+    if area <= 0.0 or wp.abs(x) >= 1.0 or wp.abs(y) >= 1.0:
+        return False
+    reach = depth_at(view, place.position, direction)
+    if reach <= 0.0:
+        return False
+    # What is hidden is mostly so by the next strand, which is found soon from here.
+    own = medium.strands[place.index]
+    before = walk(medium, place.position, -direction, reach, own)
+    if before.kind != PASSED:
+        return False
+    # A place inside another strand is hidden by that strand's side, which rays from inside do not meet.
+    radius = medium.radii[place.index]
+    met = walk(medium, place.position - reach * direction, direction, reach + radius, -1)
+    if met.kind != STRAND:
+        return False
+    return medium.strands[met.index] == own and wp.length(met.position - place.position) <= radius
 
 
 @wp.func
 def _is_near_seen(medium: Medium, is_seen: wp.array3d[wp.uint8], start: wp.vec3, end: wp.vec3):
     """Whether a segment is in any of the voxels of `voxels_of`."""
-    places = 2 + wp.clamp(int(wp.length(end - start) / medium.least_cell), 0, _MOST_PLACES)
+    places = 2 + wp.clamp(int(2.0 * wp.length(end - start) / medium.voxel), 0, _MOST_PLACES)
     found = int(0)
     for step in range(places):
         place = start + (end - start) * (float(step) / float(places - 1))
-        at = wp.cw_div(place - medium.corner, medium.cell) / float(CELLS_A_VOXEL)
+        at = (place - medium.corner) / medium.voxel
         x = wp.clamp(int(at[0]), 0, is_seen.shape[2] - 1)
         y = wp.clamp(int(at[1]), 0, is_seen.shape[1] - 1)
         z = wp.clamp(int(at[2]), 0, is_seen.shape[0] - 1)
@@ -116,8 +118,8 @@ def voxels_of(grid: StrandGrid, places: np.ndarray) -> np.ndarray:
 
     Thin hair is missed by samples, and may be in sight beside them.
     """
-    x, y, z = grid.voxels
-    at = ((places - grid.corner) / (grid.cell * CELLS_A_VOXEL)).astype(np.int64).clip(0, np.array([x, y, z]) - 1)
+    x, y, z = grid.shape
+    at = grid.voxels_at(places)
     found = np.zeros((z, y, x), np.uint8)
     found[at[:, 2], at[:, 1], at[:, 0]] = 1
     for axis in range(3):
@@ -138,8 +140,8 @@ def _see(
     first: int,
 ):
     place = first + wp.tid()
-    met, _direction, _state = start(medium, view, segments[place], keys[place])
-    if met.kind == STRAND:
+    met, direction, _state = start(medium, view, segments[place], keys[place])
+    if _is_in_sight(medium, view, met, direction):
         out_is_seen[place] = wp.uint8(1)
 
 

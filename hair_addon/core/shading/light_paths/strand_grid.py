@@ -12,20 +12,17 @@ import numpy as np
 import warp as wp
 
 from ...errors import HairError
-from ...kernels import kernel_cache
 from ...kernels.checks import require_count, require_indices
 from ..fibre import marschner
 from ..fibre.principled import scale_from_radial_roughness
-
-wp.set_module_options({"enable_backward": False, "fast_math": True})
+from . import strand_cells
 
 SEGMENT_COUNT = 3_000_000  # at most, of all strands
-CELL_COUNT = 3_000_000
-MOST_CELLS = 400  # along a side
-CELLS_A_VOXEL = 2  # along a side of the voxels that light is averaged in
-_SIZES_AN_OCTAVE = 4  # of cells
+VOXEL_COUNT = 375_000
+MOST_VOXELS = 200  # along a side
+CELLS_ALONG_VOXEL = 3  # at most: cells are wider than strands
+_SIZES_AN_OCTAVE = 4  # of voxels
 _LEAST_SEGMENTS = 8  # of a strand, that it can bend
-_MOST_PARTS = wp.constant(2 * MOST_CELLS)  # of a segment, each about as long as a cell
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +51,15 @@ class Kept:
 
 @dataclass(frozen=True, eq=False)
 class StrandGrid:
-    """S strands of N points in all, and their segments in the order of cells (Z, Y, X); (0, 0, 0) is at `corner`."""
+    """S strands of N points in all, and their segments in the cells of voxels (Z, Y, X); (0, 0, 0) is at `corner`.
+
+    Voxels are cubes, which light is averaged in.
+    """
 
     corner: np.ndarray  # (3,) [m]
-    cell: np.ndarray  # (3,) sides [m]
-    shape: tuple[int, int, int]  # X, Y, Z: multiples of `CELLS_A_VOXEL`
-    starts: np.ndarray  # (cells + 1,) int32: first of each in `segments`
-    segments: np.ndarray  # (M,) int32: first points of segments, once for each cell that they are in
+    voxel: float  # side [m]
+    shape: tuple[int, int, int]  # voxels along X, Y, Z
+    cells: strand_cells.StrandCells
     points: np.ndarray  # (N, 3) float32 [m]
     radii: np.ndarray  # (N,) float32 [m]
     sigma_a: np.ndarray  # (N, 3) float32
@@ -74,82 +73,19 @@ class StrandGrid:
     @property
     def origin(self) -> tuple[int, int, int]:
         """Numbers along X, Y, Z of the first voxel, of all that fill the world."""
-        first = np.rint(self.corner / (self.cell * CELLS_A_VOXEL)).astype(int)
-        return tuple(first.tolist())
+        return tuple(np.rint(self.corner / self.voxel).astype(int).tolist())
 
-    @property
-    def voxels(self) -> tuple[int, int, int]:
-        """Number of voxels along X, Y, Z."""
-        x, y, z = self.shape
-        return x // CELLS_A_VOXEL, y // CELLS_A_VOXEL, z // CELLS_A_VOXEL
-
-
-@wp.func
-def _touches(a: wp.vec3, b: wp.vec3, centre: wp.vec3, reach: float):
-    """Whether the part from a to b comes within a reach of a cell's centre."""
-    along = b - a
-    t = wp.clamp(wp.dot(centre - a, along) / wp.max(wp.dot(along, along), 1e-30), 0.0, 1.0)
-    return wp.length(a + t * along - centre) < reach
-
-
-@wp.kernel
-def _register(
-    points: wp.array[wp.vec3],
-    radii: wp.array[float],
-    strands: wp.array[int],
-    corner: wp.vec3,
-    cell: wp.vec3,
-    shape: wp.vec3i,
-    is_counting: int,
-    out_ends: wp.array[int],
-    out_segments: wp.array[int],
-):
-    """Count the segments of each cell, or fill each cell's from the end before it on."""
-    first = wp.tid()
-    if strands[first] == strands[first + 1]:
-        radius = wp.max(radii[first], radii[first + 1])
-        start = points[first]
-        along = points[first + 1] - start
-        parts = 1 + wp.clamp(int(wp.length(along) / wp.min(cell)), 0, _MOST_PARTS)
-        reach = radius + 0.5 * wp.length(cell)
-        before_a = start
-        before_b = start
-        before_low = wp.vec3i(0, 0, 0)
-        before_high = wp.vec3i(-1, -1, -1)
-        for part in range(parts):
-            a = start + along * (float(part) / float(parts))
-            b = start + along * (float(part + 1) / float(parts))
-            low = wp.vec3i(0, 0, 0)
-            high = wp.vec3i(0, 0, 0)
-            for axis in range(3):
-                least = (wp.min(a[axis], b[axis]) - radius - corner[axis]) / cell[axis]
-                most = (wp.max(a[axis], b[axis]) + radius - corner[axis]) / cell[axis]
-                low[axis] = wp.clamp(int(wp.floor(least)), 0, shape[axis] - 1)
-                high[axis] = wp.clamp(int(wp.floor(most)), 0, shape[axis] - 1)
-            for z in range(low[2], high[2] + 1):
-                for y in range(low[1], high[1] + 1):
-                    for x in range(low[0], high[0] + 1):
-                        middle = wp.vec3(float(x) + 0.5, float(y) + 0.5, float(z) + 0.5)
-                        centre = corner + wp.cw_mul(middle, cell)
-                        is_known = x >= before_low[0] and y >= before_low[1] and z >= before_low[2]
-                        is_known = is_known and x <= before_high[0] and y <= before_high[1] and z <= before_high[2]
-                        is_known = is_known and _touches(before_a, before_b, centre, reach)
-                        if not is_known and _touches(a, b, centre, reach):
-                            index = (z * shape[1] + y) * shape[0] + x
-                            at = wp.atomic_add(out_ends, index, 1)
-                            if is_counting == 0:
-                                out_segments[at] = first
-            before_a = a
-            before_b = b
-            before_low = low
-            before_high = high
+    def voxels_at(self, places: np.ndarray) -> np.ndarray:
+        """(N, 3) int64 numbers along X, Y, Z of the voxels that hold places (N, 3), the nearest beside the grid."""
+        at = (places - self.corner.astype(np.float32)) * np.float32(1.0 / self.voxel)
+        return at.astype(np.int64).clip(0, np.array(self.shape) - 1)
 
 
 def build(
     systems: Sequence[Strands],
     fibres: Sequence[marschner.Settings],
     segment_count: int = SEGMENT_COUNT,
-    cell_count: int = CELL_COUNT,
+    voxel_count: int = VOXEL_COUNT,
     device: wp.DeviceLike = "cpu",
 ) -> StrandGrid:
     """The grid of all `Strands`; fibres: settings that their `fibre` counts.
@@ -176,14 +112,12 @@ def build(
     strand_of_points = np.repeat(
         np.arange(sum(counts), dtype=np.int32), np.repeat([one.point_count for one in kept], counts)
     )
-    corner, cell, shape = _cells(points, float(radii.max()), cell_count)
-    starts, segments = _registered(points, radii, strand_of_points, (corner, cell, shape), device)
+    voxels = _voxels(points, float(radii.max()), voxel_count)
+    along_voxel = min(max(int(voxels[1] / (2.0 * radii.max())), 1), CELLS_ALONG_VOXEL)
+    cells = strand_cells.build(points, radii, strand_of_points, voxels, along_voxel, device)
     return StrandGrid(
-        corner,
-        cell,
-        shape,
-        starts,
-        segments,
+        *voxels,
+        cells,
         points,
         radii,
         sigma_a,
@@ -232,8 +166,8 @@ def _thinned(strands, share):
     return found, points, radii, sigma_a.astype(np.float32), strands.roughness[chosen], strands.fibre[chosen]
 
 
-def _cells(places, radius, cell_count):
-    """(corner, sides, numbers along X, Y, Z) of cells around all strands: cubes.
+def _voxels(places, radius, voxel_count):
+    """(corner, side, numbers along X, Y, Z) of voxels around all strands.
 
     They stay where they are in the world while hair moves, and their size is one of a few: what is averaged by voxel
     changes no more than the hair does.
@@ -241,30 +175,11 @@ def _cells(places, radius, cell_count):
     low, high = places.min(axis=0).astype(np.float64) - radius, places.max(axis=0).astype(np.float64) + radius
     least = 1e-6 * max(float((high - low).max()), 1e-6)
     size = np.maximum(high - low, least)
-    cell = max(float(np.prod(size) / cell_count) ** (1.0 / 3.0), float(size.max()) / (MOST_CELLS - 4), radius)
-    cell = 2.0 ** (np.ceil(_SIZES_AN_OCTAVE * np.log2(cell)) / _SIZES_AN_OCTAVE)
-    voxel = cell * CELLS_A_VOXEL
-    first = np.floor(low / voxel)
-    shape = (np.floor(high / voxel) - first + 1.0).astype(int) * CELLS_A_VOXEL
-    return first * voxel, np.full(3, cell), tuple(shape.tolist())
-
-
-def _registered(points, radii, strands, cells, device):
-    """(starts, segments) of `StrandGrid`."""
-    corner, cell, shape = cells
-    with wp.ScopedDevice(device):
-        given = [wp.array(points, dtype=wp.vec3), wp.array(radii, dtype=float), wp.array(strands, dtype=int)]
-        given += [wp.vec3(*corner.tolist()), wp.vec3(*cell.tolist()), wp.vec3i(*shape)]
-        counts = wp.zeros(int(np.prod(shape)), dtype=int)
-        none = wp.zeros(1, dtype=int)
-        kernel_cache.launch(_register, len(points) - 1, [*given, 1, counts, none], device=device)
-        starts = np.zeros(len(counts) + 1, np.int64)
-        np.cumsum(counts.numpy(), out=starts[1:])
-        if starts[-1] > np.iinfo(np.int32).max:
-            raise HairError("Strands are too wide for light among them: use dual scattering.")
-        ends, segments = wp.array(starts[:-1], dtype=int), wp.zeros(max(int(starts[-1]), 1), dtype=int)
-        kernel_cache.launch(_register, len(points) - 1, [*given, 0, ends, segments], device=device)
-        return starts.astype(np.int32), segments.numpy()
+    side = max(float(np.prod(size) / voxel_count) ** (1.0 / 3.0), float(size.max()) / (MOST_VOXELS - 2), 2.0 * radius)
+    side = float(2.0 ** (np.ceil(_SIZES_AN_OCTAVE * np.log2(side)) / _SIZES_AN_OCTAVE))
+    first = np.floor(low / side)
+    shape = (np.floor(high / side) - first + 1.0).astype(int)
+    return first * side, side, tuple(shape.tolist())
 
 
 def _fibre_row(settings):

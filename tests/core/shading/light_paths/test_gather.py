@@ -79,13 +79,13 @@ FLOOR = [(-3, -3, -0.6), (3, -3, -0.6), (0, 5, -0.6)]
 
 
 def test_white_hair_on_a_white_floor_is_lost_in_a_white_world(rng):
-    grid = grid_of(strands_in_a_box(rng), WHITE, cell_count=20_000)
+    grid = grid_of(strands_in_a_box(rng), WHITE, voxel_count=2_500)
     found = found_by(grid, surroundings(FLOOR, [(1.0, 1.0, 1.0)], world=0.7), ALONG_Y, 10_000)
     np.testing.assert_allclose(ratio(found), 0.7, rtol=1e-3)
 
 
 def test_paths_are_the_same_again(rng):
-    grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), cell_count=5_000)
+    grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     first, again = (found_by(grid, light, ALONG_Y, 20_000) for _ in range(2))
     np.testing.assert_array_equal(first, again)
@@ -93,7 +93,7 @@ def test_paths_are_the_same_again(rng):
 
 def test_light_of_voxels_and_what_they_keep_of_the_drawn_is_that_of_paths(rng):
     """In every voxel and in each channel; of what is drawn as much is kept as is like the paths' light."""
-    grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), cell_count=5_000)
+    grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
     light = surroundings(lamps=sun((0.0, 1.0, 0.0)), world=0.2)
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 20_000)
     (alone,) = gather.gather(grid, light, seen, 20_000)[0]
@@ -119,7 +119,7 @@ def test_the_nearest_strand_is_met(rng):
     """Against all segments, without a grid: rays among strands that bend."""
     points = strands_in_a_box(rng, 60)
     points += 0.03 * rng.normal(size=points.shape)
-    grid = grid_of(points, BLACK, 0.02, cell_count=3_000)
+    grid = grid_of(points, BLACK, 0.02, voxel_count=375)
     segments, places = seen_rays.met_by(grid, np.zeros((0, 3)), ALONG_Y, 900)
     start = points[:, :-1].reshape(-1, 3)
     along = np.diff(points, axis=1).reshape(-1, 3)
@@ -155,7 +155,7 @@ def test_a_strand_within_another_is_shaded_on_the_far_side(rng, axis, least, mos
     one, both, shaded = (
         ratio(
             found_by(
-                grid_of(np.concatenate([alone, alone + other]), BLACK, 0.01, cell_count=1_000),
+                grid_of(np.concatenate([alone, alone + other]), BLACK, 0.01, voxel_count=125),
                 surroundings(lamps=sun(axis)),
                 seen_in,
                 40_000,
@@ -175,12 +175,12 @@ def test_paths_start_as_often_as_rays_meet_strands(rng):
     points[: len(thin), :, 0] -= 0.6
     points[len(thin) :, :, 0] += 0.6
     radii = np.repeat([0.002, 0.02], [len(thin), len(thick)])
-    grid = grid_of(points, WHITE, radii[:, None], cell_count=20_000)
+    grid = grid_of(points, WHITE, radii[:, None], voxel_count=2_500)
     _segments, places = seen_rays.met_by(grid, np.zeros((0, 3)), ALONG_Y, 200_000)
     expected = (places[:, 0] < 0.0).mean()
     found = found_by(grid, surroundings(world=1.0), ALONG_Y, 3_000, seed=3)
     even = found[0, ..., 3].sum(axis=(0, 1))  # one a path
-    middles = grid.corner[0] + 2.0 * grid.cell[0] * (np.arange(len(even)) + 0.5)
+    middles = grid.corner[0] + grid.voxel * (np.arange(len(even)) + 0.5)
     assert even[middles < 0.0].sum() / even.sum() == pytest.approx(expected, abs=0.03)
 
 
@@ -189,7 +189,7 @@ def test_strands_next_to_the_camera_leave_paths_for_others(rng):
     points = strands_in_a_box(rng, 3_000)
     points[:20] -= points[:20].mean(axis=1, keepdims=True)
     points[:20] += rng.uniform(-0.05, 0.05, (20, 1, 3))
-    grid = grid_of(points, WHITE, 0.002, cell_count=20_000)
+    grid = grid_of(points, WHITE, 0.002, voxel_count=2_500)
     to_clip = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, 1.00002, 0, -0.0200002], [0, 1.0, 0, 0]])
     seen = seen_rays.seen_by(grid, np.zeros((0, 3)), view.View(to_clip), 40_000)
     assert (seen.places[:, 1] > 0.0099).all()
@@ -202,7 +202,7 @@ def test_bent_strands_have_no_gaps():
     """A thick ring across the rays: as much is seen as its area says."""
     turn = np.linspace(0.0, 1.9 * np.pi, 12)
     points = np.stack([0.5 * np.cos(turn), 0.0 * turn, 0.5 * np.sin(turn)], axis=-1)[None]
-    grid = grid_of(points, BLACK, 0.2, cell_count=2_000)
+    grid = grid_of(points, BLACK, 0.2, voxel_count=250)
     _segments, position = seen_rays.met_by(grid, np.zeros((0, 3)), ALONG_Y, 40_000)
     around, out = np.arctan2(position[:, 2], position[:, 0]) % (2.0 * np.pi), np.hypot(position[:, 0], position[:, 2])
     outer = (out > 0.6) & (out < 0.66) & (around < turn[-1])
@@ -231,16 +231,16 @@ def test_a_sheet_of_strands_lets_as_much_through_as_poisson_says(height):
     x, z = rng.uniform(-1.2, 1.2, count), np.linspace(-1.5, 1.5, 2)
     y = rng.uniform(0.0, height, count)
     points = np.stack(np.broadcast_arrays(x[:, None], y[:, None], z[None]), axis=-1)
-    grid = grid_of(points, WHITE, radius, cell_count=50_000)
+    grid = grid_of(points, WHITE, radius, voxel_count=6_250)
     seen = seen_rays.seen_by(grid, np.zeros((0, 3)), ALONG_Y, 40_000)
     assert len(seen.segments) / 40_000 == pytest.approx(1.0 - np.exp(-2.0 * radius * count / 2.4), abs=0.015)
-    dark = found_by(grid_of(points, BLACK, radius, cell_count=50_000), surroundings(world=1.0), ALONG_Y, 40_000)
+    dark = found_by(grid_of(points, BLACK, radius, voxel_count=6_250), surroundings(world=1.0), ALONG_Y, 40_000)
     assert (ratio(dark) < 1.0).all()
 
 
 def test_more_paths_are_taken_where_few_find_light(rng):
     """A sun behind deep hair: its light is known better by them. In an even world none is needed."""
-    grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), cell_count=20_000)
+    grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), voxel_count=2_500)
     behind, even = surroundings(lamps=sun((0.0, -1.0, 0.0))), surroundings(world=1.0)
     seen = seen_rays.seen_by(grid, behind.corners, ALONG_Y, 900)
     count = len(seen.segments)
@@ -267,7 +267,7 @@ def lit_from_below(grid, light):
 def test_light_off_a_floor_is_that_of_its_albedo(rng):
     """Strands over a wide floor under a sun, white in a black world: twice the albedo, twice the light."""
     points = strands_in_a_box(rng, 3)
-    grid = grid_of(points, BLACK, 0.002, cell_count=5_000)
+    grid = grid_of(points, BLACK, 0.002, voxel_count=625)
     down = sun((0.0, 0.0, -1.0))
     dark, bright = (lit_from_below(grid, surroundings(FLOOR, [(albedo,) * 3], down)) for albedo in (0.4, 0.8))
     np.testing.assert_allclose(bright / dark, 2.0, rtol=0.05)
@@ -275,7 +275,7 @@ def test_light_off_a_floor_is_that_of_its_albedo(rng):
 
 def test_a_surface_is_lit_as_its_normals_say(rng):
     """A floor under a level sun, whose normals are those of a slope of 60 degrees: what it sends up is halved."""
-    grid = grid_of(strands_in_a_box(rng, 300), WHITE, 0.002, cell_count=5_000)
+    grid = grid_of(strands_in_a_box(rng, 300), WHITE, 0.002, voxel_count=625)
     down = sun((0.0, 0.0, -1.0))
     slope = (np.sin(np.radians(60.0)), 0.0, np.cos(np.radians(60.0)))
     flat, sloping = (
@@ -293,7 +293,7 @@ def test_white_fur_sends_back_what_a_random_walk_finds(rng):
     expected = walked(rng, settings, view_angle, light, depth=5.0, count=8_000, blur=0.0025)
     x, y = rng.uniform(-4.0, 4.0, (2, 80_000))
     points = np.stack(np.broadcast_arrays(x[:, None], y[:, None], np.linspace(0.0, 1.0, 3)), axis=-1)
-    grid = grid_of(points, settings.sigma_a, radius=0.002, settings=settings, cell_count=200_000)
+    grid = grid_of(points, settings.sigma_a, radius=0.002, settings=settings, voxel_count=25_000)
     lamp = sun((np.cos(light), 0.0, -np.sin(light)), 1.0)
     lamp["radius"] = 2.0 * np.sqrt(0.0025)  # a disk's variance along an axis is a quarter of its radius²
     towards = np.array([-np.cos(view_angle), 0.0, np.sin(view_angle)])

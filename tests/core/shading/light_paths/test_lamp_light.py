@@ -33,7 +33,7 @@ def lamp(kind, distance, radius, power=1.0):
 def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
     """Hair in a cone of light: a lamp far off, and a world with the radiance of its disk in each direction."""
     rough = lookup_tables.Settings(mode="energy", roughness=0.8, radial_roughness=0.8)
-    grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.02, rough, cell_count=5_000)
+    grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.02, rough, voxel_count=625)
     power = {lamps.SUN: 3.0, lamps.POINT: 12.0 * np.pi * 500.0**2, lamps.AREA: 3.0 * np.pi * 500.0**2}[kind]
     wide = lamp(kind, 500.0, 1.5 if kind == lamps.SUN else 750.0, power)
     v, u = (np.arange(256) + 0.5) / 256 - 0.5, 0.5 - (np.arange(512) + 0.5) / 512
@@ -50,7 +50,7 @@ def test_a_wide_lamp_is_a_part_of_the_world(rng, kind):
 def light_on_a_strand(light, path_count=20_000):
     """`ratio` of a thin strand at the origin that a lamp lights, seen along y."""
     thin = np.stack([np.linspace(-0.02, 0.02, 3), np.zeros(3), np.zeros(3)], axis=-1)[None]
-    grid = grid_of(thin, (0.05, 0.3, 1.0), 0.002, cell_count=1_000)
+    grid = grid_of(thin, (0.05, 0.3, 1.0), 0.002, voxel_count=125)
     seen_in = level_view((0.0, -0.1, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.02, 0.004), 0.2)
     return ratio(found_by(grid, surroundings(lamps=light), seen_in, path_count))
 
@@ -101,7 +101,7 @@ def test_an_area_lamp_of_less_spread_gives_as_much_light():
 
 def test_a_lamp_among_hair_is_found_by_few_paths(rng):
     """A disk of 6 cm amid strands: means of few paths differ little, as no path has too much light."""
-    grid = grid_of(strands_in_a_box(rng, 4_000), (0.02, 0.04, 0.06), 0.004, cell_count=50_000)
+    grid = grid_of(strands_in_a_box(rng, 4_000), (0.02, 0.04, 0.06), 0.004, voxel_count=6_250)
     near = level_view((0.0, -0.3, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.3, 0.3), 4.3)
     up = lamp(lamps.AREA, 0.0, 0.06)
     up["axis"][0, :3] = 0.0, 0.0, 1.0

@@ -44,7 +44,7 @@ def test_directions_are_as_dense_as_light(rng):
 
 def test_directions_and_paths_that_meet_the_sky_find_the_same_light(rng, monkeypatch):
     """Hair on a floor under an uneven sky; beside it the light of paths that only meet it."""
-    grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.01, cell_count=5_000)
+    grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.01, voxel_count=625)
     picture = 0.1 + 4.0 * (rng.random((8, 16, 1)) < 0.15) * np.ones(3)
     floor = [(-3, -3, -0.6), (3, -3, -0.6), (0, 5, -0.6)]
     light = replace(surroundings(floor, [(0.6, 0.6, 0.6)]), world=picture)
@@ -59,7 +59,7 @@ def test_directions_and_paths_that_meet_the_sky_find_the_same_light(rng, monkeyp
 
 
 def test_a_small_bright_place_is_found_by_few_paths(rng):
-    grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.01, cell_count=5_000)
+    grid = grid_of(strands_in_a_box(rng, 600), (0.05, 0.3, 1.0), 0.01, voxel_count=625)
     picture = np.full((64, 128, 3), 0.01)
     picture[40:42, 30:32] = 2_000.0
     light = replace(surroundings(), world=picture)
