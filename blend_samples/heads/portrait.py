@@ -67,7 +67,7 @@ def grow(head_object, guide_count=400, strand_count=30_000, seed=1):
     look.mode, look.parametrization, look.absorption = "classic", "ABSORPTION", CHESTNUT
     look.cuticle_angle, look.roughness = math.radians(5.0), roughness_from_beta_r(math.radians(7.5))
     look.random_color = 0.2
-    look.tip_absorption, look.gradient_start, look.gradient_end = _CHESTNUT_TIP, 0.10, 0.42
+    look.tip_absorption, look.gradient_start, look.gradient_end = _CHESTNUT_TIP, 0.05, 0.42
     return guides, hair
 
 
