@@ -94,7 +94,7 @@ def _strands_of(strands, shading, to_world, first):
     def absorption(strand, place):
         settings, variation = fibres[0]  # water changes no pigment
         if variation is None:
-            return np.broadcast_to(np.asarray(settings.sigma_a, float), (len(strand), 3))
+            return np.broadcast_to(np.asarray(settings.sigma_a, float), (*np.broadcast(strand, place).shape, 3))
         return strand_variation.strand_sigma_a(variation, randoms[strand], place)
 
     return light_paths.strand_grid.Strands(

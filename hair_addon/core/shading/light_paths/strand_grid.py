@@ -29,7 +29,7 @@ _LEAST_SEGMENTS = 8  # of a strand, that it can bend
 class Strands:
     """One system of hair: S strands of P points in the world.
 
-    absorption: function of indices of strands (N,) and places along them (N,), root 0 to tip 1, → sigma_a (N, 3);
+    absorption: function of indices of strands (N, 1) and places along them (P,), root 0 to tip 1, → sigma_a (N, P, 3);
     fibre: (S,) index of each strand's settings among those given to `build`.
     """
 
@@ -160,10 +160,9 @@ def _thinned(strands, share):
     chosen = np.arange(0, count, stride)
     points = strands.points[chosen][:, at].reshape(-1, 3).astype(np.float32)
     radii = (strands.radii[chosen][:, at] * (count / len(chosen))).reshape(-1).astype(np.float32)
-    along = np.tile(at / most, len(chosen))
-    sigma_a = strands.absorption(np.repeat(chosen, len(at)), along)
+    sigma_a = strands.absorption(chosen[:, None], at / most).astype(np.float32).reshape(-1, 3)
     found = stride, len(at)
-    return found, points, radii, sigma_a.astype(np.float32), strands.roughness[chosen], strands.fibre[chosen]
+    return found, points, radii, sigma_a, strands.roughness[chosen], strands.fibre[chosen]
 
 
 def _voxels(places, radius, voxel_count):

@@ -38,7 +38,7 @@ def grid_of(points, sigma_a, radius=0.004, settings=None, **details):
     strands = strand_grid.Strands(
         points.astype(np.float32),
         np.broadcast_to(np.float32(radius), points.shape[:2]),
-        lambda strand, _place: np.tile(sigma_a, (len(strand), 1)),
+        lambda strand, place: np.broadcast_to(sigma_a, (*np.broadcast(strand, place).shape, 3)),
         np.full(count, settings.roughness),
         np.zeros(count, int),
     )
