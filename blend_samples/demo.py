@@ -66,13 +66,13 @@ def main():
         return
     bpy.ops.vellus.bake_tables(directory=str(out / "tables"))
     bpy.ops.wm.save_as_mainfile(filepath=str(out / "head.blend"), compress=True)
-    drawn = read()
+    with as_auburn(hair.data):
+        drawn = read()
+        draw_portrait(drawn, out / "dual_scattering.png")
     for model in MODELS.values():
         portrait.make_chestnut(hair.data, model)
         draw(with_look(drawn, hair.data), out / f"{model.lower()}.png")
     with as_auburn(hair.data):
-        auburn = with_world(with_look(drawn, hair.data))
-        draw_portrait(auburn, out / "dual_scattering.png")
         draw_styled(hair.data, out / "styled.png")
     print_spline_table()
     print_frame_table(hair.data)
@@ -91,12 +91,6 @@ def with_look(drawn, hair):
     strands, _shading, *placed = drawn.hair[index]
     shaded = (strands, hair_cache.shading_of(hair), *placed)
     return replace(drawn, hair=[*drawn.hair[:index], shaded, *drawn.hair[index + 1 :]])
-
-
-def with_world(drawn):
-    """The scene with the light of the world as its hair lets it through, whose color has changed."""
-    of_hair, of_surfaces = drawn_scene.visibility(drawn.hair, drawn.surfaces, drawn.clear)
-    return replace(drawn, hair_visibility=of_hair, surface_visibility=of_surfaces)
 
 
 def draw_portrait(drawn, path):
