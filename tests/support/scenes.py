@@ -89,12 +89,14 @@ def scene_files(blender, tmp_path_factory):
 
 
 @pytest.fixture
-def scene(scene_files, request):
+def scene(scene_files, request, monkeypatch):
     """An empty scene, undo ready; of Blender's settings, which take longer to read, those of the process stay.
 
     The nodes that carry hair are in memory, as where hair was deleted: `read_homefile` is for a scene without them.
-    What the test's other fixtures of this file would make is there already, as in a file that was opened.
+    What the test's other fixtures of this file would make is there already, as in a file that was opened. The maps that
+    the world's light is measured with are as small as the pictures of tests, which take as long to draw as all else.
     """
+    monkeypatch.setattr(ambient_visibility, "_SIZE", 64)
     wanted = [*takewhile(request.fixturenames.__contains__, STAGES)]
     if "made_anew" in request.fixturenames:
         wanted = []
@@ -182,12 +184,12 @@ def arm(scene):
 
 @pytest.fixture
 def coarse_shadows(monkeypatch):
-    """Shadow maps as small as the pictures of tests, which take as long to draw as all else."""
+    """Shadow maps of lamps that are as small, too."""
     shrink_shadows(monkeypatch)
 
 
 def shrink_shadows(patch):
-    """The same for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
+    """Small maps of both kinds, also for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
     patch.setattr(ambient_visibility, "_SIZE", 64)
     patch.setattr(scene_lights, "_MAP_SIZE", 128)
 
@@ -197,6 +199,12 @@ def fine_shadows(lit, monkeypatch):
     """For laws of shadows themselves: maps as artists have them."""
     monkeypatch.setattr(ambient_visibility, "_SIZE", 256)
     monkeypatch.setattr(scene_lights, "_MAP_SIZE", 512)
+
+
+@pytest.fixture
+def fine_world(scene, monkeypatch):
+    """The same for laws of what hides the world."""
+    monkeypatch.setattr(ambient_visibility, "_SIZE", 256)
 
 
 @pytest.fixture

@@ -9,12 +9,14 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+import pytest
 
 import hair_addon
 from hair_addon import api
 from hair_addon.blender.io import inspection
 from hair_addon.blender.ui import panels
 from tests.support.interface import layout
+from tests.support.scenes import shrink_shadows
 
 SMALL = {"width": 16, "height": 12}
 
@@ -188,6 +190,7 @@ def use(folder):
 
 if __name__ == "__main__":
     hair_addon.register()
+    shrink_shadows(pytest.MonkeyPatch())
     make(Path(sys.argv[1]) / "damaged.blend")
     use(Path(sys.argv[1]))
     make_styled(Path(sys.argv[1]) / "styled.blend")
