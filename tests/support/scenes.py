@@ -88,6 +88,17 @@ def scene_files(blender, tmp_path_factory):
     return files
 
 
+# Texels along a side of the maps that the world's light is measured with, and of how many strands they are drawn at
+# least: coarse ones resolve fewer.
+FINE_WORLD, COARSE_WORLD = (ambient_visibility._SIZE, ambient_visibility._LEAST_STRANDS), (64, 600)
+
+
+def set_world_maps(patch, size, least_strands):
+    """Draw these maps so; patch: a `pytest.MonkeyPatch`."""
+    patch.setattr(ambient_visibility, "_SIZE", size)
+    patch.setattr(ambient_visibility, "_LEAST_STRANDS", least_strands)
+
+
 @pytest.fixture
 def scene(scene_files, request, monkeypatch):
     """An empty scene, undo ready; of Blender's settings, which take longer to read, those of the process stay.
@@ -96,7 +107,7 @@ def scene(scene_files, request, monkeypatch):
     What the test's other fixtures of this file would make is there already, as in a file that was opened. The maps that
     the world's light is measured with are as small as the pictures of tests, which take as long to draw as all else.
     """
-    monkeypatch.setattr(ambient_visibility, "_SIZE", 64)
+    set_world_maps(monkeypatch, *COARSE_WORLD)
     wanted = [*takewhile(request.fixturenames.__contains__, STAGES)]
     if "made_anew" in request.fixturenames:
         wanted = []
@@ -190,21 +201,21 @@ def coarse_shadows(monkeypatch):
 
 def shrink_shadows(patch):
     """Small maps of both kinds, also for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
-    patch.setattr(ambient_visibility, "_SIZE", 64)
+    set_world_maps(patch, *COARSE_WORLD)
     patch.setattr(scene_lights, "_MAP_SIZE", 128)
 
 
 @pytest.fixture
 def fine_shadows(lit, monkeypatch):
     """For laws of shadows themselves: maps as artists have them."""
-    monkeypatch.setattr(ambient_visibility, "_SIZE", 256)
+    set_world_maps(monkeypatch, *FINE_WORLD)
     monkeypatch.setattr(scene_lights, "_MAP_SIZE", 512)
 
 
 @pytest.fixture
 def fine_world(scene, monkeypatch):
     """The same for laws of what hides the world."""
-    monkeypatch.setattr(ambient_visibility, "_SIZE", 256)
+    set_world_maps(monkeypatch, *FINE_WORLD)
 
 
 @pytest.fixture
