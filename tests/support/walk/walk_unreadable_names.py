@@ -67,8 +67,8 @@ def make_styled(path):
     image = bpy.data.images.new("QQQQimage", 8, 8)
     image.pack()
     image.use_fake_user = True
-    guides = api.distribute_guides(sphere, guide_count=20)
-    hair, other = (api.interpolate_hair(guides, strand_count=100) for guides in (guides, api.distribute_guides(sphere)))
+    guides, others = (api.distribute_guides(sphere, guide_count=20) for _ in range(2))
+    hair, other = (api.interpolate_hair(curves, strand_count=100) for curves in (guides, others))
     for curves in (hair, guides):
         curves.attributes.new("QQQQregion", "INT", "CURVE")
     sphere.data.attributes.new("QQQQregion", "INT", "FACE")
