@@ -2,7 +2,7 @@
 """Fixtures: Blender without a window, the registered add-on, and scenes for hair."""
 
 import math
-from functools import partial
+from functools import lru_cache, partial
 from itertools import takewhile
 from types import SimpleNamespace
 
@@ -17,6 +17,7 @@ from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, scene_lights
 from hair_addon.blender.host import running
 from hair_addon.core.grooming.groom import GuideSettings
+from hair_addon.core.shading.tables import albedo, dual_scattering, lookup_tables
 from tests.support.exchange.imported import curves_object, lines_on
 from tests.support.guide_tools import wave
 from tests.support.reading import vertex_positions
@@ -32,6 +33,20 @@ def blender():
     yield
     if hasattr(bpy.types.Curves, "vellus"):
         hair_addon.unregister()
+
+
+# Functions of their arguments alone: {(module, name): the same, which remembers its results}.
+REMEMBERED = {
+    (module, name): lru_cache(64)(getattr(module, name))
+    for module, name in ((lookup_tables, "bake"), (dual_scattering, "bake"), (albedo, "azimuthal_moments"))
+}
+
+
+@pytest.fixture(autouse=True)
+def tables_are_remembered(monkeypatch):
+    """Tables are baked once in a process for each of their settings: with every file the add-on forgets its own."""
+    for (module, name), remembered in REMEMBERED.items():
+        monkeypatch.setattr(module, name, remembered)
 
 
 # What most tests begin with; each stands on those before it.
