@@ -20,6 +20,10 @@ help: ## list the targets
 demo: $(installed) ## a portrait with 400 guides and 30,000 strands: images and tables in out/demo
 	$(python) blend_samples/demo.py --out out/demo $(ARGS)
 
+# As many processes test as there are processors: threads of Mesa and of OpenBLAS would only wait for one another.
+test: export LP_NUM_THREADS = 0
+test: export OPENBLAS_NUM_THREADS = 1
+
 # All tests load kernels that are compiled once, in place of each process compiling them.
 test: $(installed) ## all tests except long benchmarks and tests in a window, in up to four processes
 	$(if $(ARGS),,$(python) tools/build_extension.py --kernels)

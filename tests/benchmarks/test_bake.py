@@ -10,6 +10,8 @@ import warp as wp
 from hair_addon.core.shading import appearance
 from hair_addon.core.shading.tables import absorption_slices, lookup_tables, strand_tables, texel_kernels
 
+MODES = ["classic", "energy"]
+
 
 def median_time(way, repetitions=7):
     """Median time [s] after a first call, which compiles."""
@@ -26,9 +28,10 @@ def devices():
     return ["cpu", *(str(device) for device in wp.get_cuda_devices())]
 
 
-@pytest.mark.parametrize("mode", ["classic", pytest.param("energy", marks=pytest.mark.long)])
-def test_bake(mode, monkeypatch):
-    """Printed: times and their ratio to NumPy's. Asserted: how often kernels are launched, whatever the size."""
+@pytest.mark.long
+@pytest.mark.parametrize("mode", MODES)
+def test_bake(mode):
+    """Printed: times and their ratio to NumPy's."""
     settings = lookup_tables.Settings(mode=mode)
     varied = appearance.strand_settings(appearance.Appearance(random_color=0.5, tip_absorption=0.5))
     numpy_time = median_time(lambda: lookup_tables.bake(settings))
@@ -41,7 +44,10 @@ def test_bake(mode, monkeypatch):
         print(f"   {absorption_slices.SLICE_COUNT} slices {1e3 * slices:7.1f} ms", end="")
         print(f"   strands that differ {1e3 * strands:7.1f} ms", end="")
 
-    launches = []
+
+@pytest.mark.parametrize("mode", MODES)
+def test_all_texels_are_launched_at_once(mode, monkeypatch):
+    settings, launches = lookup_tables.Settings(mode=mode), []
     launch = wp.launch
     monkeypatch.setattr(wp, "launch", lambda *args, **kwargs: (launches.append(args), launch(*args, **kwargs)))
     edges, cosines = lookup_tables.phi_edges(settings), lookup_tables.row_cosines(settings)

@@ -20,7 +20,7 @@ def mesh(scene, tmp_path):
     """A function that makes a file with the tetrahedron of any kind, of one object or of several."""
 
     def make(name, count=1):
-        bpy.ops.wm.read_factory_settings(use_empty=True)
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         for number in range(count):
             data = bpy.data.meshes.new("Tetrahedron")
             data.from_pydata(TETRAHEDRON[0].tolist(), [], TETRAHEDRON[1].tolist())
@@ -234,7 +234,7 @@ def test_a_disk_that_is_really_full(words, tmp_path, kind):
 
 
 @needs_mounts
-@pytest.mark.parametrize("kind", [".npz", ".exr", "tables", ".json"])
+@pytest.mark.parametrize("kind", [pytest.param(".npz", marks=SLOW), ".exr", "tables", ".json"])
 def test_a_read_only_folder_is_reported(words, tmp_path, kind):
     folder = tmp_path / "folder"
     folder.mkdir()

@@ -81,15 +81,15 @@ def test_progress_is_for_terminals_only(tmp_path):
 
 def test_finished_frames_are_complete(lit, tmp_path):
     bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    render = ("render", tmp_path / "shot.blend", "--frames", "1-500", "--width", 64, "--height", 48, "--json")
+    render = ("render", tmp_path / "shot.blend", "--frames", "1-500", "--width", 64, "--height", 48, "--samples", 1)
     process = subprocess.Popen(
-        command(*render, "--out", tmp_path / "out" / "f_####.png"),
+        command(*render, "--json", "--out", tmp_path / "out" / "f_####.png"),
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env=ENVIRONMENT,
         text=True,
     )
-    lines = [process.stdout.readline() for _ in range(3)]
+    lines = [process.stdout.readline() for _ in range(2)]
     process.send_signal(signal.SIGINT)
     printed, errors = process.communicate(timeout=60)
     assert process.returncode == 130

@@ -31,7 +31,7 @@ def test_frames_are_baked_and_rendered(shot, tmp_path):
     assert [line["frame"] for line in first.results] == [2, 3, 4]  # one more for motion blur
     assert [line["frame"] for line in run_here("simulate", shot, "--json").results] == [5, 6, 7]
     size = ("--width", "64", "--height", "64", "--samples", "4")
-    run_here("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-6", *size)
+    run_here("render", shot, "--out", tmp_path / "f_##.png", "--frames", "1-4", *size)
     pictures = [read_picture(tmp_path / f"f_{frame:02}.png") for frame in (1, 4)]
     assert not np.array_equal(*pictures)
 

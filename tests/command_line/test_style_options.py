@@ -116,7 +116,7 @@ def test_lengths_that_are_not_given_fit_the_surface(scene, mesh, tmp_path):  # n
 
 
 def test_without_styles_there_is_nothing_to_fit(tmp_path):
-    ended = run("groom", HEAD, "--out", tmp_path / "a.npz", "--no-style-fit")
+    ended = run_here("groom", HEAD, "--out", tmp_path / "a.npz", "--no-style-fit")
     assert ended.status == 1 and ended.errors.strip().endswith("--no-style-fit needs --style or --style-preset.")
 
 

@@ -2,7 +2,7 @@
 """Fixtures: Blender without a window, the registered add-on, and scenes for hair."""
 
 import math
-from functools import partial
+from functools import lru_cache, partial
 from itertools import takewhile
 from types import SimpleNamespace
 
@@ -17,6 +17,7 @@ from hair_addon.blender.data.strands import curves
 from hair_addon.blender.gpu import ambient_visibility, scene_lights
 from hair_addon.blender.host import running
 from hair_addon.core.grooming.groom import GuideSettings
+from hair_addon.core.shading.tables import albedo, dual_scattering, lookup_tables
 from tests.support.exchange.imported import curves_object, lines_on
 from tests.support.guide_tools import wave
 from tests.support.reading import vertex_positions
@@ -32,6 +33,20 @@ def blender():
     yield
     if hasattr(bpy.types.Curves, "vellus"):
         hair_addon.unregister()
+
+
+# Functions of their arguments alone: {(module, name): the same, which remembers its results}.
+REMEMBERED = {
+    (module, name): lru_cache(64)(getattr(module, name))
+    for module, name in ((lookup_tables, "bake"), (dual_scattering, "bake"), (albedo, "azimuthal_moments"))
+}
+
+
+@pytest.fixture(autouse=True)
+def tables_are_remembered(monkeypatch):
+    """Tables are baked once in a process for each of their settings: with every file the add-on forgets its own."""
+    for (module, name), remembered in REMEMBERED.items():
+        monkeypatch.setattr(module, name, remembered)
 
 
 # What most tests begin with; each stands on those before it.
@@ -88,13 +103,26 @@ def scene_files(blender, tmp_path_factory):
     return files
 
 
+# Texels along a side of the maps that the world's light is measured with, and of how many strands they are drawn at
+# least: coarse ones resolve fewer.
+FINE_WORLD, COARSE_WORLD = (ambient_visibility._SIZE, ambient_visibility._LEAST_STRANDS), (64, 600)
+
+
+def set_world_maps(patch, size, least_strands):
+    """Draw these maps so; patch: a `pytest.MonkeyPatch`."""
+    patch.setattr(ambient_visibility, "_SIZE", size)
+    patch.setattr(ambient_visibility, "_LEAST_STRANDS", least_strands)
+
+
 @pytest.fixture
-def scene(scene_files, request):
+def scene(scene_files, request, monkeypatch):
     """An empty scene, undo ready; of Blender's settings, which take longer to read, those of the process stay.
 
     The nodes that carry hair are in memory, as where hair was deleted: `read_homefile` is for a scene without them.
-    What the test's other fixtures of this file would make is there already, as in a file that was opened.
+    What the test's other fixtures of this file would make is there already, as in a file that was opened. The maps that
+    the world's light is measured with are as small as the pictures of tests, which take as long to draw as all else.
     """
+    set_world_maps(monkeypatch, *COARSE_WORLD)
     wanted = [*takewhile(request.fixturenames.__contains__, STAGES)]
     if "made_anew" in request.fixturenames:
         wanted = []
@@ -182,21 +210,27 @@ def arm(scene):
 
 @pytest.fixture
 def coarse_shadows(monkeypatch):
-    """Shadow maps as small as the pictures of tests, which take as long to draw as all else."""
+    """Shadow maps of lamps that are as small, too."""
     shrink_shadows(monkeypatch)
 
 
 def shrink_shadows(patch):
-    """The same for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
-    patch.setattr(ambient_visibility, "_SIZE", 64)
+    """Small maps of both kinds, also for pictures that several tests share; patch: a `pytest.MonkeyPatch`."""
+    set_world_maps(patch, *COARSE_WORLD)
     patch.setattr(scene_lights, "_MAP_SIZE", 128)
 
 
 @pytest.fixture
 def fine_shadows(lit, monkeypatch):
     """For laws of shadows themselves: maps as artists have them."""
-    monkeypatch.setattr(ambient_visibility, "_SIZE", 256)
+    set_world_maps(monkeypatch, *FINE_WORLD)
     monkeypatch.setattr(scene_lights, "_MAP_SIZE", 512)
+
+
+@pytest.fixture
+def fine_world(scene, monkeypatch):
+    """The same for laws of what hides the world."""
+    set_world_maps(monkeypatch, *FINE_WORLD)
 
 
 @pytest.fixture

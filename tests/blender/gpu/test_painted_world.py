@@ -87,7 +87,9 @@ NAMES = ["float", "byte", "packed", "generated", "saved", "reloaded"]
 
 @pytest.fixture
 def dark(lit):
-    """A scene with hair and a camera, and no light."""
+    """A scene with a little hair and a camera, and no light."""
+    lit.data.vellus.hair.strand_count, lit.data.vellus.hair.radius = 50, 0.02
+    bpy.context.view_layer.update()
     for light in [o for o in bpy.data.objects if o.type == "LIGHT"]:
         bpy.data.objects.remove(light)
     return bpy.context.scene

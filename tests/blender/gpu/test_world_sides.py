@@ -9,6 +9,8 @@ from tests.support import glsl
 
 COUNT = 200
 
+pytestmark = pytest.mark.usefixtures("fine_world")
+
 
 def sides_of(seen, opacity, forward, channels):
     """(N, 6, 3) radiance that arrives from the sides of a white world."""

@@ -14,6 +14,8 @@ from hair_addon.core.imaging.pixel_sampling import PictureSettings
 
 HEIGHT = 64
 
+pytestmark = pytest.mark.usefixtures("fine_world")
+
 
 def picture(rng):
     """A smooth coloured picture with one bright spot, as an image of Blender's."""

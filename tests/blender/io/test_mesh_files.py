@@ -124,7 +124,7 @@ def Xform "Place"
 
 def build(scale_length):
     """The tetrahedron in Blender, moved, in a scene whose unit has a length."""
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.context.scene.unit_settings.scale_length = scale_length
     mesh = bpy.data.meshes.new("Tetrahedron")
     mesh.from_pydata(VERTICES.tolist(), [], TRIANGLES.tolist())
@@ -218,7 +218,7 @@ def test_exchange_files_hold_the_same_points_in_metres(scene, tmp_path, ending, 
     for out in (arrays, exchange):
         assert run_here(*groom, "--out", out).status == 0
     expected = load(arrays)["strand_points"]
-    bpy.ops.wm.read_factory_settings(use_empty=True)
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     found = (alembic_strands if ending == ".abc" else usd_strands)(str(exchange))
     assert sorted(found) == [12, 50]
     np.testing.assert_allclose(found[50].reshape(50, 41, 3), expected, atol=1e-5 * np.abs(expected).max())

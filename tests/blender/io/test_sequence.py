@@ -61,9 +61,9 @@ def words(turning, folder, *more, ending="png"):
     return ("render", turning, "--frames", f"1-{COUNT}", "--out", folder / f"f_###.{ending}", "--json", *more)
 
 
-def start(turning, folder):
+def start(turning, folder, *more):
     """The command in a process of its own, whose standard output may be read."""
-    line = list(map(str, command(*words(turning, folder))))
+    line = list(map(str, command(*words(turning, folder, *more))))
     return subprocess.Popen(line, stdout=subprocess.PIPE, env=ENVIRONMENT, cwd=ROOT)
 
 
@@ -147,11 +147,11 @@ def test_another_machine_goes_on(turning, whole, tmp_path):
 
 def test_processes_share_the_frames(turning, whole, tmp_path):
     """Those of one command, and another command that runs at the same time."""
-    other = start(turning, tmp_path)
-    ended = run(*words(turning, tmp_path, "--jobs", 2))
-    out, _errors = other.communicate(timeout=120)
+    with start(turning, tmp_path, "--jobs", 2) as other:
+        made = [json.loads(other.stdout.readline())["frame"]]
+        ended = run_here(*words(turning, tmp_path))
+        made += frame_numbers(ended) + [json.loads(line)["frame"] for line in other.stdout]
     assert (ended.status, other.returncode) == (0, 0), ended.errors
-    made = frame_numbers(ended) + [json.loads(line)["frame"] for line in out.splitlines()]
     assert sorted(made) == list(range(1, COUNT + 1))
     for name in ALL:
         np.testing.assert_array_equal(pixels(tmp_path / name), pixels(whole / name))

@@ -38,15 +38,15 @@ def plane_and_sun(scene, elevation=0.5 * np.pi, angle=0.0):
     return plane
 
 
-def add_sheet(scene, plane, rng):
+def add_sheet(scene, plane, rng, strand_count=STRAND_COUNT):
     """Blond strands along Y: of each period along X half are three deep, half twelve; returns their object."""
-    x = rng.uniform(-6.0, 6.0, STRAND_COUNT) * PERIOD
+    x = rng.uniform(-6.0, 6.0, strand_count) * PERIOD
     x = x[(x % PERIOD < 0.5 * PERIOD) | (rng.random(len(x)) < 0.25)]
     points = np.stack(np.broadcast_arrays(x[:, None], np.linspace(-0.4, 0.4, 3), 0.0), axis=-1)
     curves = bpy.data.hair_curves.new("Hair")
     curves.add_curves([3] * len(points))
     curves.attributes["position"].data.foreach_set("vector", points.astype(np.float32).ravel())
-    radius = 12.0 * PERIOD * 12.0 / STRAND_COUNT / 2.0
+    radius = 12.0 * PERIOD * 12.0 / strand_count / 2.0
     curves.attributes.new("radius", "FLOAT", "POINT").data.foreach_set(
         "value", np.full(points.shape[:2], radius, np.float32).ravel()
     )
@@ -102,6 +102,6 @@ def test_a_plane_that_light_grazes_does_not_shade_itself(scene, rng):
     """With hair the sun has a map of shadows: where strands are too thin to cast any, the plane stays as light."""
     plane = plane_and_sun(scene, 0.25, 0.4)
     alone = light_along_x(1)
-    radii = add_sheet(scene, plane, rng).data.attributes["radius"].data
+    radii = add_sheet(scene, plane, rng, strand_count=1000).data.attributes["radius"].data
     radii.foreach_set("value", np.full(len(radii), 1e-9, np.float32))
     np.testing.assert_allclose(light_along_x(1), alone, rtol=0.02)

@@ -15,7 +15,7 @@ COUNT = 24
 
 
 @pytest.fixture
-def lamps(lit, fine_shadows):
+def lamps(lit):
     """Lamps all around the hair, of five brightnesses; the sun is off."""
     bpy.data.objects["Sun"].hide_render = True
     found = []
@@ -47,7 +47,7 @@ def test_many_lights_are_the_sum_of_all(lamps):
     together = light()
     size = uniforms.LIGHT_CAPACITY
     each = sum(light_of(lamps, lamps[first : first + size]) for first in range(0, COUNT, size))
-    np.testing.assert_allclose(together.mean(axis=(0, 1)), each.mean(axis=(0, 1)), rtol=0.05)
+    np.testing.assert_allclose(together.mean(axis=(0, 1)), each.mean(axis=(0, 1)), rtol=0.02)
     assert np.abs(together - each).sum() < 0.12 * each.sum()
 
 

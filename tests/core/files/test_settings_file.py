@@ -75,7 +75,7 @@ def head(**sections):
 
 
 @given(wanted=GROOMS)
-@settings(max_examples=100)
+@settings(max_examples=40)
 def test_settings_come_back_as_they_went(tmp_path_factory, wanted):
     path = tmp_path_factory.mktemp("settings") / "groom.json"
     settings_file.write(path, wanted)

@@ -27,12 +27,12 @@ def strands_between(roots, normals, guides, guide_normals, distance=None, limit=
     return interpolation.interpolate(roots, normals, guides, guide_normals, weights, keep_length).numpy()
 
 
-def least_rotation(start, end):
-    """The rotation about the axis across both that takes one unit vector to the other."""
-    axis = np.cross(start, end)
-    sine = np.linalg.norm(axis)
-    angle = np.arctan2(sine, np.dot(start, end))
-    return Rotation.from_rotvec(axis * (angle / sine if sine > 0.0 else 0.0))
+def least_rotations(starts, end):
+    """Matrices (N, 3, 3) of the rotations about the axes across both that take unit vectors (N, 3) to another one."""
+    axes = np.cross(starts, end)
+    sines = np.linalg.norm(axes, axis=1)
+    angles = np.arctan2(sines, starts @ end)
+    return Rotation.from_rotvec(axes * (angles / np.where(sines > 0.0, sines, 1.0))[:, None]).as_matrix()
 
 
 @pytest.fixture
@@ -67,15 +67,13 @@ def test_strands_are_what_the_equations_say(scene, distance, keep_length):
     """Eq. 7-10 read literally, recursion and all, with every guide looked at and rotations by scipy."""
     guides = np.float32(scene["guides"]).astype(float)
     weights = weights_of(scene["roots"], guides[:, 0], distance, 8)
-    guide_lengths = np.pad(segment_lengths(guides), [(0, 0), (1, 0)])
+    guide_offsets, guide_lengths = offsets(guides), np.pad(segment_lengths(guides), [(0, 0), (1, 0)])
     expected = np.empty((200, 21, 3))
     for strand, (q, normal, w) in enumerate(zip(scene["roots"], scene["normals"], weights, strict=True)):
-        turned = [
-            least_rotation(n, normal).apply(o) for n, o in zip(scene["guide_normals"], offsets(guides), strict=True)
-        ]
+        turned = np.einsum("jab,jib->jia", least_rotations(scene["guide_normals"], normal), guide_offsets)
         expected[strand, 0] = q
         for i in range(1, 21):  # Eq. 10
-            mean = np.einsum("j,jc->c", w, np.array(turned)[:, i])
+            mean = w @ turned[:, i]
             stretch = (w @ guide_lengths[:, i]) / np.linalg.norm(mean)
             expected[strand, i] = expected[strand, i - 1] + (1.0 + keep_length * (stretch - 1.0)) * mean
     strands = strands_between(**scene, distance=distance, keep_length=keep_length)

@@ -14,10 +14,10 @@ from hair_addon.core.kernels import kernel_cache
 
 ROOT = Path(__file__).resolve().parents[3]
 
-# Four modules, two of them loaded together as grooming does it, two as they are launched.
+# Five modules, two of them loaded together as grooming does it, three as they are launched.
 WORK = """
 import numpy as np
-from hair_addon.core.geometry import bspline, fingerprint, connected_components
+from hair_addon.core.geometry import bspline, fingerprint, connected_components, counting_sort
 from hair_addon.core.grooming import groom
 from hair_addon.core.interpolation import clump_centers
 from hair_addon.core.geometry.mesh import TriMesh
@@ -28,12 +28,14 @@ points = bspline.evaluate_on_warp(controls, 9).numpy()
 np.testing.assert_allclose(points, bspline.evaluate(controls, 9).numpy(), rtol=1e-5)
 assert connected_components.connected_components(mesh).tolist() == [0]
 assert fingerprint.fingerprint(np.arange(2**20)) != fingerprint.fingerprint(np.arange(1, 2**20 + 1))
+assert counting_sort.rising(np.array([0.5, 0.25])).tolist() == [1, 0]
 assert clump_centers.clump_centers([0], [[0, 0, 0]], [[0, 0, 0]]).tolist() == [0]
 import warp
 print("cache:", warp.config.kernel_cache_dir)
 """
 NAMES = """
-modules = [warp.get_module(module.__name__) for module in (bspline, fingerprint, connected_components, clump_centers)]
+used = bspline, fingerprint, connected_components, counting_sort, clump_centers
+modules = [warp.get_module(module.__name__) for module in used]
 print(warp.config.version, warp.config.kernel_cache_dir, sep="\\n")
 print(*(module.get_module_identifier(block_dim=1) for module in modules))
 """
@@ -51,7 +53,7 @@ def work(cache, temporary, before=()):
 
 @pytest.fixture(scope="module")
 def compiled(tmp_path_factory):
-    """A cache that holds the four modules, and no others."""
+    """A cache that holds the five modules, and no others."""
     folder = tmp_path_factory.mktemp("compiled")
     # In a process of its own, as all others here: a name follows from all that Warp has seen in its process.
     done = subprocess.run([sys.executable, "-c", WORK + NAMES], cwd=ROOT, capture_output=True, text=True, check=True)
@@ -76,18 +78,19 @@ def digest(cache):
 
 
 def test_damaged_entries_are_compiled_again(cache, tmp_path):
+    """One beside a whole one on another thread; each thread that compiles reads Warp's headers, in four seconds."""
     code = file_of(cache, "bspline", ".o")
     code.write_bytes(code.read_bytes()[:700])
     zeros = file_of(cache, "connected_components", ".o")
     zeros.write_bytes(bytes(zeros.stat().st_size))
-    file_of(cache, "fingerprint", ".meta").write_text("")
+    file_of(cache, "counting_sort", ".meta").write_text("")
     entry = file_of(cache, "clump_centers", ".o").parent
     shutil.rmtree(entry)
     entry.write_text("no folder")
     damaged = digest(cache)
     assert work(cache, tmp_path).parent == cache
     mended = digest(cache)
-    assert len(mended) == 4 and all(mended[path] != damaged[path] for path in (code, zeros))
+    assert len(mended) == 5 and all(mended[path] != damaged[path] for path in (code, zeros))
     assert work(cache, tmp_path).parent == cache
     assert digest(cache) == mended
 

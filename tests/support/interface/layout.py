@@ -78,9 +78,9 @@ class Layout:
 
     def operator(self, name, text=None, icon="NONE", icon_value=0, translate=True, depress=False):
         category, operator = name.split(".")
-        assert operator in dir(getattr(bpy.ops, category))
+        kind = getattr(getattr(bpy.ops, category), operator).get_rna_type()  # a KeyError where there is none
         self.drawn[name] += 1
-        label = getattr(getattr(bpy.ops, category), operator).get_rna_type().name if text is None else text
+        label = kind.name if text is None else text
         self.texts.append(text or "")
         self.buttons.append(label)
         self._line.append(label)

@@ -17,6 +17,7 @@ from pathlib import Path
 import bpy
 import gpu
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, Phase, seed, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, get_state_machine_test, invariant
@@ -28,6 +29,7 @@ from hair_addon.core.errors import HairError
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
 from tests.support import always
 from tests.support.always import activate, changed, chosen, nothing_is_left_listening, objects, operate, ours
+from tests.support.scenes import shrink_shadows
 from tests.support.walk.walk_painting import PaintingSteps
 from tests.support.walk.walk_steps import needs_room, odd_numbers, pick, step
 from tests.support.walk.walk_styles import StyleSteps
@@ -377,6 +379,7 @@ if __name__ == "__main__":
     sys.stderr = always.Echo(sys.stderr)
     hair_addon.register()
     gpu.init()
+    shrink_shadows(pytest.MonkeyPatch())
     walk(*map(int, sys.argv[1:]))
     hair_addon.unregister()
     print("walked")

@@ -9,12 +9,14 @@ from pathlib import Path
 
 import bpy
 import numpy as np
+import pytest
 
 import hair_addon
 from hair_addon import api
 from hair_addon.blender.io import inspection
 from hair_addon.blender.ui import panels
 from tests.support.interface import layout
+from tests.support.scenes import shrink_shadows
 
 SMALL = {"width": 16, "height": 12}
 
@@ -65,8 +67,8 @@ def make_styled(path):
     image = bpy.data.images.new("QQQQimage", 8, 8)
     image.pack()
     image.use_fake_user = True
-    guides = api.distribute_guides(sphere, guide_count=20)
-    hair, other = (api.interpolate_hair(guides, strand_count=100) for guides in (guides, api.distribute_guides(sphere)))
+    guides, others = (api.distribute_guides(sphere, guide_count=20) for _ in range(2))
+    hair, other = (api.interpolate_hair(curves, strand_count=100) for curves in (guides, others))
     for curves in (hair, guides):
         curves.attributes.new("QQQQregion", "INT", "CURVE")
     sphere.data.attributes.new("QQQQregion", "INT", "FACE")
@@ -188,6 +190,7 @@ def use(folder):
 
 if __name__ == "__main__":
     hair_addon.register()
+    shrink_shadows(pytest.MonkeyPatch())
     make(Path(sys.argv[1]) / "damaged.blend")
     use(Path(sys.argv[1]))
     make_styled(Path(sys.argv[1]) / "styled.blend")

@@ -160,7 +160,6 @@ class _Tree:
 
     def __init__(self, group):
         self._group = group
-        self._column = 0
 
     def build(self):
         """All of the group, from its input to its output."""
@@ -203,6 +202,12 @@ class _Tree:
         is_deformed = self._is_deformed(info.outputs["Geometry"])
         carried = self._switch(is_deformed, at_rest, moved.outputs[0], "GEOMETRY")
         self._node("NodeGroupOutput", {0: self._switch(self._is_paused(given), carried, given["Curves"], "GEOMETRY")})
+        self._spread_out()
+
+    def _spread_out(self):
+        """Place the nodes in a row: all at once, as Blender would check the group after each."""
+        count = len(self._group.nodes)
+        self._group.nodes.foreach_set("location", [part for column in range(count) for part in (180.0 * column, 0.0)])
 
     def _is_paused(self, given):
         """Never in renders: these carry strands whatever a viewport does."""
@@ -349,8 +354,6 @@ class _Tree:
 
     def _node(self, kind, inputs=None, **settings):
         node = self._group.nodes.new(kind)
-        self._column += 180
-        node.location.x = self._column
         for name, value in settings.items():
             setattr(node, name, value)
         for name, value in (inputs or {}).items():

@@ -11,7 +11,7 @@ from hair_addon.core.files import frame_cache
 from hair_addon.core.long_work import Stopped, run_now
 from tests.support.dynamics.swung import simulate, swing
 
-LAST = 52
+LAST = 30  # a state is kept after frame 25
 
 
 @pytest.fixture
@@ -113,7 +113,7 @@ def test_baked_frames_are_of_the_same_animation_in_another_session(guides, tmp_p
 
 def test_baking_goes_on_before_what_has_changed(guides):
     bake(guides)
-    lift_ball(30)
+    lift_ball(27)
     assert bake(guides) == LAST + 1 - 25  # from the state after frame 25
     found = files_of(guides)
     bake(guides, starts_over=True)

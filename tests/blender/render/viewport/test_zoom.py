@@ -54,7 +54,7 @@ def fine(picture, drawn, camera):
 def test_small_hair_is_as_bright_and_covers_as_much(locks):
     """With one sample a pixel, near by and far away, in the first pass and in the last."""
     picture, near = hair_picture.HairPicture(SIZE, 1), None
-    for distances in (1.0, 2.0, 7.5):
+    for distances in (1.0, 7.5):
         last, first = fine(picture, locks, seen_from(distances))
         near = last if near is None else near
         np.testing.assert_allclose(first, last, rtol=0.02)
