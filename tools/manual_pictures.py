@@ -168,8 +168,9 @@ def draw_portrait(path):
     _head, _guides, hair = portrait.build()
     portrait.light()
     portrait.make_auburn(hair.data)
-    bpy.context.scene.camera.data.sensor_fit = "VERTICAL"
-    bpy.ops.vellus.render_picture(filepath=str(path), width=400, height=300)
+    lens = bpy.context.scene.camera.data
+    lens.sensor_fit, lens.sensor_height = "VERTICAL", lens.sensor_width  # all of the square that the portrait is
+    bpy.ops.vellus.render_picture(filepath=str(path), width=360, height=300)
 
 
 class Window:
