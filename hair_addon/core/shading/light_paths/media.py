@@ -66,7 +66,7 @@ def medium_of(
     medium.corner, medium.voxel, medium.shape = wp.vec3(*grid.corner.tolist()), grid.voxel, wp.vec3i(*grid.shape)
     cells = grid.cells
     medium.along_voxel = cells.along_voxel
-    medium.widths = wp.vec4(*(cells.radius * 0.5 ** np.arange(4)).tolist())
+    medium.widths = wp.vec4(*cells.widths.tolist())
     medium.bricks, medium.starts = wp.array(cells.bricks, dtype=int), wp.array(cells.starts, dtype=int)
     medium.segments = wp.array(cells.segments, dtype=int)
     medium.lines = wp.array(cells.lines.reshape(-1), dtype=wp.uint32)

@@ -36,6 +36,11 @@ class StrandCells:
     segments: np.ndarray  # (M,) int32: first points of segments, once for each cell that they are in
     lines: np.ndarray  # (M, 2) uint32: of those `line_of`
 
+    @property
+    def widths(self) -> np.ndarray:
+        """(4,) radii that segments are taken to have [m]: the largest, and each half the one before."""
+        return self.radius * 0.5 ** np.arange(_WIDTHS)
+
 
 @wp.struct
 class _Strands:
@@ -63,6 +68,7 @@ class _Axis:
 
 @wp.func
 def _axis_of(hair: _Strands, segment: int, side: float):
+    """The axis of a whole segment; side: of the cells that it is looked for in [m]."""
     axis = _Axis()
     axis.origin = hair.points[segment]
     axis.way = hair.points[segment + 1] - axis.origin
@@ -244,7 +250,7 @@ def _ends(counts):
     total = np.sum(counts, axis=0, dtype=np.int64)
     starts = np.zeros(len(total) + 1, np.int64)
     np.cumsum(total, out=starts[1:])
-    if starts[-1] > np.iinfo(np.int32).max:
+    if starts[-1] > np.iinfo(np.int32).max // 2:  # kernels count both words of each line
         raise HairError("Strands are too wide for light among them: use dual scattering.")
     ends, before = [], starts[:-1].astype(np.int32)
     for one in counts:
