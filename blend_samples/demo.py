@@ -193,9 +193,7 @@ def _frames_per_second(drawn):
     end = gpu.types.GPUFrameBuffer(color_slots=pixel)
 
     def draw(view, buffer):
-        with buffer.surfaces((0.0, 0.0, 0.0, 1.0)):
-            scene_drawing.draw_surfaces(drawn, view)
-        scene_drawing.draw_hair(drawn, view, buffer)
+        scene_drawing.draw(drawn, view, buffer, is_transparent=True)
         with end.bind():
             drawing.resolve(buffer.color, 1)
             end.read_color(0, 0, 1, 1, 4, 0, "FLOAT")  # waits until the frame is drawn

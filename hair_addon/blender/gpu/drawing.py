@@ -286,16 +286,6 @@ def gpu_state(depth_test, depth_writes, blend="NONE"):
 
 
 @contextmanager
-def depth_alone():
-    """Draw depths and no colors in a context."""
-    gpu.state.color_mask_set(False, False, False, False)
-    try:
-        yield
-    finally:
-        gpu.state.color_mask_set(True, True, True, True)
-
-
-@contextmanager
 def cleared(framebuffer, color, depth=1.0):
     """Bind a framebuffer, all of it one colour and depth."""
     with framebuffer.bind():

@@ -5,6 +5,7 @@ The depth complexity of hair is high, so only visible samples are shaded, once e
 If the graphics driver supports it, a compute program also finds the nearest segments.
 """
 
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import gpu
@@ -66,6 +67,9 @@ class VisibilityBuffer:
         self._parts = {}  # (format, background) → (framebuffer, texture, depth) of additional passes
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._hiding = gpu.types.GPUFrameBuffer(depth_slot=self.surface_depth)
+        # A framebuffer does not own its textures.
+        self._shaded_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
+        self._shaded = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self._shaded_depth)
         self._is_color_stale = False  # whether `color` is to be cleared
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
@@ -79,9 +83,30 @@ class VisibilityBuffer:
         self._is_color_stale = True
         return drawing.cleared(self._hiding, _NOTHING)
 
+    @contextmanager
+    def behind_hair(self, background=_NOTHING, is_part=False):
+        """The framebuffer that surfaces are shaded in after `find_hair`, bound; is_part: in place of `color`, `part`.
+
+        All of it has the background's color, and depths behind which nothing is shaded: hair or a surface hides it.
+        """
+        program = visibility_programs.behind_hair_program()
+        framebuffer = self._part(scene_programs.PICTURE_FORMAT, background)[0] if is_part else self._shaded
+        with framebuffer.bind():
+            with (
+                drawing.gpu_state("ALWAYS", depth_writes=True),
+                drawing.bound(program, {}, {"segments": self.segments, "surface_depth": self.surface_depth}),
+            ):
+                program.uniform_float("background", background)
+                drawing.cover(program)
+            yield
+
     def add_hair(self, hair, lights, view, in_compute=None):
         """Find the hair in front of the surfaces and shade it: arguments as for `find_hair`."""
         self.find_hair(hair, lights, view, in_compute)
+        self.shade_hair()
+
+    def shade_hair(self):
+        """Shade the hair that `find_hair` found."""
         for placed in self._hair:
             self._shade(placed, self.color)
 
@@ -139,6 +164,9 @@ class VisibilityBuffer:
 
     def surfaces_of_part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
         """As `surfaces`, of what is drawn beside the picture: `part_of_light`, `part_by`, `part`."""
+        return drawing.cleared(self._part(texture_format, background)[0], background)
+
+    def _part(self, texture_format, background):
         # Each background has a texture of its own: a software driver now and then loses the clearing of one that
         # compute programs have filled, if nothing is drawn into it.
         if (texture_format, background) not in self._parts:
@@ -147,7 +175,7 @@ class VisibilityBuffer:
             depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
             framebuffer = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
             self._parts[texture_format, background] = framebuffer, texture, depth
-        return drawing.cleared(self._parts[texture_format, background][0], background)
+        return self._parts[texture_format, background]
 
     def part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
         """The texture of `surfaces_of_part`."""

@@ -20,6 +20,17 @@ def farthest_depths_program():
 
 
 @shaders.kept
+def behind_hair_program():
+    """The program that prepares the shading of surfaces: see behind_hair.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.push_constant("VEC4", "background")
+    info.sampler(0, "UINT_2D", "segments")
+    info.sampler(1, "FLOAT_2D", "surface_depth")
+    info.depth_write("ANY")
+    return shaders.compile_drawing(info, "cover.vert", "behind_hair.frag")
+
+
+@shaders.kept
 def surface_depths_program():
     """The compute program that converts depth to integers, and clears all else: see surface_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()

@@ -9,7 +9,7 @@ from ..gpu import drawing, render_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
 from . import motion_vectors, scene_drawing
 
-_MOST_SAMPLES = 4096  # along a tile's side: its textures take 340 MB, 870 with all passes
+_MOST_SAMPLES = 4096  # along a tile's side: its textures take 410 MB, 940 with all passes
 
 FAR = 1e10  # distance of the background, as in Cycles
 
@@ -77,8 +77,7 @@ class Film:
         whole = tuple(length * self._per_side for length in size)
         corner = (length * self._per_side - self._margin for length in place)
         view = drawing.pass_record(world_to_view, view_to_clip, whole, turn, (*corner, *self.samples.size))
-        scene_drawing.draw_behind_hair(drawn, view, self.samples, self.is_transparent)
-        scene_drawing.draw_hair(drawn, view, self.samples)
+        scene_drawing.draw(drawn, view, self.samples, self.is_transparent)
         weights = [
             pixel_sampling.filter_weights(self._per_side, self._filter_width, shift)
             for shift in drawing.pass_shift(turn)

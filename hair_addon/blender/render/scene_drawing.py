@@ -11,15 +11,26 @@ from ..gpu import (
     world_texture,
 )
 
-# By how much of the depth range surfaces are drawn farther at first: more than rounding, so that none hides itself.
-_FARTHER = 1e-5
-
 
 def draw_hiding(drawn, view):
     """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for surface, _parts in drawn.surfaces:
             surface_textures.draw_depth(surface, view, drawn.lights, "surface_hides.frag")
+
+
+def draw(drawn, view, buffer, is_transparent):
+    """Fill a `VisibilityBuffer` as a render shows a scene: with the background unless it is to be left empty.
+
+    What is nearest is found before anything is shaded, so that surfaces are shaded just where they are seen.
+    """
+    with buffer.hiding():
+        draw_hiding(drawn, view)
+    lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
+    buffer.find_hair(_hair_in_view(drawn, view, is_viewport=False), lights, view)
+    with buffer.behind_hair(_background(drawn, is_transparent)):
+        _shade_behind_hair(drawn, view, buffer, is_transparent)
+    buffer.shade_hair()
 
 
 def draw_hair(drawn, view, buffer, is_viewport=False):
@@ -44,9 +55,9 @@ def relight_viewport(drawn, view, buffer, is_shadowed=False):
 
 def relight(drawn, view, buffer, is_transparent):
     """The same as a render shows it: with surfaces, and with the background unless it is to be left empty."""
-    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
-    with buffer.surfaces_of_part(background=background):
-        _draw_all_behind_hair(drawn, view, buffer, is_transparent)
+    background = _background(drawn, is_transparent)
+    with buffer.behind_hair(background, is_part=True):
+        _shade_behind_hair(drawn, view, buffer, is_transparent)
     return _relight_hair(drawn, view, buffer, buffer.part(background=background))
 
 
@@ -73,17 +84,14 @@ def _hair_in_view(drawn, view, is_viewport):
     return hair
 
 
-def draw_behind_hair(drawn, view, buffer, is_transparent):
-    """Fill a `VisibilityBuffer` with the background, unless it is to be left empty, and with all surfaces."""
-    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
-    with buffer.surfaces(background):
-        _draw_all_behind_hair(drawn, view, buffer, is_transparent)
+def _background(drawn, is_transparent):
+    return (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
 
 
-def _draw_all_behind_hair(drawn, view, buffer, is_transparent):
+def _shade_behind_hair(drawn, view, buffer, is_transparent):
     if drawn.world.image is not None and not is_transparent:
         world_texture.draw_background(drawn.world, view, *buffer.size)
-    draw_surfaces(drawn, view)
+    shade_surfaces(drawn, view)
 
 
 def draw_arrival(drawn, view, buffer):
@@ -134,22 +142,10 @@ def _see_through_hair(drawn, view):
         view["hair_reflectance"][:3] = shading.reflectance
 
 
-def _farther(view):
-    """A view that sees all in the same places, but a little farther away."""
-    record = view.copy()
-    record["world_to_clip"][:, 2] += _FARTHER * record["world_to_clip"][:, 3]  # transposed
-    return record
-
-
-def draw_surfaces(drawn, view):
-    """Draw all surfaces with depth test into the bound framebuffer, and over them those that are clear.
-
-    Their depths are drawn first, so that what is behind another surface is not shaded.
-    """
+def shade_surfaces(drawn, view):
+    """Draw all surfaces with depth test into the bound framebuffer, and over them those that are clear."""
     _see_through_hair(drawn, view)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        with drawing.depth_alone():
-            draw_hiding(drawn, _farther(view))
         for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
             if parts is None:
                 surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")

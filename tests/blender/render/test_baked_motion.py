@@ -76,7 +76,8 @@ def test_cycles_blurs_as_velocities_of_the_points_do(baked, tmp_path):
     velocity = frozen.data.attributes.new("velocity", "FLOAT_VECTOR", "POINT")
     velocity.data.foreach_set("vector", ((after - before) / 0.5 * FRAME_RATE).ravel())
     by_velocity = rendered(tmp_path, **SMALL)["Combined"]
-    assert abs(followed - by_velocity).max() <= 1.0 / 255.0
+    # A few of a pixel's paths go another way, by the processor's rounding.
+    assert abs(followed - by_velocity).max() <= 2.0 / 255.0
     assert abs(followed - still).max() > 6.0 / 255.0
 
 

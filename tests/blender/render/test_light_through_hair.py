@@ -67,7 +67,7 @@ def light_along_x(pass_count=4):
     buffer, light = VisibilityBuffer(*SIZE), 0.0
     for turn in range(pass_count):
         with buffer.surfaces():
-            scene_drawing.draw_surfaces(drawn, drawing.pass_record(*camera, SIZE, turn))
+            scene_drawing.shade_surfaces(drawn, drawing.pass_record(*camera, SIZE, turn))
         light = light + np.array(buffer.color.read(), np.float32).reshape(*SIZE[::-1], 4)[..., :3].mean(axis=0)
     return light / pass_count
 

@@ -224,7 +224,7 @@ def test_a_frame_of_an_unchanged_scene_reads_no_material(stage, monkeypatch):
     camera = read_camera(stage, depsgraph, SIZE, SIZE)
     for _frame in range(2):
         buffer = visibility_buffer.VisibilityBuffer(SIZE, SIZE)
-        scene_drawing.draw_behind_hair(drawn, drawing.view_record(*camera, SIZE), buffer, is_transparent=True)
+        scene_drawing.draw(drawn, drawing.view_record(*camera, SIZE), buffer, is_transparent=True)
 
 
 def test_what_is_behind_a_clear_surface_is_seen_through_its_highlight(stage):
