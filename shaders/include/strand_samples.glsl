@@ -8,20 +8,34 @@
 #include "include/this_place.glsl"
 #include "include/whole_samples.glsl"
 
+// Samples above each other that one thread fills. Software drivers run all of a branch though no thread takes it: those
+// without hair would cost as much as the others.
+const int SAMPLES_OF_THREAD = 8;
+
+// Segments of other hair, and no segment at all, are beyond this hair's count either way.
+uint segment_at(ivec2 place)
+{
+  return texelFetch(segments, place, 0).r - uint(first_segment);
+}
+
 void main()
 {
-  ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(window_left, window_bottom);
   ivec2 size = textureSize(segments, 0);
-  if (any(greaterThanEqual(place, size))) {
-    return;
-  }
-  // Segments of other hair, and no segment at all, are beyond this hair's count either way.
-  uint found = texelFetch(segments, place, 0).r - uint(first_segment);
-  if (found < uint(segment_count)) {
-    float share = look_share(int(found) / (view.drawn_points - 1));
+  ivec2 place = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, SAMPLES_OF_THREAD) + ivec2(window_left, window_bottom);
+  int end = (place.x < size.x) ? min(place.y + SAMPLES_OF_THREAD, size.y) : place.y;
+  while (true) {
+    while (place.y < end && segment_at(place) >= uint(segment_count)) {
+      place.y++;
+    }
+    if (place.y >= end) {
+      break;
+    }
+    int found = int(segment_at(place));
+    float share = look_share(found / (view.drawn_points - 1));
     if (share > 0.0) {
-      find_place(int(found), vec2(place) + 0.5, vec2(size));
+      find_place(found, vec2(place) + 0.5, vec2(size));
       imageStore(picture, place, mixed_light(place, sample_value(), share));
     }
+    place.y++;
   }
 }

@@ -107,7 +107,8 @@ def _walk(file, images, constants, shadow_samplers=(), samplers=()):
 
 
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
-PICTURE_GROUP_SIZE = 8  # samples along each side of what one work group of a picture's programs fills
+PICTURE_GROUP_SIZE = 8  # threads along each side of a work group of a picture's programs
+SAMPLES_OF_THREAD = 8  # of shaders/include/strand_samples.glsl
 
 
 @kept

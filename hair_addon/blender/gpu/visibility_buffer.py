@@ -322,4 +322,4 @@ class VisibilityBuffer:
             program.uniform_int("segment_count", placed.segment_count)
             program.uniform_int("window_left", left)
             program.uniform_int("window_bottom", bottom)
-            drawing.dispatch_over(program, size)
+            drawing.dispatch_over(program, (size[0], -(-size[1] // scene_programs.SAMPLES_OF_THREAD)))
