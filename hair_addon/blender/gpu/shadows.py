@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Deep opacity maps [Yuksel08]: for each light, front and back depth of hair, its layers, and the depth of surfaces."""
 
+from dataclasses import replace
+
 import gpu
 import numpy as np
 
@@ -19,6 +21,10 @@ _NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it; of 
 _LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
 _SHADE_DISTANCE = 0.15
 _ALL = drawing.Steps()
+
+# By how much strands may be longer with all of their points than with those that are drawn, where they rest: bends that
+# are left out are smaller than a texel.
+_LENGTHENING = 0.005
 
 # While hair moves, the sphere that maps are aimed at stays until it has to be larger, and is then larger by one factor,
 # or until it may be smaller by the other: maps whose texels move with every edit flicker.
@@ -85,7 +91,7 @@ class ShadowMaps:
             light_block = uniforms.uniform_buffer(lights)  # each map reads its own light alone
             for index, view in views.items():
                 cast = (hair, surfaces) if casters is None else casters(index)
-                self._draw_light(index, view, lights, light_block, *cast, steps)
+                self._draw_light(index, view, lights, light_block, *cast, steps, is_steady)
 
     def _aimed(self, index, light, hair, loose):
         """What `_aim` returns and writes, kept while the light and the sphere stay."""
@@ -106,9 +112,9 @@ class ShadowMaps:
             self._views[index] = aimed_by, view.copy(), {name: light[name].copy() for name in _AIMED}
         return view
 
-    def _draw_light(self, layer, view, lights, light_block, hair, surfaces, steps):
+    def _draw_light(self, layer, view, lights, light_block, hair, surfaces, steps, is_steady):
         hidden = {"hidden_depth": self._drawn_surfaces(layer, view, lights, surfaces)}
-        placed = [(strands, _record(strands, view, to_world, steps)) for strands, to_world in hair]
+        placed = [(strands, _record(strands, view, to_world, steps, is_steady)) for strands, to_world in hair]
         if self._in_compute:
             self._walk(layer, placed, light_block, hidden)
         else:
@@ -220,8 +226,13 @@ def _slot(texture, layer):
     return texture if layer is None else {"texture": texture, "layer": layer}
 
 
-def _record(strands, view, to_world, steps):
-    """`drawing.strand_record` of strands that cover as much with fewer points, which cut curls short."""
+def _record(strands, view, to_world, steps, is_steady):
+    """`drawing.strand_record` of strands that cover as much with fewer points, which cut curls short.
+
+    Where they rest, as few are drawn as show them.
+    """
+    if steps.point_count is None and not is_steady:
+        steps = replace(steps, point_count=strands.points_that_show(_LENGTHENING))
     record = drawing.strand_record(strands, view, to_world, steps)
     drawn_points = int(record["drawn_points"])
     if drawn_points < strands.point_count:

@@ -92,6 +92,16 @@ class StrandsOnGPU:
             self.lengthenings[point_count] = lengths[0] / max(lengths[1], 1e-12)
         return self.lengthenings[point_count]
 
+    def points_that_show(self, part: float) -> int:
+        """How many points, evenly chosen of all, are enough for strands that are hardly longer with all: by a part."""
+        pieces, enough = self.point_count - 1, self.point_count
+        fewer = [step for step in range(2, pieces + 1) if pieces % step == 0] if self.has_points else []
+        for step in fewer:
+            if self.lengthening(pieces // step + 1) > 1.0 + part:
+                break
+            enough = pieces // step + 1
+        return enough
+
 
 def upload_strands(points, radii, randoms=None, wetness=None):
     """(S, P, 3) points and (S, P) radii, float32, in one coordinate system → `StrandsOnGPU`.
