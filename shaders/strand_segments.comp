@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Visibility buffer of strands: first the depth of the nearest segment, then its index. Strands are round: the depth is
-// that of the side which faces the viewer.
+// Visibility buffer of strands: first the depth of the nearest segment (IS_DEPTH), then its index. Strands are round: the
+// depth is that of the side which faces the viewer. IS_ROUND: as in include/walk_segment.glsl.
 
 #include "include/segment.glsl"
 #include "include/tile.glsl"
@@ -22,12 +22,12 @@ ivec2 run_texel(int run)
 // Indices are those of runs whose depths were the least when they were met: of one in many.
 bool is_left_out(int run)
 {
-  return is_depth == 0 && imageLoad(seen_runs, run_texel(run)).r == 0u;
+  return !IS_DEPTH && imageLoad(seen_runs, run_texel(run)).r == 0u;
 }
 
 void end_run(int run)
 {
-  if (is_depth != 0) {
+  if (IS_DEPTH) {
     imageStore(seen_runs, run_texel(run), uvec4(is_seen ? 1u : 0u));
   }
 }
@@ -37,7 +37,7 @@ void begin(int strand, int piece, Segment segment, vec4 first, vec4 second)
   end_depths = vec2(segment.start.z, segment.end.z);
   end_rises = depth_rises(segment, distance(first.xyz, second.xyz));
   round_rises = segment.half_width / segment.w * view.depth_rise;
-  this_index = uint(first_segment + strand * (view.drawn_points - 1) + piece);
+  this_index = uint(view.first_segment + strand * (view.drawn_points - 1) + piece);
 }
 
 // Whether all samples of tiles have something nearer. Depths are linear along a segment, but for rounding.
@@ -68,7 +68,7 @@ void meet(ivec2 place, float along, float across, float coverage)
   float rise = mix(rises.x, rises.y, within) * sqrt(max(1.0 - across * across, 0.0));
   uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, within) - rise, 0.0));
   uint nearest = imageLoad(depths, place).r;
-  if (is_depth != 0) {
+  if (IS_DEPTH) {
     is_seen = is_seen || depth <= nearest;
     // Most samples are occluded: reading first is cheaper than writing.
     if (depth < nearest) {
@@ -80,7 +80,7 @@ void meet(ivec2 place, float along, float across, float coverage)
   }
 }
 
-const bool IS_ROUND = true;
+const bool HAS_TILES = true;
 
 #include "include/walk_segment.glsl"
 

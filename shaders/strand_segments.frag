@@ -19,7 +19,7 @@ void main()
   }
   int pieces = view.drawn_points - 1;
   int piece = clamp(int(strand_place), 0, pieces - 1);
-  segment = uint(first_segment + strand_index * pieces + piece);
+  segment = uint(view.first_segment + strand_index * pieces + piece);
   float part = clamp(side / max(strand_coverage, 1e-6), -1.0, 1.0);
   gl_FragDepth = max(gl_FragCoord.z - strand_rise * sqrt(1.0 - part * part), 0.0);
   depth = floatBitsToUint(gl_FragDepth);

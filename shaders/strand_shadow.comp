@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Strands in a deep opacity map: first the depths of the nearest and of the last, then the opacity of each layer between.
+// Strands in a deep opacity map: first the depths of the nearest and of the last (IS_FRONT), then the opacity of each layer
+// between.
 
 #include "include/opacity.glsl"
 #include "include/segment.glsl"
@@ -35,7 +36,7 @@ void meet(ivec2 place, float along, float across, float coverage)
 {
   float depth = mix(end_depths.x, end_depths.y, clamp(along, 0.0, 1.0));
   float hidden = texelFetch(hidden_depth, place, 0).r;
-  if (is_front != 0) {
+  if (IS_FRONT) {
     if (depth > hidden) {
       return;
     }
@@ -57,7 +58,7 @@ void meet(ivec2 place, float along, float across, float coverage)
   }
 }
 
-const bool IS_ROUND = false;
+const bool HAS_TILES = false;
 
 #include "include/walk_segment.glsl"
 

@@ -15,7 +15,7 @@ const int SAMPLES_OF_THREAD = 8;
 // Segments of other hair, and no segment at all, are beyond this hair's count either way.
 uint segment_at(ivec2 place)
 {
-  return texelFetch(segments, place, 0).r - uint(first_segment);
+  return texelFetch(segments, place, 0).r - uint(view.first_segment);
 }
 
 void main()
@@ -23,8 +23,9 @@ void main()
   ivec2 size = textureSize(segments, 0);
   ivec2 place = ivec2(gl_GlobalInvocationID.xy) * ivec2(1, SAMPLES_OF_THREAD) + ivec2(window_left, window_bottom);
   int end = (place.x < size.x) ? min(place.y + SAMPLES_OF_THREAD, size.y) : place.y;
+  uint count = uint(view.strand_count * (view.drawn_points - 1));
   while (true) {
-    while (place.y < end && segment_at(place) >= uint(segment_count)) {
+    while (place.y < end && segment_at(place) >= count) {
       place.y++;
     }
     if (place.y >= end) {

@@ -6,9 +6,10 @@
 #include "include/segment.glsl"
 #include "include/tile.glsl"
 
-// A program defines whether bends are filled and wide ends are disks, for what is seen; without, strands cover their length
-// times their width, and as far beyond either end as half a disk covers.
-// const bool IS_ROUND
+// Of a program, these are known before it is compiled: software drivers run all of a branch though no thread takes it.
+// IS_ROUND: bends are filled and wide ends are disks, where any strand is as wide as LEAST_BEND and is seen; without, strands
+// cover their length times their width, and as far beyond either end as half a disk covers.
+// const bool HAS_TILES: whether tiles may be hidden, and samples lie off their centers.
 
 // Consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;
@@ -77,7 +78,7 @@ void walk(Segment segment, vec2 beyond_ends, ivec2 size)
   float beyond = float(first_column) + 0.5 - start.x;  // the column's center from the start
   while (column <= last_column) {
     // As far as the end of the tile.
-    int end_column = min((column & ~(TILE - 1)) + TILE - 1, last_column);
+    int end_column = HAS_TILES ? min((column & ~(TILE - 1)) + TILE - 1, last_column) : last_column;
     float end_beyond = beyond + float(end_column - column);
     vec2 rows = start.y + vec2(beyond, end_beyond) * slope;
     ivec2 low = ivec2(column, max(first_sample(min(rows.x, rows.y) - most_reach - 0.5), 0));
@@ -94,8 +95,8 @@ void walk(Segment segment, vec2 beyond_ends, ivec2 size)
       float half_width = max(true_half_width, least_half_width);
       float middle = start.y + beyond * slope;
       float reach = half_width * widening;
-      float offset_part = view.sample_offset * offset_share(true_half_width);
-      if (offset_part > 0.0) {
+      float offset_part = HAS_TILES ? view.sample_offset * offset_share(true_half_width) : 0.0;
+      if (HAS_TILES && offset_part > 0.0) {
         middle -= offset_part * sample_offset(first_place.x + column, float(first_place.y) + middle, turn);
       }
       int first_row = max(first_sample(middle - reach), 0);

@@ -53,7 +53,6 @@ def strip_segments_program():
     """The program that draws strips of strands as samples of a picture: see strand_segments.frag."""
     info = gpu.types.GPUShaderCreateInfo()
     _strip(info, ())
-    info.push_constant("INT", "first_segment")
     info.depth_write("ANY")
     return compile_drawing(info, "strand.vert", "strand_segments.frag", (("segment", "UINT"), ("depth", "UINT")))
 
@@ -78,22 +77,25 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.
 
 
 @kept
-def segments_program():
+def segments_program(is_depth, is_round):
     """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
-    constants = ("first_segment", "first_run", "is_depth", "are_tiles_known")
-    samplers = (("farthest_depths", "UINT_2D"),)
-    return _walk("strand_segments.comp", ("depths", "segments", "seen_runs"), constants, samplers=samplers)
+    constants, samplers = ("first_run", "are_tiles_known"), (("farthest_depths", "UINT_2D"),)
+    defined = {"IS_DEPTH": is_depth, "IS_ROUND": is_round}
+    return _walk("strand_segments.comp", ("depths", "segments", "seen_runs"), defined, constants, samplers=samplers)
 
 
 @kept
-def strand_shadow_program():
+def strand_shadow_program(is_front):
     """The compute program that draws strands into a deep opacity map: see strand_shadow.comp."""
-    samplers = (("hidden_depth", "FLOAT_2D"),)
-    return _walk("strand_shadow.comp", ("fronts", "backs", "counts"), ("is_front",), ("hair_front",), samplers)
+    images, samplers = ("fronts", "backs", "counts"), (("hidden_depth", "FLOAT_2D"),)
+    defined = {"IS_FRONT": is_front, "IS_ROUND": False}
+    return _walk("strand_shadow.comp", images, defined, shadow_samplers=("hair_front",), samplers=samplers)
 
 
-def _walk(file, images, constants, shadow_samplers=(), samplers=()):
+def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=()):
     info = gpu.types.GPUShaderCreateInfo()
+    for name, value in defined.items():
+        info.define(name, str(value).lower())
     declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
     info.local_group_size(RUN_GROUP_SIZE)
     own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
@@ -153,7 +155,7 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, 
     for slot, (name, kind) in enumerate(read, start=first):
         info.sampler(slot, kind, name)
     info.image(0, texture_format, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"} if is_mixed else {"WRITE"})
-    for name in ("first_segment", "segment_count", "window_left", "window_bottom"):
+    for name in ("window_left", "window_bottom"):
         info.push_constant("INT", name)
     return info
 

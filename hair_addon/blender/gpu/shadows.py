@@ -141,7 +141,6 @@ class ShadowMaps:
 
     def _walk(self, layer, placed, lights, hidden):
         """Draw a map of strands by compute programs: integer sums are independent of the order."""
-        program = scene_programs.strand_shadow_program()
         samplers = {"hair_front": self._hair_front, **hidden}
         images = {"fronts": self._fronts, "backs": self._backs, "counts": self._counts}
         if not self._is_empty:
@@ -149,11 +148,12 @@ class ShadowMaps:
             self._counts.clear(format="UINT", value=(0,))
         self._is_empty = False
         placed = [(*one, {"view": uniforms.uniform_buffer(one[1]), "lights": lights}) for one in placed]
+        fronts, counts = map(scene_programs.strand_shadow_program, (True, False))
         for strands, record, blocks in placed:
-            drawing.walk_strands(strands, program, record, blocks, samplers, images, {"is_front": 1})
+            drawing.walk_strands(strands, fronts, record, blocks, samplers, images, {})
         self._fill_fronts(layer)
         for strands, record, blocks in placed:
-            drawing.walk_strands(strands, program, record, blocks, samplers, images, {"is_front": 0})
+            drawing.walk_strands(strands, counts, record, blocks, samplers, images, {})
         self._filter(shadow_programs.counts_program(), self._hair_layers, layer, images)
         self._is_empty = True
 

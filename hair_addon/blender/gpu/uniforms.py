@@ -73,6 +73,7 @@ VIEW = Block(
         "first_strand": "int",  # of the turns in which strands are drawn
         "part_size": "int",  # strands: turns go from one such part of the strands to the next
         "part_stride": "int",  # and so much further in each when they come back to it
+        "first_segment": "int",  # of this hair, among those of all hair in a picture
         "thickness": "float",
         "seen_points": "int",  # of each strand's points, those of the visibility textures
         "seen_opacity": "float",  # of a strand, for which they hold

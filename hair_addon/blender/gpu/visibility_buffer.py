@@ -33,6 +33,7 @@ class _Placed:
     first: int
     lights: gpu.types.GPUUniformBuf
     window: tuple  # `drawing.window_of` it
+    is_round: bool  # whether any strand is so wide that its bends and ends are seen
 
     @property
     def segment_count(self):
@@ -140,12 +141,14 @@ class VisibilityBuffer:
         light_blocks = [uniforms.uniform_buffer(record) for record in np.atleast_1d(lights)]
         for index, (strands, shading, to_world, samplers, steps) in enumerate(hair):
             record = drawing.strand_record(strands, view, to_world, steps)
+            record["first_segment"] = first
             record["seen_points"] = seen_points(strands.point_count)
             record["seen_opacity"] = shading.opacity
             record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
             light_block = light_blocks[index if lights.shape else 0]
             window = drawing.window_of(strands, record, self.size)
-            found.append(_Placed(strands, shading, record, samplers, first, light_block, window))
+            is_round = drawing.may_be_wide(strands, record, self.size, visibility_programs.LEAST_BEND)
+            found.append(_Placed(strands, shading, record, samplers, first, light_block, window, is_round))
             first += found[-1].segment_count
         return found
 
@@ -220,15 +223,15 @@ class VisibilityBuffer:
             {"view": uniforms.uniform_buffer(placed.record), "lights": placed.lights} for placed in self._hair
         ]
         if sum(placed.segment_count for placed in self._hair) < _FEW_SEGMENTS:
-            self._walk(all_blocks, drawing.WALK_ALL, is_depth=1)
-            self._walk(all_blocks, drawing.WALK_ALL, is_depth=0)
+            self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
+            self._walk(all_blocks, drawing.WALK_ALL, is_depth=False)
             return
         # A few strands hide most of the others.
-        self._walk(all_blocks, drawing.WALK_FIRST, is_depth=1)
+        self._walk(all_blocks, drawing.WALK_FIRST, is_depth=True)
         self._find_farthest()
-        self._walk(all_blocks, drawing.WALK_OTHERS, is_depth=1, are_tiles_known=True)
+        self._walk(all_blocks, drawing.WALK_OTHERS, is_depth=True, are_tiles_known=True)
         self._find_farthest()
-        self._walk(all_blocks, drawing.WALK_ALL, is_depth=0, are_tiles_known=True)
+        self._walk(all_blocks, drawing.WALK_ALL, is_depth=False, are_tiles_known=True)
 
     def _provide_runs(self, count):
         """Make the texture of runs larger where it has fewer texels."""
@@ -244,12 +247,11 @@ class VisibilityBuffer:
             drawing.dispatch_over(program, (self._farthest.width, self._farthest.height))
 
     def _walk(self, all_blocks, part, is_depth, are_tiles_known=False):
-        program = scene_programs.segments_program()
         images = {"depths": self.depths, "segments": self.segments, "seen_runs": self._seen_runs}
         samplers, first_run = {"farthest_depths": self._farthest}, 0
         for placed, blocks in zip(self._hair, all_blocks, strict=True):
-            constants = {"first_segment": placed.first, "first_run": first_run}
-            constants |= {"is_depth": is_depth, "are_tiles_known": int(are_tiles_known)}
+            constants = {"first_run": first_run, "are_tiles_known": int(are_tiles_known)}
+            program = scene_programs.segments_program(is_depth, placed.is_round)
             first_run += placed.run_count
             drawing.walk_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
 
@@ -278,8 +280,6 @@ class VisibilityBuffer:
         program = scene_programs.strip_segments_program()
         with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             for placed in self._hair:
-                program.bind()
-                program.uniform_int("first_segment", placed.first)
                 drawing.draw_strip(placed.strands, program, placed.record, placed.lights)
         self._has_strips = True
 
@@ -318,8 +318,6 @@ class VisibilityBuffer:
         textures |= {"segments": self.segments, **drawing.strand_samplers(placed.strands)}
         with drawing.bound(program, blocks, textures):
             program.image("picture", picture)
-            program.uniform_int("first_segment", placed.first)
-            program.uniform_int("segment_count", placed.segment_count)
             program.uniform_int("window_left", left)
             program.uniform_int("window_bottom", bottom)
             drawing.dispatch_over(program, (size[0], -(-size[1] // scene_programs.SAMPLES_OF_THREAD)))

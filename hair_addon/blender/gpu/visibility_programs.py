@@ -6,6 +6,7 @@ import gpu
 from . import scene_programs, shaders
 
 RUNS_IN_ROW = 16384  # RUNS_IN_ROW of shaders/strand_segments.comp
+LEAST_BEND = 1.0  # [samples]: LEAST_BEND of shaders/include/walk_segment.glsl
 TILE = 8  # samples along each side of a tile: TILE of shaders/include/tile.glsl
 
 
