@@ -28,7 +28,8 @@ _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _KNOWN = 0.015  # standard error of the mean light, as a part of it, below which no more paths are taken
-_MOST_TURNS = 64  # of paths on the same hair, each as many as all before
+_MOST_TURNS = 64  # of paths on the same hair
+_LEAST_TURN = 0.125  # of all before, that a further turn has
 
 
 @wp.kernel
@@ -120,9 +121,9 @@ def gather(
     over samples, which are others, what is drawn without paths, and what even light would give there; and how many
     paths.
 
-    About `path_count` start on hair that is in sight. As many as there were follow again and again, until the standard
-    error of their mean light is 1.5 % of it, or there would be more than `most_paths`: few paths of dark hair find a
-    lamp.
+    About `path_count` start on hair that is in sight. As many as seem to be wanted follow, at most as there were, until
+    the standard error of their mean light is 1.5 % of it, or there would be more than `most_paths`: few paths of dark
+    hair find a lamp.
     """
     count = len(seen.segments)
     require_indices("segments", seen.segments, len(grid.points) - 1)
@@ -139,9 +140,8 @@ def gather(
         sources = sources_of(surroundings)
         drawn = np.concatenate([seen.drawn, _even_there(medium, seen, device)], axis=-1)
         drawn = _by_voxel(grid, seen.places, systems[seen.segments], drawn)
-        sums, total, squares, taken, tried, turn = 0.0, 0.0, 0.0, 0, 0, 0
+        sums, total, squares, taken, tried, turn, more = 0.0, 0.0, 0.0, 0, 0, 0, path_count
         while True:
-            more = max(tried, path_count)
             starts = start_places.of_seen(medium, grid, seen, voxels, more, seed * _MOST_TURNS + turn, device)
             positions, light, even = _traced(medium, sources, seen.view, starts, device)
             found = np.concatenate([light, even], axis=-1)
@@ -150,7 +150,9 @@ def gather(
             total, squares = total + float(brightness.sum()), squares + float(np.square(brightness).sum())
             taken += len(light)
             tried, turn = tried + more, turn + 1
-            if 2 * tried > most_paths or _standard_error(total, squares, taken) < _KNOWN:
+            missing = (_standard_error(total, squares, taken) / _KNOWN) ** 2 - 1.0
+            more = int(tried * min(max(missing, _LEAST_TURN), 1.0))
+            if missing < 0.0 or tried + more > most_paths:
                 return np.concatenate([sums, drawn], axis=-1), taken
 
 

@@ -50,7 +50,7 @@ def test_directions_and_paths_that_meet_the_sky_find_the_same_light(rng, monkeyp
     light = replace(surroundings(floor, [(0.6, 0.6, 0.6)]), world=picture)
     light = replace(light, gloss=np.array([[0.4, 0.0, 0.06]]))
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 10_000)
-    monkeypatch.setattr(gather, "_KNOWN", 0.0)
+    monkeypatch.setattr(gather, "_KNOWN", 1e-6)
     count = len(seen.segments)
     by_both, _taken = gather.gather(grid, light, seen, count, most_paths=8 * count)
     monkeypatch.setattr(world_light, "_UNEVEN", np.inf)
