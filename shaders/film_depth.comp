@@ -23,9 +23,8 @@ void main()
     for (int x = 0; x < tap_count(); x++) {
       ivec2 tap = ivec2(x, y);
       ivec2 place = pixel * samples_per_side + tap;
-      float depth = texelFetch(surface_depth, place, 0).r;
+      float depth = uintBitsToFloat(texelFetch(depths, place, 0).r);
       if (texelFetch(segments, place, 0).r < NO_SEGMENT) {
-        depth = min(depth, uintBitsToFloat(texelFetch(depths, place, 0).r));
         found.x += filter_weight(tap);
       }
       if (depth < 1.0) {

@@ -68,7 +68,9 @@ void meet(ivec2 place, float along, float across, float coverage)
   float rise = mix(rises.x, rises.y, within) * sqrt(max(1.0 - across * across, 0.0));
   uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, within) - rise, 0.0));
   uint nearest = imageLoad(depths, place).r;
-  if (IS_DEPTH) {
+  // That tiles are known or not is always so. Without a branch that is decided at run time, NVIDIA's compiler makes the walk a
+  // sixth slower.
+  if (IS_DEPTH && are_tiles_known >= 0) {
     is_seen = is_seen || depth <= nearest;
     // Most samples are occluded: reading first is cheaper than writing.
     if (depth < nearest) {

@@ -17,7 +17,7 @@ def film_program():
 @shaders.kept
 def film_depth_program():
     """The same for data passes: see film_depth.comp."""
-    samplers = (("segments", "UINT_2D"), ("depths", "UINT_2D"), ("surface_depth", "FLOAT_2D"))
+    samplers = (("segments", "UINT_2D"), ("depths", "UINT_2D"))
     return _film("film_depth.comp", samplers, (("VEC4", "view_to_clip"),))
 
 

@@ -65,12 +65,10 @@ class VisibilityBuffer:
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
         self._has_strips = False  # whether `depths` are of strips alone
-        self._parts = {}  # (format, background) → (framebuffer, texture, depth) of additional passes
+        # (format, background) → (framebuffer, texture, framebuffer of `behind_hair`, depth) of additional passes
+        self._parts = {}
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._hiding = gpu.types.GPUFrameBuffer(depth_slot=self.surface_depth)
-        # A framebuffer does not own its textures.
-        self._shaded_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
-        self._shaded = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self._shaded_depth)
         self._is_color_stale = False  # whether `color` is to be cleared
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
@@ -88,18 +86,27 @@ class VisibilityBuffer:
     def behind_hair(self, background=_NOTHING, is_part=False):
         """The framebuffer that surfaces are shaded in after `find_hair`, bound; is_part: in place of `color`, `part`.
 
-        All of it has the background's color, and depths behind which nothing is shaded: hair or a surface hides it.
+        All of it has the background's color, and `surface_depth`, behind which nothing is shaded: there hair is now at
+        the viewer.
         """
-        program = visibility_programs.behind_hair_program()
-        framebuffer = self._part(scene_programs.PICTURE_FORMAT, background)[0] if is_part else self._shaded
+        self.nearest_depths()  # before surfaces are drawn into `surface_depth` again, a little nearer
+        framebuffer = self._part(scene_programs.PICTURE_FORMAT, background)[2] if is_part else self._surfaces
         with framebuffer.bind():
-            with (
-                drawing.gpu_state("ALWAYS", depth_writes=True),
-                drawing.bound(program, {}, {"segments": self.segments, "surface_depth": self.surface_depth}),
-            ):
-                program.uniform_float("background", background)
-                drawing.cover(program)
+            framebuffer.clear(color=background)
+            self._put_hair_first()
             yield
+
+    def _put_hair_first(self):
+        """Put the samples in which hair is nearest before all surfaces."""
+        program = visibility_programs.hair_first_program()
+        with (
+            drawing.gpu_state("ALWAYS", depth_writes=True),
+            drawing.bound(program, {}, {"segments": self.segments}),
+        ):
+            for window in (placed.window for placed in self._hair if all(placed.window[2:])):
+                gpu.state.viewport_set(*window)
+                drawing.cover(program)
+        gpu.state.viewport_set(0, 0, *self.size)
 
     def add_hair(self, hair, lights, view, in_compute=None):
         """Find the hair in front of the surfaces and shade it: arguments as for `find_hair`."""
@@ -177,7 +184,8 @@ class VisibilityBuffer:
             texture = gpu.types.GPUTexture(self.size, format=texture_format)
             depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
             framebuffer = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=depth)
-            self._parts[texture_format, background] = framebuffer, texture, depth
+            behind = gpu.types.GPUFrameBuffer(color_slots=texture, depth_slot=self.surface_depth)
+            self._parts[texture_format, background] = framebuffer, texture, behind, depth
         return self._parts[texture_format, background]
 
     def part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):

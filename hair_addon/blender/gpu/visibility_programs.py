@@ -21,14 +21,12 @@ def farthest_depths_program():
 
 
 @shaders.kept
-def behind_hair_program():
-    """The program that prepares the shading of surfaces: see behind_hair.frag."""
+def hair_first_program():
+    """The program of depths that leave surfaces behind hair out: see hair_first.frag."""
     info = gpu.types.GPUShaderCreateInfo()
-    info.push_constant("VEC4", "background")
     info.sampler(0, "UINT_2D", "segments")
-    info.sampler(1, "FLOAT_2D", "surface_depth")
     info.depth_write("ANY")
-    return shaders.compile_drawing(info, "cover.vert", "behind_hair.frag")
+    return shaders.compile_drawing(info, "cover.vert", "hair_first.frag")
 
 
 @shaders.kept

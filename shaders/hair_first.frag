@@ -1,0 +1,13 @@
+// SPDX-License-Identifier: GPL-3.0-or-later
+// Depths that leave surfaces behind hair out, before they are shaded.
+
+#include "include/no_segment.glsl"
+
+void main()
+{
+  if (texelFetch(segments, ivec2(gl_FragCoord.xy), 0).r >= NO_SEGMENT) {
+    discard;
+  }
+  color = vec4(0.0);
+  gl_FragDepth = 0.0;
+}
