@@ -188,3 +188,32 @@ def test_the_sphere_around_hair_touches_it(scene, rng):
         every = np.concatenate([hair.points.reshape(-1, 3) @ m[:3, :3].T + m[:3, 3] for _, m in placed])
         farthest = np.linalg.norm(every - center, axis=1).max()
         assert 0.8 * radius < farthest < radius * (1.0 + 1e-5)
+
+
+def test_maps_at_rest_are_drawn_from_the_points_that_show_the_strands(scene, rng):
+    """Straight strands need two points and curls all of theirs; the map is that of all points, but for half a texel."""
+    points, radii = tuft(rng)
+    straight = points[:, :1] + np.linspace(0.0, 1.0, points.shape[1])[:, None] * (points[:, -1:] - points[:, :1])
+    on_gpu = strand_textures.upload_strands(straight.astype(np.float32), radii)
+    assert on_gpu.points_that_show(0.005) == 2
+    turn = np.linspace(0.0, 12.0 * np.pi, 33)
+    curls = np.stack([0.01 * np.cos(turn), 0.01 * np.sin(turn), 0.002 * turn], axis=-1)
+    on_gpu = strand_textures.upload_strands(
+        (points[:, :1] + curls).astype(np.float32), np.full((len(points), 33), 1e-4, np.float32)
+    )
+    assert on_gpu.points_that_show(0.005) == 33
+    turn = np.linspace(0.0, 1.5, 61)
+    arcs = np.stack([0.2 * np.sin(turn), 0.0 * turn, 0.2 * np.cos(turn)], axis=-1)
+    on_gpu = strand_textures.upload_strands(
+        (points[:, :1] + arcs).astype(np.float32), np.full((len(points), 61), 1e-4, np.float32)
+    )
+    fewer = on_gpu.points_that_show(0.005)
+    assert 4 <= fewer <= 16
+    counts = []
+    for steps in (drawing.Steps(), drawing.Steps(point_count=61)):
+        maps = shadows.ShadowMaps(128, 1)
+        maps.draw(sun(0.4, 0.7), [(on_gpu, np.eye(4))], [], steps)
+        counts.append(np.array(maps.samplers["hair_layers"].read()).reshape(128, 128, 4)[..., 3])
+    beside = [of.reshape(32, 4, 32, 4).mean(axis=(1, 3)) for of in counts]
+    np.testing.assert_allclose(beside[0].sum(), beside[1].sum(), rtol=0.01)
+    assert np.abs(beside[0] - beside[1]).mean() < 0.1 * beside[1].mean()

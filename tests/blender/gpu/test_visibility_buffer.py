@@ -232,3 +232,21 @@ def test_leaving_out_what_tiles_hide_changes_no_sample(shading, rng, monkeypatch
         found.append(drawn(placed, view_to_clip, shading, in_compute=True, hiding_at=0.9))
     for all_walked, some_walked in zip(*found, strict=True):
         np.testing.assert_array_equal(all_walked, some_walked)
+
+
+@pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
+def test_bends_and_ends_are_left_out_only_where_strands_are_too_thin_for_them(shading, rng, monkeypatch, view_to_clip):
+    """Tufts of all widths, by the program that leaves them out and by that which draws them."""
+    may_be_wide, chosen = drawing.may_be_wide, []
+    for x, thickness in ((0.0, 2e-3), (0.1, 6e-3), (0.0, 0.012), (0.1, 0.018), (0.0, 0.025), (0.1, 0.06)):
+        points, radii = tuft(rng, strand_count=12, thickness=thickness)
+        to_world = np.diag([0.15, 0.1, 0.1, 1.0])
+        to_world[:3, 3] = x, 0.0, -0.6
+        placed, found = [(points, radii, to_world)], []
+        monkeypatch.setattr(drawing, "may_be_wide", lambda *given: chosen.append(may_be_wide(*given)) or chosen[-1])
+        found.append(drawn(placed, view_to_clip, shading, in_compute=True))
+        monkeypatch.setattr(drawing, "may_be_wide", lambda *_given: True)
+        found.append(drawn(placed, view_to_clip, shading, in_compute=True))
+        for chosen_program, whole_program in zip(*found, strict=True):
+            np.testing.assert_array_equal(chosen_program, whole_program)
+    assert 0 < sum(chosen) < len(chosen)

@@ -239,3 +239,27 @@ def test_what_is_behind_a_clear_surface_is_seen_through_its_highlight(stage):
     assert seen[middle, middle].min() > 2.0 * bare.max()  # the sun, in the sphere
     beside = seen[SIZE // 2, SIZE // 4]
     np.testing.assert_allclose(beside, bare[SIZE // 2, SIZE // 4] * 0.96, rtol=0.05)
+
+
+def test_surfaces_that_hair_hides_in_part_are_shaded_where_they_are_seen(stage, monkeypatch):
+    """A surface with hair before it, and a clear one: beside hair as they are alone, and behind hair not at all."""
+    material_of(plane(), Base_Color=(0.5, 0.4, 0.3, 1.0))
+    clear = plane(0.5)
+    clear.location.y = -0.5
+    material_of(clear, Transmission_Weight=1.0)
+    sun(math.radians(60.0), 0.4, 0.0, strength=math.pi)
+    bpy.ops.mesh.primitive_plane_add(size=0.8, rotation=(math.pi / 2, 0.0, 0.0), location=(0.3, -0.1, 0.0))
+    bpy.ops.vellus.add_hair(guide_count=20, strand_count=300, length=0.4, radius=0.004)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(stage, bpy.context.view_layer, depsgraph)
+    view = drawing.pass_record(*read_camera(stage, depsgraph, 4 * SIZE, 4 * SIZE), (4 * SIZE, 4 * SIZE))
+    found, whole = (visibility_buffer.VisibilityBuffer(4 * SIZE, 4 * SIZE) for _ in range(2))
+    monkeypatch.setattr(visibility_buffer.VisibilityBuffer, "shade_hair", lambda _buffer: None)
+    scene_drawing.draw(drawn, view, found, is_transparent=True)
+    with whole.surfaces():
+        scene_drawing.shade_surfaces(drawn, view)
+    is_hair = np.array(found.segments.read()).reshape(4 * SIZE, 4 * SIZE) < visibility_buffer.NO_SEGMENT
+    colors = [np.array(buffer.color.read(), np.float32).reshape(4 * SIZE, 4 * SIZE, 4) for buffer in (found, whole)]
+    assert 0.05 < is_hair.mean() < 0.9
+    np.testing.assert_array_equal(*(of[~is_hair] for of in colors))
+    assert not colors[0][is_hair].any() and colors[1][is_hair].any()

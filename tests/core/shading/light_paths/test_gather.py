@@ -256,6 +256,21 @@ def test_more_paths_are_taken_where_few_find_light(rng):
     assert spread[1] < 0.3 * spread[0]
 
 
+def test_as_many_more_paths_are_taken_as_are_wanted(rng, monkeypatch):
+    """Where the error is a tenth above what is wanted, a fifth more paths bring it there: they are not doubled."""
+    grid = grid_of(strands_in_a_box(rng, 1500), (0.1, 0.3, 1.0), voxel_count=2_500)
+    behind = surroundings(lamps=sun((0.0, -1.0, 0.0)))
+    seen = seen_rays.seen_by(grid, behind.corners, ALONG_Y, 3000)
+    errors, standard_error = [], gather._standard_error
+    monkeypatch.setattr(gather, "_standard_error", lambda *of: errors.append(standard_error(*of)) or errors[-1])
+    count = len(seen.segments)
+    _sums, few = gather.gather(grid, behind, seen, count)
+    monkeypatch.setattr(gather, "_KNOWN", errors[0] / 1.1)
+    _sums, more = gather.gather(grid, behind, seen, count, most_paths=64 * count)
+    assert 1.1 * few < more < 1.7 * few
+    assert errors[-1] < errors[0] / 1.1
+
+
 def lit_from_below(grid, light):
     """`ratio` of light that does not come straight from a lamp."""
     seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 100_000)
