@@ -23,12 +23,14 @@ _TYPES = {
 
 
 class Block:
-    """A GLSL struct: `source` declares it, `dtype` is the NumPy record of its std140 layout."""
+    """A GLSL struct: `source` declares it, `dtype` is the NumPy record of its std140 layout.
+
+    What lies between members is a member of the record too, so that copies of it have the same bytes.
+    """
 
     def __init__(self, type_name, members):
         """members: {name: GLSL type}, or {name: (Block, count)} and {name: ("vec4", count)} for arrays."""
-        names, offsets, formats, lines = [], [], [], []
-        end = 0
+        fields, lines, end = [], [], 0
         # A float behind a vec3 is in its fourth word in std140, and behind that in the Metal Shading Language.
         for name, kind in sorted(members.items(), key=lambda member: member[1] == "vec3"):
             if isinstance(kind, tuple):
@@ -40,18 +42,20 @@ class Block:
                 scalar, shape, alignment = _TYPES[kind]
                 form = np.dtype((scalar, shape))
                 lines.append(f"  {kind} {name};")
-            end += -end % alignment
-            names.append(name)
-            offsets.append(end)
-            formats.append(form)
-            end += form.itemsize
+            fields += [*_gap(end, alignment), (name, form)]
+            end += -end % alignment + form.itemsize
         self.type_name = type_name
         self.source = f"struct {type_name} {{\n" + "\n".join(lines) + "\n};\n"
-        self.dtype = np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": end + -end % 16})
+        self.dtype = np.dtype([*fields, *_gap(end, 16)])
 
     def record(self):
         """A zeroed record to be filled by member name."""
         return np.zeros((), self.dtype)
+
+
+def _gap(end, alignment):
+    """[(name, type)] of the bytes from an end to the next multiple of an alignment; none where there are none."""
+    return [(f"unused_{end}", np.dtype((np.uint8, (-end % alignment,))))] if end % alignment else []
 
 
 LIGHT_CAPACITY = 16

@@ -24,6 +24,17 @@ PROBED = [
 ]
 
 
+BLOCKS = [
+    *PROBED,
+    *map(uniforms.settings_block, (lookup_tables.Settings, kajiya_kay.Settings, strand_variation.Settings)),
+]
+
+
+def members(dtype):
+    """Names of a record's members, without what lies between them."""
+    return [name for name in dtype.names if not name.startswith("unused")]
+
+
 def scalars(dtype, name):
     """GLSL expressions of every number in a record, in the order of `np.ndenumerate` over its members."""
     if dtype.subdtype:
@@ -31,13 +42,13 @@ def scalars(dtype, name):
         indices = np.ndindex(*shape)
         return [e for index in indices for e in scalars(scalar, name + "".join(f"[{i}]" for i in index))]
     if dtype.names:
-        return [e for member in dtype.names for e in scalars(dtype[member], f"{name}.{member}")]
+        return [e for member in members(dtype) for e in scalars(dtype[member], f"{name}.{member}")]
     return [f"float({name})"]
 
 
 def number(record, start=1):
     """Fill every number of a record with the next integer; returns the one after the last."""
-    for member in record.dtype.names:
+    for member in members(record.dtype):
         values = record[member]
         if values.dtype.names:
             for nested in values.reshape(-1):
@@ -48,14 +59,17 @@ def number(record, start=1):
     return start
 
 
-@pytest.mark.parametrize(
-    "block",
-    [*PROBED, *map(uniforms.settings_block, (lookup_tables.Settings, kajiya_kay.Settings, strand_variation.Settings))],
-    ids=lambda block: block.type_name,
-)
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.type_name)
+def test_copies_of_a_record_have_its_bytes(block):
+    """NumPy copies members alone: bytes between them would be whatever was in memory."""
+    assert sum(form.itemsize for form, *_place in block.dtype.fields.values()) == block.dtype.itemsize
+    assert block.dtype.itemsize % 16 == 0
+
+
+@pytest.mark.parametrize("block", BLOCKS, ids=lambda block: block.type_name)
 def test_a_vec3_takes_four_words_as_metal_has_it(block):
     """The Metal Shading Language pads it to 16 bytes, where std140 lets a scalar into the last four."""
-    fields = sorted((offset, form.shape) for form, offset, *_title in block.dtype.fields.values())
+    fields = sorted((block.dtype.fields[name][1], block.dtype[name].shape) for name in members(block.dtype))
     for (offset, shape), (after, _shape) in pairwise(fields):
         assert shape != (3,) or after - offset >= 16
 

@@ -37,6 +37,7 @@ def comb(count):
 @pytest.mark.parametrize("count", [1, 60])
 def test_a_stroke_passes_few_files_and_comes_back_to_none(watched, count, monkeypatch):
     """Printed: all of it. What is drawn is handed over, and not asked for again."""
+    comb(count)  # compiles what is compiled once
     way, follow_guides = Way(), live_hair.follow_guides
 
     def follow(*given):
