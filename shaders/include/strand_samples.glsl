@@ -10,7 +10,7 @@
 
 // Samples above each other that one thread fills. Software drivers run all of a branch though no thread takes it: those
 // without hair would cost as much as the others.
-const int SAMPLES_OF_THREAD = 16;
+const int SAMPLES_OF_THREAD = 8;
 
 // Segments of other hair, and no segment at all, are beyond this hair's count either way.
 uint segment_at(ivec2 place)

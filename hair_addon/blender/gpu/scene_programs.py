@@ -110,7 +110,7 @@ def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=()):
 
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves
 PICTURE_GROUP_SIZE = 8  # threads along each side of a work group of a picture's programs
-SAMPLES_OF_THREAD = 16  # of shaders/include/strand_samples.glsl
+SAMPLES_OF_THREAD = 8  # of shaders/include/strand_samples.glsl
 
 
 @kept
