@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Depths that leave surfaces behind hair out, before they are shaded.
+// Sets the depth to zero where hair is nearest, so that surfaces behind it are not shaded.
 
 #include "include/no_segment.glsl"
 

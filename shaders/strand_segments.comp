@@ -68,8 +68,8 @@ void meet(ivec2 place, float along, float across, float coverage)
   float rise = mix(rises.x, rises.y, within) * sqrt(max(1.0 - across * across, 0.0));
   uint depth = floatBitsToUint(max(mix(end_depths.x, end_depths.y, within) - rise, 0.0));
   uint nearest = imageLoad(depths, place).r;
-  // That tiles are known or not is always so. Without a branch that is decided at run time, NVIDIA's compiler makes the walk a
-  // sixth slower.
+  // The second condition is always true. It is a branch that is decided at run time: without one, NVIDIA's compiler makes the
+  // walk a sixth slower.
   if (IS_DEPTH && are_tiles_known >= 0) {
     is_seen = is_seen || depth <= nearest;
     // Most samples are occluded: reading first is cheaper than writing.

@@ -9,6 +9,7 @@
 const float NEAREST = 0.015;
 const float FARTHEST = 0.45;
 const float TURNS = 2.5;
+const int PLACES = 4;  // of each sample
 // Distance of neighbors that tell the slope of the hair's lit side, as a part of the map; and the largest difference of
 // their depths: beyond it they are of different locks.
 const float SLOPE_REACH = 0.012;
@@ -74,14 +75,8 @@ vec3 reflection_of_place(
   return reflected_by_hair(count) * (facing * sent * weight / squared);
 }
 
-// The direction of a sample's next tap: two are opposite, four are at right angles.
-vec2 next_tap(vec2 turn)
-{
-  return (view.light_taps > 2) ? vec2(-turn.y, turn.x) : -turn;
-}
-
-// The same of all hair beside it: of places in as many directions and at as many distances of their range as a sample has
-// taps, which are others in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`.
+// The same of all hair beside it: of places in four directions and at four distances of their range, which are
+// others in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`.
 vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn)
 {
   if (view.hair_reflectance.rgb == vec3(0.0)) {
@@ -89,12 +84,12 @@ vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, v
   }
   float part = TURNS * atan(turn.y, turn.x) / PI;
   vec3 light_there = vec3(0.0);
-  for (int tap = 0; tap < view.light_taps; tap++) {
+  for (int place = 0; place < PLACES; place++) {
     light_there += reflection_of_place(light, across, at, depth, N, L, turn, fract(part));
-    turn = next_tap(turn);
-    part += 1.0 / float(view.light_taps);
+    turn = vec2(-turn.y, turn.x);
+    part += 1.0 / float(PLACES);
   }
   // Where hair shades a surface, its lit side is on the other side.
   float open = exp(-crossed_before_surface(at, depth));
-  return light_there * (open / float(view.light_taps));
+  return light_there * (open / float(PLACES));
 }

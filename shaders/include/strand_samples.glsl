@@ -8,8 +8,8 @@
 #include "include/this_place.glsl"
 #include "include/whole_samples.glsl"
 
-// Samples above each other that one thread fills. Software drivers run all of a branch though no thread takes it: those
-// without hair would cost as much as the others.
+// Samples of a column that one thread fills. Software drivers run all of a branch, even if no thread takes it: with one sample
+// a thread, those without hair would cost as much as the others.
 const int SAMPLES_OF_THREAD = 8;
 
 // Segments of other hair, and no segment at all, are beyond this hair's count either way.

@@ -5,6 +5,7 @@
 
 #include "include/hair_reflection.glsl"
 
+const int TAP_COUNT = 4;
 // Distances of hair from the surface, as parts of the hair's extent: where it is looked for first, and the largest.
 const float FIRST_DISTANCE = 0.06;
 const float LARGEST_DISTANCE = 0.25;
@@ -71,9 +72,9 @@ void surface_visibility(
   float seen = lit_part(at, depth, SURFACE_BIAS);
   float between = 0.0;
   vec3 through = vec3(0.0);
-  for (int tap = 0; tap < view.light_taps; tap++) {
-    float part = (float(tap) + 0.5) / float(view.light_taps);
-    aside = next_tap(aside);
+  for (int tap = 0; tap < TAP_COUNT; tap++) {
+    float part = (float(tap) + 0.5) / float(TAP_COUNT);
+    aside = vec2(-aside.y, aside.x);
     float meters = away * light.extent;
     float reach = meters * across.scale / max(across.w - meters, 0.25 * across.w);
     if (direct > 0.0) {
@@ -94,5 +95,5 @@ void surface_visibility(
     }
   }
   past_surfaces = direct * seen;
-  past_hair = (vec3(direct * between) + through) / float(view.light_taps) + reflected;
+  past_hair = (vec3(direct * between) + through) / float(TAP_COUNT) + reflected;
 }

@@ -6,10 +6,13 @@
 #include "include/segment.glsl"
 #include "include/tile.glsl"
 
-// Of a program, these are known before it is compiled: software drivers run all of a branch though no thread takes it.
-// IS_ROUND: bends are filled and wide ends are disks, where any strand is as wide as LEAST_BEND and is seen; without, strands
-// cover their length times their width, and as far beyond either end as half a disk covers.
-// const bool HAS_TILES: whether tiles may be hidden, and samples lie off their centers.
+// Constants of a program, which are known when it is compiled: software drivers run all of a branch, even if no thread takes it.
+//
+// IS_ROUND
+//     bends are filled and wide ends are drawn as disks; without it, strands cover their length times their width, and as far
+//     beyond either end as half a disk covers
+// HAS_TILES
+//     tiles may be hidden, and samples may lie off their centers
 
 // Consecutive segments per thread: their points are read and projected once.
 const int RUN_LENGTH = 8;

@@ -53,7 +53,6 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     record["depth_rise"] = 0.5 * abs(a_unit) / record["pixels_per_unit"]
     record["least_half_width"] = 0.5 * least_width / record["pixels_per_unit"]
     record["seen_opacity"] = 1.0  # the visibility of the world is computed without hair
-    record["light_taps"] = 4
     return record
 
 

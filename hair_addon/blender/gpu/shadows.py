@@ -22,8 +22,8 @@ _LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
 _SHADE_DISTANCE = 0.15
 _ALL = drawing.Steps()
 
-# By how much strands may be longer with all of their points than with those that are drawn, where they rest: bends that
-# are left out are smaller than a texel.
+# Strands at rest are drawn with so few points that they are shorter by this part at most: bends that are left out are
+# smaller than a texel.
 _LENGTHENING = 0.005
 
 # While hair moves, the sphere that maps are aimed at stays until it has to be larger, and is then larger by one factor,
@@ -229,7 +229,7 @@ def _slot(texture, layer):
 def _record(strands, view, to_world, steps, is_steady):
     """`drawing.strand_record` of strands that cover as much with fewer points, which cut curls short.
 
-    Where they rest, as few are drawn as show them.
+    Strands at rest are drawn with as few as show them.
     """
     if steps.point_count is None and not is_steady:
         steps = replace(steps, point_count=strands.points_that_show(_LENGTHENING))

@@ -93,10 +93,13 @@ class StrandsOnGPU:
         return self.lengthenings[point_count]
 
     def points_that_show(self, part: float) -> int:
-        """How many points, evenly chosen of all, are enough for strands that are hardly longer with all: by a part."""
+        """How few of the points, evenly chosen, show the strands: with all, they are longer by at most this part.
+
+        All of them where points are known to the GPU alone.
+        """
         pieces, enough = self.point_count - 1, self.point_count
-        fewer = [step for step in range(2, pieces + 1) if pieces % step == 0] if self.has_points else []
-        for step in fewer:
+        steps = [step for step in range(2, pieces + 1) if pieces % step == 0] if self.has_points else []
+        for step in steps:
             if self.lengthening(pieces // step + 1) > 1.0 + part:
                 break
             enough = pieces // step + 1

@@ -94,7 +94,6 @@ VIEW = Block(
         "coverage_turn": "float",  # by which a pass takes other samples of thin strands
         "first_column": "int",  # of the picture's samples, where what is drawn is a tile of it
         "first_row": "int",
-        "light_taps": "int",  # how often maps are looked up for a light on a sample of a surface: two or four times
     },
 )
 LIGHT = Block(

@@ -86,10 +86,10 @@ class VisibilityBuffer:
     def behind_hair(self, background=_NOTHING, is_part=False):
         """The framebuffer that surfaces are shaded in after `find_hair`, bound; is_part: in place of `color`, `part`.
 
-        All of it has the background's color, and `surface_depth`, behind which nothing is shaded: there hair is now at
-        the viewer.
+        It is filled with the background's color. Its depths are those of `surface_depth`, but zero where hair is
+        nearest: nothing is shaded there, nor behind another surface.
         """
-        self.nearest_depths()  # before surfaces are drawn into `surface_depth` again, a little nearer
+        self.nearest_depths()  # `surface_depth` is about to change
         framebuffer = self._part(scene_programs.PICTURE_FORMAT, background)[2] if is_part else self._surfaces
         with framebuffer.bind():
             framebuffer.clear(color=background)
@@ -97,7 +97,7 @@ class VisibilityBuffer:
             yield
 
     def _put_hair_first(self):
-        """Put the samples in which hair is nearest before all surfaces."""
+        """Set the depth to zero where hair is nearest."""
         program = visibility_programs.hair_first_program()
         with (
             drawing.gpu_state("ALWAYS", depth_writes=True),

@@ -77,8 +77,6 @@ class Film:
         whole = tuple(length * self._per_side for length in size)
         corner = (length * self._per_side - self._margin for length in place)
         view = drawing.pass_record(world_to_view, view_to_clip, whole, turn, (*corner, *self.samples.size))
-        if self._per_side > 1:
-            view["light_taps"] = 2  # of each of several samples
         scene_drawing.draw(drawn, view, self.samples, self.is_transparent)
         weights = [
             pixel_sampling.filter_weights(self._per_side, self._filter_width, shift)

@@ -26,8 +26,7 @@ def draw(drawn, view, buffer, is_transparent):
     """
     with buffer.hiding():
         draw_hiding(drawn, view)
-    lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
-    buffer.find_hair(_hair_in_view(drawn, view, is_viewport=False), lights, view)
+    buffer.find_hair(_hair_in_view(drawn, view, is_viewport=False), _hair_lights(drawn), view)
     with buffer.behind_hair(_background(drawn, is_transparent)):
         _shade_behind_hair(drawn, view, buffer, is_transparent)
     buffer.shade_hair()
@@ -38,8 +37,7 @@ def draw_hair(drawn, view, buffer, is_viewport=False):
 
     view: a `uniforms.VIEW` record; is_viewport: only as much of it as is seen from there, and as the artist wants.
     """
-    lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
-    buffer.add_hair(_hair_in_view(drawn, view, is_viewport), lights, view)
+    buffer.add_hair(_hair_in_view(drawn, view, is_viewport), _hair_lights(drawn), view)
 
 
 def relight_viewport(drawn, view, buffer, is_shadowed=False):
@@ -62,8 +60,7 @@ def relight(drawn, view, buffer, is_transparent):
 
 
 def _relight_hair(drawn, view, buffer, picture, is_viewport=False):
-    lights = drawn.lights if drawn.hair_lights is None else drawn.hair_lights
-    buffer.relight(_hair_in_view(drawn, view, is_viewport), lights, view, picture)
+    buffer.relight(_hair_in_view(drawn, view, is_viewport), _hair_lights(drawn), view, picture)
     return picture
 
 
@@ -74,6 +71,11 @@ def find_hair(drawn, view, buffer, chosen=None):
     """
     hair = _hair_in_view(drawn, view, is_viewport=True)
     buffer.find_hair(hair if chosen is None else [hair[index] for index in chosen], drawn.lights, view)
+
+
+def _hair_lights(drawn):
+    """`uniforms.LIGHTS` of all hair, or of each."""
+    return drawn.lights if drawn.hair_lights is None else drawn.hair_lights
 
 
 def _hair_in_view(drawn, view, is_viewport):

@@ -29,7 +29,7 @@ _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _KNOWN = 0.015  # standard error of the mean light, as a part of it, below which no more paths are taken
 _MOST_TURNS = 64  # of paths on the same hair
-_LEAST_TURN = 0.125  # of all before, that a further turn has
+_LEAST_TURN = 0.125  # paths of a further turn, as a part of all before
 
 
 @wp.kernel
@@ -121,9 +121,9 @@ def gather(
     over samples, which are others, what is drawn without paths, and what even light would give there; and how many
     paths.
 
-    About `path_count` start on hair that is in sight. As many as seem to be wanted follow, at most as there were, until
-    the standard error of their mean light is 1.5 % of it, or there would be more than `most_paths`: few paths of dark
-    hair find a lamp.
+    About `path_count` start on hair that is in sight. Then follow as many as the standard error of their mean light
+    seems to need to fall to 1.5 % of it, at most as many again, until it has fallen so far or there would be more than
+    `most_paths`: few paths of dark hair find a lamp.
     """
     count = len(seen.segments)
     require_indices("segments", seen.segments, len(grid.points) - 1)
