@@ -30,7 +30,8 @@ bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
 float lit_part(vec3 at, float depth, float bias)
 {
   vec2 moments = textureLod(surface_moments, at, 0.0).rg;
-  float warped = warped_depth(depth - bias);
+  // Surfaces are no farther in the maps either: they would be in their own shadow.
+  float warped = warped_depth(min(depth, FAR_SURFACE) - bias);
   float behind = warped - moments.x;
   float rounding = 0.3 * SURFACE_BIAS * WARP * warped;
   float variance = max(moments.y, rounding * rounding);

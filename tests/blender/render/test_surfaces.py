@@ -263,3 +263,15 @@ def test_surfaces_that_hair_hides_in_part_are_shaded_where_they_are_seen(stage, 
     assert 0.05 < is_hair.mean() < 0.9
     np.testing.assert_array_equal(*(of[~is_hair] for of in colors))
     assert not colors[0][is_hair].any() and colors[1][is_hair].any()
+
+
+def test_a_surface_far_behind_hair_is_not_in_its_own_shadow(stage):
+    """A few strands before a wall, many times their size away: their map of the sun holds a part of the wall."""
+    material_of(plane(4.0), Base_Color=(0.5, 0.5, 0.5, 1.0), Specular_IOR_Level=0.0)
+    sun(math.radians(90.0), 0.0, 0.0, strength=math.pi)
+    bare = picture()[..., :3]
+    plane(0.02).location.y = -1.0
+    bpy.ops.vellus.add_hair(guide_count=5, strand_count=5, length=0.3, radius=1e-4)
+    found = picture()[..., :3]
+    np.testing.assert_allclose(found.mean(), bare.mean(), rtol=0.01)
+    assert (found < 0.8 * bare).any(axis=-1).sum() <= 4
