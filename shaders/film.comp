@@ -13,7 +13,7 @@ void main()
   for (int y = 0; y < tap_count(); y++) {
     for (int x = 0; x < tap_count(); x++) {
       ivec2 tap = ivec2(x, y);
-      total += filter_weight(tap) * texelFetch(picture, pixel * samples_per_side + tap, 0);
+      total += filter_weight(tap) * texelFetch(picture, sample_place(pixel, tap), 0);
     }
   }
   imageStore(sums, pixel, total);

@@ -22,7 +22,7 @@ void main()
   for (int y = 0; y < tap_count(); y++) {
     for (int x = 0; x < tap_count(); x++) {
       ivec2 tap = ivec2(x, y);
-      ivec2 place = pixel * samples_per_side + tap;
+      ivec2 place = sample_place(pixel, tap);
       float depth = uintBitsToFloat(texelFetch(depths, place, 0).r);
       if (texelFetch(segments, place, 0).r < NO_SEGMENT) {
         found.x += filter_weight(tap);

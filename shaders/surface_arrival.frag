@@ -10,15 +10,12 @@ void main()
   vec3 N = normalize(gl_FrontFacing ? surface_normal : -surface_normal);
   vec3 sent = vec3(0.0);
   vec3 arriving = vec3(0.0);
-  vec2 turn = sample_turn();
+  vec2 turn = sample_turn(picture_place(ivec2(gl_FragCoord.xy)));
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 irradiance = irradiance_of(light, drawn_position);
-    float past_surfaces;
-    vec3 past_hair;
-    surface_visibility(light, drawn_position, N, view.hair_forward.rgb, turn, past_surfaces, past_hair);
     sent += irradiance * abs(dot(N, to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position)));
-    arriving += irradiance * past_hair;
+    arriving += irradiance * surface_visibility(light, drawn_position, N, view.hair_forward.rgb, turn).past_hair;
   }
   color = vec4(min(part_of(arriving, sent), vec3(1.0)), 1.0);
 }

@@ -75,21 +75,42 @@ vec3 reflection_of_place(
   return reflected_by_hair(count) * (facing * sent * weight / squared);
 }
 
-// The same of all hair beside it: of places in four directions and at four distances of their range, which are
-// others in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`.
-vec3 hair_reflection(Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn)
+// Square of a color's mean over its channels.
+float squared_mean(vec3 value)
 {
+  float mean = dot(value, vec3(1.0 / 3.0));
+  return mean * mean;
+}
+
+// Variance of the mean of values with a sum and a sum of `squared_mean`.
+float variance_of_mean(vec3 sum, float squares, int count)
+{
+  float number = float(count);
+  return max(squares - squared_mean(sum) / number, 0.0) / (number * number);
+}
+
+// The same of all hair beside it: of places in four directions and at four distances of their range, which are
+// others in each pass. at, depth: of `shadow_place`; L: towards the light; turn: of `sample_turn`; variance: of the result, in
+// the mean of its channels.
+vec3 hair_reflection(
+    Light light, Across across, vec3 at, float depth, vec3 N, vec3 L, vec2 turn, out float variance)
+{
+  variance = 0.0;
   if (view.hair_reflectance.rgb == vec3(0.0)) {
     return vec3(0.0);  // a model without light between strands
   }
   float part = TURNS * atan(turn.y, turn.x) / PI;
   vec3 light_there = vec3(0.0);
+  float squares = 0.0;
   for (int place = 0; place < PLACES; place++) {
-    light_there += reflection_of_place(light, across, at, depth, N, L, turn, fract(part));
+    vec3 light_of_place = reflection_of_place(light, across, at, depth, N, L, turn, fract(part));
+    light_there += light_of_place;
+    squares += squared_mean(light_of_place);
     turn = vec2(-turn.y, turn.x);
     part += 1.0 / float(PLACES);
   }
   // Where hair shades a surface, its lit side is on the other side.
   float open = exp(-crossed_before_surface(at, depth));
+  variance = variance_of_mean(light_there, squares, PLACES) * open * open;
   return light_there * (open / float(PLACES));
 }

@@ -26,14 +26,16 @@ vec3 part_past_hair(bool is_soft)
   // Of the world's light about as much as of all directions that surfaces leave open.
   float part = corner_seen_z.w / max(corner_seen_z.z, 1e-6);
   vec3 past_surfaces = past_hair / seen_through(part, view.seen_opacity, view.hair_forward.rgb);
-  vec2 turn = sample_turn();
+  vec2 turn = sample_turn(picture_place(ivec2(gl_FragCoord.xy)));
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
     vec3 irradiance = irradiance_of(light, drawn_position);
     float of_surfaces;
     vec3 of_hair;
     if (is_soft) {
-      surface_visibility(light, drawn_position, N, view.hair_forward.rgb, turn, of_surfaces, of_hair);
+      SurfaceVisibility seen = surface_visibility(light, drawn_position, N, view.hair_forward.rgb, turn);
+      of_surfaces = seen.past_surfaces;
+      of_hair = seen.past_hair;
     }
     else {
       hard_visibility(light, N, view.hair_forward.rgb, of_surfaces, of_hair);

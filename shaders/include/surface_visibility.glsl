@@ -34,52 +34,67 @@ float part_noise(ivec2 part)
   return float(bits >> 8u) / 16777216.0;
 }
 
+// The place of a sample in the whole picture.
+ivec2 picture_place(ivec2 place)
+{
+  return place + ivec2(view.first_column, view.first_row);
+}
+
 // A direction for the samples of a place in the picture, another one in each pass: parts of 4 × 4 samples have even noise,
 // moved at random from part to part, as noise that is even everywhere leaves stripes where passes have several samples.
-vec2 sample_turn()
+vec2 sample_turn(ivec2 place)
 {
-  ivec2 place = ivec2(gl_FragCoord.xy + vec2(view.first_column, view.first_row));
   float angle = 2.0 * PI * fract(gradient_noise(vec2(place & 3)) + part_noise(place >> 2) + view.coverage_turn);
   return vec2(cos(angle), sin(angle));
 }
 
-// Irradiance of a surface past surfaces alone, and past hair too, as parts of that of a small ball. N: the surface's
-// normal; forward: what a strand passes on; turn: of `sample_turn`.
-void surface_visibility(
-    Light light, vec3 position, vec3 N, vec3 forward, vec2 turn, out float past_surfaces, out vec3 past_hair)
+// Irradiance of a surface, as parts of that of a small ball.
+struct SurfaceVisibility {
+  float past_surfaces;  // alone
+  vec3 past_hair;  // and surfaces
+  float variance;  // of `past_hair`, by where it is looked for hair, in the mean of its channels
+};
+
+// N: the surface's normal; forward: what a strand passes on; turn: of `sample_turn`.
+SurfaceVisibility surface_visibility(Light light, vec3 position, vec3 N, vec3 forward, vec2 turn)
 {
+  SurfaceVisibility seen;
   vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, position);
   float cosine = dot(N, L);
   float tangent = 2.0 * sqrt(light_blur(light.kind, light.position.xyz, light.radius, position));
   float direct = disk_cosine(cosine, tangent * inversesqrt(1.0 + tangent * tangent));
-  past_surfaces = direct;
-  past_hair = vec3(direct);
+  seen.past_surfaces = direct;
+  seen.past_hair = vec3(direct);
+  seen.variance = 0.0;
   vec3 at;
   float depth;
   if (!shadow_place(light, position, at, depth)) {
-    return;
+    return seen;
   }
   Across across = across_of(light, position);
-  vec3 reflected = hair_reflection(light, across, at, depth, N, L, turn);
-  past_hair += reflected;
+  float variance;
+  vec3 reflected = hair_reflection(light, across, at, depth, N, L, turn, variance);
+  seen.past_hair += reflected;
+  seen.variance = variance;
   if (cosine < LEAST_COSINE) {
-    return;
+    return seen;
   }
   float texel = 1.0 / float(textureSize(hair_front, 0).x);
   vec2 aside = turn;
   float away = FIRST_DISTANCE;
   // The maps of surfaces are blurred already. Beside the place they would be those of another depth.
-  float seen = lit_part(at, depth, SURFACE_BIAS);
-  float between = 0.0;
-  vec3 through = vec3(0.0);
+  float lit = lit_part(at, depth, SURFACE_BIAS);
+  vec3 sum = vec3(0.0);
+  float squares = 0.0;
   for (int tap = 0; tap < TAP_COUNT; tap++) {
     float part = (float(tap) + 0.5) / float(TAP_COUNT);
     aside = vec2(-aside.y, aside.x);
     float meters = away * light.extent;
+    vec3 found = vec3(0.0);
     float reach = meters * across.scale / max(across.w - meters, 0.25 * across.w);
     if (direct > 0.0) {
       vec3 near = at + vec3(aside * (sqrt(part) * max(tangent * reach, texel)), 0.0);
-      between += seen * exp(-crossed_before_surface(near, depth));
+      found += direct * lit * exp(-crossed_before_surface(near, depth));
     }
     // Half of the light of an even sheet of hair arrives from within 45 degrees.
     float spread = sqrt(part / (1.0 - part));
@@ -90,10 +105,14 @@ void surface_visibility(
       float scattered = max(dot(N, L + spread * (aside.x * across.right + aside.y * across.up)), 0.0);
       scattered *= lit_part(at + vec3(0.5 * offset, 0.0), depth - 0.5 * away, SURFACE_BIAS);
       float count = crossed_before_surface(at + vec3(offset, 0.0), depth);
-      through += scattered * (transmitted(count, forward) - exp(-count));
+      found += scattered * (transmitted(count, forward) - exp(-count));
       away = clamp(depth - ends.y, 0.0, LARGEST_DISTANCE);
     }
+    sum += found;
+    squares += squared_mean(found);
   }
-  past_surfaces = direct * seen;
-  past_hair = (vec3(direct * between) + through) / float(TAP_COUNT) + reflected;
+  seen.past_surfaces = direct * lit;
+  seen.past_hair = sum / float(TAP_COUNT) + reflected;
+  seen.variance += variance_of_mean(sum, squares, TAP_COUNT);
+  return seen;
 }

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import gpu
 import numpy as np
 
-from . import scene_programs, shaders, uniforms
+from . import scene_programs, shaders, uniforms, windows
 from .strand_textures import bare_vertices, run_for_each, vertex_count
 
 
@@ -27,9 +27,6 @@ class Steps:
 
 
 _ALL = Steps()
-_CORNERS = np.array(
-    [[bool(corner >> axis & 1) for axis in range(3)] for corner in range(8)]
-)  # of a box: on the far side?
 _LEAST_RADIUS = 1e-6  # [m]
 
 # A render runs beside the window, and both share programs and their uniforms: a lock serialises drawing.
@@ -94,8 +91,7 @@ def bounding_sphere(hair):
     """
     corners = []
     for strands, to_world in hair:
-        box = np.where(_CORNERS, strands.bounds[1], strands.bounds[0])
-        corners.append(box @ to_world[:3, :3].T + to_world[:3, 3])
+        corners.append(windows.corners_of(strands.bounds) @ to_world[:3, :3].T + to_world[:3, 3])
     corners = np.concatenate(corners)
     centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
     return centre, max(float(np.linalg.norm(corners - centre, axis=1).max()), _LEAST_RADIUS)
@@ -128,51 +124,6 @@ def strand_record(strands, view, object_to_world, steps=_ALL):
     record["row_strands"] = strands.row_strands
     record["radius_strands"], record["radius_unit"] = strands.radius_strands, strands.radius_unit
     return record
-
-
-def window_of(strands, record, size):
-    """(left, bottom, width, height) [samples] of the part of a picture that `StrandsOnGPU` may cover.
-
-    record: of `strand_record`; size: (width, height) of the picture [samples].
-    """
-    clip = _corners_in_clip(strands, record)
-    if clip is None:
-        return 0, 0, *size
-    half_width = max(_half_width_at(strands, record, clip[3].min()), 0.0)
-    half_width = max(half_width, float(record["least_half_width"] * record["pixels_per_unit"]))
-    # A strip is up to the root of two wider across its columns than across its axis; samples lie off their centers.
-    margin = 1.5 * half_width + 1.0 + 0.5 * float(record["sample_offset"])
-    places = (0.5 * clip[:2] / clip[3] + 0.5) * np.array(size)[:, None]
-    low = np.clip(np.floor(places.min(axis=1) - margin), 0, size).astype(int)
-    high = np.clip(np.ceil(places.max(axis=1) + margin), 0, size).astype(int)
-    return (*low.tolist(), *(high - low).tolist())
-
-
-def may_be_wide(strands, record, size, half_width):
-    """Whether any of `StrandsOnGPU` may have a half width [samples] in a picture: arguments as for `window_of`."""
-    clip = _corners_in_clip(strands, record)
-    if clip is None:
-        return True
-    # As `width_stretch` of shaders/include/segment.glsl has it, at the picture's corner farthest from its axis.
-    stretch, to_clip = 1.0, record["object_to_clip"].T.astype(np.float64)
-    if record["is_perspective"]:
-        axis = to_clip @ np.append(to_clip[3, :3], 0.0)
-        beside = np.maximum(np.abs(axis[:2] / axis[3]) + 1.0, 2.0) * 0.5 * np.array(size)
-        stretch = (1.0 + (beside @ beside) / float(record["pixels_per_unit"]) ** 2) ** 0.5
-    return stretch * _half_width_at(strands, record, clip[3].min()) >= half_width
-
-
-def _corners_in_clip(strands, record):
-    """(4, 8) corners of the box around strands, in clip space; None where it is in part behind the viewer."""
-    corners = np.where(_CORNERS, strands.bounds[1], strands.bounds[0])
-    clip = record["object_to_clip"][:3].T.astype(np.float64) @ corners.T + record["object_to_clip"][3][:, None]
-    return clip if (clip[2] + clip[3]).min() > 0.0 and clip[3].min() > 0.0 else None
-
-
-def _half_width_at(strands, record, w):
-    """Greatest half width [samples] of strands on the picture's axis, at a w of clip space."""
-    scale = float(record["object_scale"] * record["thickness"] * record["pixels_per_unit"])
-    return scale * strands.greatest_radius / w
 
 
 # Strands in a part: with their stride they are multiplied in a shader, whose integers have 32 bits.

@@ -26,7 +26,7 @@ def _film(file, samplers, constants=()):
     info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
     for slot, (name, kind) in enumerate((("filter_weights", "FLOAT_2D"), *samplers)):
         info.sampler(slot, kind, name)
-    for kind, name in (("INT", "samples_per_side"), ("INT", "margin"), *constants):
+    for kind, name in (*(("INT", name) for name in ("samples_per_side", "margin", "border")), *constants):
         info.push_constant(kind, name)
     info.image(0, FILM_FORMAT, "FLOAT_2D", "sums", qualifiers={"READ", "WRITE"})
     return shaders.compile_compute(info, file)
@@ -36,12 +36,6 @@ def _film(file, samplers, constants=()):
 def strand_arrival_program():
     """The compute program of light visibility from strands: see strand_arrival.comp."""
     return shaders.compile_compute(scene_programs.strand_samples_info(), "strand_arrival.comp")
-
-
-@shaders.kept
-def lit_surface_program(fragment):
-    """The program of how much light reaches surfaces, by a .frag."""
-    return shaders.compile_drawing(scene_programs.lit_surface_info(), "lit_surface.vert", fragment)
 
 
 MOTION_FORMAT = "RGBA32F"  # of how far things move

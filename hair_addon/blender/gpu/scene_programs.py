@@ -160,51 +160,6 @@ def strand_samples_info(structs="", samplers=(), texture_format=PICTURE_FORMAT, 
     return info
 
 
-SURFACE_IMAGES = ("color_image", "roughness_image", "normal_image")  # of a `SurfaceMaterial`
-
-
-@kept
-def surface_program():
-    """The program that draws a lit surface: the block of its material, its images."""
-    info = lit_surface_info(uniforms.SURFACE.source)
-    info.uniform_buf(2, "Surface", "surface")
-    names = (*SURFACE_IMAGES, "surface_albedo")
-    for slot, name in enumerate(names, start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS) + 2):
-        info.sampler(slot, "FLOAT_2D", name)
-    return compile_drawing(info, "lit_surface.vert", "surface.frag")
-
-
-@kept
-def surface_depth_program(fragment="shadow_surface.frag"):
-    """The program that draws a surface into a shadow map, or one that only hides."""
-    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
-    declare_scene(info, shadow_samplers=(), is_lit=False)
-    info.sampler(0, "FLOAT_2D", "places")
-    varying.smooth("VEC3", "drawn_position")
-    info.vertex_out(varying)
-    return compile_drawing(info, "surface_place.vert", fragment)
-
-
-def lit_surface_info(structs=""):
-    """Info of a program of lit_surface.vert: its attributes, and the samplers of the scene and of `SurfaceOnGPU`."""
-    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
-    declare_scene(info, structs)
-    for slot, name in enumerate(("places", "normals"), start=len(SHADOW_SAMPLERS) + len(VISIBILITY_SAMPLERS)):
-        info.sampler(slot, "FLOAT_2D", name)
-    for slot, (kind, name) in enumerate((("INT", "corner_vertex"), ("INT", "corner_normal"), ("VEC2", "uv"))):
-        info.vertex_in(slot, kind, name)
-    for kind, name in (
-        ("VEC3", "drawn_position"),
-        ("VEC3", "surface_normal"),
-        ("VEC4", "corner_seen_x_y"),
-        ("VEC4", "corner_seen_z"),
-        ("VEC2", "surface_uv"),
-    ):
-        varying.smooth(kind, name)
-    info.vertex_out(varying)
-    return info
-
-
 @kept
 def environment_program(fragment):
     """The program that draws a picture of the surroundings."""

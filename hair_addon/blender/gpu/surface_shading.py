@@ -6,26 +6,52 @@ import numpy as np
 
 from ...core.shading.tables import surface_albedo
 from ..host.caches import Cache
-from . import drawing, scene_programs, uniforms
+from . import drawing, surface_programs, uniforms, windows
 
 texture_cache = Cache()  # of the textures that all surfaces are drawn with
 
 
-def draw(surface, parts, view, lights, scene_samplers):
-    """Draw a `SurfaceOnGPU` into the bound framebuffer.
+def shade(surface, parts, first_triangle, view, lights, samplers, buffer, picture, has_over):
+    """Shade a `SurfaceOnGPU` in those samples of a picture that show it.
 
-    parts: (first corner, number of corners, `SurfaceMaterial`), ...; view, lights: records of `uniforms`;
-    scene_samplers: {sampler: texture} of shadows and of the world's visibility.
+    parts: (first corner, number of corners, `SurfaceMaterial`), ...; first_triangle: of it in the numbers of a
+    `VisibilityBuffer`; view, lights: records of `uniforms`; samplers: {sampler: texture} of shadows and of the world's
+    visibility; picture: the texture to fill; has_over: whether it holds what is drawn over surfaces.
     """
-    blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
-    program = scene_programs.surface_program()
+    placed, program = surface.placed(view), surface_programs.shading_program()
+    blocks = {"view": uniforms.uniform_buffer(placed), "lights": uniforms.uniform_buffer(lights)}
+    to_clip = (placed["object_to_world"].astype(np.float64) @ placed["world_to_clip"]).T
+    samplers = surface.samplers | samplers | {"segments": buffer.segments, "depths": buffer.nearest_depths()}
+    constants = {"has_blocks": int(buffer.has_blocks), "has_over": int(has_over)}
     for first, count, material in parts:
-        images = {name: _texture(getattr(material, name)) for name in scene_programs.SURFACE_IMAGES}
-        blocks["surface"] = uniforms.uniform_buffer(_record(material, images))
-        samplers = {"surface_albedo": _albedo_texture()}
-        samplers |= {name: _white() if texture is None else texture for name, texture in images.items()}
-        with drawing.bound(program, blocks, surface.samplers | scene_samplers | samplers):
-            surface.corners.lit.draw_range(program, elem_start=first, elem_count=count)
+        left, bottom, *size = windows.of_box(surface.bounds_of(first, count), to_clip, buffer.size)
+        if not all(size):
+            continue
+        constants |= {"first_triangle": first_triangle + first // 3, "triangle_count": count // 3}
+        constants |= {"window_left": left, "window_bottom": bottom}
+        with drawing.bound(program, blocks, samplers | _of_material(blocks, material)):
+            program.image("picture", picture)
+            for name, value in constants.items():
+                program.uniform_int(name, value)
+            # The first thread may begin before the window.
+            drawing.dispatch_over(program, [length // surface_programs.SIDE + 2 for length in size])
+
+
+def draw_clear(surface, parts, view, lights, samplers):
+    """Draw a clear `SurfaceOnGPU` into the bound framebuffer; samplers: of shadows and of the world's visibility."""
+    blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
+    program = surface_programs.clear_program()
+    for first, count, material in parts:
+        with drawing.bound(program, blocks, surface.samplers | samplers | _of_material(blocks, material)):
+            surface.corners.bare.draw_range(program, elem_start=first, elem_count=count)
+
+
+def _of_material(blocks, material):
+    """{sampler: texture} of a material, whose block is put among others."""
+    images = {name: _texture(getattr(material, name)) for name in surface_programs.SURFACE_IMAGES}
+    blocks["surface"] = uniforms.uniform_buffer(_record(material, images))
+    images = {name: _white() if texture is None else texture for name, texture in images.items()}
+    return {"surface_albedo": _albedo_texture(), **images}
 
 
 def _texture(image_map):
@@ -61,9 +87,9 @@ def _albedo_texture():
 def _record(material, images):
     record = uniforms.SURFACE.record()
     record["color"][:3] = material.color
-    for name in ("roughness", "metallic", "reflectance", "normal_strength", "is_clear"):
+    for name in ("roughness", "metallic", "reflectance", "normal_strength"):
         record[name] = getattr(material, name)
-    for index, name in enumerate(scene_programs.SURFACE_IMAGES):
+    for index, name in enumerate(surface_programs.SURFACE_IMAGES):
         record[f"has_{name}"] = images[name] is not None
         if images[name] is not None:
             record["image_rows"][2 * index : 2 * index + 2, :3] = getattr(material, name).rows

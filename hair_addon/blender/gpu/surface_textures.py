@@ -14,8 +14,8 @@ import numpy as np
 from ...core import geometry
 from ...core.kernels.checks import require_count, require_indices
 from ..host.caches import Cache
-from . import drawing, scene_programs, uniforms
-from .strand_textures import TEXTURE_WIDTH
+from . import drawing, surface_programs, uniforms
+from .strand_textures import TEXTURE_WIDTH, bare_vertices
 
 _ROW_VERTICES = TEXTURE_WIDTH // 3  # at most; each is three texels
 
@@ -47,21 +47,23 @@ class _Corners:
         return gpu.types.GPUBatch(type="TRIS", buf=vertices, elem=indices)
 
     @cached_property
-    def lit(self):
-        """The batch of triangles with attributes corner_vertex, corner_normal and uv, for who needs normals."""
+    def bare(self):
+        """The batch of corners without attributes: a shader reads `texture` by the index of a corner."""
+        return bare_vertices(len(self.vertices), "TRIS")
+
+    @cached_property
+    def texture(self):
+        """Each corner's vertex, in two numbers of sixteen bits, and its uv: see shaders/include/surface_corner.glsl."""
         count = len(self.vertices)
-        normals = self.vertices if self.has_vertex_normals else np.arange(count)
-        uvs = np.zeros((count, 2)) if self.uvs is None else self.uvs
-        layout = gpu.types.GPUVertFormat()
-        for name in ("corner_vertex", "corner_normal"):
-            layout.attr_add(id=name, comp_type="I32", len=1, fetch_mode="INT")
-        layout.attr_add(id="uv", comp_type="F32", len=2, fetch_mode="FLOAT")
-        buffer = gpu.types.GPUVertBuf(layout, count)
-        # Other types than these would be accepted silently and drawn incorrectly.
-        buffer.attr_fill("corner_vertex", np.ascontiguousarray(self.vertices, np.int32))
-        buffer.attr_fill("corner_normal", np.ascontiguousarray(normals, np.int32))
-        buffer.attr_fill("uv", np.ascontiguousarray(uvs, np.float32))
-        return gpu.types.GPUBatch(type="TRIS", buf=buffer)
+        width = min(count, TEXTURE_WIDTH)
+        texels = np.zeros((-(-count // width) * width, 4), np.float32)
+        texels[:count, 0], texels[:count, 1] = self.vertices & 0xFFFF, self.vertices >> 16
+        if self.uvs is not None:
+            texels[:count, 2:] = self.uvs
+        data = gpu.types.Buffer("FLOAT", texels.size, texels.ravel())
+        texture = gpu.types.GPUTexture((width, len(texels) // width), format="RGBA32F", data=data)
+        texture.filter_mode(False)
+        return texture
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,13 +99,29 @@ class SurfaceOnGPU:
     @property
     def samplers(self) -> dict:
         """{sampler: texture} of a program that draws it lit."""
-        return {"places": self.places, "normals": self.normals}
+        return {"places": self.places, "normals": self.normals, "corners": self.corners.texture}
+
+    @property
+    def triangle_count(self) -> int:
+        return len(self.corners.vertices) // 3
+
+    def bounds_of(self, first: int, count: int) -> np.ndarray:
+        """(2, 3) least and greatest coordinates of some of the corners."""
+        if (first, count) not in self._bounds:
+            places = self.vertices[self.corners.vertices[first : first + count]]
+            self._bounds[first, count] = np.stack([places.min(axis=0), places.max(axis=0)])
+        return self._bounds[first, count]
+
+    @cached_property
+    def _bounds(self):
+        return {}
 
     def placed(self, view: np.ndarray) -> np.ndarray:
         """A copy of a `uniforms.VIEW` record that places it."""
         record = view.copy()
         record["object_to_world"] = self.to_world.T
         record["row_strands"] = self.row_vertices
+        record["has_vertex_normals"] = self.corners.has_vertex_normals
         return record
 
 
@@ -161,7 +179,7 @@ _COLORED = "shadow_surface.frag"  # the only one that a material's color matters
 
 def draw_depth(surface, view, lights, fragment=_COLORED):
     """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surface_hides.frag."""
-    program = scene_programs.surface_depth_program(fragment)
+    program = surface_programs.depth_program(fragment)
     placed, light_block = surface.placed(view), uniforms.uniform_buffer(lights)
     first, has_color = 0, fragment == _COLORED
     for color, parts in groupby(surface.corners.colors, key=lambda part: part[1] if has_color else 0.0):
@@ -174,7 +192,16 @@ def draw_depth(surface, view, lights, fragment=_COLORED):
 
 
 def draw_lit(surface, program, view, lights, samplers):
-    """Draw all corners of a `SurfaceOnGPU` with a program of `scene_programs.lit_surface_info`."""
+    """Draw a `SurfaceOnGPU` with a program of `surface_programs.arrival_program`."""
     blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
     with drawing.bound(program, blocks, surface.samplers | samplers):
-        surface.corners.lit.draw(program)
+        surface.corners.bare.draw(program)
+
+
+def draw_numbers(surface, view, lights, first_triangle):
+    """Draw numbers of a `SurfaceOnGPU`'s triangles into a visibility buffer, those before it being `first_triangle`."""
+    program = surface_programs.number_program()
+    blocks = {"view": uniforms.uniform_buffer(surface.placed(view)), "lights": uniforms.uniform_buffer(lights)}
+    with drawing.bound(program, blocks, surface.samplers):
+        program.uniform_int("first_triangle", first_triangle)
+        surface.corners.bare.draw(program)

@@ -82,6 +82,7 @@ VIEW = Block(
         "seen_points": "int",  # of each strand's points, those of the visibility textures
         "seen_opacity": "float",  # of a strand, for which they hold
         "row_strands": "int",
+        "has_vertex_normals": "int",  # of a surface, whether its normals are of vertices, not of corners
         "radius_strands": "int",  # whose radii are stored: one for all, or each
         "radius_unit": "float",  # that they are stored in
         "object_scale": "float",
@@ -134,7 +135,6 @@ SURFACE = Block(
         "metallic": "float",
         "reflectance": "float",  # at normal incidence, of all but metal
         "normal_strength": "float",
-        "is_clear": "int",
         "has_color_image": "int",
         "has_roughness_image": "int",
         "has_normal_image": "int",

@@ -12,7 +12,7 @@ import gpu
 import numpy as np
 
 from ...core.errors import HairError
-from . import drawing, light_grid, scene_programs, uniforms, visibility_programs
+from . import drawing, light_grid, scene_programs, uniforms, visibility_programs, windows
 from .hair_shading import MixedShading, Shading
 from .strand_textures import StrandsOnGPU, seen_points
 
@@ -32,7 +32,7 @@ class _Placed:
     samplers: dict
     first: int
     lights: gpu.types.GPUUniformBuf
-    window: tuple  # `drawing.window_of` it
+    window: tuple  # of `windows`
     is_round: bool  # whether any strand is so wide that its bends and ends are seen
 
     @property
@@ -50,12 +50,14 @@ _NOTHING = (0.0, 0.0, 0.0, 0.0)
 class VisibilityBuffer:
     """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
 
-    color: linear light, premultiplied; segments: of strands, what is nearest; surface_depth: of surfaces, from 0 to 1;
-    depths: of hair where there is any, the bits of floats from 0 to 1; elsewhere of surfaces, or 1.
+    color: linear light, premultiplied; segments: of strands, what is nearest, and beyond `NO_SEGMENT` of the triangles
+    of surfaces that were drawn into `numbered`; surface_depth: of surfaces, from 0 to 1; depths: of hair where there is
+    any, the bits of floats from 0 to 1; elsewhere of surfaces, or 1.
     """
 
-    def __init__(self, width, height):
-        self.size = (width, height)
+    def __init__(self, width, height, has_blocks=False):
+        """has_blocks: whether surfaces may be shaded once for two by two samples."""
+        self.size, self.has_blocks = (width, height), has_blocks
         self.color = gpu.types.GPUTexture(self.size, format=scene_programs.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")
@@ -69,44 +71,47 @@ class VisibilityBuffer:
         self._parts = {}
         self._surfaces = gpu.types.GPUFrameBuffer(color_slots=self.color, depth_slot=self.surface_depth)
         self._hiding = gpu.types.GPUFrameBuffer(depth_slot=self.surface_depth)
-        self._is_color_stale = False  # whether `color` is to be cleared
+        self._numbered = gpu.types.GPUFrameBuffer(color_slots=self.segments, depth_slot=self.surface_depth)
+        self._is_color_stale = self._is_numbered = False  # whether `color` is to be cleared, `segments` to be kept
         self._strips = gpu.types.GPUFrameBuffer(color_slots=(self.segments, self.depths), depth_slot=self.surface_depth)
 
     def surfaces(self, background=_NOTHING):
         """The framebuffer that surfaces are drawn into, bound and cleared: a context manager."""
-        self._is_color_stale = False
+        self._is_color_stale = self._is_numbered = False
         return drawing.cleared(self._surfaces, background)
 
     def hiding(self):
         """The same of depths alone, where surfaces only hide hair: `color` is transparent behind it."""
-        self._is_color_stale = True
+        self._is_color_stale, self._is_numbered = True, False
         return drawing.cleared(self._hiding, _NOTHING)
 
     @contextmanager
-    def behind_hair(self, background=_NOTHING, is_part=False):
-        """The framebuffer that surfaces are shaded in after `find_hair`, bound; is_part: in place of `color`, `part`.
-
-        It is filled with the background's color. Its depths are those of `surface_depth`, but zero where hair is
-        nearest: nothing is shaded there, nor behind another surface.
-        """
-        self.nearest_depths()  # `surface_depth` is about to change
-        framebuffer = self._part(scene_programs.PICTURE_FORMAT, background)[2] if is_part else self._surfaces
-        with framebuffer.bind():
-            framebuffer.clear(color=background)
-            self._put_hair_first()
+    def numbered(self):
+        """The framebuffer that numbers of triangles are drawn into, where surfaces are shaded after `find_hair`."""
+        self._is_color_stale, self._is_numbered = False, True  # `behind_hair` clears `color`
+        self.segments.clear(format="UINT", value=(NO_SEGMENT,))
+        with self._numbered.bind():
+            self._numbered.clear(depth=1.0)
             yield
 
-    def _put_hair_first(self):
-        """Set the depth to zero where hair is nearest."""
+    def behind_hair(self, picture):
+        """The framebuffer of a picture, `color` or `part`, and of `surface_depth`, bound: a context manager."""
+        is_part = picture is not self.color
+        return (self._part(scene_programs.PICTURE_FORMAT, _NOTHING)[2] if is_part else self._surfaces).bind()
+
+    def put_hair_first(self):
+        """Set `surface_depth` to zero where hair is nearest: nothing is drawn there. And empty samples of surfaces."""
+        self.nearest_depths()  # which are read from it
+        with drawing.gpu_state("NONE", depth_writes=False):
+            drawing.draw_cover(visibility_programs.surface_blank_program(), {}, {"segments": self.segments})
         program = visibility_programs.hair_first_program()
         with (
             drawing.gpu_state("ALWAYS", depth_writes=True),
             drawing.bound(program, {}, {"segments": self.segments}),
         ):
             for window in (placed.window for placed in self._hair if all(placed.window[2:])):
-                gpu.state.viewport_set(*window)
-                drawing.cover(program)
-        gpu.state.viewport_set(0, 0, *self.size)
+                with windows.drawn_in(window):
+                    drawing.cover(program)
 
     def add_hair(self, hair, lights, view, in_compute=None):
         """Find the hair in front of the surfaces and shade it: arguments as for `find_hair`."""
@@ -137,7 +142,8 @@ class VisibilityBuffer:
         self._draw_strips()
 
     def _clear(self):
-        self.segments.clear(format="UINT", value=(NO_SEGMENT,))
+        if not self._is_numbered:
+            self.segments.clear(format="UINT", value=(NO_SEGMENT,))
         if self._is_color_stale:
             self.color.clear(format="FLOAT", value=_NOTHING)
             self._is_color_stale = False
@@ -153,8 +159,8 @@ class VisibilityBuffer:
             record["seen_opacity"] = shading.opacity
             record["hair_forward"][:3], record["hair_reflectance"][:3] = shading.forward, shading.reflectance
             light_block = light_blocks[index if lights.shape else 0]
-            window = drawing.window_of(strands, record, self.size)
-            is_round = drawing.may_be_wide(strands, record, self.size, visibility_programs.LEAST_BEND)
+            window = windows.of_strands(strands, record, self.size)
+            is_round = windows.may_be_wide(strands, record, self.size, visibility_programs.LEAST_BEND)
             found.append(_Placed(strands, shading, record, samplers, first, light_block, window, is_round))
             first += found[-1].segment_count
         return found
@@ -190,7 +196,7 @@ class VisibilityBuffer:
 
     def part(self, texture_format=scene_programs.PICTURE_FORMAT, background=_NOTHING):
         """The texture of `surfaces_of_part`."""
-        return self._parts[texture_format, background][1]
+        return self._part(texture_format, background)[1]
 
     def part_by(self, program, texture_format=scene_programs.PICTURE_FORMAT, inputs=None):
         """The texture of `surfaces_of_part`, filled by a program where the hair that was added last is nearest.
@@ -279,7 +285,7 @@ class VisibilityBuffer:
         with drawing.bound(program, {}, {"surface_depth": self.surface_depth}):
             for name, image in (("depths", self.depths), ("segments", self.segments), ("picture", self.color)):
                 program.image(name, image)
-            program.uniform_int("is_start", int(is_start))
+            program.uniform_int("is_start", int(is_start and not self._is_numbered))
             program.uniform_int("is_blank", int(is_start and self._is_color_stale))
             drawing.dispatch_over(program, self.size)
 

@@ -30,6 +30,14 @@ def hair_first_program():
 
 
 @shaders.kept
+def surface_blank_program():
+    """The program that empties samples of surfaces: see surface_blank.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.sampler(0, "UINT_2D", "segments")
+    return shaders.compile_drawing(info, "cover.vert", "surface_blank.frag")
+
+
+@shaders.kept
 def surface_depths_program():
     """The compute program that converts depth to integers, and clears all else: see surface_depths.comp."""
     info = gpu.types.GPUShaderCreateInfo()

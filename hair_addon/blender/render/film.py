@@ -5,11 +5,13 @@ import gpu
 import numpy as np
 
 from ...core.imaging import pixel_sampling
-from ..gpu import drawing, render_programs
+from ..gpu import drawing, render_programs, surface_programs
 from ..gpu.visibility_buffer import VisibilityBuffer
 from . import motion_vectors, scene_drawing
 
 _MOST_SAMPLES = 4096  # along a tile's side: its textures take 340 MB, 870 with all passes
+
+BORDER = surface_programs.SIDE - 1  # of tiles [samples]: all that share light with one that is seen are in its tile
 
 FAR = 1e10  # distance of the background, as in Cycles
 
@@ -40,15 +42,17 @@ def channels_of(name):
 class Film:
     """Passes over a tile of `size` (width, height) [pixels], each with per_side² samples of every pixel.
 
-    passes: names of those that are wanted, "Combined", "Depth", "Hair Mask", "Hair Shadow", "Shadow", "Vector" or of
-    `LOBES`; is_transparent: whether the background is left empty; filter_width: of `picture.filter_weights` [pixels].
-    motion: `motion.Motion` of a film with the pass "Vector".
+    border: how many samples more there are around it; passes: names of those that are wanted, "Combined", "Depth",
+    "Hair Mask", "Hair Shadow", "Shadow", "Vector" or of `LOBES`; is_transparent: whether the background is left empty;
+    filter_width: of `picture.filter_weights` [pixels]. motion: `motion.Motion` of a film with the pass "Vector".
     """
 
-    def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0):
+    def __init__(self, size, per_side, passes, is_transparent, filter_width=0.0, border=BORDER):
         self.size, self._per_side, self.is_transparent = size, per_side, is_transparent
         self._filter_width, self._margin = filter_width, pixel_sampling.filter_margin(per_side, filter_width)
-        self.samples = VisibilityBuffer(*(length * per_side + 2 * self._margin for length in size))
+        self._border = border
+        sides = (length * per_side + 2 * (self._margin + border) for length in size)
+        self.samples = VisibilityBuffer(*sides, has_blocks=per_side > 1)
         self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
         self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
         self._passes, self.motion = passes, None
@@ -75,7 +79,7 @@ class Film:
         if lens is not None:
             world_to_view = lens.world_to_view(world_to_view, turn)
         whole = tuple(length * self._per_side for length in size)
-        corner = (length * self._per_side - self._margin for length in place)
+        corner = (length * self._per_side - self._margin - self._border for length in place)
         view = drawing.pass_record(world_to_view, view_to_clip, whole, turn, (*corner, *self.samples.size))
         scene_drawing.draw(drawn, view, self.samples, self.is_transparent)
         weights = [
@@ -117,6 +121,7 @@ class Film:
         with drawing.bound(program, {}, samplers):
             program.uniform_int("samples_per_side", self._per_side)
             program.uniform_int("margin", self._margin)
+            program.uniform_int("border", self._border)
             program.image("sums", sums)
             drawing.dispatch_over(program, self.size)
 
@@ -161,4 +166,4 @@ def _weights_texture(weights):
 def largest_tile(per_side, filter_width):
     """Longest side [pixels] of a tile that the graphics driver supports, by the samples along a pixel's side."""
     most = min(gpu.capabilities.max_texture_size_get(), _MOST_SAMPLES)
-    return max((most - 2 * pixel_sampling.filter_margin(per_side, filter_width)) // per_side, 1)
+    return max((most - 2 * (pixel_sampling.filter_margin(per_side, filter_width) + BORDER)) // per_side, 1)

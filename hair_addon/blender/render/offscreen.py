@@ -44,7 +44,7 @@ def drawing_picture(settings, drawn=None, lens_passes=None):
         pass_count = sample_count // per_side**2
     width, height = size = settings.width, settings.height
     largest = gpu.capabilities.max_texture_size_get()
-    if max(size) * per_side > largest:
+    if max(size) * per_side + 2 * film.BORDER > largest:
         sentence = f"{width * per_side} × {height * per_side} samples exceed the graphics driver's {largest} a side"
         raise HairError(f"{sentence}: use fewer.")
     yield Stage("Drawing shadows", 0.0)

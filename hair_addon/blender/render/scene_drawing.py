@@ -6,6 +6,7 @@ from ..gpu import (
     drawing,
     level_of_detail,
     render_programs,
+    surface_programs,
     surface_shading,
     surface_textures,
     world_texture,
@@ -22,14 +23,22 @@ def draw_hiding(drawn, view):
 def draw(drawn, view, buffer, is_transparent):
     """Fill a `VisibilityBuffer` as a render shows a scene: with the background unless it is to be left empty.
 
-    What is nearest is found before anything is shaded, so that surfaces are shaded just where they are seen.
+    What is nearest is found before anything is shaded, so that each sample is shaded once.
     """
-    with buffer.hiding():
-        draw_hiding(drawn, view)
+    with buffer.numbered():
+        _number_surfaces(drawn, view)
     buffer.find_hair(_hair_in_view(drawn, view, is_viewport=False), _hair_lights(drawn), view)
-    with buffer.behind_hair(_background(drawn, is_transparent)):
-        _shade_behind_hair(drawn, view, buffer, is_transparent)
+    _shade_behind_hair(drawn, view, buffer, buffer.color, is_transparent)
     buffer.shade_hair()
+
+
+def _number_surfaces(drawn, view):
+    """Draw numbers of the triangles of all surfaces, one after the other, into the bound framebuffer."""
+    first_triangle = 0
+    with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
+        for surface, _parts in drawn.surfaces:
+            surface_textures.draw_numbers(surface, view, drawn.lights, first_triangle)
+            first_triangle += surface.triangle_count
 
 
 def draw_hair(drawn, view, buffer, is_viewport=False):
@@ -53,10 +62,9 @@ def relight_viewport(drawn, view, buffer, is_shadowed=False):
 
 def relight(drawn, view, buffer, is_transparent):
     """The same as a render shows it: with surfaces, and with the background unless it is to be left empty."""
-    background = _background(drawn, is_transparent)
-    with buffer.behind_hair(background, is_part=True):
-        _shade_behind_hair(drawn, view, buffer, is_transparent)
-    return _relight_hair(drawn, view, buffer, buffer.part(background=background))
+    picture = buffer.part()
+    _shade_behind_hair(drawn, view, buffer, picture, is_transparent)
+    return _relight_hair(drawn, view, buffer, picture)
 
 
 def _relight_hair(drawn, view, buffer, picture, is_viewport=False):
@@ -86,14 +94,20 @@ def _hair_in_view(drawn, view, is_viewport):
     return hair
 
 
-def _background(drawn, is_transparent):
-    return (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
-
-
-def _shade_behind_hair(drawn, view, buffer, is_transparent):
-    if drawn.world.image is not None and not is_transparent:
-        world_texture.draw_background(drawn.world, view, *buffer.size)
-    shade_surfaces(drawn, view)
+def _shade_behind_hair(drawn, view, buffer, picture, is_transparent):
+    """Fill a picture of a `VisibilityBuffer` with all but hair, each surface where it is nearest."""
+    picture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0))
+    has_image = drawn.world.image is not None and not is_transparent
+    has_over = bool(drawn.clear) or any(parts is None for _surface, parts in drawn.surfaces)
+    _see_through_hair(drawn, view)
+    if has_image or has_over:
+        with buffer.behind_hair(picture):
+            if has_image:
+                world_texture.draw_background(drawn.world, view, *buffer.size)
+            if has_over:
+                buffer.put_hair_first()
+                _draw_over_surfaces(drawn, _nearer(view))
+    _shade_surfaces(drawn, view, buffer, picture)
 
 
 def draw_arrival(drawn, view, buffer):
@@ -120,7 +134,7 @@ def draw_viewport_shadow(drawn, view):
 def _draw_by_lights(drawn, view, fragment, are_holdouts_left_out=False):
     """Draw how much of the light reaches surfaces; are_holdouts_left_out: leave the picture empty where they are."""
     _see_through_hair(drawn, view)
-    program = render_programs.lit_surface_program(fragment)
+    program = surface_programs.arrival_program(fragment)
     for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
         if parts is None and are_holdouts_left_out:
             surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
@@ -133,7 +147,11 @@ def _light_of(drawn, solid):
     count = len(drawn.surfaces)
     of_all = [drawn.lights] * len(drawn.surface_visibility) if drawn.surface_lights is None else drawn.surface_lights
     chosen = slice(count) if solid else slice(count, None)
-    return of_all[chosen], [drawn.shadow_maps.samplers | seen for seen in drawn.surface_visibility[chosen]]
+    seen_samplers = [
+        drawn.shadow_maps.samplers | {name: seen[name] for name in surface_programs.SEEN_SAMPLERS}
+        for seen in drawn.surface_visibility[chosen]
+    ]
+    return of_all[chosen], seen_samplers
 
 
 def _see_through_hair(drawn, view):
@@ -144,8 +162,18 @@ def _see_through_hair(drawn, view):
         view["hair_reflectance"][:3] = shading.reflectance
 
 
-# By how much of the depth range surfaces are shaded nearer than `draw_hiding` draws them: more than rounding, so that
-# none hides itself.
+def _shade_surfaces(drawn, view, buffer, picture):
+    """Shade all surfaces but holdouts where they are nearest, below those that are clear."""
+    first_triangle = 0
+    for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
+        if parts is not None:
+            given = view, lights, samplers, buffer, picture, bool(drawn.clear)
+            surface_shading.shade(surface, parts, first_triangle, *given)
+        first_triangle += surface.triangle_count
+
+
+# By how much of the depth range surfaces are drawn nearer when they are drawn again: more than rounding, so that none
+# hides itself.
 _NEARER = 1e-5
 
 
@@ -156,16 +184,12 @@ def _nearer(view):
     return record
 
 
-def shade_surfaces(drawn, view):
-    """Draw all surfaces with depth test into the bound framebuffer, and over them those that are clear."""
-    view = _nearer(view)
-    _see_through_hair(drawn, view)
+def _draw_over_surfaces(drawn, view):
+    """Draw holdouts into the bound framebuffer, and then over all surfaces those that are clear."""
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-        for (surface, parts), lights, samplers in zip(drawn.surfaces, *_light_of(drawn, solid=True), strict=True):
+        for (surface, parts), lights in zip(drawn.surfaces, _light_of(drawn, solid=True)[0], strict=True):
             if parts is None:
                 surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
-                continue
-            surface_shading.draw(surface, parts, view, lights, samplers)
     with drawing.gpu_state("LESS_EQUAL", depth_writes=False, blend="ALPHA_PREMULT"):
         for (surface, parts), lights, samplers in zip(drawn.clear, *_light_of(drawn, solid=False), strict=True):
-            surface_shading.draw(surface, parts, view, lights, samplers)
+            surface_shading.draw_clear(surface, parts, view, lights, samplers)

@@ -54,7 +54,7 @@ def surfaces():
 
 def test_a_pose_uploads_places_and_normals_of_vertices_and_a_turn_nothing(ball, floats):
     (first,) = surfaces()
-    batches = first.corners.triangles, first.corners.lit
+    batches = first.corners.triangles, first.corners.texture
     floats.clear()
     for angle in (0.3, 0.6):
         ball.rotation_euler.z = angle
@@ -66,7 +66,7 @@ def test_a_pose_uploads_places_and_normals_of_vertices_and_a_turn_nothing(ball, 
     ball.data.update()
     (posed,) = surfaces()
     assert len(floats) == 2 and max(floats) < 3 * (posed.vertex_count + posed.row_vertices)
-    assert (posed.corners.triangles, posed.corners.lit) == batches
+    assert (posed.corners.triangles, posed.corners.texture) == batches
     floats.clear()
     (again,) = surfaces()
     assert not floats and again.fingerprint == posed.fingerprint

@@ -13,6 +13,7 @@ from hair_addon.blender.gpu import (
     surface_textures,
     uniforms,
     visibility_buffer,
+    windows,
 )
 from hair_addon.core.shading.fibre import kajiya_kay
 
@@ -217,7 +218,7 @@ def test_all_that_hair_covers_lies_in_its_window(shading, rng, view_to_clip):
             strand_textures.upload_strands(points, radii),
             drawing.pass_record(np.eye(4), view_to_clip, SIZE),
         )
-        left, bottom, width, height = drawing.window_of(on_gpu, drawing.strand_record(on_gpu, view, to_world), SIZE)
+        left, bottom, width, height = windows.of_strands(on_gpu, drawing.strand_record(on_gpu, view, to_world), SIZE)
         assert ((is_there >= (left, bottom)) & (is_there < (left + width, bottom + height))).all()
         assert width * height < 0.5 * SIZE[0] * SIZE[1]
 
@@ -237,15 +238,15 @@ def test_leaving_out_what_tiles_hide_changes_no_sample(shading, rng, monkeypatch
 @pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL])
 def test_bends_and_ends_are_left_out_only_where_strands_are_too_thin_for_them(shading, rng, monkeypatch, view_to_clip):
     """Tufts of all widths, by the program that leaves them out and by that which draws them."""
-    may_be_wide, chosen = drawing.may_be_wide, []
+    may_be_wide, chosen = windows.may_be_wide, []
     for x, thickness in ((0.0, 2e-3), (0.1, 6e-3), (0.0, 0.012), (0.1, 0.018), (0.0, 0.025), (0.1, 0.06)):
         points, radii = tuft(rng, strand_count=12, thickness=thickness)
         to_world = np.diag([0.15, 0.1, 0.1, 1.0])
         to_world[:3, 3] = x, 0.0, -0.6
         placed, found = [(points, radii, to_world)], []
-        monkeypatch.setattr(drawing, "may_be_wide", lambda *given: chosen.append(may_be_wide(*given)) or chosen[-1])
+        monkeypatch.setattr(windows, "may_be_wide", lambda *given: chosen.append(may_be_wide(*given)) or chosen[-1])
         found.append(drawn(placed, view_to_clip, shading, in_compute=True))
-        monkeypatch.setattr(drawing, "may_be_wide", lambda *_given: True)
+        monkeypatch.setattr(windows, "may_be_wide", lambda *_given: True)
         found.append(drawn(placed, view_to_clip, shading, in_compute=True))
         for chosen_program, whole_program in zip(*found, strict=True):
             np.testing.assert_array_equal(chosen_program, whole_program)

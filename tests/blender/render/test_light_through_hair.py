@@ -66,8 +66,9 @@ def light_along_x(pass_count=4):
     camera = scene_data.read_camera(bpy.context.scene, depsgraph, *SIZE)
     buffer, light = VisibilityBuffer(*SIZE), 0.0
     for turn in range(pass_count):
-        with buffer.surfaces():
-            scene_drawing.shade_surfaces(drawn, drawing.pass_record(*camera, SIZE, turn))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(scene_drawing, "_hair_in_view", lambda *_given, **_options: [])
+            scene_drawing.draw(drawn, drawing.pass_record(*camera, SIZE, turn), buffer, is_transparent=True)
         light = light + np.array(buffer.color.read(), np.float32).reshape(*SIZE[::-1], 4)[..., :3].mean(axis=0)
     return light / pass_count
 

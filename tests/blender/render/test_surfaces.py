@@ -256,8 +256,8 @@ def test_surfaces_that_hair_hides_in_part_are_shaded_where_they_are_seen(stage, 
     found, whole = (visibility_buffer.VisibilityBuffer(4 * SIZE, 4 * SIZE) for _ in range(2))
     monkeypatch.setattr(visibility_buffer.VisibilityBuffer, "shade_hair", lambda _buffer: None)
     scene_drawing.draw(drawn, view, found, is_transparent=True)
-    with whole.surfaces():
-        scene_drawing.shade_surfaces(drawn, view)
+    monkeypatch.setattr(scene_drawing, "_hair_in_view", lambda *_given, **_options: [])
+    scene_drawing.draw(drawn, view, whole, is_transparent=True)
     is_hair = np.array(found.segments.read()).reshape(4 * SIZE, 4 * SIZE) < visibility_buffer.NO_SEGMENT
     colors = [np.array(buffer.color.read(), np.float32).reshape(4 * SIZE, 4 * SIZE, 4) for buffer in (found, whole)]
     assert 0.05 < is_hair.mean() < 0.9
@@ -275,3 +275,67 @@ def test_a_surface_far_behind_hair_is_not_in_its_own_shadow(stage):
     found = picture()[..., :3]
     np.testing.assert_allclose(found.mean(), bare.mean(), rtol=0.01)
     assert (found < 0.8 * bare).any(axis=-1).sum() <= 4
+
+
+def test_a_surface_that_goes_on_behind_the_viewer_is_seen_where_it_is(stage):
+    """A floor of two triangles to both sides of a perspective camera: each sample has the color of its place."""
+    camera = stage.camera
+    camera.data.type, camera.data.angle = "PERSP", math.radians(60.0)
+    camera.location, camera.rotation_euler = (0.0, 0.0, 1.0), (math.radians(60.0), 0.0, 0.0)
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    width = 512
+    ramp = np.repeat(((np.arange(width) + 0.5) / width)[None], 2, axis=0)
+    along = image_of(np.stack([ramp, 0.0 * ramp, 1.0 + 0.0 * ramp], axis=-1), is_data=True)
+    principled = material_of(bpy.context.object, Specular_IOR_Level=0.0)
+    link_image(principled, along)
+    sun(0.0, 0.0, 0.0)
+    found = picture()
+    across, up = np.meshgrid(*[np.tan(math.radians(30.0)) * (2.0 * (np.arange(SIZE) + 0.5) / SIZE - 1.0)] * 2)
+    down = math.cos(math.radians(60.0)) - math.sin(math.radians(60.0)) * up  # of the ray through a pixel, at depth one
+    is_floor = found[..., 3] == 1.0
+    assert 0.5 < is_floor.mean() <= 1.0
+    expected = 0.5 + across / np.maximum(down, 0.2) / 20.0
+    is_near = is_floor & (np.abs(expected - 0.5) < 0.45) & (down > 0.2)
+    np.testing.assert_allclose(found[is_near, 0] / found[is_near, 2], expected[is_near], atol=0.004)
+
+
+def samples_of(drawn, view, has_blocks, width=4 * SIZE):
+    """(W, W, 4) samples of a `DrawnScene`, with its surfaces shaded in blocks or not."""
+    buffer = visibility_buffer.VisibilityBuffer(width, width, has_blocks=has_blocks)
+    scene_drawing.draw(drawn, view, buffer, is_transparent=True)
+    return np.array(buffer.color.read(), np.float32).reshape(width, width, 4)
+
+
+def test_samples_share_light_of_their_own_surface_alone(stage):
+    """A box before a plane, in even light: its sides, the plane and nothing at all have no light of each other."""
+    material_of(plane(1.6), Base_Color=(0.1, 0.2, 0.9, 1.0), Specular_IOR_Level=0.0)
+    bpy.ops.mesh.primitive_cube_add(size=0.6, location=(0.0, -1.0, 0.0), rotation=(0.5, 0.2, 0.7))
+    material_of(bpy.context.object, Base_Color=(0.9, 0.4, 0.1, 1.0), Specular_IOR_Level=0.0)
+    sun(math.radians(60.0), 0.2, 0.0)
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(stage, bpy.context.view_layer, depsgraph)
+    view = drawing.pass_record(*read_camera(stage, depsgraph, 4 * SIZE, 4 * SIZE), (4 * SIZE, 4 * SIZE), 1)
+    shared, alone = (samples_of(drawn, view, has_blocks) for has_blocks in (True, False))
+    assert len(np.unique(np.round(alone, 2).reshape(-1, 4), axis=0)) > 4
+    np.testing.assert_allclose(shared, alone, atol=2e-3)
+
+
+def test_light_that_samples_share_is_as_bright_below_hair(stage):
+    """Where places are looked for hair at random, those that find none are not taken for the others."""
+    material_of(plane(), Base_Color=(0.6, 0.5, 0.4, 1.0))
+    bpy.ops.mesh.primitive_plane_add(size=0.5, rotation=(math.pi / 2, 0.0, 0.0), location=(0.0, -0.3, 0.0))
+    bpy.ops.vellus.add_hair(guide_count=20, strand_count=60, length=0.2, radius=0.004)
+    sun(math.radians(70.0), 0.3, 0.0, strength=math.pi)
+    bpy.data.objects["Sun"].data.angle = 0.2
+    depsgraph = bpy.context.evaluated_depsgraph_get()
+    drawn = drawn_scene.read(stage, bpy.context.view_layer, depsgraph)
+    camera, means, deviations = read_camera(stage, depsgraph, 4 * SIZE, 4 * SIZE), [], []
+    for has_blocks in (True, False):
+        passes = [
+            samples_of(drawn, drawing.pass_record(*camera, (4 * SIZE, 4 * SIZE), turn), has_blocks) for turn in range(8)
+        ]
+        means.append(np.mean(passes, axis=0)[..., :3].reshape(SIZE // 4, 16, SIZE // 4, 16, 3).mean(axis=(1, 3)))
+        deviations.append(np.std(passes, axis=0).mean())
+    np.testing.assert_allclose(means[0].mean(), means[1].mean(), rtol=0.002)
+    np.testing.assert_allclose(means[0], means[1], rtol=0.03)
+    assert deviations[0] < 1.5 * deviations[1]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...gpu import drawing
+from ...gpu import drawing, windows
 
 _MOST_PER_SIDE = 6  # samples along each side of a pixel: about as many as a finished picture has
 
@@ -73,7 +73,7 @@ def _window(drawn, camera, size):
     view = drawing.pass_record(*camera, size)
     low, high = np.array(size), np.zeros(2, int)
     for strands, _shading, to_world, *_ in drawn.hair:
-        left, bottom, width, height = drawing.window_of(strands, drawing.strand_record(strands, view, to_world), size)
+        left, bottom, width, height = windows.of_strands(strands, drawing.strand_record(strands, view, to_world), size)
         if width and height:
             low, high = np.minimum(low, (left, bottom)), np.maximum(high, (left + width, bottom + height))
     return (*low.tolist(), *np.maximum(high - low, 0).tolist())

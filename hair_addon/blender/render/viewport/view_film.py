@@ -17,7 +17,7 @@ class ViewFilm:
     """
 
     def __init__(self, size, per_side, is_transparent):
-        self._film = Film(size, per_side, ("Combined",), is_transparent)
+        self._film = Film(size, per_side, ("Combined",), is_transparent, border=0)
         self._detail = picture_detail.whole(size, per_side)
         self._history = History(size)
         self._pass_total = -(-SAMPLE_COUNT // per_side**2)

@@ -130,22 +130,22 @@ def gather(
     for name in ("places", "drawn"):
         require_count(name, len(getattr(seen, name)), count)
     systems = grid.systems[grid.strands]
+    sums = np.zeros((len(grid.kept), *grid.shape[::-1], 12))
     if not count:
-        x, y, z = grid.shape
-        return np.zeros((len(grid.kept), z, y, x, 12)), 0
+        return sums, 0
     voxels = start_places.voxels_of(grid, seen.places)
     with wp.ScopedDevice(device):
         mesh = mesh_of(surroundings.corners)
         medium = medium_of(grid, mesh, surroundings.normals, surroundings.albedo, surroundings.gloss)
         sources = sources_of(surroundings)
         drawn = np.concatenate([seen.drawn, _even_there(medium, seen, device)], axis=-1)
-        drawn = _by_voxel(grid, seen.places, systems[seen.segments], drawn)
-        sums, total, squares, taken, tried, turn, more = 0.0, 0.0, 0.0, 0, 0, 0, path_count
+        _add_by_voxel(sums[..., 6:], grid, seen.places, systems[seen.segments], drawn)
+        total, squares, taken, tried, turn, more = 0.0, 0.0, 0, 0, 0, path_count
         while True:
             starts = start_places.of_seen(medium, grid, seen, voxels, more, seed * _MOST_TURNS + turn, device)
             positions, light, even = _traced(medium, sources, seen.view, starts, device)
             found = np.concatenate([light, even], axis=-1)
-            sums = sums + _by_voxel(grid, positions, systems[starts.segments], found)
+            _add_by_voxel(sums[..., :6], grid, positions, systems[starts.segments], found)
             brightness = light.sum(axis=1, dtype=np.float64)
             total, squares = total + float(brightness.sum()), squares + float(np.square(brightness).sum())
             taken += len(light)
@@ -153,7 +153,7 @@ def gather(
             missing = (_standard_error(total, squares, taken) / _KNOWN) ** 2 - 1.0
             more = int(tried * min(max(missing, _LEAST_TURN), 1.0))
             if missing < 0.0 or tried + more > most_paths:
-                return np.concatenate([sums, drawn], axis=-1), taken
+                return sums, taken
 
 
 def _even_there(medium, seen, device):
@@ -178,12 +178,13 @@ def _standard_error(total, squares, count):
     return np.sqrt(max(squares - total * total / count, 0.0)) / total if total > 0.0 else np.inf
 
 
-def _by_voxel(grid, positions, systems, values):
-    """(systems, Z, Y, X, C) sums of values (N, C) at positions (N, 3) of hairs (N,)."""
-    x, y, z = grid.shape
+def _add_by_voxel(sums, grid, positions, systems, values):
+    """Add values (N, C) at positions (N, 3) of hairs (N,) to (systems, Z, Y, X, C) sums."""
     column, row, layer = grid.voxels_at(positions).T
-    voxel = ((systems * z + layer) * y + row) * x + column
-    sums = np.empty((len(grid.kept) * x * y * z, values.shape[1]))
-    for channel in range(values.shape[1]):
-        sums[:, channel] = np.bincount(voxel, weights=values[:, channel], minlength=len(sums))
-    return sums.reshape(len(grid.kept), z, y, x, -1)
+    at = np.ravel_multi_index((systems, layer, row, column), sums.shape[:4])
+    # Most voxels are empty: the memory of those that are used is read alone.
+    used, which = np.unique(at, return_inverse=True)
+    channels = values.shape[1]
+    each = (which[:, None] * channels + np.arange(channels)).ravel()
+    found = np.bincount(each, weights=values.ravel(), minlength=len(used) * channels)
+    sums[np.unravel_index(used, sums.shape[:4])] += found.reshape(-1, channels)

@@ -13,10 +13,25 @@ def shares(sums: np.ndarray, path_count: int, origin: tuple[int, int, int] = (0,
     Both together are the paths' light. What is drawn tells apart strands and places that the paths' mean is too coarse
     for; as much is kept as explains the paths best, but where that is more than they find in any channel.
     """
+    # One hair may take a small part of the grid of all.
+    box, beside = _box_of((sums[..., 3] > 0.0) | (sums[..., 9] > 0.0))
+    sums = sums[box]
+    origin = tuple(first + part.start for first, part in zip(origin, box[::-1], strict=True))
     light, drawn = (smooth_ratios(pair, path_count, origin) for pair in (sums[..., :6], sums[..., 6:]))
     most = explained_part(sums)
     kept = np.clip((light / np.maximum(drawn, 1e-12)).min(axis=-1, keepdims=True), 0.0, most)
-    return np.concatenate([light - kept * drawn, kept], axis=-1)
+    return np.pad(np.concatenate([light - kept * drawn, kept], axis=-1), [*beside, (0, 0)], mode="edge")
+
+
+def _box_of(is_used):
+    """(slices along Z, Y, X around all that is used of (Z, Y, X), numbers of voxels before and after them)."""
+    box = []
+    for axis in range(3):
+        others = tuple(other for other in range(3) if other != axis)
+        (used,) = np.nonzero(is_used.any(axis=others))
+        box.append(slice(int(used[0]), int(used[-1]) + 1) if len(used) else slice(0, is_used.shape[axis]))
+    beside = [(part.start, length - part.stop) for part, length in zip(box, is_used.shape, strict=True)]
+    return tuple(box), beside
 
 
 def explained_part(sums: np.ndarray) -> float:

@@ -354,3 +354,17 @@ def test_drawn_light_keeps_edges_that_noisy_paths_do_not_find(rng):
     there = found[..., :3] + found[..., 3:] * drawn
     np.testing.assert_allclose(there.mean(axis=(0, 1)), expected.mean(axis=(0, 1)), rtol=0.15)
     assert there.std(axis=(0, 1)).max() < 0.05
+
+
+def test_hair_has_the_same_light_in_a_grid_of_more_hair(rng):
+    """Voxels around a hair's own, which other hair needs, do not change what its own have."""
+    sums = rng.exponential(size=(4, 6, 5, 12))
+    beside = [(3, 2), (0, 7), (4, 1)]
+    origin = (5, -2, 9)
+    wide = np.pad(sums, [*beside, (0, 0)])
+    around = tuple(first - before for first, (before, _after) in zip(origin, beside[::-1], strict=True))
+    found = voxel_means.shares(wide, 1000, around)
+    assert found.shape[:3] == wide.shape[:3]
+    np.testing.assert_array_equal(found[3:7, :6, 4:9], voxel_means.shares(sums, 1000, origin))
+    assert np.isfinite(found).all()
+    assert not voxel_means.shares(np.zeros((2, 2, 2, 12)), 10)[..., :3].any()

@@ -1,34 +1,39 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// The surface under the hair, a Principled BSDF: diffuse below a rough dielectric, or metal. Of a clear one, what it
-// reflects, and as alpha the part that it does not let through.
+// Light from a point of a surface, a Principled BSDF: diffuse below a rough dielectric, or metal.
 
 #include "include/surface_visibility.glsl"
 #include "include/world.glsl"
 #include "include/surface_reflection.glsl"
 #include "include/surface_material.glsl"
+#include "include/surface_point.glsl"
 
 // Largest light that a picture's half-precision samples hold.
 const float BRIGHTEST = 6e4;
 
 // alpha of microfacets and of the normal's change within a sample, which would leave dots of light [Tokuyoshi19].
-float filtered_alpha(float roughness, vec3 N)
+float filtered_alpha(float roughness, float variance)
 {
-  vec3 x_step = dFdx(N);
-  vec3 y_step = dFdy(N);
-  float variance = 0.25 * (dot(x_step, x_step) + dot(y_step, y_step));
   float squared = roughness * roughness * roughness * roughness;
   return sqrt(min(squared + min(2.0 * variance, 0.18), 1.0));
 }
 
-void main()
+struct SurfaceLight {
+  vec3 below;  // through the coat
+  vec3 highlight;  // what the coat, or metal, reflects
+  float coat;  // the part of even light that it does
+  float alpha;  // of its microfacets
+  float noise;  // variance of its irradiance, by that squared
+};
+
+// turn: of `sample_turn`.
+SurfaceLight surface_light(SurfacePoint point, vec2 turn)
 {
-  vec3 N = normalize(gl_FrontFacing ? surface_normal : -surface_normal);
-  N = mapped_normal(N, drawn_position, surface_uv);
-  vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - drawn_position) : view.eye.xyz;
+  vec3 N = point.N;
+  vec3 V = view.is_perspective != 0 ? normalize(view.eye.xyz - point.position) : view.eye.xyz;
   float n_dot_v = max(abs(dot(N, V)), 1e-4);
-  vec3 albedo = base_color(surface_uv);
-  float roughness = base_roughness(surface_uv);
-  float alpha = filtered_alpha(roughness, N);
+  vec3 albedo = base_color(point.uv, point.uv_right, point.uv_up);
+  float roughness = base_roughness(point.uv, point.uv_right, point.uv_up);
+  float alpha = filtered_alpha(roughness, point.normal_variance);
   vec4 share = directional_albedo(surface_albedo, n_dot_v, roughness);
   // A surface that reflects nothing straight on does not at any angle.
   float grazing = share.z * min(50.0 * surface.reflectance, 1.0);
@@ -39,17 +44,15 @@ void main()
 
   mat3 plus;
   mat3 minus;
-  world_sides(corner_seen_x_y, corner_seen_z.xy, view.seen_opacity, view.hair_forward.rgb, plus, minus);
+  world_sides(point.seen_x_y, point.seen_z.xy, view.seen_opacity, view.hair_forward.rgb, plus, minus);
   vec3 irradiance = surface_irradiance(plus, minus, N);
   vec3 highlight = reflected * surface_irradiance(plus, minus, reflect(-V, N)) / PI;
-  vec2 turn = sample_turn();
+  float variance = 0.0;
   for (int index = 0; index < lights.count; index++) {
     Light light = lights.light[index];
-    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, drawn_position);
-    float past_surfaces;
-    vec3 past_hair;
-    surface_visibility(light, drawn_position, N, view.hair_forward.rgb, turn, past_surfaces, past_hair);
-    if (any(greaterThan(past_hair, vec3(0.0)))) {
+    vec3 L = to_light(light.kind, light.position.xyz, light.axis.xyz, point.position);
+    SurfaceVisibility seen = surface_visibility(light, point.position, N, view.hair_forward.rgb, turn);
+    if (any(greaterThan(seen.past_hair, vec3(0.0)))) {
       vec3 facing = light_irradiance(light.kind,
                                      light.position.xyz,
                                      light.axis.xyz,
@@ -57,10 +60,11 @@ void main()
                                      light.cos_cone,
                                      light.blend,
                                      light.radius,
-                                     drawn_position);
+                                     point.position);
       // A plane receives less of a wide lobe of the world than a ball does, in the mean by its variance.
-      float blur = light_blur(light.kind, light.position.xyz, light.radius, drawn_position);
-      vec3 arriving = facing * past_hair * ((light.kind == LIGHT_SUN) ? 1.0 - blur : 1.0);
+      float blur = light_blur(light.kind, light.position.xyz, light.radius, point.position);
+      variance += seen.variance * squared_mean(facing);
+      vec3 arriving = facing * seen.past_hair * ((light.kind == LIGHT_SUN) ? 1.0 - blur : 1.0);
       irradiance += arriving;
       float n_dot_l = max(dot(N, L), 1e-3);
       vec3 H = normalize(L + V);
@@ -79,10 +83,11 @@ void main()
       highlight += arriving * gain * fresnel * facets;
     }
   }
-  if (surface.is_clear != 0) {
-    color = vec4(min(highlight, vec3(BRIGHTEST)), coat);
-    return;
-  }
-  vec3 below = (1.0 - surface.metallic) * max(1.0 - coat, 0.0) * albedo;
-  color = vec4(min(below * irradiance / PI + highlight, vec3(BRIGHTEST)), 1.0);
+  SurfaceLight light_here;
+  light_here.below = (1.0 - surface.metallic) * max(1.0 - coat, 0.0) * albedo * irradiance / PI;
+  light_here.highlight = highlight;
+  light_here.coat = coat;
+  light_here.alpha = alpha;
+  light_here.noise = variance / max(squared_mean(irradiance), 1e-20);
+  return light_here;
 }

@@ -1,0 +1,97 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""GLSL files → GPU programs that draw surfaces, and what they read."""
+
+import gpu
+
+from . import scene_programs, uniforms
+from .shaders import compile_compute, compile_drawing, kept
+
+SEEN_SAMPLERS = ("visibility_x_y", "visibility_z")  # of VISIBILITY_SAMPLERS, what surfaces read
+CORNER_SAMPLERS = ("places", "normals", "corners")  # of a `SurfaceOnGPU`
+SURFACE_IMAGES = ("color_image", "roughness_image", "normal_image")  # of a `SurfaceMaterial`
+_MATERIAL_SAMPLERS = (*SURFACE_IMAGES, "surface_albedo")
+
+
+@kept
+def number_program():
+    """The program that draws a surface as samples of a picture: see surface_number.vert."""
+    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("number_varying")
+    scene_programs.declare_scene(info, shadow_samplers=(), is_lit=False)
+    for slot, name in enumerate(CORNER_SAMPLERS):
+        info.sampler(slot, "FLOAT_2D", name)
+    info.push_constant("INT", "first_triangle")
+    varying.flat("INT", "triangle")
+    info.vertex_out(varying)
+    return compile_drawing(info, "surface_number.vert", "surface_number.frag", (("segment", "UINT"),))
+
+
+SIDE = 4  # samples along each side of what a thread takes: of shaders/surface.comp
+
+
+@kept
+def shading_program():
+    """The compute program that shades a surface in the samples where it is nearest: see surface.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
+    for slot, name in enumerate(("segments", "depths"), start=_declare_material(info)):
+        info.sampler(slot, "UINT_2D", name)
+    info.image(0, scene_programs.PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"})
+    for name in ("first_triangle", "triangle_count", "window_left", "window_bottom", "has_blocks", "has_over"):
+        info.push_constant("INT", name)
+    return compile_compute(info, "surface.comp")
+
+
+@kept
+def clear_program():
+    """The program that draws a clear surface: see clear_surface.frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    _declare_material(info)
+    info.vertex_out(_lit_varying())
+    return compile_drawing(info, "lit_surface.vert", "clear_surface.frag")
+
+
+@kept
+def arrival_program(fragment):
+    """The program of how much light reaches surfaces, by a .frag."""
+    info = gpu.types.GPUShaderCreateInfo()
+    _declare_lit(info)
+    info.vertex_out(_lit_varying())
+    return compile_drawing(info, "lit_surface.vert", fragment)
+
+
+@kept
+def depth_program(fragment="shadow_surface.frag"):
+    """The program that draws a surface into a shadow map, or one that only hides."""
+    info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
+    scene_programs.declare_scene(info, shadow_samplers=(), is_lit=False)
+    info.sampler(0, "FLOAT_2D", "places")
+    varying.smooth("VEC3", "drawn_position")
+    info.vertex_out(varying)
+    return compile_drawing(info, "surface_place.vert", fragment)
+
+
+def _declare_material(info):
+    """Declare the inputs of programs that shade; returns the first slot of samplers that is left."""
+    info.uniform_buf(2, "Surface", "surface")
+    return _declare_lit(info, uniforms.SURFACE.source, _MATERIAL_SAMPLERS)
+
+
+def _declare_lit(info, structs="", samplers=()):
+    scene_programs.declare_scene(info, structs, is_lit=False)
+    names, first = (*SEEN_SAMPLERS, *CORNER_SAMPLERS, *samplers), len(scene_programs.SHADOW_SAMPLERS)
+    for slot, name in enumerate(names, start=first):
+        info.sampler(slot, "FLOAT_2D", name)
+    return first + len(names)
+
+
+def _lit_varying():
+    varying = gpu.types.GPUStageInterfaceInfo("surface_varying")
+    for kind, name in (
+        ("VEC3", "drawn_position"),
+        ("VEC3", "surface_normal"),
+        ("VEC4", "corner_seen_x_y"),
+        ("VEC4", "corner_seen_z"),
+        ("VEC2", "surface_uv"),
+    ):
+        varying.smooth(kind, name)
+    return varying
