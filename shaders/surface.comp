@@ -7,6 +7,7 @@
 #include "include/no_segment.glsl"
 
 const int SIDE = 4;  // samples along each side of what a thread takes
+const uint STRIDE = 7919u;  // a prime beyond any number of rows of work groups
 
 // How far a sample may be off the plane of another one, as a part of the steps of depth, and by rounding.
 const float OFF_PLANE = 0.5;
@@ -57,10 +58,18 @@ int first_of(int index)
   return (index & ~3) | ((index + first) & 3);
 }
 
+// The row of this thread. Software drivers give each processor groups that follow each other: they are of rows all over the
+// picture, as a surface may be in a part of it.
+uint turned_row()
+{
+  uint group = gl_WorkGroupID.y * STRIDE % gl_NumWorkGroups.y;
+  return group * gl_WorkGroupSize.y + gl_LocalInvocationID.y;
+}
+
 void main()
 {
   ivec2 size = textureSize(segments, 0);
-  ivec2 corner = SIDE * ivec2(gl_GlobalInvocationID.xy) + ivec2(window_left, window_bottom);
+  ivec2 corner = SIDE * ivec2(gl_GlobalInvocationID.x, turned_row()) + ivec2(window_left, window_bottom);
   // Two by two samples are those of the whole picture.
   corner -= picture_place(corner) & (SIDE - 1);
   int waiting = 0;  // a bit for each sample

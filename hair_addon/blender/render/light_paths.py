@@ -13,7 +13,7 @@ from ..gpu import drawing, light_grid, world_texture
 from ..settings import preferences
 from . import seen_strands
 
-_PATHS_A_PIXEL = 8
+_PATHS_A_PIXEL = 2
 _LEAST_PATHS, _MOST_PATHS = 20_000, 300_000  # over the part of the picture that holds the hair
 _SAMPLES_A_PATH = 2  # in which strands are drawn
 _MOST_TIMES = 4  # where that part is mostly empty, or few of its paths find light
