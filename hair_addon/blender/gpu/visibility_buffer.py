@@ -88,16 +88,32 @@ class VisibilityBuffer:
     @contextmanager
     def numbered(self):
         """The framebuffer that numbers of triangles are drawn into, where surfaces are shaded after `find_hair`."""
-        self._is_color_stale, self._is_numbered = False, True  # `behind_hair` clears `color`
-        self.segments.clear(format="UINT", value=(NO_SEGMENT,))
+        self._is_color_stale, self._is_numbered = False, True  # `color` is filled later
         with self._numbered.bind():
+            with drawing.gpu_state("NONE", depth_writes=False):
+                drawing.draw_cover(visibility_programs.no_triangle_program(), {}, {})
             self._numbered.clear(depth=1.0)
             yield
 
-    def behind_hair(self, picture):
-        """The framebuffer of a picture, `color` or `part`, and of `surface_depth`, bound: a context manager."""
+    def fill(self, picture, color):
+        """Fill a picture, `color` or `part`, before programs shade it."""
+        program = visibility_programs.fill_program()
+        with drawing.bound(program, {}, {}):
+            program.image("picture", picture)
+            program.uniform_float("fill_color", color)
+            drawing.dispatch_over(program, self.size)
+
+    @contextmanager
+    def behind_hair(self, picture, color):
+        """The framebuffer of a picture, `color` or `part`, filled with a color, and of `surface_depth`, bound.
+
+        Something is to be drawn into it: else `fill` is for it.
+        """
         is_part = picture is not self.color
-        return (self._part(scene_programs.PICTURE_FORMAT, _NOTHING)[2] if is_part else self._surfaces).bind()
+        framebuffer = self._part(scene_programs.PICTURE_FORMAT, _NOTHING)[2] if is_part else self._surfaces
+        with framebuffer.bind():
+            framebuffer.clear(color=color)
+            yield
 
     def put_hair_first(self):
         """Set `surface_depth` to zero where hair is nearest: nothing is drawn there. And empty samples of surfaces."""

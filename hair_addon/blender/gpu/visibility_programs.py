@@ -30,6 +30,24 @@ def hair_first_program():
 
 
 @shaders.kept
+def fill_program():
+    """The compute program that fills a picture with a color: see fill.comp."""
+    info = gpu.types.GPUShaderCreateInfo()
+    info.local_group_size(scene_programs.PICTURE_GROUP_SIZE, scene_programs.PICTURE_GROUP_SIZE)
+    info.image(0, scene_programs.PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"WRITE"})
+    info.push_constant("VEC4", "fill_color")
+    return shaders.compile_compute(info, "fill.comp")
+
+
+@shaders.kept
+def no_triangle_program():
+    """The program that empties a visibility buffer's samples: see no_triangle.frag."""
+    return shaders.compile_drawing(
+        gpu.types.GPUShaderCreateInfo(), "cover.vert", "no_triangle.frag", (("segment", "UINT"),)
+    )
+
+
+@shaders.kept
 def surface_blank_program():
     """The program that empties samples of surfaces: see surface_blank.frag."""
     info = gpu.types.GPUShaderCreateInfo()

@@ -96,17 +96,19 @@ def _hair_in_view(drawn, view, is_viewport):
 
 def _shade_behind_hair(drawn, view, buffer, picture, is_transparent):
     """Fill a picture of a `VisibilityBuffer` with all but hair, each surface where it is nearest."""
-    picture.clear(format="FLOAT", value=(0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0))
+    background = (0.0, 0.0, 0.0, 0.0) if is_transparent else (*drawn.world.color, 1.0)
     has_image = drawn.world.image is not None and not is_transparent
     has_over = bool(drawn.clear) or any(parts is None for _surface, parts in drawn.surfaces)
     _see_through_hair(drawn, view)
     if has_image or has_over:
-        with buffer.behind_hair(picture):
+        with buffer.behind_hair(picture, background):
             if has_image:
                 world_texture.draw_background(drawn.world, view, *buffer.size)
             if has_over:
                 buffer.put_hair_first()
                 _draw_over_surfaces(drawn, _nearer(view))
+    else:
+        buffer.fill(picture, background)
     _shade_surfaces(drawn, view, buffer, picture)
 
 
