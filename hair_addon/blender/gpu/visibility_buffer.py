@@ -47,6 +47,11 @@ class _Placed:
 _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
+def _are_clears_slow():
+    """Whether a program may fill a texture much faster than its clearing does."""
+    return gpu.platform.backend_type_get() == "OPENGL"
+
+
 class VisibilityBuffer:
     """Textures of width × height samples: surfaces are drawn first, then hair, which they hide.
 
@@ -89,14 +94,20 @@ class VisibilityBuffer:
     def numbered(self):
         """The framebuffer that numbers of triangles are drawn into, where surfaces are shaded after `find_hair`."""
         self._is_color_stale, self._is_numbered = False, True  # `color` is filled later
+        if not _are_clears_slow():
+            self.segments.clear(format="UINT", value=(NO_SEGMENT,))
         with self._numbered.bind():
-            with drawing.gpu_state("NONE", depth_writes=False):
-                drawing.draw_cover(visibility_programs.no_triangle_program(), {}, {})
+            if _are_clears_slow():
+                with drawing.gpu_state("NONE", depth_writes=False):
+                    drawing.draw_cover(visibility_programs.no_triangle_program(), {}, {})
             self._numbered.clear(depth=1.0)
             yield
 
     def fill(self, picture, color):
         """Fill a picture, `color` or `part`, before programs shade it."""
+        if not _are_clears_slow():
+            picture.clear(format="FLOAT", value=color)
+            return
         program = visibility_programs.fill_program()
         with drawing.bound(program, {}, {}):
             program.image("picture", picture)
