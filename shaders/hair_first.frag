@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Sets the depth to zero where hair is nearest, so that surfaces behind it are not shaded.
+// Sets the depth to zero where hair is nearest, so that no surface behind it is drawn.
 
 #include "include/no_segment.glsl"
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Surfaces under the hair, in samples where one of their triangles is nearest. Each thread takes four by four samples. Where
-// light has little noise, one of two by two that show the same part of a surface is shaded for all, in each pass another one.
+// Shades surfaces where one of their triangles is nearest. Each thread takes four by four samples. With coarse shading, where
+// light has little noise, one of two by two samples of the same part of a surface is shaded for all, another one in each pass.
 
 #include "include/surface_light.glsl"
 #include "include/found_point.glsl"
@@ -90,7 +90,7 @@ void main()
     uint triangle = triangle_at(place);
     vec2 depth_steps;
     SurfacePoint point = found_point(int(triangle), vec2(place) + 0.5, vec2(size), depth_steps);
-    if (has_blocks != 0) {
+    if (is_coarse != 0) {
       // Images are averaged over the samples that take their light from this one.
       point.uv_right *= 2.0;
       point.uv_up *= 2.0;
@@ -112,9 +112,9 @@ void main()
         }
       }
     }
-    // The first sample tells of the noise of the others, and its own light is of itself alone: were it shared where it has
-    // met no hair, light would be biased.
-    is_quiet = is_first ? has_blocks != 0 && light_here.noise <= NOISE : is_quiet;
+    // The first sample only estimates the noise, and its light is not shared: samples that happen to miss the hair have no
+    // noise, so sharing them would bias the light.
+    is_quiet = is_first ? is_coarse != 0 && light_here.noise <= NOISE : is_quiet;
     is_first = false;
   }
 }

@@ -22,7 +22,7 @@ def shade(surface, parts, first_triangle, view, lights, samplers, buffer, pictur
     blocks = {"view": uniforms.uniform_buffer(placed), "lights": uniforms.uniform_buffer(lights)}
     to_clip = (placed["object_to_world"].astype(np.float64) @ placed["world_to_clip"]).T
     samplers = surface.samplers | samplers | {"segments": buffer.segments, "depths": buffer.nearest_depths()}
-    constants = {"has_blocks": int(buffer.has_blocks), "has_over": int(has_over)}
+    constants = {"is_coarse": int(buffer.is_coarse), "has_over": int(has_over)}
     for first, count, material in parts:
         left, bottom, *size = windows.of_box(surface.bounds_of(first, count), to_clip, buffer.size)
         if not all(size):

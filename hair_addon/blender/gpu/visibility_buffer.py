@@ -48,7 +48,7 @@ _NOTHING = (0.0, 0.0, 0.0, 0.0)
 
 
 def _are_clears_slow():
-    """Whether a program may fill a texture much faster than its clearing does."""
+    """Whether some drivers take much longer to clear a texture than a program takes to fill it."""
     return gpu.platform.backend_type_get() == "OPENGL"
 
 
@@ -60,9 +60,9 @@ class VisibilityBuffer:
     any, the bits of floats from 0 to 1; elsewhere of surfaces, or 1.
     """
 
-    def __init__(self, width, height, has_blocks=False):
-        """has_blocks: whether surfaces may be shaded once for two by two samples."""
-        self.size, self.has_blocks = (width, height), has_blocks
+    def __init__(self, width, height, is_coarse=False):
+        """is_coarse: whether two by two samples of a surface may be shaded once."""
+        self.size, self.is_coarse = (width, height), is_coarse
         self.color = gpu.types.GPUTexture(self.size, format=scene_programs.PICTURE_FORMAT)
         self.depths = gpu.types.GPUTexture(self.size, format="R32UI")
         self.segments = gpu.types.GPUTexture(self.size, format="R32UI")

@@ -52,7 +52,7 @@ class Film:
         self._filter_width, self._margin = filter_width, pixel_sampling.filter_margin(per_side, filter_width)
         self._border = border
         sides = (length * per_side + 2 * (self._margin + border) for length in size)
-        self.samples = VisibilityBuffer(*sides, has_blocks=per_side > 1)
+        self.samples = VisibilityBuffer(*sides, is_coarse=per_side > 1)
         self._sums = {name: self._texture() for name in passes if name not in {"Depth", "Hair Mask"}}
         self._depth = self._texture() if {"Depth", "Hair Mask", "Vector"} & set(passes) else None
         self._passes, self.motion = passes, None

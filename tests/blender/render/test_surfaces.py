@@ -299,9 +299,9 @@ def test_a_surface_that_goes_on_behind_the_viewer_is_seen_where_it_is(stage):
     np.testing.assert_allclose(found[is_near, 0] / found[is_near, 2], expected[is_near], atol=0.004)
 
 
-def samples_of(drawn, view, has_blocks, width=4 * SIZE):
+def samples_of(drawn, view, is_coarse, width=4 * SIZE):
     """(W, W, 4) samples of a `DrawnScene`, with its surfaces shaded in blocks or not."""
-    buffer = visibility_buffer.VisibilityBuffer(width, width, has_blocks=has_blocks)
+    buffer = visibility_buffer.VisibilityBuffer(width, width, is_coarse=is_coarse)
     scene_drawing.draw(drawn, view, buffer, is_transparent=True)
     return np.array(buffer.color.read(), np.float32).reshape(width, width, 4)
 
@@ -315,7 +315,7 @@ def test_samples_share_light_of_their_own_surface_alone(stage):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(stage, bpy.context.view_layer, depsgraph)
     view = drawing.pass_record(*read_camera(stage, depsgraph, 4 * SIZE, 4 * SIZE), (4 * SIZE, 4 * SIZE), 1)
-    shared, alone = (samples_of(drawn, view, has_blocks) for has_blocks in (True, False))
+    shared, alone = (samples_of(drawn, view, is_coarse) for is_coarse in (True, False))
     assert len(np.unique(np.round(alone, 2).reshape(-1, 4), axis=0)) > 4
     np.testing.assert_allclose(shared, alone, atol=2e-3)
 
@@ -330,9 +330,9 @@ def test_light_that_samples_share_is_as_bright_below_hair(stage):
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(stage, bpy.context.view_layer, depsgraph)
     camera, means, deviations = read_camera(stage, depsgraph, 4 * SIZE, 4 * SIZE), [], []
-    for has_blocks in (True, False):
+    for is_coarse in (True, False):
         passes = [
-            samples_of(drawn, drawing.pass_record(*camera, (4 * SIZE, 4 * SIZE), turn), has_blocks) for turn in range(8)
+            samples_of(drawn, drawing.pass_record(*camera, (4 * SIZE, 4 * SIZE), turn), is_coarse) for turn in range(8)
         ]
         means.append(np.mean(passes, axis=0)[..., :3].reshape(SIZE // 4, 16, SIZE // 4, 16, 3).mean(axis=(1, 3)))
         deviations.append(np.std(passes, axis=0).mean())

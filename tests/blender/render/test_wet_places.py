@@ -88,7 +88,7 @@ def test_half_of_the_hair_is_wet(small, model, mode, random_color, monkeypatch):
 
     With surfaces that are shaded in each sample: by noise, and so by the hair, they share light from sample to sample.
     """
-    monkeypatch.setattr(film, "VisibilityBuffer", lambda *size, **_blocks: visibility_buffer.VisibilityBuffer(*size))
+    monkeypatch.setattr(film, "VisibilityBuffer", lambda *size, **_options: visibility_buffer.VisibilityBuffer(*size))
     state = small.data.vellus
     state.model, state.appearance.mode, state.appearance.random_color = model, mode, random_color
     group("any", np.ones(len(bpy.data.objects["Sphere"].data.vertices)))

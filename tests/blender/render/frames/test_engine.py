@@ -64,7 +64,9 @@ def test_a_picture_larger_than_any_texture_is_rendered(lit, tmp_path, monkeypatc
     monkeypatch.setattr(film, "_MOST_SAMPLES", largest)
     made = []
     real = film.VisibilityBuffer
-    monkeypatch.setattr(film, "VisibilityBuffer", lambda *size, **blocks: (made.append(size), real(*size, **blocks))[1])
+    monkeypatch.setattr(
+        film, "VisibilityBuffer", lambda *size, **options: (made.append(size), real(*size, **options))[1]
+    )
     combined = rendered(tmp_path, film_transparent=True, sample_count=4)["Combined"]
     assert made and max(map(max, made)) <= largest
     np.testing.assert_allclose(combined.mean(), offscreen_picture().mean(), rtol=1e-3)
