@@ -60,7 +60,7 @@ def grow(
     device = preferences.device()
     guides = groom.distribute_guides(
         surface.mesh,
-        replace(settings, drape=False),
+        settings,
         density=density,
         texture=texture,
         mirror_normal=surface.mirror_normal,

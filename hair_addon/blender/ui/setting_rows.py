@@ -101,7 +101,7 @@ def growth_rows(layout, owner):
     rows(layout, owner, GuideSettings, _GROWTH)
     search_row(layout, owner, "flow_lines", bpy.data, "objects")
     angle = layout.column()
-    angle.active = bool(text_of(owner, "flow_lines"))
+    angle.active = owner.drape or bool(text_of(owner, "flow_lines"))
     row(angle, owner, "lift")
 
 

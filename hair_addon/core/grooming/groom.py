@@ -102,7 +102,7 @@ class GuideSettings(Settings):
     )
     lift: float = param(
         math.radians(30.0),
-        "Angle between the surface and guides near flow lines; at 0 they lie flat",
+        "Angle between the surface and guides that are draped or near flow lines; at 0 they lie flat",
         low=0.0,
         high=math.radians(90.0),
         unit="ROTATION",
@@ -234,7 +234,7 @@ def distribute_guides(
     device: str = "cpu",
     progress: Progress = no_progress,
 ) -> Strands:
-    """Guides, evenly placed and grown: (guide_count, POINT_COUNT) strands.
+    """Guides, evenly placed and grown: (guide_count, POINT_COUNT) strands; `dynamics.draped_growth` lets them fall.
 
     mesh: `TriMesh` [m]; settings: `GuideSettings`; those that are None follow from the mesh (groom_defaults.py);
     density: (V,) per vertex, at least 0, or None for uniform; texture: `Texture` that multiplies it, or None;
@@ -275,6 +275,7 @@ def distribute_guides(
         tilt=settings.tilt,
         gravity=groom_defaults.known(settings.gravity),
         flow=None if flow is None else grooming.flow_lines.lay(mesh, flow, device, drawn_on),
+        is_draped=settings.drape,
         lift=settings.lift,
         seed=settings.seed,
         control_point_count=CONTROL_POINT_COUNT,

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Growth of guides from roots: control points of a smooth arc that starts along the normal, or along flow lines, and
-bends with gravity.
+"""Growth of guides from roots: control points of a smooth arc that starts along the normal, along flow lines, or the way
+that it will fall, and bends with gravity.
 """
 
 import numpy as np
@@ -21,6 +21,7 @@ TURNING = 10.0  # how far full gravity bends a guide: the angle to the ground, a
 CLEARANCE = 0.03  # how far above the surface a guide slides, by its length
 RISE = 0.5  # how fast a guide may leave the surface at its root, by its length
 LEAST_RISE = 0.05  # of guides that begin flat on it
+LEVEL = 0.04  # sine of the slope on which guides that fall begin half upright, as it hardly says which way
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
 
 
@@ -35,6 +36,7 @@ def grow(
     seed: int,
     control_point_count: int,
     flow: flow_lines.FlowLines | None = None,
+    is_draped: bool = False,
     lift: float = 0.5 * np.pi,
     device: wp.DeviceLike = "cpu",
 ) -> np.ndarray:
@@ -42,7 +44,8 @@ def grow(
 
     length [m]; length_variation: each guide's length is multiplied by a random number within 1 ± this; tilt [rad]:
     largest random angle to the smooth normal; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z);
-    flow: lines along which guides begin instead, at the angle lift [rad] to the surface, or None.
+    flow: lines along which guides begin instead, at the angle lift [rad] to the surface, or None; is_draped: whether
+    guides fall once they are grown, and so begin downhill where no lines are, at that angle (`downhill`).
     A guide keeps its length while it bends, and slides over the surface where it would sink into it.
     """
     random = np.random.Generator(np.random.PCG64(seed)).random((len(roots), 3))
@@ -51,6 +54,9 @@ def grow(
     axes, rises = root_normals, np.full(len(roots), RISE)
     if flow is not None:
         axes = flow_lines.axes(flow, positions(mesh, roots), root_normals, lift)
+    elif is_draped:
+        axes = downhill(root_normals, lift, gravity)
+    if axes is not root_normals:
         rises = np.clip(np.einsum("gi,gi->g", axes, root_normals), LEAST_RISE, RISE)
     directions = _tilted(axes, tilt, random[:, 1], random[:, 2])
     surface = SurfaceQuery(mesh, device=device).mesh
@@ -73,6 +79,22 @@ def grow(
     # Controls whose curve runs through the arc itself, so that it is neither shorter nor nearer to the surface.
     abscissae = greville_abscissae(control_point_count)
     return np.linalg.inv(basis(abscissae, control_point_count)).astype(np.float32) @ _along(path.numpy(), abscissae)
+
+
+def downhill(root_normals: np.ndarray, lift: float, gravity: float) -> np.ndarray:
+    """Unit (G, 3) directions in which guides lie that fall: those of neighbors agree, so that they part nowhere but at
+    the summit, as at the whorl of a scalp.
+
+    root_normals: unit (G, 3); lift: angle [rad] to the surface; gravity as in `grow`: without it, they stand upright.
+    Where the surface is level a guide stands upright, and below an overhang none begins beyond straight down.
+    """
+    steepest = np.array([0.0, 0.0, -1.0]) + root_normals[:, 2:] * root_normals
+    slope = np.linalg.norm(steepest, axis=1)
+    # As far as gravity turns a guide that begins level: TURNING.
+    share = slope**2 / (slope**2 + LEVEL**2) * (1.0 - np.exp(-TURNING * gravity))
+    turned = np.minimum(share * (0.5 * np.pi - lift), np.arccos(np.clip(-root_normals[:, 2], -1.0, 1.0)))
+    along = steepest / np.maximum(slope, 1e-12)[:, None]
+    return np.cos(turned)[:, None] * root_normals + np.sin(turned)[:, None] * along
 
 
 def mirrored(controls: np.ndarray, places: np.ndarray, mirror: Mirror) -> np.ndarray:

@@ -23,7 +23,7 @@ def grown(settings=SETTINGS, mesh=BALL, density=UPPER, **ground):
 
 
 def undraped(settings=SETTINGS):
-    return distribute_guides(BALL, settings, density=UPPER, device=DEVICE)
+    return distribute_guides(BALL, replace(settings, drape=False), density=UPPER, device=DEVICE)
 
 
 def lengths(points):
@@ -43,6 +43,16 @@ def test_guides_hang_lower_and_lie_closer(draped):
     assert heights[on_top].mean() < 0.8 * free_heights[on_top].mean()
 
 
+def test_guides_fall_away_from_the_summit(draped):
+    """However they are tilted, from where the surface slopes by eight degrees: hair does not cross the whorl."""
+    guides = draped.numpy()
+    roots, falls = guides[:, 0, :2], guides[:, -1, :2] - guides[:, 0, :2]
+    slopes = np.linalg.norm(roots, axis=1) / RADIUS
+    cosines = np.einsum("gi,gi->g", falls, roots) / (np.linalg.norm(falls, axis=1) * np.linalg.norm(roots, axis=1))
+    above = (slopes > np.sin(np.radians(8.0))) & (slopes < np.sin(np.radians(60.0)))
+    assert above.sum() > 20 and cosines[above].min() > 0.7
+
+
 def test_guides_stay_outside(draped):
     flat = np.linalg.norm(BALL.corners.mean(axis=1), axis=1).min()
     assert np.linalg.norm(draped.numpy(), axis=2).min() > flat - 1e-4
@@ -50,7 +60,7 @@ def test_guides_stay_outside(draped):
 
 def test_roots_stay_to_the_bit_and_lengths(draped):
     assert np.array_equal(draped.numpy()[:, 0], undraped().numpy()[:, 0])
-    np.testing.assert_allclose(lengths(draped.numpy()), lengths(undraped().numpy()), rtol=0.01)
+    np.testing.assert_allclose(lengths(draped.numpy()), LENGTH, rtol=5e-3)
 
 
 def test_same_seed_same_guides(draped):
@@ -88,7 +98,8 @@ def test_faces_out_of_reach_do_not_matter(draped):
     )
     density = np.concatenate([UPPER, 0.0 * UPPER])
     assert not draped_growth.within_reach(far, SETTINGS, density)[len(BALL.triangles) :].any()
-    points = draped_growth.settled(undraped(), far, SETTINGS, density=density).numpy()
+    begun = distribute_guides(BALL, SETTINGS, density=UPPER, device=DEVICE)
+    points = draped_growth.settled(begun, far, SETTINGS, density=density).numpy()
     np.testing.assert_allclose(points, draped.numpy(), atol=1e-5 * LENGTH)
 
 

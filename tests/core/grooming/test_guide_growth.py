@@ -44,6 +44,29 @@ def test_untouched_guides_are_straight_even_and_upright(sphere, roots):
     np.testing.assert_allclose(segment_lengths(points), 0.5 / 40.0, rtol=1e-3)
 
 
+def test_downhill_is_smooth_and_never_beyond_straight_down(rng):
+    upright = rng.normal(size=(2000, 3))
+    upright /= np.linalg.norm(upright, axis=1, keepdims=True)
+    lift = np.radians(30.0)
+    begins = guide_growth.downhill(upright, lift, 0.75)
+    np.testing.assert_allclose(np.linalg.norm(begins, axis=1), 1.0, rtol=1e-12)
+    # In the plane of the normal and the vertical, on the lower side of the normal.
+    assert np.abs(np.einsum("gi,gi->g", np.cross(upright, begins), (0.0, 0.0, 1.0) + 0.0 * upright)).max() < 1e-12
+    assert (begins[:, 2] <= upright[:, 2]).all()
+    # At the angle to the surface where it slopes, or straight down where the normal is nearer to that than the angle.
+    rises = np.einsum("gi,gi->g", begins, upright)
+    wanted = np.maximum(np.sin(lift), np.cos(np.arccos(np.clip(-upright[:, 2], -1.0, 1.0))))
+    slopes = np.linalg.norm(upright[:, :2], axis=1) > 0.5
+    np.testing.assert_allclose(rises[slopes], wanted[slopes], atol=0.01)
+    # Normals that differ by little begin alike, at the summit and below an overhang too.
+    poles = np.array([(0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0)])
+    near = poles + 1e-4 * rng.normal(size=(100, 1, 3))
+    near /= np.linalg.norm(near, axis=2, keepdims=True)
+    there = guide_growth.downhill(near.reshape(-1, 3), lift, 0.75).reshape(near.shape)
+    assert np.linalg.norm(there - guide_growth.downhill(poles, lift, 0.75), axis=2).max() < 0.02
+    np.testing.assert_allclose(guide_growth.downhill(upright, lift, 0.0), upright, atol=1e-12)
+
+
 def test_tilt_is_the_largest_angle(sphere, roots):
     points = grown(sphere, roots, tilt=0.4)
     directions = (points[:, -1] - points[:, 0]) / 0.5

@@ -3,26 +3,40 @@
 
 import bpy
 
-from blend_samples.heads import bust, eyes
+from mathutils import Vector
 
-_SKIN = (0.52, 0.31, 0.22, 1.0)
+from blend_samples.heads import bust, eyes, skin
+
+_MIDDLE = (0.0, 0.0, 0.72)  # [m], of the head
+
+# Name, place [m], power [W] and size [m] of the lights beside that of Blender's first scene.
+_LIGHTS = (
+    ("Fill", (1.3, -0.1, 0.75), 6.0, 0.9),
+    ("Rim", (-0.5, 1.0, 1.45), 34.0, 0.4),
+    ("Rim 2", (1.2, 0.9, 1.3), 22.0, 0.4),
+)
 
 
 def light():
-    """Move the light of Blender's first scene, which is for a cube of two meters, near a head."""
-    lamp = bpy.data.objects["Light"]
-    lamp.location, lamp.data.energy = (1.1, -1.0, 1.6), 150.0  # [m], [W]
+    """Key, fill and rims for a head: the light of Blender's first scene, for a cube of two meters, comes near as key."""
+    key = bpy.data.objects["Light"]
+    key.location, key.data.energy, key.data.shadow_soft_size = (0.75, -1.35, 1.35), 60.0, 0.25  # [m], [W], [m]
+    for name, place, watts, size in _LIGHTS:
+        data = bpy.data.lights.new(name, "AREA")
+        data.energy, data.size = watts, size
+        lamp = bpy.data.objects.new(name, data)
+        bpy.context.scene.collection.objects.link(lamp)
+        lamp.location = place
+        lamp.rotation_euler = (Vector(_MIDDLE) - lamp.location).to_track_quat("-Z", "Y").to_euler()
 
 
 def dress(head, target):
     """Give an imported head what a portrait has without hair; target: what its eyes look at [m]."""
     material = bpy.data.materials.new("Skin")
-    material.diffuse_color, material.roughness = _SKIN, 0.6  # of Solid view
-    principled = next(node for node in material.node_tree.nodes if node.type == "BSDF_PRINCIPLED")
-    principled.inputs["Base Color"].default_value = _SKIN
-    principled.inputs["Roughness"].default_value = 0.55
+    material.diffuse_color, material.roughness = (*skin.COLOR, 1.0), 0.6  # of Solid view
     head.data.materials.clear()
     head.data.materials.append(material)
+    skin.paint(head)
     _balls, corneas, _lids = eyes.build(head, target)
     corneas.hide_set(True)  # Solid shows glass as opaque
     bust.build(head)

@@ -120,9 +120,9 @@ def open_head():
         bpy.ops.object.shade_smooth()
     mask_scalp(head)
     if MORE:
-        face.dress(head, (1.0, -0.7, 0.8))
+        face.dress(head, (0.6, -1.0, 0.8))
         face.light()
-    look_at(head, (1.0, -0.7, 0.3), 0.55)
+    look_at(head, (0.75, -1.0, 0.25), 0.55)
     yield
 
 
@@ -134,7 +134,7 @@ def grow_on_the_head():
     guides, hair = of_kind("GUIDES").data.vellus, of_kind("HAIR").data
     hair.vellus.hair.strand_count = STRAND_COUNT
     guides.guides.density_group = "scalp"
-    guides.guides.length = 0.12
+    guides.guides.length = 0.1
     guides.guides.gravity = 0.75
     guides.guides.drape = True
     hair.vellus.hair.thickness = 0.25
