@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Growth of guides from roots: control points of a smooth arc that starts along the normal, along flow lines, or the way
-that it will fall, and bends with gravity.
+"""Growth of guides from roots: control points of a smooth arc that bends with gravity.
+
+It starts along the normal, along flow lines, or, where guides are draped, downhill.
 """
 
 import numpy as np

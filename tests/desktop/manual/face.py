@@ -2,7 +2,6 @@
 """The face of the head in the manual's pictures of the window: skin, eyes, and a bust below the cut of the neck."""
 
 import bpy
-
 from mathutils import Vector
 
 from blend_samples.heads import bust, eyes, skin
@@ -18,7 +17,7 @@ _LIGHTS = (
 
 
 def light():
-    """Key, fill and rims for a head: the light of Blender's first scene, for a cube of two meters, comes near as key."""
+    """Key, fill and rims for a head: Blender's first scene has one light, for a cube of two meters."""
     key = bpy.data.objects["Light"]
     key.location, key.data.energy, key.data.shadow_soft_size = (0.75, -1.35, 1.35), 60.0, 0.25  # [m], [W], [m]
     for name, place, watts, size in _LIGHTS:
