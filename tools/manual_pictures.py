@@ -22,7 +22,7 @@ MODULE = "bl_ext.user_default.vellus"
 # Step of tests/desktop/manual/first_minutes.py → its picture in README.
 FIVE_MINUTES = {"cube_near": "new_hair_system", "head": "guide_mask", "combed": "comb_guides", "shaded": "look"}
 SAMPLES = 32  # per pixel: as an artist sees them
-FIVE_MINUTES_STRANDS, CURLY_STRANDS = 40_000, 16_000
+FIVE_MINUTES_STRANDS, CURLY_STRANDS = 40_000, 30_000
 
 # Steps of tests/desktop/manual/curly_hair.py that the page Curly Hair shows.
 CURLY_HAIR = (

@@ -132,11 +132,13 @@ def bare_head():
     above, positions = mask_scalp(head)
     if MORE:
         face.dress(head, (0.55, -1.0, 0.85))
+        face.light()
     fringe = head.vertex_groups.new(name="fringe")
     is_front = above & (positions[:, 1] < -0.085) & (np.abs(positions[:, 0]) < 0.075)
     fringe.add(np.flatnonzero(is_front).tolist(), 1.0, "REPLACE")
     area, _region = viewport()
     area.spaces.active.show_region_ui = True
+    area.spaces.active.overlay.show_extras = False  # lamps and the camera
     view = area.spaces.active.region_3d
     view.view_location, view.view_distance = (0.02, -0.03, 0.70), 0.6
     view.view_rotation = Vector((0.55, -1.0, 0.18)).to_track_quat("Z", "Y")
@@ -147,12 +149,12 @@ def bare_head():
 
 
 def hair_system():
-    """2. New Hair System, with Guide Mask scalp, 0.24 m long, Bend 0.9."""
+    """2. New Hair System, with Guide Mask scalp, 0.24 m long, Gravity 0.9, draped."""
     with in_viewport():
         bpy.ops.vellus.add_hair("INVOKE_DEFAULT")
     yield from wait_for(lambda: hair_object() is not None)
     guides, hair = guides_object().data.vellus.guides, hair_object().data.vellus.hair
-    guides.density_group, guides.length, guides.gravity = "scalp", 0.24, 0.9
+    guides.density_group, guides.length, guides.gravity, guides.drape = "scalp", 0.24, 0.9, True
     hair.strand_count, hair.thickness = STRAND_COUNT, 0.2
     yield from wait_for(lambda: len(hair_object().data.curves) == STRAND_COUNT)
     yield from wait(1.0)

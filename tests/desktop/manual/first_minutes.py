@@ -122,6 +122,7 @@ def open_head():
     if MORE:
         face.dress(head, (0.6, -1.0, 0.8))
         face.light()
+        viewport()[0].spaces.active.overlay.show_extras = False  # lamps and the camera
     look_at(head, (0.75, -1.0, 0.25), 0.55)
     yield
 
@@ -149,17 +150,17 @@ def grow_on_the_head():
 
 
 def comb():
-    """2. Comb Guides, and two strokes across the hair, from the face to the back."""
+    """2. Comb Guides, and two strokes across the hair, from the face over the ear."""
     with in_viewport():
         bpy.ops.vellus.comb_guides()
     yield from wait(1.0)
     guides, hair = of_kind("GUIDES"), of_kind("HAIR")
     before = curve_points(guides), curve_points(hair)
     facts["mode"] = bpy.context.mode
-    bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 120
+    bpy.context.tool_settings.curves_sculpt.unified_paint_settings.size = 150
     middle = places(before[0][40::41]).mean(axis=0)
-    for below in (0, 70):
-        yield from drag(middle + np.array([-130, 20 - below]), middle + np.array([90, 80 - below]))
+    for below in (0, 60):
+        yield from drag(middle + np.array([-120, 60 - below]), middle + np.array([60, -50 - below]))
     yield from wait(2.0)
     step("combed")
     facts["combed"] = [float(np.abs(curve_points(o) - b).max()) for o, b in zip((guides, hair), before, strict=True)]
