@@ -26,6 +26,8 @@ VARIABLE = "VELLUS_DESKTOP_BLENDER"
 WINDOW_SIZE = (1280, 800)
 BACKENDS = ("opengl", "vulkan")
 
+_SHADERS = ROOT / "build" / "compiled-shaders"
+
 # Mesa draws on the processor where there is no GPU. The modules are what Debian's Blender runs without and this one
 # needs: NumPy for every add-on, OpenColorIO for the display transform.
 _PACKAGES = (
@@ -94,6 +96,8 @@ def _inherited():
 def _environment(profile):
     """NAME=VALUE for a Blender whose user files and home are a folder."""
     values = {"HOME": profile, "BLENDER_USER_RESOURCES": profile, "LC_ALL": "C.UTF-8"}
+    # Software drivers take minutes to compile a window's shaders, which are the same in all profiles.
+    values["MESA_SHADER_CACHE_DIR"] = _SHADERS
     return [f"{name}={value}" for name, value in values.items()]
 
 

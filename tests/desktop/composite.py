@@ -14,7 +14,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT))
 from tests.desktop.random_walk import any_scene  # noqa: E402
-from tests.desktop.steps import OUT, ZIP, facts, take  # noqa: E402
+from tests.desktop.steps import OUT, PART, ZIP, facts, take  # noqa: E402
 from tests.desktop.window import (  # noqa: E402
     MODULE,
     in_viewport,
@@ -231,5 +231,9 @@ def export():
     facts["frame"] = scene().frame_current
 
 
+PARTS = {"renders": (build, turn_on, animate, reload_while_it_renders)}
+PARTS["all"] = (*PARTS["renders"], copy, disable, focus, export)
+
+
 if __name__ == "__main__":
-    take((build, turn_on, animate, reload_while_it_renders, copy, disable, focus, export))
+    take(PARTS[PART])

@@ -6,12 +6,18 @@ import re
 import shutil
 from pathlib import Path
 
-from tools import build_extension
+import pytest
+
+from tools import build_extension, desktop_blender
 
 SCRIPTS = Path(__file__).parent
 
 # Lines of the console by which the add-on, Python and OpenEXR complain.
 _COMPLAINT = re.compile(r"Vellus:|Traceback|\w*(Error|Exception)\b(?! \(0x)|<\w+>: \(EXR_ERR")
+
+
+# For tests of what is the same with any driver: which parts a walk has with which is told by its file.
+with_opengl = pytest.mark.parametrize("walk", desktop_blender.BACKENDS[:1], indirect=True)
 
 
 class Walk:

@@ -275,6 +275,7 @@ def look():
     yield from wait(2.0)
     facts["styles"] = [item.name for item in hair_object().data.vellus.styles]
     facts["status"] = hair_object().data.vellus.status
+    facts["are finite"] = bool(np.isfinite(strands()).all())
     picture("look")
 
 
@@ -326,7 +327,7 @@ def comb_styled():
             followed.append(moved(before))
     yield from wait(1.5)
     facts["combed with styles"] = {"while the brush moves": followed[0] if followed else 0.0, "after": moved(before)}
-    facts["are finite"] = bool(np.isfinite(strands()).all())
+    facts["stay finite"] = bool(np.isfinite(strands()).all())
     picture("combed_styled")
 
 

@@ -333,7 +333,7 @@ def state_after_load():
 
 
 PARTS = {"play": (hair_on_a_swinging_ball, played, jumped_back, undone), "bake": (baked, stopped)}
-PARTS["end"] = (loaded, ended, deleted, disabled)
+PARTS |= {"end": (loaded, ended), "vanish": (deleted, disabled)}
 
 
 def go_on():
