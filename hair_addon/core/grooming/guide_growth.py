@@ -22,7 +22,7 @@ TURNING = 10.0  # how far full gravity bends a guide: the angle to the ground, a
 CLEARANCE = 0.03  # how far above the surface a guide slides, by its length
 RISE = 0.5  # how fast a guide may leave the surface at its root, by its length
 LEAST_RISE = 0.05  # of guides that begin flat on it
-LEVEL = 0.04  # sine of the slope on which guides that fall begin half upright, as it hardly says which way
+LEVEL = 0.01  # sine of the slope on which guides that fall begin half upright, as it hardly says which way
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
 
 
