@@ -205,7 +205,7 @@ def focus():
     for name in ("sharp", "blurred"):
         scene().camera.data.dof.use_dof = name == "blurred"
         yield
-        take_picture(OUT / f"{name}.png")
+        take_picture(OUT / f"{name}.png", redraws=7)
     left, bottom, width, height = rectangle(region)
     rows, columns = slice(bottom + height // 4, bottom + 3 * height // 4), slice(left, left + width)
     shown = [pixels_of(OUT / f"{name}.png")[rows, columns].max(axis=-1) > 0.05 for name in ("sharp", "blurred")]

@@ -94,7 +94,7 @@ def import_head():
     return head
 
 
-def take_picture(path, redraws=7):
+def take_picture(path, redraws=1):
     """Redraw until nothing is refined any more, and write a picture of the whole screen."""
     with in_viewport():
         bpy.ops.wm.redraw_timer(type="DRAW_WIN", iterations=redraws)
