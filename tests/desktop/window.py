@@ -35,10 +35,13 @@ def addon():
 def refine_to(sample_count=2):
     """Viewports draw so many samples of each pixel's hair, and one of all else: each is a redraw of its own.
 
-    For drivers without a GPU; once the add-on is installed, in each Blender of a walk.
+    For drivers without a GPU, which take as long for shadow maps, so these are small too; once the add-on is installed,
+    in each Blender of a walk.
     """
     bpy.context.preferences.system.viewport_aa = "OFF"
     addon().render.viewport.hair_picture.SAMPLE_COUNT = sample_count
+    addon().gpu.scene_lights._MAP_SIZE = 256
+    addon().gpu.ambient_visibility._SIZE, addon().gpu.ambient_visibility._LEAST_STRANDS = 64, 600
 
 
 def window():
