@@ -17,10 +17,16 @@ const float EVEN = 0.25;
 // Variance of light, by that squared, which is left to the mean over blocks and passes.
 const float NOISE = 2e-3;
 
-// The triangle of this surface in a sample. Those of others, hair, and nothing at all are beyond the count either way.
+// The triangle of this surface in a sample. Those of others, hair, and nothing at all are beyond its triangles.
 uint triangle_at(ivec2 place)
 {
   return texelFetch(segments, place, 0).r - (NO_SEGMENT + 1u + uint(first_triangle));
+}
+
+// Whether a triangle has the material that is shaded.
+bool is_of_part(uint triangle)
+{
+  return triangle - uint(part_triangle) < uint(triangle_count);
 }
 
 float depth_of_sample(ivec2 place)
@@ -76,7 +82,7 @@ void main()
   for (int index = 0; index < SIDE * SIDE; index++) {
     ivec2 place = sample_of(corner, index);
     bool is_inside = all(greaterThanEqual(place, ivec2(0))) && all(lessThan(place, size));
-    waiting |= (is_inside && triangle_at(place) < uint(triangle_count)) ? 1 << index : 0;
+    waiting |= (is_inside && is_of_part(triangle_at(place))) ? 1 << index : 0;
   }
   bool is_first = true;
   bool is_quiet = false;

@@ -36,7 +36,8 @@ def shading_program():
     for slot, name in enumerate(("segments", "depths"), start=_declare_material(info)):
         info.sampler(slot, "UINT_2D", name)
     info.image(0, scene_programs.PICTURE_FORMAT, "FLOAT_2D", "picture", qualifiers={"READ", "WRITE"})
-    for name in ("first_triangle", "triangle_count", "window_left", "window_bottom", "is_coarse", "has_over"):
+    numbers = "first_triangle", "part_triangle", "triangle_count", "window_left", "window_bottom"
+    for name in (*numbers, "is_coarse", "has_over"):
         info.push_constant("INT", name)
     return compile_compute(info, "surface.comp")
 

@@ -22,12 +22,12 @@ def shade(surface, parts, first_triangle, view, lights, samplers, buffer, pictur
     blocks = {"view": uniforms.uniform_buffer(placed), "lights": uniforms.uniform_buffer(lights)}
     to_clip = (placed["object_to_world"].astype(np.float64) @ placed["world_to_clip"]).T
     samplers = surface.samplers | samplers | {"segments": buffer.segments, "depths": buffer.nearest_depths()}
-    constants = {"is_coarse": int(buffer.is_coarse), "has_over": int(has_over)}
+    constants = {"is_coarse": int(buffer.is_coarse), "has_over": int(has_over), "first_triangle": first_triangle}
     for first, count, material in parts:
         left, bottom, *size = windows.of_box(surface.bounds_of(first, count), to_clip, buffer.size)
         if not all(size):
             continue
-        constants |= {"first_triangle": first_triangle + first // 3, "triangle_count": count // 3}
+        constants |= {"part_triangle": first // 3, "triangle_count": count // 3}
         constants |= {"window_left": left, "window_bottom": bottom}
         with drawing.bound(program, blocks, samplers | _of_material(blocks, material)):
             program.image("picture", picture)

@@ -320,6 +320,27 @@ def test_samples_share_light_of_their_own_surface_alone(stage):
     np.testing.assert_allclose(shared, alone, atol=2e-3)
 
 
+def test_slots_of_like_materials_change_nothing(stage):
+    """On a surface that is bent, where each sample has a shade of its own; those that share light differ by little."""
+    bpy.ops.mesh.primitive_uv_sphere_add(segments=16, ring_count=8, radius=0.8)
+    ball = bpy.context.object
+    ball.data.shade_smooth()
+    for _slot in range(3):
+        material_of(ball, Base_Color=(0.8, 0.5, 0.2, 1.0), Roughness=0.6)
+    sun(math.radians(60.0), 0.0, math.radians(30.0))
+    slots = np.random.default_rng(1).integers(0, 3, len(ball.data.polygons)).astype(np.int32)
+    seen = []
+    for indices in (0 * slots, slots):
+        ball.data.polygons.foreach_set("material_index", indices)
+        ball.data.update()
+        depsgraph = bpy.context.evaluated_depsgraph_get()
+        drawn = drawn_scene.read(stage, bpy.context.view_layer, depsgraph)
+        view = drawing.pass_record(*read_camera(stage, depsgraph, 4 * SIZE, 4 * SIZE), (4 * SIZE, 4 * SIZE), 1)
+        seen.append([samples_of(drawn, view, is_coarse) for is_coarse in (False, True)])
+    np.testing.assert_allclose(seen[1][0], seen[0][0], atol=1e-3)
+    assert np.abs(seen[1][1] - seen[0][0]).mean() < 3e-3
+
+
 def test_light_that_samples_share_is_as_bright_below_hair(stage):
     """Where places are looked for hair at random, those that find none are not taken for the others."""
     material_of(plane(), Base_Color=(0.6, 0.5, 0.4, 1.0))
