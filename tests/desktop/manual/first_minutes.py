@@ -120,7 +120,7 @@ def open_head():
         bpy.ops.object.shade_smooth()
     mask_scalp(head)
     if MORE:
-        face.dress(head, (1.0, -0.8, 0.85))
+        face.dress(head, (0.4, -1.0, 0.78))
         face.light()
         viewport()[0].spaces.active.overlay.show_extras = False  # lamps and the camera
     look_at(head, (0.75, -1.0, 0.25), 0.55)
