@@ -17,7 +17,7 @@ const float EVEN = 0.25;
 // Variance of light, by that squared, which is left to the mean over blocks and passes.
 const float NOISE = 2e-3;
 
-// The triangle of this surface in a sample. Those of others, hair, and nothing at all are beyond its triangles.
+// The triangle of this surface in a sample. Other surfaces, hair and empty samples give numbers beyond its triangles.
 uint triangle_at(ivec2 place)
 {
   return texelFetch(segments, place, 0).r - (NO_SEGMENT + 1u + uint(first_triangle));

@@ -22,7 +22,7 @@ TURNING = 10.0  # how far full gravity bends a guide: the angle to the ground, a
 CLEARANCE = 0.03  # how far above the surface a guide slides, by its length
 RISE = 0.5  # how fast a guide may leave the surface at its root, by its length
 LEAST_RISE = 0.05  # of guides that begin flat on it
-LEVEL = 0.01  # sine of the slope on which guides that fall begin half upright, as it hardly says which way
+LEVEL = 0.01  # sine of the slope at which draped guides begin half upright: level ground has no downhill
 DOWN = wp.constant(wp.vec3(0.0, 0.0, -1.0))
 
 
@@ -44,7 +44,7 @@ def grow(
     """Control points (G, control_point_count, 3) float32 [m] of guides on a checked mesh.
 
     length [m]; length_variation: each guide's length is multiplied by a random number within 1 ± this; tilt [rad]:
-    largest random angle to the smooth normal; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z);
+    largest random angle to the direction that a guide begins in; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z);
     flow: lines along which guides begin instead, at the angle lift [rad] to the surface, or None; is_draped: whether
     guides fall once they are grown, and so begin downhill where no lines are, at that angle (`downhill`).
     A guide keeps its length while it bends, and slides over the surface where it would sink into it.
@@ -83,15 +83,15 @@ def grow(
 
 
 def downhill(root_normals: np.ndarray, lift: float, gravity: float) -> np.ndarray:
-    """Unit (G, 3) directions in which guides lie that fall: those of neighbors agree, so that they part nowhere but at
-    the summit, as at the whorl of a scalp.
+    """Unit (G, 3) directions that draped guides begin in. Neighbors agree, so hair parts only at the summit, as at the
+    whorl of a scalp.
 
-    root_normals: unit (G, 3); lift: angle [rad] to the surface; gravity as in `grow`: without it, they stand upright.
-    Where the surface is level a guide stands upright, and below an overhang none begins beyond straight down.
+    root_normals: unit (G, 3); lift: angle [rad] to the surface; gravity: as in `grow`, without it guides stand upright.
+    Guides also stand upright on level ground, and below an overhang they turn no further than straight down.
     """
     steepest = np.array([0.0, 0.0, -1.0]) + root_normals[:, 2:] * root_normals
     slope = np.linalg.norm(steepest, axis=1)
-    # As far as gravity turns a guide that begins level: TURNING.
+    # Gravity turns guides by the same law while they grow.
     share = slope**2 / (slope**2 + LEVEL**2) * (1.0 - np.exp(-TURNING * gravity))
     turned = np.minimum(share * (0.5 * np.pi - lift), np.arccos(np.clip(-root_normals[:, 2], -1.0, 1.0)))
     along = steepest / np.maximum(slope, 1e-12)[:, None]
