@@ -44,9 +44,10 @@ def grow(
     """Control points (G, control_point_count, 3) float32 [m] of guides on a checked mesh.
 
     length [m]; length_variation: each guide's length is multiplied by a random number within 1 ± this; tilt [rad]:
-    largest random angle to the direction that a guide begins in; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z);
-    flow: lines along which guides begin instead, at the angle lift [rad] to the surface, or None; is_draped: whether
-    guides fall once they are grown, and so begin downhill where no lines are, at that angle (`downhill`).
+    largest random angle to the direction that a guide would begin in, the smooth normal if neither flow nor is_draped
+    says otherwise; gravity in [0, 1]: none, to nearly all the way down by the tip (-Z); flow: lines along which guides
+    begin, at the angle lift [rad] to the surface, or None; is_draped: whether guides fall once they are grown, and so
+    begin downhill where there are no lines, at the same angle (`downhill`).
     A guide keeps its length while it bends, and slides over the surface where it would sink into it.
     """
     random = np.random.Generator(np.random.PCG64(seed)).random((len(roots), 3))
