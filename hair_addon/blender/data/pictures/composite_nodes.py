@@ -106,12 +106,17 @@ def _is_hair(node):
 
 def _rendered(tree, blender_scene):
     """The Render Layers node of a scene whose image is used; of several that of the view layer that a set shows."""
-    shown = next((layer.name for layer in blender_scene.view_layers if layer.use), "")
     layers = [n for n in tree.nodes if n.bl_idname == "CompositorNodeRLayers" and n.scene == blender_scene]
     used = [node for node in layers if node.outputs["Image"].links]
     if not used:
         raise HairError("The compositor does not use the image of this scene's Render Layers: add and link them.")
-    return next((node for node in used if node.layer == shown), used[0])
+    return next((node for node in used if node.layer == _shown_layer(blender_scene)), used[0])
+
+
+def _shown_layer(blender_scene):
+    """The name of the first view layer that is rendered, of the first where none is."""
+    layers = blender_scene.view_layers
+    return next((layer.name for layer in layers if layer.use), layers[0].name)
 
 
 def _new_tree(blender_scene):
@@ -120,6 +125,7 @@ def _new_tree(blender_scene):
     tree.interface.new_socket("Image", in_out="OUTPUT", socket_type="NodeSocketColor")
     rendered, output = tree.nodes.new("CompositorNodeRLayers"), tree.nodes.new("NodeGroupOutput")
     rendered.scene, output.location = blender_scene, (700.0, 0.0)
+    rendered.layer = _shown_layer(blender_scene)
     tree.links.new(rendered.outputs["Image"], output.inputs["Image"])
     return tree
 

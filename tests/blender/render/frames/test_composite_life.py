@@ -109,6 +109,18 @@ def test_hair_is_laid_over_the_view_layer_that_it_is_rendered_with(composited):
     assert shaded.from_node.layer == first
 
 
+def test_the_first_view_layer_that_is_rendered_has_the_surfaces(composited):
+    bpy.ops.vellus.toggle_composite()
+    scene = bpy.context.scene
+    scene.view_layers.new("Front")
+    scene.view_layers[0].use = False
+    assert scene.compositing_node_group is None
+    bpy.ops.vellus.toggle_composite()
+    nodes = scene.compositing_node_group.nodes
+    (rendered,) = [n for n in nodes if n.bl_idname == "CompositorNodeRLayers" and n.scene == scene]
+    assert rendered.layer == "Front"
+
+
 def test_frames_that_are_not_baked_are_refused_in_the_hair_s_scene_too(composited, tmp_path, capfd):
     """And a window says so after the render, which Blender does not."""
     scene = bpy.context.scene
