@@ -3,11 +3,12 @@
 // to where a light grazes a surface.
 
 #include "include/arrival.glsl"
+#include "include/drawn_normal.glsl"
 #include "include/surface_visibility.glsl"
 
 void main()
 {
-  vec3 N = normalize(gl_FrontFacing ? surface_normal : -surface_normal);
+  vec3 N = drawn_normal();
   vec3 sent = vec3(0.0);
   vec3 arriving = vec3(0.0);
   vec2 turn = sample_turn(picture_place(ivec2(gl_FragCoord.xy)));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The point of a surface that is drawn as triangles.
 
+#include "include/drawn_normal.glsl"
 #include "include/surface_point.glsl"
 #include "include/surface_material.glsl"
 
@@ -11,7 +12,7 @@ SurfacePoint drawn_point()
   point.uv = surface_uv;
   point.uv_right = dFdx(surface_uv);
   point.uv_up = dFdy(surface_uv);
-  vec3 N = normalize(gl_FrontFacing ? surface_normal : -surface_normal);
+  vec3 N = drawn_normal();
   vec3 map = normal_map(point.uv, point.uv_right, point.uv_up);
   point.N = mapped_normal(N, map, dFdx(drawn_position), dFdy(drawn_position), point.uv_right, point.uv_up);
   point.normal_variance = normal_variance(dFdx(N), dFdy(N), map);

@@ -6,8 +6,8 @@
 #include "include/surface_material.glsl"
 
 // Perspective-correct barycentric coordinates at a place of the picture, from -1 to 1, of a triangle in clip space, which
-// may reach behind the viewer [Olano97]. facing: its signed area, positive if the front is seen. Corners are taken relative
-// to the place, so that rounding errors are as small as the triangle.
+// may reach behind the viewer [Olano97]. facing: its signed area, positive if the front is seen in a view that is not
+// mirrored. Corners are taken relative to the place, so that rounding errors are as small as the triangle.
 vec3 barycentrics_at(vec4 clip[3], vec2 place, out float facing)
 {
   vec2 away[3];
@@ -68,9 +68,9 @@ SurfacePoint found_point(int triangle, vec2 place, vec2 size, out vec2 depth_ste
   point.uv_up = uvs * up - point.uv;
   point.seen_x_y = seen_x_y * barycentrics;
   point.seen_z = seen_z * barycentrics;
-  float side = (facing > 0.0) ? 1.0 : -1.0;
   vec3 first = positions[1] - positions[0];
   vec3 second = positions[2] - positions[0];
+  float side = ((facing > 0.0) != (view.is_mirrored != 0)) ? 1.0 : -1.0;
   vec2 first_uv = uvs[1] - uvs[0];
   vec2 second_uv = uvs[2] - uvs[0];
   vec3 N = side * unit(corner_normals * barycentrics);

@@ -29,7 +29,7 @@ bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
 // Visibility of the light past surfaces: the upper bound of the part with a greater depth [Donnelly06].
 float lit_part(vec3 at, float depth, float bias)
 {
-  vec2 moments = textureLod(surface_moments, at, 0.0).rg;
+  vec3 moments = textureLod(surface_moments, at, 0.0).rgb;
   // Surfaces are no farther in the maps either: they would be in their own shadow.
   float warped = warped_depth(min(depth, FAR_SURFACE) - bias);
   float behind = warped - moments.x;
@@ -37,7 +37,16 @@ float lit_part(vec3 at, float depth, float bias)
   float variance = max(moments.y, rounding * rounding);
   // Where one surface is behind another, the bound is not tight: its tail is cut off.
   float part = clamp((variance / (variance + behind * behind) - 0.05) / 0.95, 0.0, 1.0);
+  // The mean around the bend that a surface has in the maps there is nearer than the surface.
+  part = mix(part, 1.0, smoothstep(FAR_SURFACE - 0.1, FAR_SURFACE - 0.04, min(depth, moments.b)));
   return (behind <= 0.0) ? 1.0 : part;
+}
+
+// Part of the shadow of surfaces that is left towards the border of a light's maps, beyond which there is none.
+float inside_part(vec2 at)
+{
+  vec2 inside = min(at, vec2(1.0) - at);
+  return smoothstep(0.0, 0.06, min(inside.x, inside.y));
 }
 
 // What a strand adds to the counts of a map at its own axis, the mean over the places of the axis within a texel:

@@ -83,7 +83,7 @@ SurfaceVisibility surface_visibility(Light light, vec3 position, vec3 N, vec3 fo
   vec2 aside = turn;
   float away = FIRST_DISTANCE;
   // The maps of surfaces are blurred already. Beside the place they would be those of another depth.
-  float lit = lit_part(at, depth, SURFACE_BIAS);
+  float lit = mix(1.0, lit_part(at, depth, SURFACE_BIAS), inside_part(at.xy));
   vec3 sum = vec3(0.0);
   float squares = 0.0;
   for (int tap = 0; tap < TAP_COUNT; tap++) {

@@ -97,7 +97,8 @@ def measure(drawn, frame, points, radii):
         frame.wait()
 
     def see_world():
-        seen = ambient_visibility.measure([(uploaded[0], to_world)], [surface for surface, _ in drawn.surfaces], [0.6])
+        surfaces = [surface for surface, _parts in drawn.surfaces]
+        seen = ambient_visibility.measure([(uploaded[0], to_world)], surfaces, [0.6], surfaces)
         frame.wait()
         return seen
 

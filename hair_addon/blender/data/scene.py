@@ -315,10 +315,9 @@ def read_camera(scene, depsgraph, width, height, camera=None, eye=None):
     if shift:
         moved = 2.0 * shift * _shift_unit(render, camera.data, width, height) / width  # in clip space
         view_to_clip = Matrix(((1, 0, 0, -moved), (0, 1, 0, 0), (0, 0, 1, 0), (0, 0, 0, 1))) @ view_to_clip
-    # The scale of a camera object does not affect the view.
-    location, rotation, _scale = to_world.decompose()
-    view_to_world = rotation.to_matrix().to_4x4()
-    view_to_world.translation = location
+    # The size of a camera object does not affect the view, but what is mirrored sees a mirrored picture.
+    view_to_world = to_world.to_3x3().normalized().to_4x4()
+    view_to_world.translation = to_world.translation
     if not can_be_drawn(camera, camera.matrix_world, view_to_clip):
         sentence = 'The camera "{name}" has a non-finite transform or lens: correct its values.'
         raise HairError(sentence, name=name_of(camera))

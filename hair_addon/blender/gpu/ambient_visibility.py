@@ -19,11 +19,11 @@ _POINT_COUNT, _LEAST_STRANDS = 11, 10_000
 _FULL_WIDTH = 0.5  # texels that a strand may be wide that is drawn for several
 
 
-def measure(hair, surfaces, opacities, clear=(), forwards=None):
+def measure(hair, blockers, opacities, surfaces, forwards=None):
     """Visibility textures {sampler: texture} of each strands and of each surface: two lists.
 
-    hair: [(StrandsOnGPU, object to world)]; surfaces: [SurfaceOnGPU]; opacities: of each hair's strands, for which its
-    visibility holds; the surfaces' is for the densest; clear: surfaces that hide nothing, which follow the others;
+    hair: [(StrandsOnGPU, object to world)]; blockers: [SurfaceOnGPU] that hide the world; opacities: of each hair's
+    strands, for which its visibility holds; the surfaces' is for the densest; surfaces: [SurfaceOnGPU] that see it;
     forwards: what a strand of each hair passes on, (3,) each, None: the same of all channels, by the opacities.
     """
     if forwards is None:
@@ -31,8 +31,8 @@ def measure(hair, surfaces, opacities, clear=(), forwards=None):
     of_strands = list(zip(opacities, forwards, strict=True))
     lights = _suns(ambient_cube.DIRECTIONS, ambient_cube.WEIGHTS)
     maps = shadows.ShadowMaps(_SIZE, len(ambient_cube.DIRECTIONS))
-    maps.draw(lights, hair, surfaces, _steps(hair))
-    targets = [_Target(place, not _is_surface(place)) for place in _places(hair, [*surfaces, *clear], of_strands)]
+    maps.draw(lights, hair, blockers, _steps(hair))
+    targets = [_Target(place, not _is_surface(place)) for place in _places(hair, surfaces, of_strands)]
     for target in targets:
         target.add(lights, maps.samplers)
     return _split([target.textures for target in targets], len(hair))
@@ -49,19 +49,19 @@ class Renewal:
         self._maps = shadows.ShadowMaps(_SIZE, len(ambient_cube.DIRECTIONS))  # of all, whose surfaces may stay
         self._targets, self._turn = [], 0
 
-    def step(self, seen, hair, surfaces, through, clear=()):
+    def step(self, seen, hair, blockers, through, surfaces):
         """Add a direction; the visibility textures that are complete now, as `measure` returns them.
 
         seen: those that were complete before, of as many places; through: (opacity, what is passed on (3,)) of each
         hair; the rest as for `measure`.
         """
-        places = _places(hair, [*surfaces, *clear], through)
+        places = _places(hair, surfaces, through)
         if [target.size for target in self._targets] != [_size_of(*place) for place in places]:
             self._targets, self._turn = [_Target(place) for place in places], 0
         for target, place in zip(self._targets, places, strict=True):
             target.view, target.places = place
         turn = self._turn
-        self._maps.draw(self._lights, hair, surfaces, _steps(hair), is_steady=True, chosen=turn)
+        self._maps.draw(self._lights, hair, blockers, _steps(hair), is_steady=True, chosen=turn)
         one = self._lights.copy()
         one["count"], one["light"][0] = 1, self._lights["light"][turn]
         for target in self._targets:

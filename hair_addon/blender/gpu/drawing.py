@@ -43,6 +43,7 @@ def view_record(world_to_view, view_to_clip, height, least_width=0.0):
     view_to_world = np.linalg.inv(world_to_view)
     record["world_to_clip"] = (view_to_clip @ world_to_view).T
     record["is_perspective"] = view_to_clip[3, 3] == 0.0
+    record["is_mirrored"] = np.linalg.det(view_to_world[:3, :3]) < 0.0
     backwards = view_to_world[:3, 2]
     record["eye"][:3] = view_to_world[:3, 3] if record["is_perspective"] else backwards / np.linalg.norm(backwards)
     record["pixels_per_unit"] = 0.5 * height * view_to_clip[1, 1]

@@ -9,6 +9,7 @@ from mathutils import Euler, Matrix
 
 from ...core.imaging import lamps
 from ..data.pictures import light_linking
+from ..data.pictures.rendered_instances import is_rendered
 from ..host import scene_time
 from ..host.caches import Cache
 from ..host.notices import can_be_drawn
@@ -29,7 +30,7 @@ def read_lights(depsgraph, for_render):
     """
     lights, links = [], []
     for instance in depsgraph.object_instances:
-        if instance.object.type == "LIGHT" and _shines(instance.object, for_render):
+        if instance.object.type == "LIGHT" and _shines(instance, for_render):
             with np.errstate(all="ignore"):  # such values are checked below
                 light = _read_light(instance.object.data, np.array(instance.matrix_world))
             if can_be_drawn(instance.object, *(light[name] for name in light.dtype.names)):
@@ -38,8 +39,8 @@ def read_lights(depsgraph, for_render):
     return np.array(lights, uniforms.LIGHT.dtype), links
 
 
-def _shines(light_object, for_render):
-    return not (for_render and light_object.hide_render) and any(getattr(light_object, rays) for rays in _RAYS)
+def _shines(instance, for_render):
+    return (not for_render or is_rendered(instance)) and any(getattr(instance.object, rays) for rays in _RAYS)
 
 
 def _read_light(light, matrix):
@@ -124,12 +125,13 @@ class World:
         return (*self.color, image.session_uid, self.frame, *read_as, self.to_image.tobytes(), self.is_mirror_ball)
 
 
-def read_world(scene):
-    """The `World` of a scene. Nodes that are not understood count as the world's colour in the viewport.
+def read_world(scene, view_layer=None):
+    """The `World` of a scene, or of a view layer that overrides it.
 
-    A world with non-finite values is black, with a message.
+    Nodes that are not understood count as the world's colour in the viewport. A world with non-finite values is black,
+    with a message.
     """
-    world = scene.world
+    world = (view_layer and view_layer.world_override) or scene.world
     if world is None:
         return World(np.zeros(3))
     with np.errstate(all="ignore"):

@@ -70,6 +70,7 @@ VIEW = Block(
         "hair_forward": "vec4",  # what one strand passes on of the light that meets it
         "hair_reflectance": "vec4",  # of infinitely many strands
         "is_perspective": "int",
+        "is_mirrored": "int",  # whether a picture shows left as right: triangles turn their other side to the front
         "point_count": "int",
         "drawn_points": "int",  # of each strand's points, evenly chosen: at least two
         "strand_count": "int",

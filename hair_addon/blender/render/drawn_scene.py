@@ -31,7 +31,7 @@ class DrawnScene:
     """Read once by `read`, drawn from any number of views until something moves."""
 
     hair: list  # (StrandsOnGPU, Shading, object to world, part in viewports)
-    surfaces: list  # (SurfaceOnGPU, parts of a `DrawnMesh`, None of a holdout)
+    surfaces: list  # that are seen: (SurfaceOnGPU, parts of a `DrawnMesh`, None of a holdout)
     lights: np.ndarray  # uniforms.LIGHTS: of all, as far as they are drawn one by one
     world: light_door.World
     shadow_maps: ShadowMaps | None  # None in a viewport without hair
@@ -42,14 +42,25 @@ class DrawnScene:
     selected: tuple = ()  # whether that object is selected
     instances: tuple = ()  # of hair, as `hair_places.read_instances` found them
     surface_owners: tuple = ()  # `drawn_meshes.owner_of` each surface
-    # (corner positions, their normals, `triangle_materials`) of each of `surfaces`, of a render
-    meshes: tuple = ()
     clear: tuple = ()  # as `surfaces`, of those that hide nothing
+    blockers: tuple = ()  # `Blocker`s: surfaces that stop light, seen or not
     lamps: scene_lights.SceneLights | None = None
     receivers: tuple = ()  # `scene_lights.Receiver` of `surfaces`, then of `clear`
     renewal: ambient_visibility.Renewal | None = None  # of the visibility textures, while hair moves
     hair_lights: np.ndarray | None = None  # uniforms.LIGHTS of each of the hair; None: of all
     surface_lights: np.ndarray | None = None  # the same of `surfaces`, then of `clear`
+
+
+@dataclass(frozen=True, eq=False)
+class Blocker:
+    """A surface that stops light. owner: of its `scene_lights.Receiver`; mesh: (corner positions, their normals,
+    `triangle_materials`) in a render; is_seen: whether a camera sees it.
+    """
+
+    surface: surface_textures.SurfaceOnGPU
+    owner: tuple
+    mesh: tuple | None = None
+    is_seen: bool = True
 
 
 _EMPTY = DrawnScene([], [], uniforms.LIGHTS.record(), light_door.World(np.zeros(3)), None, [], [])
@@ -73,7 +84,6 @@ def read(
     changed, and nothing else; is_draft: hair is about to change again, and shadows may be coarse; is_hair_only: whether
     Blender draws the rest of a viewport; former: the `DrawnScene` of the frame before of an animation that plays.
     """
-    corners = () if before is None else before.meshes
     # Where only the geometry of hair has changed, instances are where they were.
     instances = hair_places.read_instances(depsgraph, viewport) if before is None else before.instances
     hair, places = _read_hair(hair_places.hair_places(view_layer, viewport, instances), viewport, refused)
@@ -84,15 +94,12 @@ def read(
         is_shaded = viewport is None or not is_hair_only
         has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # by which hair's shadow falls on them
         meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
-        surfaces, clear, receivers = _upload(meshes, is_shaded)
-        if viewport is None:
-            corners = _corners_of(meshes)
-        surface_owners = tuple(mesh.owner for mesh in meshes if not (is_shaded and mesh.is_clear))
-        world = light_door.read_world(blender_scene)
+        shown = _upload(meshes, is_shaded, has_paths=viewport is None)
+        world = light_door.read_world(blender_scene, view_layer)
         lamps = maps = None
     else:
-        surfaces, clear, surface_owners = before.surfaces, before.clear, before.surface_owners
-        receivers, world, lamps, maps = before.receivers, before.world, before.lamps, before.shadow_maps
+        shown = {name: getattr(before, name) for name in _SHOWN}
+        world, lamps, maps = before.world, before.lamps, before.shadow_maps
     hair_receivers = _hair_receivers(hair, [(place.owner, place.hair_object.session_uid) for place in places])
     if lamps is None:
         found = light_door.read_lights(depsgraph, for_render=viewport is None)
@@ -106,28 +113,22 @@ def read(
     if before is None and last is not None and _fit(last.shadow_maps, lamps):
         maps = last.shadow_maps
     renewal = None
-    if is_draft and last is not None and _have_same_places(last, hair, (*surfaces, *clear)):
+    drawn = replace(_EMPTY, hair=hair, world=world, **shown)
+    if is_draft and last is not None and _have_same_places(last, drawn):
         seen = last.hair_visibility, last.surface_visibility
         if are_made:
             renewal = last.renewal or ambient_visibility.Renewal()
-            seen = _renewed(renewal, seen, hair, surfaces, clear)
+            seen = _renewed(renewal, seen, drawn)
     else:
-        seen = visibility(hair, surfaces, clear)
+        seen = visibility(drawn)
     owners, selected = tuple(place.owner for place in places), tuple(place.is_selected for place in places)
     drawn = replace(
-        _EMPTY,
-        hair=hair,
-        surfaces=surfaces,
-        world=world,
+        drawn,
         hair_visibility=seen[0],
         surface_visibility=seen[1],
         owners=owners,
         selected=selected,
         instances=instances,
-        surface_owners=surface_owners,
-        meshes=corners,
-        clear=clear,
-        receivers=receivers,
         renewal=renewal,
     )
     return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
@@ -148,11 +149,10 @@ def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
     are_made: whether a graphics card makes or carries hair, or would.
     """
     maps = maps or scene_lights.new_maps(lamps.record)
-    placed, solid = _placed(drawn.hair), [surface for surface, _parts in drawn.surfaces]
+    placed, solid = _placed(drawn.hair), _blocking(drawn)
     hair_owners = [receiver.owner for receiver in hair_receivers]
-    surface_owners = [receiver.owner for receiver in drawn.receivers[: len(solid)]]
     steps = _DRAFT_STEPS if is_draft and not are_made else _SHADOW_STEPS
-    casters = lamps.casters(placed, hair_owners, solid, surface_owners)
+    casters = lamps.casters(placed, hair_owners, solid, [blocker.owner for blocker in drawn.blockers])
     # Where strands are made, what is drawn at rest is what was drawn while they moved.
     maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or are_made)
     own = {}
@@ -177,10 +177,10 @@ def read_render(depsgraph, known, refused):
     still is not uploaded again.
     """
     unlit = read_unlit(depsgraph, known, refused)
-    world = light_door.read_world(depsgraph.scene_eval)
+    world = light_door.read_world(depsgraph.scene_eval, depsgraph.view_layer_eval)
     hair_receivers = _hair_receivers(unlit.hair, [owner[1::-1] for owner in unlit.owners])
     lamps = scene_lights.gather(*light_door.read_lights(depsgraph, for_render=True), world, hair_receivers)
-    hair_seen, surfaces_seen = visibility(unlit.hair, unlit.surfaces, unlit.clear)
+    hair_seen, surfaces_seen = visibility(unlit)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
     return _lit(drawn, lamps, None, hair_receivers)
 
@@ -192,42 +192,42 @@ def read_unlit(depsgraph, known, refused):
     if depsgraph.scene.vellus.is_hair_only:
         meshes = drawn_meshes.held_out(meshes)
     hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)
-    surface_owners = tuple(mesh.owner for mesh in meshes if not mesh.is_clear)
-    surfaces, clear, receivers = _upload(meshes, is_shaded=True)
-    return replace(
-        _EMPTY,
-        hair=hair,
-        surfaces=surfaces,
-        clear=clear,
-        receivers=receivers,
-        owners=owners,
-        surface_owners=surface_owners,
-        meshes=_corners_of(meshes),
-    )
+    return replace(_EMPTY, hair=hair, owners=owners, **_upload(meshes, is_shaded=True, has_paths=True))
 
 
-def _corners_of(meshes):
-    """`DrawnScene.meshes`."""
-    return tuple((mesh.positions, mesh.corner_normals, mesh.triangle_materials) for mesh in meshes if not mesh.is_clear)
+_SHOWN = ("surfaces", "clear", "receivers", "surface_owners", "blockers")
 
 
-def _upload(meshes, is_shaded):
-    """(surfaces, those that are clear, receivers) of a `DrawnScene`; is_shaded: whether they are seen as we shade."""
-    uploaded = {False: [], True: []}
+def _upload(meshes, is_shaded, has_paths):
+    """{name of `_SHOWN`: value} of `DrawnMesh`es.
+
+    is_shaded: whether they are seen as we shade; has_paths: whether paths of light will meet them.
+    """
+    uploaded, blockers = {False: [], True: []}, []
     for mesh in meshes:
-        places = scene_lights.places_on_surface(mesh.vertices, mesh.triangles, mesh.to_world)
-        receiver = scene_lights.Receiver(mesh.owner[1::-1], places)
-        uploaded[is_shaded and mesh.is_clear].append(((_on_gpu(mesh), mesh.parts), receiver))
-    solid, clear = ([surface for surface, _receiver in uploaded[is_clear]] for is_clear in (False, True))
-    receivers = tuple(receiver for is_clear in (False, True) for _surface, receiver in uploaded[is_clear])
-    return solid, tuple(clear), receivers
+        is_clear, surface = is_shaded and mesh.is_clear, _on_gpu(mesh)
+        if mesh.is_seen:
+            places = scene_lights.places_on_surface(mesh.vertices, mesh.triangles, mesh.to_world)
+            receiver = scene_lights.Receiver(mesh.owner[1::-1], places)
+            uploaded[is_clear].append(((surface, mesh.parts), receiver, mesh.owner))
+        if mesh.casts_shadow and not is_clear:
+            met = (mesh.positions, mesh.corner_normals, mesh.triangle_materials) if has_paths else None
+            blockers.append(Blocker(surface, mesh.owner[1::-1], met, mesh.is_seen))
+    solid, clear = uploaded.values()
+    return {
+        "surfaces": [surface for surface, _receiver, _owner in solid],
+        "clear": tuple(surface for surface, _receiver, _owner in clear),
+        "receivers": tuple(receiver for _surface, receiver, _owner in (*solid, *clear)),
+        "surface_owners": tuple(owner for _surface, _receiver, owner in solid),
+        "blockers": tuple(blockers),
+    }
 
 
 def _on_gpu(mesh):
     """The `SurfaceOnGPU` of a `DrawnMesh`: of what was drawn of its object before, what is the same stays."""
-    uid, cache = mesh.owner[0], surface_textures.surface_cache
+    key, cache = (mesh.owner[0], mesh.is_clear), surface_textures.surface_cache
     return cache.keep(
-        uid,
+        key,
         surface_textures.upload_surface(
             mesh.vertices,
             mesh.triangles,
@@ -236,7 +236,7 @@ def _on_gpu(mesh):
             mesh.uvs,
             mesh.colors,
             mesh.to_world,
-            cache.get(uid),
+            cache.get(key),
         ),
     )
 
@@ -245,19 +245,27 @@ def _placed(hair):
     return [(strands, to_world) for strands, _, to_world, *_ in hair]
 
 
-def visibility(hair, surfaces, clear):
+def _blocking(drawn):
+    """[`SurfaceOnGPU`] that stop light."""
+    return [blocker.surface for blocker in drawn.blockers]
+
+
+def _receiving(drawn):
+    """[`SurfaceOnGPU`] that are lit, in the order of `DrawnScene.surface_visibility`."""
+    return [surface for surface, _parts in (*drawn.surfaces, *drawn.clear)]
+
+
+def visibility(drawn):
     """(of hair, of surfaces) of a `DrawnScene`: how much of the world is seen from each place."""
-    opacities = [shading.opacity for _, shading, *_ in hair]
-    forwards = [shading.forward for _, shading, *_ in hair]
-    solid, seen_through = ([surface for surface, _parts in some] for some in (surfaces, clear))
-    return ambient_visibility.measure(_placed(hair), solid, opacities, seen_through, forwards)
+    opacities = [shading.opacity for _, shading, *_ in drawn.hair]
+    forwards = [shading.forward for _, shading, *_ in drawn.hair]
+    return ambient_visibility.measure(_placed(drawn.hair), _blocking(drawn), opacities, _receiving(drawn), forwards)
 
 
-def _renewed(renewal, seen, hair, surfaces, clear):
-    """What `_visibility` returns, with one step of a `Renewal`; seen: before it."""
-    through = [(shading.opacity, shading.forward) for _, shading, *_ in hair]
-    solid, seen_through = ([surface for surface, _parts in some] for some in (surfaces, clear))
-    return renewal.step(seen, _placed(hair), solid, through, seen_through)
+def _renewed(renewal, seen, drawn):
+    """What `visibility` returns, with one step of a `Renewal`; seen: before it."""
+    through = [(shading.opacity, shading.forward) for _, shading, *_ in drawn.hair]
+    return renewal.step(seen, _placed(drawn.hair), _blocking(drawn), through, _receiving(drawn))
 
 
 def _read_rendered_hair(depsgraph, known, refused):
@@ -305,10 +313,8 @@ def _read_hair(places, viewport, refused):
     return hair, drawn_places
 
 
-def _have_same_places(drawn, hair, surfaces):
-    """Whether the visibility textures of a `DrawnScene` have a texel for each place of some hair and surfaces."""
-    sizes, others = ([(one[0].strand_count, one[0].point_count) for one in many] for many in (drawn.hair, hair))
-    corners, other_corners = (
-        [surface.vertex_count for surface, _parts in many] for many in ((*drawn.surfaces, *drawn.clear), surfaces)
-    )
+def _have_same_places(drawn, other):
+    """Whether the visibility textures of a `DrawnScene` have a texel for each place of another's hair and surfaces."""
+    sizes, others = ([(one[0].strand_count, one[0].point_count) for one in many.hair] for many in (drawn, other))
+    corners, other_corners = ([surface.vertex_count for surface in _receiving(many)] for many in (drawn, other))
     return sizes == others and corners == other_corners

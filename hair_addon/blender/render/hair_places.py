@@ -7,6 +7,7 @@ import bpy
 import numpy as np
 
 from ..data import scene
+from ..data.pictures.rendered_instances import is_rendered
 
 
 @dataclass(frozen=True)
@@ -69,8 +70,7 @@ def _instances(depsgraph, viewport):
         hair_object, owner = instance.object.original, instance.parent.original
         if hair_object.data.vellus.kind != "HAIR":
             continue
-        is_rendered = not (hair_object.hide_render or owner.hide_render)
-        if not (is_rendered if viewport is None else owner.visible_in_viewport_get(viewport)):
+        if not (is_rendered(instance) if viewport is None else owner.visible_in_viewport_get(viewport)):
             continue
         matrix = np.array(instance.matrix_world, np.float64)
         yield _Instance(hair_object.session_uid, matrix, owner.session_uid)

@@ -112,7 +112,8 @@ def _surroundings(drawn):
     centre, radius = drawing.bounding_sphere([(strands, to_world) for strands, _shading, to_world, *_ in drawn.hair])
     places = centre + 0.5 * radius * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
     importance = lamps.irradiance(found, places).mean(axis=(1, 2)) if len(found) else np.zeros(0)
-    corners, normals, materials = ([mesh[index] for mesh in drawn.meshes] for index in range(3))
+    corners, normals, materials = ([blocker.mesh[index] for blocker in drawn.blockers] for index in range(3))
+    is_seen = [np.full(len(rows), blocker.is_seen) for rows, blocker in zip(materials, drawn.blockers, strict=True)]
     colors, gloss = np.split(np.concatenate([np.zeros((0, 6)), *materials]), 2, axis=1)
     return light_paths.media.Surroundings(
         np.concatenate([np.zeros((0, 3), np.float32), *corners]),
@@ -122,4 +123,5 @@ def _surroundings(drawn):
         importance,
         world_texture.picture_of(drawn.world),
         gloss,
+        np.concatenate([np.zeros(0, bool), *is_seen]),
     )

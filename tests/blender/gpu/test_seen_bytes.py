@@ -108,7 +108,7 @@ def test_memory_of_visibility_is_as_it_is_counted(scene, rng, point_count):
     """A byte for each of twenty numbers, at every fourth point and the tip."""
     points = rng.random((50, point_count, 3)).astype(np.float32)
     strands = strand_textures.upload_strands(points, np.full((50, point_count), 1e-4, np.float32))
-    (seen,), _surfaces = ambient_visibility.measure([(strands, np.eye(4))], [], [0.5])
+    (seen,), _surfaces = ambient_visibility.measure([(strands, np.eye(4))], [], [0.5], [])
     bytes_each = {"RGBA8": 4}
     held = sum(texture.width * texture.height * bytes_each[texture.format] for texture in seen.values())
     assert held == strand_textures.seen_bytes(strands)

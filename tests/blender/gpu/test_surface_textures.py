@@ -48,8 +48,8 @@ def surfaces():
     """[SurfaceOnGPU] of the scene as a render reads it."""
     bpy.context.view_layer.update()
     meshes = drawn_meshes.read_drawn_meshes(bpy.context.evaluated_depsgraph_get())
-    solid, clear, _receivers = drawn_scene._upload(meshes, is_shaded=True)
-    return [surface for surface, _parts in (*solid, *clear)]
+    shown = drawn_scene._upload(meshes, is_shaded=True, has_paths=False)
+    return [surface for surface, _parts in (*shown["surfaces"], *shown["clear"])]
 
 
 def test_a_pose_uploads_places_and_normals_of_vertices_and_a_turn_nothing(ball, floats):

@@ -65,7 +65,7 @@ def test_a_floor_hides_half_of_the_world_of_every_channel(scene, rng):
     corners = 99.0 * np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, -1, 0], [1, 1, 0], [-1, 1, 0]])
     floor = surface_textures.upload_surface(corners.astype(np.float32), np.arange(6, dtype=np.int32))
     forward = np.array([0.9, 0.5, 0.1])
-    (seen,), _surfaces = ambient_visibility.measure([(hair, np.eye(4))], [floor], [0.5], forwards=[forward])
+    (seen,), _surfaces = ambient_visibility.measure([(hair, np.eye(4))], [floor], [0.5], [], forwards=[forward])
     texture = seen["visibility_channels"]
     found = (np.array(texture.read(), float).reshape(-1, 2, 4)[:50, 1] / 255.0) ** 2  # at the tips
     np.testing.assert_allclose(found[:, :3], np.repeat(found[:, :1], 3, axis=1), atol=1e-3)

@@ -144,7 +144,7 @@ def seen(places, strands=None, opacity=1.0):
     """(N, 6) part of each side that places (N, 3) see among strands (S, P, 3) of radius (S, P)."""
     surface = surface_textures.upload_surface(places.astype(np.float32), np.zeros(3, np.int32))
     hair = [(strand_textures.upload_strands(*strands), np.eye(4))] if strands else []
-    _hair, (found,) = ambient_visibility.measure(hair, [surface], [opacity] * len(hair))
+    _hair, (found,) = ambient_visibility.measure(hair, [surface], [opacity] * len(hair), [surface])
     texels = [np.array(found[name].read()).reshape(-1, 4) for name in ("visibility_x_y", "visibility_z")]
     return np.concatenate([texels[0], texels[1][:, :2]], axis=1)[: len(places)]
 

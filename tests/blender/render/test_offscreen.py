@@ -137,7 +137,7 @@ def test_light_through_curtains_falls_exponentially(scene, sheets):
     maps = shadows.ShadowMaps(512, 1)
     placed = [(strands, np.eye(4)) for strands in (*hair, receiver)]
     maps.draw(lights, placed, [])
-    seen, _none = ambient_visibility.measure([(receiver, np.eye(4))], [], [shading.opacity])
+    seen, _none = ambient_visibility.measure([(receiver, np.eye(4))], [], [shading.opacity], [])
     drawn = [(receiver, shading, np.eye(4), 1.0)]
     radiance = seen_from_behind(drawn_scene.DrawnScene(drawn, [], lights, World(np.zeros(3)), maps, seen, []))
     depth = -np.log(radiance / np.array(settings.diffuse_color))

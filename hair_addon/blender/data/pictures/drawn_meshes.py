@@ -11,6 +11,7 @@ from ...host.caches import Cache
 from ...host.notices import can_be_drawn, name_of
 from .. import scene
 from . import surface_materials
+from .rendered_instances import is_rendered, placed_by
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,8 @@ class DrawnMesh:
 
     to_world: (4, 4), from there to world space [m]; normals: unit, (V, 3) of vertices or (3 F, 3) of corners, in the
     object's coordinates too; uvs: (3 F, 2), None: zero; parts: (first corner, number of corners, `SurfaceMaterial`) of
-    each material. A holdout has none: where it is nearest the picture is empty. owner: `owner_of` it.
+    each material. A holdout has none: where it is nearest the picture is empty. owner: `owner_of` it; is_seen: whether
+    a camera sees it; casts_shadow: whether it stops light.
     """
 
     vertices: np.ndarray
@@ -31,6 +33,8 @@ class DrawnMesh:
     parts: tuple | None
     owner: tuple = ()
     materials: tuple = ()  # (number of corners, `SurfaceMaterial`), in the corners' order: of a holdout too
+    is_seen: bool = True
+    casts_shadow: bool = True
 
     @property
     def positions(self):
@@ -63,8 +67,12 @@ class DrawnMesh:
 
     @property
     def is_clear(self):
-        """Whether all of it transmits light: it hides nothing, and casts no shadow."""
+        """Whether all of it lets light through: it hides nothing, and casts no shadow."""
         return self.parts is not None and all(material.is_clear for _first, _count, material in self.parts)
+
+    @property
+    def stops_light(self):
+        return self.casts_shadow and not self.is_clear
 
 
 @dataclass(frozen=True)
@@ -98,15 +106,16 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
     is_moving: whether polygons may be cut as they were before a moment ago, while their corners are the same;
     has_normals: whether they are needed, which Blender computes for each pose.
     """
-    meshes = []
+    meshes, override = [], depsgraph.view_layer_eval.material_override
     for instance in depsgraph.object_instances:
         if instance.object.type == "MESH" and instance.show_self and _is_surface_seen(instance, viewport):
-            is_holdout = viewport is None and instance.object.original.holdout_get(view_layer=depsgraph.view_layer)
+            is_holdout = viewport is None and _has(instance, "holdout_get", depsgraph.view_layer)
             matrix = np.array(instance.matrix_world, np.float64)
             if not can_be_drawn(instance.object, matrix):
                 continue
-            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, has_normals)
-            meshes.append(replace(mesh, owner=owner_of(instance)))
+            mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, has_normals, override)
+            rays = {} if viewport is not None else _rays_of(instance, depsgraph.view_layer)
+            meshes += [replace(part, owner=owner_of(instance), **rays) for part in _solid_and_clear(mesh)]
     return [mesh for mesh in meshes if len(mesh.triangles)]
 
 
@@ -122,20 +131,62 @@ def owner_of(instance):
 
 
 def _is_surface_seen(instance, viewport):
-    placed = instance.parent if instance.is_instance else instance.object
     if viewport is None:
-        return not (instance.object.hide_render or placed.hide_render)
-    return placed.original.visible_in_viewport_get(viewport) and instance.object.display_type in {"TEXTURED", "SOLID"}
+        return is_rendered(instance)
+    is_shown = placed_by(instance).original.visible_in_viewport_get(viewport)
+    return is_shown and instance.object.display_type in {"TEXTURED", "SOLID"}
 
 
-def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals):
+def _has(instance, question, view_layer):
+    """What a view layer says of an instance; as in Cycles, that of what places it."""
+    return getattr(placed_by(instance).original, question)(view_layer=view_layer)
+
+
+def _rays_of(instance, view_layer):
+    """{`DrawnMesh` field: value} of the rays that see a mesh in a render."""
+    placed = {instance.object, placed_by(instance)}
+    is_seen = all(one.visible_camera for one in placed) and not _has(instance, "indirect_only_get", view_layer)
+    return {"is_seen": is_seen, "casts_shadow": all(one.visible_shadow for one in placed)}
+
+
+def _solid_and_clear(mesh):
+    """What is solid of a `DrawnMesh` and what is clear of it, without what is invisible."""
+    if mesh.parts is None:
+        return [mesh]
+    kinds = [(material.is_clear, material.is_invisible) for _first, _count, material in mesh.parts]
+    if len(set(kinds)) == 1:
+        return [] if mesh.parts and kinds[0][1] else [mesh]
+    return [
+        _some_parts(mesh, [part for part, found in zip(mesh.parts, kinds, strict=True) if found == kind])
+        for kind in ((False, False), (True, False))
+        if kind in kinds
+    ]
+
+
+def _some_parts(mesh, parts):
+    """A `DrawnMesh` of some of the parts of another."""
+    corners = np.concatenate([np.arange(first, first + count) for first, count, _material in parts])
+    ends = np.cumsum([count for _first, count, _material in parts])
+    return replace(
+        mesh,
+        triangles=mesh.triangles[corners],
+        normals=mesh.normals if mesh.has_vertex_normals else mesh.normals[corners],
+        uvs=None if mesh.uvs is None else mesh.uvs[corners],
+        parts=tuple(
+            (int(end) - count, count, material) for (_first, count, material), end in zip(parts, ends, strict=True)
+        ),
+        materials=tuple((count, material) for _first, count, material in parts),
+    )
+
+
+def _read_drawn_mesh(mesh_object, to_world, is_holdout, is_moving, has_normals, override):
     mesh = mesh_object.to_mesh()
     try:
         vertices = scene.vertex_positions(mesh)
         layout = _layout(mesh_object, mesh, is_moving)
         has_vertex_normals = not has_normals or mesh.normals_domain == "POINT"
         normals = _normals(mesh, layout, has_vertex_normals) if has_normals else None
-        parts = _parts(mesh_object, layout.runs)
+        parts = _parts(mesh_object, layout.runs, override)
         uvs = _read_uvs(mesh, layout.loops, () if is_holdout else parts)
     finally:
         mesh_object.to_mesh_clear()
@@ -186,9 +237,9 @@ def _layout(mesh_object, mesh, is_moving):
     return layout_cache.keep(uid, _Layout(faces, slots, triangles.ravel(), runs))
 
 
-def _parts(mesh_object, runs):
-    """`DrawnMesh.parts` of an evaluated mesh, with as many materials as it has."""
-    materials = [slot.material for slot in mesh_object.material_slots] or [None]
+def _parts(mesh_object, runs, override):
+    """`DrawnMesh.parts` of an evaluated mesh, with as many materials as it has; override: the view layer's material."""
+    materials = [override or slot.material for slot in mesh_object.material_slots] or [override]
     ends = 3 * np.cumsum([count for _slot, count in runs])
     return tuple(
         (int(end) - 3 * count, 3 * count, surface_materials.read_material(materials[slot]))

@@ -18,7 +18,7 @@ _CHANNELS = {
 }
 
 # Extension modes of Blender's images → those of GPU textures.
-_EXTENSIONS = {"REPEAT": "REPEAT", "EXTEND": "EXTEND", "CLIP": "CLIP_TO_BORDER", "MIRROR": "MIRRORED_REPEAT"}
+_EXTENSIONS = {"REPEAT": "REPEAT", "EXTEND": "EXTEND", "CLIP": "CLAMP_TO_BORDER", "MIRROR": "MIRRORED_REPEAT"}
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class ImageMap:
 class SurfaceMaterial:
     """Inputs of a Principled BSDF. color: linear RGB; reflectance: at normal incidence, of all but metal.
 
-    is_clear: whether it transmits light, as glass or a cornea does: it is seen by what it reflects.
+    is_clear: whether it lets light through, as glass or a cornea does: it is seen by what it reflects.
     """
 
     color: tuple = (0.8, 0.8, 0.8)
@@ -55,6 +55,11 @@ class SurfaceMaterial:
     normal_image: ImageMap | None = None
 
     @property
+    def is_invisible(self):
+        """Whether it is not seen at all."""
+        return self.is_clear and self.reflectance == 0.0
+
+    @property
     def uv_map(self):
         """Name of the UV map of all its images, "" for the active one; None without images."""
         images = (self.color_image, self.roughness_image, self.normal_image)
@@ -62,16 +67,21 @@ class SurfaceMaterial:
 
 
 def read_material(material):
-    """The `SurfaceMaterial` of a Blender material; without Principled BSDF it is matt, of its color in the viewport.
+    """The `SurfaceMaterial` of a Blender material; without a shader of `_READERS` it is matt, of its viewport's color.
 
     Without a material a surface has a Principled BSDF as it is added, as in EEVEE and Cycles.
     """
     if material is None:
         return SurfaceMaterial(roughness=0.5, reflectance=_reflectance(1.5, 0.5))
-    principled = _principled(material.node_tree)
-    if principled is None:
+    shader = _shader(material.node_tree)
+    if shader is None:
         return SurfaceMaterial(tuple(material.diffuse_color[:3]))
-    sockets = principled.inputs
+    return _READERS[shader.type](shader.inputs, material)
+
+
+def _read_principled(sockets, material):
+    if float(_value(sockets["Alpha"])) < 0.5:
+        return _INVISIBLE
     normal_map = _source(sockets["Normal"])[0]
     is_mapped = normal_map is not None and normal_map.type == "NORMAL_MAP" and normal_map.space == "TANGENT"
     return SurfaceMaterial(
@@ -87,18 +97,42 @@ def read_material(material):
     )
 
 
+def _read_diffuse(sockets, material):
+    color, image = tuple(_value(sockets["Color"])[:3]), _image_map(sockets["Color"], material)
+    return SurfaceMaterial(color, color_image=image)
+
+
+def _read_glass(sockets, _material):
+    reflectance = _reflectance(float(_value(sockets["IOR"])), 0.5)
+    return SurfaceMaterial(roughness=float(_value(sockets["Roughness"])), reflectance=reflectance, is_clear=True)
+
+
+def _read_transparent(_sockets, _material):
+    return _INVISIBLE
+
+
+_INVISIBLE = SurfaceMaterial(is_clear=True)
+_READERS = {
+    "BSDF_PRINCIPLED": _read_principled,
+    "BSDF_DIFFUSE": _read_diffuse,
+    "BSDF_GLASS": _read_glass,
+    "BSDF_REFRACTION": _read_transparent,  # which it is without what it bends
+    "BSDF_TRANSPARENT": _read_transparent,
+}
+
+
 def _reflectance(refractive_index, level):
     """Reflectance at normal incidence; level: ½ leaves it as it is."""
     return min(2.0 * level * ((refractive_index - 1.0) / (refractive_index + 1.0)) ** 2, 0.99)
 
 
-def _principled(tree):
-    """The Principled BSDF that a material shows, or the first one."""
+def _shader(tree):
+    """The shader that a material shows, if it can be read; or its first Principled BSDF; or None."""
     if tree is None:
         return None
     output = tree.get_output_node("ALL")
     shown = _source(output.inputs["Surface"])[0] if output else None
-    if shown is not None and shown.type == "BSDF_PRINCIPLED":
+    if shown is not None and shown.type in _READERS:
         return shown
     return next((node for node in tree.nodes if node.type == "BSDF_PRINCIPLED"), None)
 

@@ -16,7 +16,7 @@ from .fibre_walk import even_return, turn
 from .grid_walk import PASSED, STRAND, Medium, fibre_of, walk
 from .lamp_light import Event, light_at_once, light_by_share, light_met
 from .light_sources import Sources, across
-from .media import Surroundings, launch, medium_of, mesh_of, sources_of
+from .media import Surroundings, launch, medium_of, mesh_of, sources_of, unlit_medium_of
 from .seen_rays import Seen
 from .start_places import start
 from .strand_grid import StrandGrid
@@ -137,12 +137,13 @@ def gather(
     with wp.ScopedDevice(device):
         mesh = mesh_of(surroundings.corners)
         medium = medium_of(grid, mesh, surroundings.normals, surroundings.albedo, surroundings.gloss)
+        in_sight, _hiding = _sight_of(grid, surroundings) or (medium, mesh)
         sources = sources_of(surroundings)
         drawn = np.concatenate([seen.drawn, _even_there(medium, seen, device)], axis=-1)
         _add_by_voxel(sums[..., 6:], grid, seen.places, systems[seen.segments], drawn)
         total, squares, taken, tried, turn, more = 0.0, 0.0, 0, 0, 0, path_count
         while True:
-            starts = start_places.of_seen(medium, grid, seen, voxels, more, seed * _MOST_TURNS + turn, device)
+            starts = start_places.of_seen(in_sight, grid, seen, voxels, more, seed * _MOST_TURNS + turn, device)
             positions, light, even = _traced(medium, sources, seen.view, starts, device)
             found = np.concatenate([light, even], axis=-1)
             _add_by_voxel(sums[..., :6], grid, positions, systems[starts.segments], found)
@@ -154,6 +155,15 @@ def gather(
             more = int(tried * min(max(missing, _LEAST_TURN), 1.0))
             if missing < 0.0 or tried + more > most_paths:
                 return sums, taken
+
+
+def _sight_of(grid, surroundings):
+    """(`Medium` of what is seen, the mesh in it) where some surfaces are not; None where all are."""
+    if surroundings.is_seen is None or surroundings.is_seen.all():
+        return None
+    require_count("surfaces that are seen", len(surroundings.is_seen), len(surroundings.corners) // 3)
+    mesh = mesh_of(surroundings.corners.reshape(-1, 3, 3)[surroundings.is_seen])
+    return unlit_medium_of(grid, mesh), mesh
 
 
 def _even_there(medium, seen, device):

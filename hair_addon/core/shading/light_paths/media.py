@@ -26,7 +26,8 @@ class Surroundings:
     albedo: (F, 3) base colors of them; lamps: (N,) records with the fields of `Light` in shaders/include/lights.glsl;
     importance: (N,) of lamps, their mean irradiance; world: (H, W, 3) radiance, a picture of longitude
     and latitude as core/imaging/environment.py takes it apart; gloss: (F, 3) of triangles, roughness, metallic, and
-    reflectance at normal incidence, without it all are matt.
+    reflectance at normal incidence, without it all are matt; is_seen: (F,) bool of triangles, whether they hide hair
+    from the viewer, without it all do.
     """
 
     corners: np.ndarray
@@ -36,6 +37,7 @@ class Surroundings:
     importance: np.ndarray
     world: np.ndarray
     gloss: np.ndarray | None = None
+    is_seen: np.ndarray | None = None
 
 
 def launch(kernel: wp.Kernel, count: int, inputs: list[Any], device: wp.DeviceLike) -> None:
@@ -78,6 +80,12 @@ def medium_of(
     medium.normals, medium.albedo, medium.gloss = (vectors(values) for values in (normals, albedo, gloss))
     medium.reflected = wp.array(surface_albedo.table(), dtype=wp.vec4)
     return medium
+
+
+def unlit_medium_of(grid: StrandGrid, mesh: wp.Mesh | None) -> Medium:
+    """The same of a mesh whose triangles only hide what is behind them."""
+    corner_count = 0 if mesh is None else len(mesh.indices)
+    return medium_of(grid, mesh, np.zeros((corner_count, 3)), np.zeros((corner_count // 3, 3)))
 
 
 def sources_of(surroundings: Surroundings) -> Sources:

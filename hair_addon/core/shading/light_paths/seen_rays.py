@@ -9,7 +9,7 @@ import warp as wp
 from ...kernels import parallel
 from ...kernels.checks import require_count, require_indices
 from .grid_walk import FAR, STRAND, Medium, walk
-from .media import launch, medium_of, mesh_of
+from .media import launch, mesh_of, unlit_medium_of
 from .strand_grid import StrandGrid
 from .view import AREA, View, ViewOnDevice, on_device, ray_at
 
@@ -59,7 +59,7 @@ def met_by(
     side = max(1, round(ray_count**0.5))
     with wp.ScopedDevice(device):
         mesh = mesh_of(corners)
-        medium = medium_of(grid, mesh, np.zeros((len(corners), 3)), np.zeros((len(corners) // 3, 3)))
+        medium = unlit_medium_of(grid, mesh)
         segments, positions = wp.full(side * side, -1, dtype=int), wp.zeros(side * side, dtype=wp.vec3)
         launch(_find, side * side, [medium, on_device(view), seed, side, segments, positions], device)
         found, places = segments.numpy(), positions.numpy()
