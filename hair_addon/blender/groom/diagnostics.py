@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Curves, Object
 
+from ..data import rest_nodes
 from ..data.strands import follow_nodes
 from ..data.strands.curves import followers
 from ..host.notices import name_of, text_of
@@ -78,6 +79,10 @@ def _of_surface(surface, parts):
         return
     if any(abs(component - 1.0) > 1e-4 for component in surface.scale):
         yield Warning(interface_text("The scale is not applied."), "vellus.apply_scale")
+    lost = rest_nodes.lost_copies(surface)
+    if lost is not None:
+        text = '"{name}" copies faces that are deformed already: move it up, or apply it.'
+        yield Warning(interface_text(text, name=name_of(lost)))
     if surface.mode != "OBJECT" and any(part.vellus.is_stale for part in parts):
         yield Warning(interface_text("Hair updates when you leave this mode."))
 

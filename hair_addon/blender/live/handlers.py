@@ -4,6 +4,7 @@
 import bpy
 from bpy.app.handlers import persistent
 
+from ..data import rest_nodes
 from ..data.strands import curves_objects
 from ..groom import bindings, paused_hair, pipeline, staleness
 from ..groom.dynamics import frame_folders
@@ -55,8 +56,8 @@ def after_depsgraph_update(scene, depsgraph):
     changed = [u.id.original for u in depsgraph.updates if u.is_updated_geometry and not _is_only_carried(u, deformed)]
     for surface_object in deformed:
         events.surface_moved(surface_object)
-        # Hair waits until the surface leaves edit and paint modes.
-        if surface_object.mode == "OBJECT":
+        # Hair waits until the surface leaves edit and paint modes, and until copies of its faces are told apart.
+        if surface_object.mode == "OBJECT" and not _tells_apart(surface_object):
             is_edited = surface_object.data in changed and not moving_surfaces.is_to_be_checked_later(surface_object)
             stale_marks.follow_surface(surface_object, depsgraph, is_edited)
     moved = [u.id.original for u in depsgraph.updates if u.is_updated_geometry or u.is_updated_transform]
@@ -87,6 +88,11 @@ def after_depsgraph_update(scene, depsgraph):
     if running.job() is None:
         stored_guide_maps.follow(depsgraph)
         live_hair.follow_masks(_painted(depsgraph), depsgraph)
+
+
+def _tells_apart(surface_object):
+    """Whether nodes were added to a surface, or moved, with which Blender will report it again."""
+    return surface_object.add_rest_position_attribute and rest_nodes.tell_apart(surface_object)
 
 
 def _surfaces():

@@ -4,7 +4,7 @@
 import bpy
 import numpy as np
 
-from .. import surface_collections
+from .. import rest_nodes, surface_collections
 from . import follow_nodes
 
 _RAYS = ("camera", "diffuse", "glossy", "transmission", "volume_scatter", "shadow")
@@ -67,8 +67,10 @@ def show_again(curves_object):
 
 def keep_rest(surface_object):
     """Let Blender store the rest positions of a surface's vertices, on which strands are rooted."""
-    if not surface_object.add_rest_position_attribute:
+    is_new = not surface_object.add_rest_position_attribute
+    if is_new:
         surface_object.add_rest_position_attribute = True
+    if rest_nodes.tell_apart(surface_object) or is_new:
         # Blender reports this as a change of the mesh: update before there is hair that would react to it.
         bpy.context.view_layer.update()
 
