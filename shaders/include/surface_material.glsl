@@ -13,7 +13,11 @@ vec4 image_at(sampler2D image, vec2 uv, vec2 right, vec2 up, int first)
 
 vec3 base_color(vec2 uv, vec2 right, vec2 up)
 {
-  return surface.has_color_image != 0 ? image_at(color_image, uv, right, up, 0).rgb : surface.color.rgb;
+  if (surface.has_color_image == 0) {
+    return surface.color.rgb;
+  }
+  vec4 color = image_at(color_image, uv, right, up, 0);
+  return color.rgb * (surface.is_color_opaque != 0 ? 1.0 : color.a);
 }
 
 float base_roughness(vec2 uv, vec2 right, vec2 up)

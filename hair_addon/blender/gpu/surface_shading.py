@@ -93,6 +93,7 @@ def _record(material, images):
         record[f"has_{name}"] = images[name] is not None
         if images[name] is not None:
             record["image_rows"][2 * index : 2 * index + 2, :3] = getattr(material, name).rows
+    record["is_color_opaque"] = material.color_image is None or material.color_image.is_opaque
     if material.roughness_image is not None:
         record["roughness_channels"] = material.roughness_image.channels
     return record

@@ -137,6 +137,7 @@ SURFACE = Block(
         "reflectance": "float",  # at normal incidence, of all but metal
         "normal_strength": "float",
         "has_color_image": "int",
+        "is_color_opaque": "int",  # whether the image's alpha does not darken its color
         "has_roughness_image": "int",
         "has_normal_image": "int",
     },

@@ -137,6 +137,23 @@ def test_an_image_ends_where_it_is_clipped(is_clipped, stage):
     np.testing.assert_allclose(seen_color(picture()), 0.0 if is_clipped else 1.0, atol=5e-3)
 
 
+@pytest.mark.parametrize(("alpha_mode", "seen"), [("STRAIGHT", 0.4), ("CHANNEL_PACKED", 1.0)])
+def test_straight_alpha_lays_an_image_over_black_unless_it_is_read(alpha_mode, seen, stage):
+    """As in Cycles and EEVEE."""
+    made = matt(0.0, 0.0, 0.0)
+    tree = made.node_tree
+    image = tree.nodes.new("ShaderNodeTexImage")
+    image.image = bpy.data.images.new("Half", 4, 4, alpha=True)
+    image.image.pixels.foreach_set(np.tile(np.float32([1.0, 1.0, 1.0, 0.4]), 16))
+    image.image.alpha_mode = alpha_mode
+    principled = tree.nodes["Principled BSDF"]
+    tree.links.new(image.outputs["Color"], principled.inputs["Base Color"])
+    plane(made, depth=0.5)
+    np.testing.assert_allclose(seen_color(picture()), seen, atol=0.01)
+    tree.links.new(image.outputs["Alpha"], principled.inputs["Alpha"])
+    np.testing.assert_allclose(seen_color(picture()), 1.0, atol=0.01)
+
+
 def test_what_the_camera_does_not_see_still_casts_its_shadow(stage):
     """A blocker between wall and camera, whose shadow falls beside it as the sun is tilted."""
     bpy.data.objects["Sun"].rotation_euler.x -= math.radians(30.0)

@@ -26,7 +26,7 @@ class ImageMap:
     """An image of a material: which UV map it lies on, "" for the active one, and where.
 
     rows: (2, 3) float, from (u, v, 1) to coordinates of the image; channels: weights (4,) of RGBA where it is read as a
-    number; extension: of a GPU texture.
+    number; extension: of a GPU texture; is_opaque: whether its alpha does not darken its color.
     """
 
     image: bpy.types.Image
@@ -35,6 +35,7 @@ class ImageMap:
     channels: tuple
     extension: str
     is_smooth: bool
+    is_opaque: bool
 
 
 @dataclass(frozen=True)
@@ -178,7 +179,9 @@ def _image_map(socket, material, uv_map=""):
         return None
     rows, own_map = mapping
     extension, is_smooth = _EXTENSIONS[node.extension], node.interpolation != "Closest"
-    return ImageMap(node.image, own_map or uv_map, rows, channels, extension, is_smooth)
+    # Blender lays straight alpha over black, unless a material reads it.
+    is_opaque = node.outputs["Alpha"].is_linked or node.image.is_float or node.image.alpha_mode != "STRAIGHT"
+    return ImageMap(node.image, own_map or uv_map, rows, channels, extension, is_smooth, is_opaque)
 
 
 def _is_readable(image, material):
