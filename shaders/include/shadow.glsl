@@ -29,7 +29,7 @@ bool shadow_place(Light light, vec3 position, out vec3 at, out float depth)
 // Visibility of the light past surfaces: the upper bound of the part with a greater depth [Donnelly06].
 float lit_part(vec3 at, float depth, float bias)
 {
-  vec3 moments = textureLod(surface_moments, at, 0.0).rgb;
+  vec2 moments = textureLod(surface_moments, at, 0.0).rg;
   // Surfaces are no farther in the maps either: they would be in their own shadow.
   float warped = warped_depth(min(depth, FAR_SURFACE) - bias);
   float behind = warped - moments.x;
@@ -37,8 +37,6 @@ float lit_part(vec3 at, float depth, float bias)
   float variance = max(moments.y, rounding * rounding);
   // Where one surface is behind another, the bound is not tight: its tail is cut off.
   float part = clamp((variance / (variance + behind * behind) - 0.05) / 0.95, 0.0, 1.0);
-  // The mean around the bend that a surface has in the maps there is nearer than the surface.
-  part = mix(part, 1.0, smoothstep(FAR_SURFACE - 0.1, FAR_SURFACE - 0.04, min(depth, moments.b)));
   return (behind <= 0.0) ? 1.0 : part;
 }
 
@@ -47,6 +45,19 @@ float inside_part(vec2 at)
 {
   vec2 inside = min(at, vec2(1.0) - at);
   return smoothstep(0.0, 0.06, min(inside.x, inside.y));
+}
+
+// Visibility of the light past surfaces around the hair, by a map of these alone.
+float wide_lit_part(Light light, vec3 position)
+{
+  if (light.wide_layer < 0) {
+    return 1.0;
+  }
+  float depth = light_depth(
+      light.kind, light.position.xyz, light.axis.xyz, light.wide_near, light.wide_extent, position);
+  vec4 clip = light.world_to_wide * vec4(position, 1.0);
+  vec3 at = vec3(0.5 * clip.xy / clip.w + 0.5, float(light.wide_layer));
+  return (clip.w > 0.0) ? mix(1.0, lit_part(at, depth, SURFACE_BIAS), inside_part(at.xy)) : 1.0;
 }
 
 // What a strand adds to the counts of a map at its own axis, the mean over the places of the axis within a texel:

@@ -63,8 +63,9 @@ SurfaceVisibility surface_visibility(Light light, vec3 position, vec3 N, vec3 fo
   float cosine = dot(N, L);
   float tangent = 2.0 * sqrt(light_blur(light.kind, light.position.xyz, light.radius, position));
   float direct = disk_cosine(cosine, tangent * inversesqrt(1.0 + tangent * tangent));
-  seen.past_surfaces = direct;
-  seen.past_hair = vec3(direct);
+  float wide = wide_lit_part(light, position);
+  seen.past_surfaces = direct * wide;
+  seen.past_hair = vec3(direct * wide);
   seen.variance = 0.0;
   vec3 at;
   float depth;
@@ -83,7 +84,9 @@ SurfaceVisibility surface_visibility(Light light, vec3 position, vec3 N, vec3 fo
   vec2 aside = turn;
   float away = FIRST_DISTANCE;
   // The maps of surfaces are blurred already. Beside the place they would be those of another depth.
-  float lit = mix(1.0, lit_part(at, depth, SURFACE_BIAS), inside_part(at.xy));
+  // Behind the hair its maps keep surfaces no farther than there: the mean around that bend is nearer than the surface.
+  float far = (light.wide_layer < 0) ? 0.0 : smoothstep(FAR_SURFACE - 0.2, FAR_SURFACE - 0.1, depth);
+  float lit = mix(wide, lit_part(at, depth, SURFACE_BIAS), inside_part(at.xy) * (1.0 - far));
   vec3 sum = vec3(0.0);
   float squares = 0.0;
   for (int tap = 0; tap < TAP_COUNT; tap++) {

@@ -128,6 +128,6 @@ def places_on_surface(vertices, triangles, to_world):
     return some @ to_world[:3, :3].T + to_world[:3, 3]
 
 
-def new_maps(record):
-    """`ShadowMaps` for a `uniforms.LIGHTS` record."""
-    return ShadowMaps(_MAP_SIZE, max(1, int(record["count"])))
+def new_maps(record, is_wide):
+    """`ShadowMaps` for a `uniforms.LIGHTS` record; is_wide: as there."""
+    return ShadowMaps(_MAP_SIZE, max(1, int(record["count"])), is_wide=is_wide)

@@ -20,6 +20,7 @@ _NOTHING = int(np.float32(_FAR + 1.0).view(np.int32))  # front_bits() of it; of 
 # the hair's diameter, a surface is taken to be from the hair that it shades.
 _LEAST_BLUR, _MOST_BLUR = 0.7, 1 / 64
 _SHADE_DISTANCE = 0.15
+_LEAST_WIDE = 1e-4  # [m] radius of what a wide map holds
 _ALL = drawing.Steps()
 
 # Strands at rest are drawn with so few points that they are shorter by this part at most: bends that are left out are
@@ -31,24 +32,26 @@ _LENGTHENING = 0.005
 _SPARE, _LOOSEST = 1.1, 1.4
 
 _AIMED = ("world_to_shadow", "near", "extent")  # of a light, by `_aim`
+_SHADED_BY = ("kind", "position", "axis", "near", "extent", "radius")  # of a light, what maps of surfaces follow from
 
 
 class ShadowMaps:
     """Shadow textures of the first lights, reused until something moves.
 
     size: texels along a side of each map; layer_count: of lights that have one; in_compute: whether compute programs
-    draw the strands, None: where they can.
+    draw the strands, None: where they can; is_wide: whether each light has a map of the surfaces around the hair too.
     """
 
-    def __init__(self, size, layer_count, in_compute=None):
-        self._size, self.layer_count = size, layer_count
+    def __init__(self, size, layer_count, in_compute=None, is_wide=False):
+        self._size, self.layer_count, self.is_wide = size, layer_count, is_wide
         self._hair_front = _array(size, layer_count, "RG32F")
         self._hair_layers = _array(size, layer_count, "RGBA16F")
-        self._surface_moments = _array(size, layer_count, "RGBA32F")
+        self._surface_moments = _array(size, 2 * layer_count if is_wide else layer_count, "RGBA32F")
         self._in_compute = scene_programs.has_image_atomics() if in_compute is None else in_compute
         self._sphere = None  # that maps were aimed at last
         self._views = {}  # index of a light not near hair → (what it was aimed by, view, what `_aim` wrote)
-        self._surfaces = {}  # layer → (what its surfaces were drawn with, texture of the depth that they hide behind)
+        self._surfaces = {}  # layer → what its surfaces were drawn with
+        self._hidden = {}  # layer → texture of the depth that they hide strands behind
         # Target of the drawing before it is filtered into a map.
         self._surface_depth = _array(size, 1, "RG32F")  # and their color
         self._half_blurred = _array(size, 1, "RGBA32F")
@@ -75,7 +78,7 @@ class ShadowMaps:
         shadow, None: all; is_steady: whether maps stay aimed where they are as long as hair fits; chosen: index of the
         only light whose map is drawn, None: of all.
         """
-        lights["light"]["shadow_layer"] = -1
+        lights["light"]["shadow_layer"] = lights["light"]["wide_layer"] = -1
         if not hair:
             return
         loose = drawing.bounding_sphere(hair)
@@ -113,31 +116,56 @@ class ShadowMaps:
         return view
 
     def _draw_light(self, layer, view, lights, light_block, hair, surfaces, steps, is_steady):
-        hidden = {"hidden_depth": self._drawn_surfaces(layer, view, lights, surfaces)}
+        hidden = {"hidden_depth": self._hiding_depth(layer, view, lights, surfaces)}
         placed = [(strands, _record(strands, view, to_world, steps, is_steady)) for strands, to_world in hair]
         if self._in_compute:
             self._walk(layer, placed, light_block, hidden)
         else:
             self._draw_strips(layer, placed, light_block, hidden)
 
-    def _drawn_surfaces(self, layer, view, lights, surfaces):
+    def draw_wide(self, lights, surfaces, sphere, casters=None):
+        """Draw the maps of surfaces around the hair and write each light's part in them into its record.
+
+        sphere: (centre, radius) that maps hold as far as a light sees it; the rest as for `draw`.
+        """
+        for index in range(min(int(lights["count"]), self.layer_count)):
+            light = lights["light"][index]
+            view = _aim_wide(light, *sphere, self._size) if light["casts_shadow"] else None
+            light["wide_layer"] = -1 if view is None else self.layer_count + index
+            if view is None:
+                continue
+            view["light_index"] = index
+            seen_from = lights.copy()
+            for name, wide_name in (("near", "wide_near"), ("extent", "wide_extent")):
+                seen_from["light"][index][name] = light[wide_name]
+            chosen = surfaces if casters is None else casters(index)[1]
+            self._are_surfaces_new(self.layer_count + index, view, seen_from, chosen)
+
+    def _hiding_depth(self, layer, view, lights, surfaces):
         """Draw surfaces into a map, unless they are there; returns the depth behind which they hide strands."""
-        drawn_with = view.tobytes(), lights["light"][layer].tobytes(), tuple(surfaces)
-        before, hidden = self._surfaces.get(layer, (None, None))
-        if before == drawn_with:
+        hidden = self._hidden.get(layer)
+        if not self._are_surfaces_new(layer, view, lights, surfaces):
             return hidden
         if hidden is None:
-            hidden = gpu.types.GPUTexture((self._size, self._size), format="R32F")
+            hidden = self._hidden[layer] = gpu.types.GPUTexture((self._size, self._size), format="R32F")
+        self._filter(shadow_programs.hidden_program(), hidden, surface_depth=self._surface_depth)
+        return hidden
+
+    def _are_surfaces_new(self, layer, view, lights, surfaces):
+        """Draw surfaces into a layer, by the light that a view looks from, unless they are there; whether it did."""
+        light = lights["light"][int(view["light_index"])]
+        drawn_with = view.tobytes(), *(light[name].tobytes() for name in _SHADED_BY), tuple(surfaces)
+        if self._surfaces.get(layer) == drawn_with:
+            return False
         with (
             drawing.cleared(self._drawing_depth, _NO_SURFACE),
             drawing.gpu_state("LESS_EQUAL", depth_writes=True),
         ):
             for surface in surfaces:
                 surface_textures.draw_depth(surface, view, lights)
-        self._blur(layer, _blur_of(lights["light"][layer], self._size))
-        self._filter(shadow_programs.hidden_program(), hidden, surface_depth=self._surface_depth)
-        self._surfaces[layer] = drawn_with, hidden
-        return hidden
+        self._blur(layer, _blur_of(light, self._size))
+        self._surfaces[layer] = drawn_with
+        return True
 
     def _walk(self, layer, placed, lights, hidden):
         """Draw a map of strands by compute programs: integer sums are independent of the order."""
@@ -273,6 +301,28 @@ def _aim(light, hair, loose, size):
     light["world_to_shadow"] = view["world_to_clip"]
     light["near"] = near if is_sun else max(near, 0.0)
     light["extent"] = radius + (radius if is_sun else min(distance, radius))
+    return view
+
+
+def _aim_wide(light, centre, radius, size):
+    """The view of a light that holds a sphere, also written into the light; of a light in it, a smaller sphere.
+
+    None of a light in the sphere's middle.
+    """
+    position, is_sun = light["position"][:3].astype(np.float64), light["kind"] == SUN
+    axis = light["axis"][:3].astype(np.float64) if is_sun else centre - position
+    distance = float(np.linalg.norm(axis))
+    if not is_sun:
+        radius = min(radius, 0.99 * distance * np.sin(_WIDEST))
+    if radius < _LEAST_WIDE or distance == 0.0:
+        return None
+    axis = axis / distance
+    eye = centre - axis * (2.0 * radius) if is_sun else position
+    view_to_clip = _orthographic(radius) if is_sun else _perspective(radius, distance)
+    view = drawing.view_record(_look_at(eye, axis), view_to_clip, size, least_width=1.0)
+    light["world_to_wide"] = view["world_to_clip"]
+    light["wide_near"] = centre @ axis - radius if is_sun else distance - radius
+    light["wide_extent"] = 2.0 * radius
     return view
 
 

@@ -105,6 +105,11 @@ class SurfaceOnGPU:
     def triangle_count(self) -> int:
         return len(self.corners.vertices) // 3
 
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """(2, 3) least and greatest coordinates of its vertices."""
+        return np.stack([self.vertices.min(axis=0), self.vertices.max(axis=0)])
+
     def bounds_of(self, first: int, count: int) -> np.ndarray:
         """(2, 3) least and greatest coordinates of some of the corners."""
         if (first, count) not in self._bounds:

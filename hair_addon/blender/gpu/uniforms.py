@@ -113,6 +113,10 @@ LIGHT = Block(
         "radius": "float",  # [m]; of a sun, the tangent of its angular radius
         "extent": "float",  # diameter of the hair [m], which the layers of a shadow are parts of
         "near": "float",  # depth [m] of the hair's near side, which depths are counted from
+        "world_to_wide": "mat4",  # of the map of surfaces around the hair
+        "wide_layer": "int",  # of the shadow maps, -1 without
+        "wide_extent": "float",  # as `extent` and `near`, of what that map holds
+        "wide_near": "float",
     },
 )
 LIGHTS = Block(

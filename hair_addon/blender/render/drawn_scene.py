@@ -14,6 +14,7 @@ from ..gpu import (
     strand_textures,
     surface_textures,
     uniforms,
+    windows,
 )
 from ..gpu import lights as light_door
 from ..gpu.shadows import ShadowMaps
@@ -23,6 +24,7 @@ from . import hair_cache, hair_places, made_strands
 # The number of strands that a shadow map can resolve, thickened in proportion; and the number during a stroke of the
 # comb.
 _SHADOW_STEPS = drawing.Steps(strand_count=50_000)
+_WIDE = 10.0  # radii of the hair, that surfaces cast shadows within
 _DRAFT_STEPS = drawing.Steps(point_count=21, strand_count=10_000)
 
 
@@ -90,8 +92,8 @@ def read(
     if viewport is not None and is_hair_only and not hair:
         # Scenes without hair have no cost.
         return _EMPTY
+    is_shaded = viewport is None or not is_hair_only
     if before is None or before.shadow_maps is None:
-        is_shaded = viewport is None or not is_hair_only
         has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # by which hair's shadow falls on them
         meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
         shown = _upload(meshes, is_shaded, has_paths=viewport is None)
@@ -110,7 +112,7 @@ def read(
     are_made = _are_made(hair) or (has_played and bool(hair) and made_strands.are_wanted())
     last = before or (former if are_made else None)
     is_draft = is_draft or (former is not None and are_made)
-    if before is None and last is not None and _fit(last.shadow_maps, lamps):
+    if before is None and last is not None and _fit(last.shadow_maps, lamps, is_shaded):
         maps = last.shadow_maps
     renewal = None
     drawn = replace(_EMPTY, hair=hair, world=world, **shown)
@@ -131,6 +133,7 @@ def read(
         instances=instances,
         renewal=renewal,
     )
+    maps = maps or scene_lights.new_maps(lamps.record, is_shaded)
     return _lit(drawn, lamps, maps, hair_receivers, are_made, is_draft)
 
 
@@ -139,8 +142,9 @@ def _are_made(hair):
     return bool(hair) and all(strands.is_made for strands, *_ in hair)
 
 
-def _fit(maps, lamps):
-    return maps is not None and maps.layer_count == max(1, int(lamps.record["count"]))
+def _fit(maps, lamps, is_wide):
+    is_as_wide = maps is not None and maps.is_wide == is_wide
+    return is_as_wide and maps.layer_count == max(1, int(lamps.record["count"]))
 
 
 def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
@@ -148,17 +152,36 @@ def _lit(drawn, lamps, maps, hair_receivers, are_made=False, is_draft=False):
 
     are_made: whether a graphics card makes or carries hair, or would.
     """
-    maps = maps or scene_lights.new_maps(lamps.record)
     placed, solid = _placed(drawn.hair), _blocking(drawn)
     hair_owners = [receiver.owner for receiver in hair_receivers]
     steps = _DRAFT_STEPS if is_draft and not are_made else _SHADOW_STEPS
     casters = lamps.casters(placed, hair_owners, solid, [blocker.owner for blocker in drawn.blockers])
     # Where strands are made, what is drawn at rest is what was drawn while they moved.
     maps.draw(lamps.record, placed, solid, steps, casters, is_steady=is_draft or are_made)
+    if maps.is_wide and (sphere := _sphere_around_hair(drawn)) is not None:
+        maps.draw_wide(lamps.record, solid, sphere, casters)
     own = {}
     if not lamps.are_alike:
         own = {"hair_lights": lamps.lit(hair_receivers), "surface_lights": lamps.lit(drawn.receivers)}
     return replace(drawn, lights=lamps.record, lamps=lamps, shadow_maps=maps, **own)
+
+
+def _sphere_around_hair(drawn):
+    """(centre, radius) of a sphere around all surfaces, or those near hair; None where maps of hair hold them all."""
+    surfaces = {*_blocking(drawn), *_receiving(drawn)}
+    if not surfaces:
+        return None
+    corners = np.concatenate(
+        [windows.corners_of(one.bounds) @ one.to_world[:3, :3].T + one.to_world[:3, 3] for one in surfaces]
+    )
+    centre = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    radius = float(np.linalg.norm(corners - centre, axis=1).max())
+    if not drawn.hair:
+        return centre, radius
+    middle, around = drawing.bounding_sphere(_placed(drawn.hair))
+    if np.linalg.norm(corners - middle, axis=1).max() <= around:
+        return None
+    return (centre, radius) if radius <= _WIDE * around else (middle, _WIDE * around)
 
 
 def _hair_receivers(hair, owners):
@@ -182,7 +205,7 @@ def read_render(depsgraph, known, refused):
     lamps = scene_lights.gather(*light_door.read_lights(depsgraph, for_render=True), world, hair_receivers)
     hair_seen, surfaces_seen = visibility(unlit)
     drawn = replace(unlit, world=world, hair_visibility=hair_seen, surface_visibility=surfaces_seen)
-    return _lit(drawn, lamps, None, hair_receivers)
+    return _lit(drawn, lamps, scene_lights.new_maps(lamps.record, is_wide=True), hair_receivers)
 
 
 def read_unlit(depsgraph, known, refused):

@@ -312,6 +312,7 @@ def test_samples_share_light_of_their_own_surface_alone(stage):
     bpy.ops.mesh.primitive_cube_add(size=0.6, location=(0.0, -1.0, 0.0), rotation=(0.5, 0.2, 0.7))
     material_of(bpy.context.object, Base_Color=(0.9, 0.4, 0.1, 1.0), Specular_IOR_Level=0.0)
     sun(math.radians(60.0), 0.2, 0.0)
+    bpy.data.lights["Sun"].use_shadow = False
     depsgraph = bpy.context.evaluated_depsgraph_get()
     drawn = drawn_scene.read(stage, bpy.context.view_layer, depsgraph)
     view = drawing.pass_record(*read_camera(stage, depsgraph, 4 * SIZE, 4 * SIZE), (4 * SIZE, 4 * SIZE), 1)
@@ -360,3 +361,34 @@ def test_light_that_samples_share_is_as_bright_below_hair(stage):
     np.testing.assert_allclose(means[0].mean(), means[1].mean(), rtol=0.002)
     np.testing.assert_allclose(means[0], means[1], rtol=0.03)
     assert deviations[0] < 1.5 * deviations[1]
+
+
+@pytest.mark.parametrize("kind", ["SUN", "POINT", "SPOT", "AREA"])
+@pytest.mark.parametrize("has_hair", [False, True])
+def test_surfaces_cast_shadows_as_in_cycles(kind, has_hair, stage, tmp_path):
+    """A box on a floor, as far from hair as can be seen, in the light of one lamp: each block of 4 × 4 pixels."""
+    stage.camera.data.ortho_scale = 6.0
+    stage.camera.location, stage.camera.rotation_euler = (0.0, -6.0, 6.0), (math.radians(45.0), 0.0, 0.0)
+    bpy.ops.mesh.primitive_plane_add(size=20.0)
+    floor = bpy.context.object
+    material_of(floor, Base_Color=(0.5, 0.5, 0.5, 1.0), Specular_IOR_Level=0.0)
+    bpy.ops.mesh.primitive_cube_add(size=1.2, location=(0.8, 0.3, 0.6), rotation=(0.0, 0.0, 0.5))
+    material_of(bpy.context.object, Base_Color=(0.2, 0.5, 0.8, 1.0), Specular_IOR_Level=0.0)
+    if has_hair:
+        bpy.ops.mesh.primitive_plane_add(size=0.1, location=(-1.8, 0.0, 0.05))
+        bpy.ops.vellus.add_hair(guide_count=5, strand_count=20, length=0.3, radius=1e-4)
+    lamp = bpy.data.lights.new("Lamp", kind)
+    lamp.energy = 3.0 if kind == "SUN" else 1000.0
+    if kind == "SUN":
+        lamp.angle = 0.02
+    elif kind == "AREA":
+        lamp.size = 0.2
+    else:
+        lamp.shadow_soft_size = 0.1
+    placed = bpy.data.objects.new("Lamp", lamp)
+    placed.location, placed.rotation_euler = (3.0, 1.0, 3.0), (0.0, math.radians(45.0), 0.0)
+    stage.collection.objects.link(placed)
+    blocks = [of.reshape(12, 4, 12, 4, 4).mean(axis=(1, 3))[..., :3] for of in (picture(), by_cycles(tmp_path))]
+    apart = np.abs(blocks[0] - blocks[1])
+    assert apart.mean() < (0.03 if kind == "SPOT" else 0.01) * blocks[1].mean()  # a spot's border is another
+    assert apart.max() < 0.1 * blocks[1].max()
