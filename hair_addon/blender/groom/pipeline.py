@@ -314,6 +314,8 @@ def restyle(
     guide_curves, settings = inputs_of(target)
     if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
+    if target.surface is None:  # deleted: what binds the hair again says so
+        return False
     device = bound.binding.positions.device
     guides = curves.read_shown_guides(guide_curves, bound.surface, device, bound.guides)
     combed = following.combed(guides, bound.guides)
