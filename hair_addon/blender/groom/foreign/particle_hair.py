@@ -35,7 +35,7 @@ def as_curves(surface: Object) -> Iterator[Object]:
     If it ends well the system is switched off, else the object is gone again.
     """
     system = system_to_convert(surface)
-    curves.require_editable(surface)
+    curves.require_overridable(surface)
     surface.particle_systems.active_index = list(surface.particle_systems).index(system)
     name, before = system.name, set(bpy.data.objects)
     modifier = next(m for m in surface.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system == system)
