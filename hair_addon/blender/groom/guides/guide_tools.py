@@ -99,8 +99,6 @@ class CombedGuides:
 
 def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
     """The `CombedGuides` of guide Curves, all of weight one. Raises `HairError` where they cannot be read."""
-    if datablock.surface is None:
-        raise HairError("The surface is missing: pick a mesh.")
     surface = scene.read_surface(datablock.surface, depsgraph)
     mesh_math.check_mesh(surface.mesh)
     starts = curves.curve_offsets(datablock).astype(np.int64)
