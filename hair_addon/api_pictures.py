@@ -44,7 +44,8 @@ def render(
 
     engine: "vellus", "cycles" or "eevee"; settings: fields of `PictureSettings` (width, height, sample_count,
     is_transparent, has_passes), width and height default to the scene's. Returns the path, in which ### is
-    replaced with the frame number.
+    replaced with the frame number. Views of a stereoscopic scene are saved as its output settings say: one file, or
+    one for each view, with its suffix before the extension.
 
     >>> api.render("frame_####.png", frame=3, width=64, height=48).name
     'frame_0003.png'

@@ -133,7 +133,7 @@ def test_linked_hair_is_left_alone(groom_file, operator):
     """Blender would take the change and lose it on reload."""
     hair = bring(groom_file, is_linked=True)
     before, made = snapshot(), points(hair)
-    with pytest.raises(RuntimeError, match="library override"):
+    with pytest.raises(RuntimeError, match="is linked from another file"):
         getattr(bpy.ops.vellus, operator)(**LINKED[operator])
     assert snapshot() == before and np.array_equal(points(hair), made)
 
@@ -141,9 +141,12 @@ def test_linked_hair_is_left_alone(groom_file, operator):
 def test_linked_hair_is_drawn_and_settings_change_nothing(groom_file):
     hair = bring(groom_file, is_linked=True)
     assert hair_cache.strands_on_gpu(hair.data).strand_count == 500
+    hair.data.vellus.hair.radius = 0.001
+    bpy.context.view_layer.update()
+    assert "is linked from another file: make it local first" in hair.data.vellus.status
     hair.data.vellus.hair.strand_count = 30
     bpy.context.view_layer.update()
-    assert len(hair.data.curves) == 500 and "library override" in hair.data.vellus.status
+    assert len(hair.data.curves) == 500 and "keeps the 500 strands of its file" in hair.data.vellus.status
 
 
 def test_linked_hair_keeps_the_materials_of_its_file(groom_file):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hair_addon import api
-from hair_addon.blender.groom import bindings
+from hair_addon.blender.groom import bindings, reweighed_hair
 from hair_addon.blender.live import invalidation, live_hair
 from hair_addon.blender.render import drawn_scene
 from hair_addon.core.errors import HairError
@@ -81,6 +81,46 @@ def test_other_hair_follows_its_guides(two, monkeypatch, capfd):
     assert np.abs(points(good) - before).max() > 0.05
     assert bad.data.vellus.status == "This hair cannot be written."
     assert "Traceback" not in capfd.readouterr().err
+
+
+@pytest.mark.parametrize("changes", ["a setting", "the frame"])
+def test_other_hair_follows_its_settings_where_one_mesh_was_deleted(hair, capfd, changes):
+    api.set_styles(hair.data, [api.Frizz()])
+    bpy.ops.mesh.primitive_ico_sphere_add(subdivisions=3, location=(3.0, 0.0, 0.0))
+    guides = api.distribute_guides(bpy.context.object, guide_count=5, length=0.2)
+    good = api.interpolate_hair(guides, strand_count=20)
+    update()
+    bpy.data.objects.remove(hair.data.surface)
+    update()
+    for datablock, path, value in ((hair.data, "styles[0].frizz.amplitude", 0.02), (good, "hair.strand_count", 30)):
+        group, name = datablock.path_resolve(f"vellus.{path.rpartition('.')[0]}"), path.rpartition(".")[2]
+        if changes == "the frame":
+            datablock.keyframe_insert(f"vellus.{path}", frame=1)
+        setattr(group, name, value)
+        if changes == "the frame":
+            datablock.keyframe_insert(f"vellus.{path}", frame=10)
+    update()
+    bpy.context.scene.frame_set(10)
+    assert reweighed_hair.reweighed(hair.data, bpy.context.evaluated_depsgraph_get()) is None  # as a slider asks
+    assert len(good.curves) == 30 and good.vellus.status == ""
+    assert hair.data.vellus.status == "Hair needs a mesh object to grow on: select one."
+    assert "Traceback" not in capfd.readouterr().err
+
+
+def test_an_error_that_nobody_expects_is_reported_when_other_hair_is_done(two, monkeypatch, capfd):
+    bad, good = two
+    make = live_hair.make_again
+
+    def make_some(hair, depsgraph):
+        if hair == bad.data:
+            raise RuntimeError("Nobody expects this.")
+        make(hair, depsgraph)
+
+    monkeypatch.setattr(live_hair, "make_again", make_some)
+    bad.data.vellus.hair.strand_count = good.data.vellus.hair.strand_count = 25
+    update()
+    assert (len(bad.data.curves), len(good.data.curves)) == (500, 25)
+    assert "Nobody expects this." in capfd.readouterr().err
 
 
 def test_the_render_engine_draws_other_hair_and_reports_the_one(two, tmp_path, capfd):

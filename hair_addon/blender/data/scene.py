@@ -26,7 +26,9 @@ surface_cache = Cache(capacity=16)
 
 
 def read_surface(surface_object, depsgraph):
-    """The evaluated mesh of an object as a `Surface`. Raises `HairError`."""
+    """The evaluated mesh of an object, None if it was deleted, as a `Surface`. Raises `HairError`."""
+    if surface_object is None:
+        raise HairError("The surface is missing: pick a mesh.")
     if surface_object.type != "MESH":  # a script may have set it as the surface of Curves
         raise HairError(
             '"{name}" is not a mesh that hair can grow on: attach the hair to a mesh.', name=name_of(surface_object)

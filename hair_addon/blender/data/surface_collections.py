@@ -7,14 +7,20 @@ import bpy
 def collection_of(surface_object):
     """The collection of a surface that the view layer shows; else one that it has, else any; the scene's without any.
 
-    A mesh may be in a collection that only lists it, as colliders are, which is hidden, excluded or in no scene.
+    A mesh may be in a collection that only lists it, as colliders are, which is hidden, excluded or in no scene. Where
+    Blender adds nothing, as the collection is linked or a library override, it is the scene's too.
     """
-    owners = [owner for owner in surface_object.users_collection if owner.library is None]
+    owners = surface_object.users_collection
     layers = list(_layers(bpy.context.view_layer.layer_collection))
     shown = {layer.collection for layer in layers if layer.is_visible}
     present = {layer.collection for layer in layers}
-    ranked = [owner for known in (shown, present, owners) for owner in owners if owner in known]
-    return ranked[0] if ranked else bpy.context.scene.collection
+    ranked = ([owner for owner in owners if owner in known] for known in (shown, present, owners))
+    best = next(filter(None, ranked), [])
+    return next((owner for owner in best if _takes_objects(owner)), bpy.context.scene.collection)
+
+
+def _takes_objects(collection):
+    return collection.library is None and collection.override_library is None
 
 
 def _layers(layer_collection):

@@ -7,7 +7,7 @@ from bpy.types import Curves, Depsgraph
 from ...core import geometry
 from ...core.geometry.mesh import require_finite
 from ..data import scene
-from ..data.strands import curves, kept_shapes, posed_strands
+from ..data.strands import curves, curves_objects, kept_shapes, posed_strands
 from . import bindings
 
 
@@ -37,7 +37,7 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
         followers = [hair for hair in curves.followers(guide_curves) if not curves.is_hand_made(hair)]
         for target in (guide_curves, *followers):
             kept_shapes.move(target, lambda points: points @ applied.T)
-            curves.clear_parent_inverse(target)
+            curves_objects.clear_parent_inverse(target)
             bindings.invalidate(target)
     else:
         motion = geometry.surface_deform.motion(before, surface.rest, surface.faces, roots[0])

@@ -43,7 +43,7 @@ def delete(parts: Iterable[Curves]) -> None:
 
 def restore_object(guides: Curves) -> Object:
     """Create a new object for guides whose object was deleted while hair still follows them."""
-    curves.require_editable(guides)
+    curves.require_overridable(guides)
     if guides.surface is None:
         raise HairError("The surface is missing: pick a mesh.")
     return curves_objects.link_object(guides.name, guides, guides.surface, is_rendered=False)
@@ -66,7 +66,7 @@ def attach(parts: Iterable[Curves], surface_object: Object) -> None:
 
 def make_uv_map(surface_object: Object, view_layer: ViewLayer) -> None:
     """Unwrap a mesh object to an additional UV map, and update the hair on it."""
-    curves.require_editable(surface_object)
+    curves.require_overridable(surface_object)
     curves.require_editable(surface_object.data)
     if not surface_object.data.polygons:
         raise HairError("The surface has no faces to grow hair on.")
@@ -90,11 +90,16 @@ def make_uv_map(surface_object: Object, view_layer: ViewLayer) -> None:
 
 def renew_uvs(surface_object: Object, depsgraph: Depsgraph) -> None:
     """Write the UV coordinates of roots, of all hair on a mesh object, by the UV map that is active now."""
-    surface = scene.read_surface(surface_object, depsgraph)
-    for part in curves_on(surface_object, "GUIDES") + curves_on(surface_object, "HAIR"):
+    surface, parts = scene.read_surface(surface_object, depsgraph), _parts_on(surface_object)
+    for part in parts:
         curves.require_editable(part)
+    for part in parts:
         curves.write_uvs(part, surface)
         part.vellus.uv_status = ""
+
+
+def _parts_on(surface_object):
+    return curves_on(surface_object, "GUIDES") + curves_on(surface_object, "HAIR")
 
 
 def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
@@ -104,14 +109,14 @@ def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
     if surface.corner_uvs is None:
         raise HairError('"{name}" has no UV map: make one.', name=name_of(surface_object))
     share = uv_check.misleading_fraction(surface.mesh, surface.corner_uvs)
-    for part in curves_on(surface_object, "GUIDES") + curves_on(surface_object, "HAIR"):
+    for part in _parts_on(surface_object):
         part.vellus.uv_status = "UVs overlap" if share > _TOLERATED else ""
     return share
 
 
 def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
     """Apply a mesh object's scale, and keep its hair in place."""
-    curves.require_editable(surface_object)
+    curves.require_overridable(surface_object)
     curves.require_editable(surface_object.data)
     if surface_object.data.users > 1:
         raise HairError(

@@ -84,6 +84,7 @@ def interpolating_hair(
     """`interpolate_hair` as work in steps; styles: of new hair, whose Curves then keep them (`writing.keep_styles`)."""
     place, its_guides, its_target = map(Remembered, (guide_curves.surface, guide_curves, target))
     bound = yield from _binding_hair(guide_curves, settings, depsgraph, target, styles)
+    writing.require_count(its_target.find(), len(bound.binding.positions), len(bound.radii))
     # Only now, as nothing comes between it and the writing.
     bindings.grow_in_place_of(its_target.find(), bound)
     return writing.write_strands(its_target.find(), place.find(), its_guides.find(), bound)
@@ -314,6 +315,8 @@ def restyle(
     guide_curves, settings = inputs_of(target)
     if bound is None or bound.settings != settings or bound.guide_uid != guide_curves.session_uid:
         return False
+    if target.surface is None:  # deleted: what binds the hair again says so
+        return False
     device = bound.binding.positions.device
     guides = curves.read_shown_guides(guide_curves, bound.surface, device, bound.guides)
     combed = following.combed(guides, bound.guides)
@@ -393,4 +396,4 @@ def _read_surface(surface_object, depsgraph, target=None):
 def _check_surface(surface_object):
     if surface_object is None or surface_object.type != "MESH":
         raise HairError("Hair needs a mesh object to grow on: select one.")
-    curves.require_editable(surface_object)
+    curves.require_overridable(surface_object)

@@ -26,7 +26,7 @@ def reweighed(target: Curves, depsgraph: Depsgraph) -> BoundHair | None:
     guide_curves, settings = pipeline.inputs_of(target)
     if known is None or known.guide_uid != guide_curves.session_uid or known.straight is not None:
         return None
-    if known.free is not None:
+    if known.free is not None or target.surface is None:
         return None
     weighing, others = ({name: getattr(settings, name) for name in names} for names in (_WEIGHING, _AFTER_WEIGHING))
     if replace(known.settings, **weighing, **others) != settings:

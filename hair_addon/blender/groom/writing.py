@@ -16,7 +16,7 @@ from ..data.scene import Surface
 from ..data.strands import attributes, curves, curves_objects, kept_shapes
 from ..host.notices import name_of
 from ..materials import looks
-from ..settings import setting_properties, style_items
+from ..settings import animated, setting_properties, style_items
 from . import bindings, hair_outside, staleness
 from .bindings import BoundHair
 from .grown_guides import GrownGuides
@@ -39,11 +39,12 @@ def write_guides(
     settings: completed for the surface, so with a length; key: `staleness.root_key`; flow_key: `drawn_lines.key` of
     their flow lines.
     """
+    guides = grown.strands
+    require_count(target, *guides.points.shape)
     target = target or curves_objects.new_object("Guides", surface_object, is_rendered=False).data
     _keep_settings(target, "GUIDES", target.vellus.guides, settings)
     target.vellus.status = grown.status
     target.vellus.root_key, target.vellus.flow_key = key, flow_key
-    guides = grown.strands
     radii = np.full(guides.points.shape[1], _GUIDE_RADIUS * (settings.length or 0.0) / surface.scale, np.float32)
     points = Future()
     points.set_result(surface.to_local(guides.numpy()))
@@ -70,7 +71,7 @@ def write_hand_made(surface_object: Object, surface: Surface, guides: Strands) -
 def write_strands(target: Curves | None, surface_object: Object, guide_curves: Curves, bound: BoundHair) -> Curves:
     """Write hair that was bound and grows into Curves, a new object's for None; returns them."""
     target = target or curves_objects.new_object("Hair", surface_object).data
-    curves.require_editable(target)
+    curves.require_not_linked(target)
     target.vellus.guide_curves = guide_curves
     bindings.keep(target, bound)
     write_hair(target)
@@ -128,9 +129,26 @@ def fits(target: Curves, bound: BoundHair) -> bool:
     if bound.points.size == 3 * len(target.points):
         return True
     if attributes.is_from_library(target):
-        name, count = name_of(target), len(target.curves)
-        raise HairError('"{name}" keeps the {count} strands of its file: change them there.', name=name, count=count)
+        raise _other_count(target)
     return False
+
+
+def require_count(target: Curves | None, strand_count: int, point_count: int) -> None:
+    """Raise `HairError` where a change of settings would give Curves of another file another size, which is lost.
+
+    Keys may: a shot plays them as the file does.
+    """
+    if target is None or not attributes.is_from_library(target) or animated.are_keyed(target):
+        return
+    if strand_count * point_count != len(target.points):
+        raise _other_count(target)
+
+
+def _other_count(target):
+    is_hair, name, count = target.vellus.kind == "HAIR", name_of(target), len(target.curves)
+    if is_hair:
+        return HairError('"{name}" keeps the {count} strands of its file: change them there.', name=name, count=count)
+    return HairError('"{name}" keeps the {count} guides of its file: change them there.', name=name, count=count)
 
 
 def keep_styles(target: Curves, styles: Sequence[StyleSettings], names: Sequence[str] = ()) -> None:
@@ -151,7 +169,7 @@ def _store_roots(guide_curves, bound):
 
 
 def _keep_settings(target, kind, group, settings):
-    curves.require_editable(target)
+    curves.require_not_linked(target)
     setting_properties.assign(group, settings)
     target.vellus.kind = kind
     target.vellus.is_stale = False

@@ -102,7 +102,7 @@ def take_off(guides):
     if not delivered:
         raise HairError('No hair of the guides "{name}" plays delivered frames.', name=name_of(guides))
     for hair in delivered:
-        curves.require_editable(hair)
+        curves.require_overridable(hair)
         for user in delivered_hair.objects_of(hair):
             delivered_hair.take_off(user)
         hair.vellus.delivered_key = ""
@@ -116,7 +116,7 @@ def _deliverable(guides):
     if not chosen:
         raise HairError('No hair in this view layer follows the guides "{name}".', name=name_of(guides))
     for hair in chosen:
-        curves.require_editable(hair)
+        curves.require_overridable(hair)
         if not len(hair.curves):
             raise HairError('"{name}" has no strands.', name=name_of(hair))
     return chosen

@@ -8,7 +8,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import HairError, cause_of
-from ...core.files.whole_file import require_place, whole_file
+from ...core.files.whole_file import new_partial_of, require_place, whole_files
 from ...core.imaging import picture_checks
 from ...core.imaging.pixel_sampling import FIRST_FRAME, LAST_FRAME, PassSettings
 from ...core.long_work import no_progress
@@ -20,6 +20,7 @@ from ..host import scene_time
 from ..live import live_hair
 from ..render.frames import engine as render_engine
 from ..render.viewport import viewport
+from . import view_files
 
 # The user's names → Blender's names.
 ENGINES = {"vellus": viewport.ENGINE, "cycles": "CYCLES", "eevee": "BLENDER_EEVEE"}
@@ -102,10 +103,11 @@ def _number_width(pattern):
 
 
 def write_frame(path, frame, engine, settings, partial=None, progress=no_progress):
-    """Render a frame of the open scene and write it; the file appears whole or not at all. Raises `HairError`.
+    """Render a frame of the open scene and write it; its files appear whole or not at all. Raises `HairError`.
 
-    engine: of `ENGINES`; settings: `PictureSettings`, but `DRAWING_FIELDS`; partial: of `whole_file`; progress(step,
-    part): told how far it is, and may raise to stop it: Vellus after any pass, others before the file is written.
+    path: of `view_files.files_of`; engine: of `ENGINES`; settings: `PictureSettings`, but `DRAWING_FIELDS`; partial:
+    where it is written first, None for a new path; progress(step, part): told how far it is, and may raise to stop it:
+    Vellus after any pass, others before the file is written.
     """
     blender_scene = bpy.context.scene
     if not FIRST_FRAME <= frame <= LAST_FRAME:
@@ -114,7 +116,9 @@ def write_frame(path, frame, engine, settings, partial=None, progress=no_progres
     _require_layers(path, settings.has_passes)
     if blender_scene.camera is None:
         raise HairError("The scene has no camera: add one.")
-    with whole_file(path, partial) as partial, _rendering(blender_scene, partial, engine, settings):
+    files, partial = view_files.files_of(path), partial or new_partial_of(Path(path))
+    partials = view_files.files_of(partial)
+    with whole_files(files, partials), _rendering(blender_scene, partial, engine, settings):
         scene_time.go_to(blender_scene, frame)
         progress(f"Frame {frame}", 0.0)
         try:
@@ -124,7 +128,8 @@ def write_frame(path, frame, engine, settings, partial=None, progress=no_progres
             raise HairError(f"Frame {frame} was not rendered: {cause_of(error)}.") from error
         if ended != {"FINISHED"}:
             raise HairError(f"Frame {frame} was not rendered: {engine} stopped before it finished.")
-        picture_checks.require_whole(partial, path)
+        for written, file in zip(partials, files, strict=True):
+            picture_checks.require_whole(written, file)
         progress(f"Frame {frame}", 1.0)
 
 
@@ -158,6 +163,7 @@ def _of_scene(blender_scene, path, engine, settings):
     if not settings.has_passes:
         yield image, "color_mode", "RGBA"
     yield image, "color_depth", color_depth
+    yield image, "views_format", view_files.views_format(path, settings.has_passes)
     if settings.sample_count:
         owner, name = {
             "vellus": (blender_scene.vellus, "sample_count"),

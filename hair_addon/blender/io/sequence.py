@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Frames of a sequence, shared among all processes with the same command: none is rendered twice.
 
-A frame is done when its file exists and is complete: files are written atomically, but another program may have left
-an empty one with the same name. A file beside the frames identifies the sequence, so that another command does not
-continue it.
+A frame is done when its files, one or one for each view, exist and are complete: they are written atomically, but
+another program may have left an empty one with the same name. A file beside the frames identifies the sequence, so that
+another command does not continue it.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ from ...core.files.whole_file import partial_of, require_place, whole_file
 from ...core.imaging import picture_checks
 from ...core.long_work import no_progress
 from ..host import paths
-from . import frames
+from . import frames, view_files
 
 _VERSION = 1
 _PAUSE = 0.5  # [s] between checks of other processes' frames
@@ -43,7 +43,7 @@ def begin(pattern, numbers, described, replaces=False):
     """
     record = record_of(pattern)
     require_place(record)
-    folder = next((path for number in numbers if (path := frames.path_of(pattern, number)).is_dir()), None)
+    folder = next((path for path in _files(pattern, numbers) if path.is_dir()), None)
     if folder is not None:
         raise HairError(f"{folder} is a folder: move it, or choose another file name.")
     while True:
@@ -72,8 +72,8 @@ def record_of(pattern):
 
 def _begin(pattern, numbers, record, described, replaces):
     if replaces:
-        for number in numbers:
-            frames.path_of(pattern, number).unlink(missing_ok=True)
+        for path in _files(pattern, numbers):
+            path.unlink(missing_ok=True)
     elif record.exists():
         _require_same(record, described)
         return
@@ -97,7 +97,7 @@ def _require_same(record, described):
 
 
 def _require_none(pattern, numbers):
-    paths = (frames.path_of(pattern, number) for number in numbers)
+    paths = _files(pattern, numbers)
     there = next((path for path in paths if path.exists() and not picture_checks.is_broken(path)), None)
     if there is not None:
         raise HairError(f"{there} belongs to no known sequence: choose another name, or use --overwrite.")
@@ -115,11 +115,11 @@ def make(pattern, numbers, write, told=no_progress):
         for number in list(left):
             told(f"Frame {number}", 1.0 - len(left) / len(numbers))
             path = frames.path_of(pattern, number)
-            if not picture_checks.is_whole(path):
+            if not _is_done(path):
                 with _claimed(path) as is_ours:
                     if not is_ours:
                         continue
-                    if not picture_checks.is_whole(path):
+                    if not _is_done(path):
                         write(path, number)
                         is_idle = False
                         yield number, path
@@ -129,10 +129,21 @@ def make(pattern, numbers, write, told=no_progress):
     _sweep(pattern, numbers)
 
 
+def _files(pattern, numbers):
+    """The files of all frames, one after the other."""
+    return (file for number in numbers for file in view_files.files_of(frames.path_of(pattern, number)))
+
+
+def _is_done(path):
+    return all(map(picture_checks.is_whole, view_files.files_of(path)))
+
+
 def _sweep(pattern, numbers):
     """Remove partial files of killed processes, for frames that others have rendered since."""
     for path in [frames.path_of(pattern, number) for number in numbers]:
-        if partial_of(path).exists() or claim_of(path).exists():
+        partials = view_files.files_of(partial_of(path))
+        if any(file.exists() for file in (*partials, claim_of(path))):
             with _claimed(path) as is_ours:
                 if is_ours:
-                    partial_of(path).unlink(missing_ok=True)
+                    for file in partials:
+                        file.unlink(missing_ok=True)

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """bpy.app.handlers: detection of outdated hair from depsgraph updates."""
 
+import contextlib
+
 import bpy
 from bpy.app.handlers import persistent
 
@@ -179,26 +181,36 @@ def _evaluate(depsgraph, combed):
         for guides in combed:
             stale_marks.mark_followers(guides)
         return
-    for guides in _of_kind("GUIDES"):
-        if guides.vellus.is_shading_stale:
-            looks.evaluate_guides(guides)
-        if guides.vellus.is_stale and guides.vellus.is_live and _is_surface_at_rest(guides):
-            pipeline.evaluate(guides, depsgraph)
-            events.strands_made(guides)
-            stale_marks.follow_mask(guides, depsgraph)
-            combed[guides] = None  # to be read
-    for hair in _of_kind("HAIR"):
-        state = hair.vellus
-        follows = state.guide_curves in combed
-        if not (state.is_live and _is_surface_at_rest(hair)):
-            state.is_stale = state.is_stale or follows
-        elif state.is_stale and not live_hair.is_ahead(hair):
-            live_hair.make_again(hair, depsgraph)
-        elif follows:
-            live_hair.follow_guides(hair, depsgraph, combed[state.guide_curves])
-        if state.is_shading_stale:
-            looks.evaluate_shading(hair)
-    live_hair.show_styles(depsgraph)
+    # Called last to first. An error that nobody expects is raised when all were called, so that it stops no other hair.
+    with contextlib.ExitStack() as stack:
+        stack.callback(live_hair.show_styles, depsgraph)
+        for hair in reversed(_of_kind("HAIR")):
+            stack.callback(_evaluate_hair, hair, depsgraph, combed)
+        for guides in reversed(_of_kind("GUIDES")):
+            stack.callback(_evaluate_guides, guides, depsgraph, combed)
+
+
+def _evaluate_guides(guides, depsgraph, combed):
+    if guides.vellus.is_shading_stale:
+        looks.evaluate_guides(guides)
+    if guides.vellus.is_stale and guides.vellus.is_live and _is_surface_at_rest(guides):
+        pipeline.evaluate(guides, depsgraph)
+        events.strands_made(guides)
+        stale_marks.follow_mask(guides, depsgraph)
+        combed[guides] = None  # to be read
+
+
+def _evaluate_hair(hair, depsgraph, combed):
+    state = hair.vellus
+    follows = state.guide_curves in combed
+    if not (state.is_live and _is_surface_at_rest(hair)):
+        state.is_stale = state.is_stale or follows
+    elif state.is_stale and not live_hair.is_ahead(hair):
+        live_hair.make_again(hair, depsgraph)
+    elif follows:
+        live_hair.follow_guides(hair, depsgraph, combed[state.guide_curves])
+    if state.is_shading_stale:
+        looks.evaluate_shading(hair)
 
 
 def _is_surface_at_rest(curves):
@@ -221,18 +233,20 @@ def after_frame_change(scene, depsgraph):
         moving_surfaces.frame_changed(deformed & _surfaces())
         for surface_object in deformed:
             events.surface_moved(surface_object)
-    if scene_time.may_write(scene, depsgraph) and animated.follow(depsgraph):
-        # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
-        is_render = scene_time.is_rendered(depsgraph)
-        _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, {})
+    if not scene_time.may_write(scene, depsgraph):
+        unlocked_renders.note(scene)
+        return
+    is_render = scene_time.is_rendered(depsgraph)
+    try:
+        if animated.follow(depsgraph):
+            # A render may subdivide surfaces differently; hair is rooted on the viewport's mesh.
+            _evaluate(bpy.context.evaluated_depsgraph_get() if is_render else depsgraph, {})
+            if is_render:
+                live_hair.write_all()
+    finally:
+        simulated_hair.follow_frame(scene, depsgraph)
         if is_render:
             live_hair.write_all()
-    if scene_time.may_write(scene, depsgraph):
-        simulated_hair.follow_frame(scene, depsgraph)
-        if scene_time.is_rendered(depsgraph):
-            live_hair.write_all()
-    else:
-        unlocked_renders.note(scene)
 
 
 @persistent

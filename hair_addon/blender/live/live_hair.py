@@ -107,7 +107,7 @@ def make_again(hair, depsgraph):
         events.strands_made(hair)
         return
     try:
-        curves.require_editable(hair)
+        curves.require_not_linked(hair)
         guide_curves, settings = pipeline.inputs_of(hair)
         known = bindings.of(hair)
         if known is None or known.is_written:
@@ -116,7 +116,9 @@ def make_again(hair, depsgraph):
             return
         if hair_cache.may_make(hair.session_uid) and _is_reweighed(hair, depsgraph):
             return
-        bindings.keep(hair, pipeline.bind_hair(guide_curves, settings, depsgraph, hair))
+        bound = pipeline.bind_hair(guide_curves, settings, depsgraph, hair)
+        writing.require_count(hair, len(bound.binding.positions), len(bound.radii))
+        bindings.keep(hair, bound)
         _follow_simulated(hair)
     except HairError as error:
         hair.vellus.is_stale = False

@@ -31,7 +31,7 @@ def whole_files(
     for path in places:
         _require_file(path)
     # In the same folder, otherwise paths relative to the file would be wrong.
-    partials = partials or [path.with_name(f".vellus_{secrets.token_hex(4)}{path.suffix}") for path in places]
+    partials = partials or [new_partial_of(path) for path in places]
     try:
         for path in places:
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -49,6 +49,11 @@ def whole_files(
         for partial in partials:
             with contextlib.suppress(OSError):  # it has moved to its place, or was never made
                 partial.unlink()
+
+
+def new_partial_of(path: Path) -> Path:
+    """Return a path for writing a file that nothing else is written to."""
+    return path.with_name(f".vellus_{secrets.token_hex(4)}{path.suffix}")
 
 
 def partial_of(path: Path) -> Path:

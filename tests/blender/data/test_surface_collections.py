@@ -2,7 +2,11 @@
 """New hair and meshes are seen where their surface is, whichever collections list it besides."""
 
 import bpy
+import numpy as np
 import pytest
+
+from hair_addon import api
+from tests.support.overridden import override, parts, reopen
 
 
 @pytest.mark.parametrize("way", ["in no scene", "excluded", "hidden"])
@@ -45,3 +49,25 @@ def test_cards_are_made_beside_a_surface_that_the_view_layer_lacks(hair):
     bpy.context.view_layer.objects.active = hair
     assert bpy.ops.vellus.hair_cards(card_count=3, level_count=2, texture_size=128) == {"FINISHED"}
     assert [o.name for o in kept.all_objects if "Cards" in o.name] == ["Hair Cards LOD0", "Hair Cards LOD1"]
+
+
+def test_what_is_new_on_an_overridden_character_is_in_the_scene(hair, tmp_path):
+    """Blender links no object to an overridden collection; another one only lists the surface, and is hidden."""
+    character = override(hair, tmp_path)
+    present, overridden = set(bpy.data.objects), set(character.objects)
+    sphere, _guides, _hair = parts()
+    listed = bpy.data.collections.new("Colliders")
+    bpy.context.scene.collection.children.link(listed)
+    listed.objects.link(sphere)
+    bpy.context.view_layer.layer_collection.children["Colliders"].hide_viewport = True
+    bpy.context.view_layer.objects.active = sphere
+    bpy.ops.vellus.add_hair(guide_count=5, strand_count=20, length=0.2)
+    made = api.interpolate_hair(api.distribute_guides(sphere, guide_count=5, length=0.2), strand_count=20)
+    api.make_hair_tubes(made, tube_count=3)
+    api.make_hair_cards(made, card_count=3, texture_size=128)
+    new = set(bpy.data.objects) - present
+    assert len(new) == 6 and all(o.visible_get() for o in new)
+    assert set(character.objects) == overridden
+    name, strands = made.name, api.points(made)
+    reopen(tmp_path)
+    np.testing.assert_allclose(api.points(bpy.data.hair_curves[name]), strands, atol=1e-6)

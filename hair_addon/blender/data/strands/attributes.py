@@ -107,6 +107,13 @@ def read(curves, name, data_type, domain):
     return values[:, 0] if width == 1 else values
 
 
+def repeats(values, row):
+    """Whether values (N,) repeat a row; compared in blocks that fit the CPU caches."""
+    some = np.tile(row, 4096)
+    parts = (values[first : first + len(some)] for first in range(0, len(values), len(some)))
+    return all(np.array_equal(part, some[: len(part)]) for part in parts)
+
+
 def valid_radii(radii):
     """Radii as they are, Blender's own default in place of negative and non-finite ones."""
     return np.where((radii >= 0.0) & (radii < np.inf), radii, np.float32(RADIUS))

@@ -7,7 +7,6 @@ evaluation of Catmull-Rom curves would cost more than generating the strands.
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ....core import geometry
 from ....core.errors import HairError
@@ -34,16 +33,9 @@ def _write_positions(curves, points):
 def _write_radii(curves, radii):
     """Write the same radii (P,) along every strand, unless they are unchanged."""
     radii, present = np.asarray(radii, np.float32), attributes.read(curves, "radius", "FLOAT", "POINT")
-    if present is not None and _repeats(present, radii):
+    if present is not None and attributes.repeats(present, radii):
         return
     attributes.write(curves, "radius", "FLOAT", "POINT", np.tile(radii, len(curves.curves)))
-
-
-def _repeats(values, row):
-    """Whether values (N,) repeat a row; compared in blocks that fit the CPU caches."""
-    some = np.tile(row, 4096)
-    parts = (values[first : first + len(some)] for first in range(0, len(values), len(some)))
-    return all(np.array_equal(part, some[: len(part)]) for part in parts)
 
 
 def make_strands(curves, surface, roots, radii, identities, *, leaders=None, normals=None, written_radii=None):
@@ -167,16 +159,6 @@ def write_moved(curves, points):
     _write_positions(curves, points)
     if was_combed:
         curves.vellus.written = before
-
-
-def clear_parent_inverse(curves):
-    """Remove the parent inverse that Blender set to keep children in place when their surface's transform was applied.
-
-    For Curves whose points were transformed for that.
-    """
-    for user in bpy.data.objects:
-        if user.data == curves and user.parent == curves.surface:
-            user.matrix_local = Matrix()
 
 
 def read_root_places(curves, vertex_count):
@@ -391,7 +373,23 @@ def follows_library(hair):
     return any(attributes.is_from_library(c) for c in (hair, hair.vellus.guide_curves) if c is not None)
 
 
-def require_editable(datablock):
-    """Raise `HairError` for linked data: Blender would accept the change and lose it on reload."""
+def require_overridable(datablock):
+    """Raise `HairError` for linked data, before changes that library overrides store: of dynamics, of objects."""
     if datablock.library is not None:
-        raise HairError(f'"{name_of(datablock)}" is linked from another file: make a library override of it first.')
+        sentence = '"{name}" is linked from another file: make a library override of it first.'
+        raise HairError(sentence, name=name_of(datablock))
+
+
+def require_not_linked(datablock):
+    """Raise `HairError` for linked data, before changes that overridden data has until its file is closed."""
+    if datablock.library is not None:
+        sentence = '"{name}" is linked from another file: make it local first, with Object ▸ Relations ▸ Make Local.'
+        raise HairError(sentence, name=name_of(datablock))
+
+
+def require_editable(datablock):
+    """Raise `HairError` for linked and overridden data: Blender would accept the change and lose it on reload."""
+    require_not_linked(datablock)
+    if datablock.override_library is not None:
+        sentence = '"{name}" is a library override: make it local first, with Object ▸ Relations ▸ Make Local.'
+        raise HairError(sentence, name=name_of(datablock))

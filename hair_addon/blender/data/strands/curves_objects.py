@@ -3,6 +3,7 @@
 
 import bpy
 import numpy as np
+from mathutils import Matrix
 
 from .. import rest_nodes, surface_collections
 from . import follow_nodes
@@ -63,6 +64,16 @@ def show_again(curves_object):
         for ray, was_seen in zip(_RAYS, curves_object[_RAYS_BEFORE], strict=True):
             setattr(curves_object, f"visible_{ray}", bool(was_seen))
         del curves_object[_RAYS_BEFORE]
+
+
+def clear_parent_inverse(curves):
+    """Remove the parent inverse that Blender set to keep children in place when their surface's transform was applied.
+
+    For Curves whose points were transformed for that.
+    """
+    for user in bpy.data.objects:
+        if user.data == curves and user.parent == curves.surface:
+            user.matrix_local = Matrix()
 
 
 def keep_rest(surface_object):

@@ -167,7 +167,7 @@ def using_as_guides(
 def require_usable(curves_object: Object, surface_object: Object) -> None:
     """Raise `HairError` unless an object's curves may be put on a mesh object."""
     foreign_curves.require_editable(curves_object)
-    curves.require_editable(surface_object)
+    curves.require_overridable(surface_object)
     usable_surfaces.require_evaluated(surface_object)
     ancestor = surface_object
     while ancestor is not None:

@@ -35,13 +35,13 @@ def as_curves(surface: Object) -> Iterator[Object]:
     If it ends well the system is switched off, else the object is gone again.
     """
     system = system_to_convert(surface)
-    curves.require_editable(surface)
+    curves.require_overridable(surface)
     surface.particle_systems.active_index = list(surface.particle_systems).index(system)
     name, before = system.name, set(bpy.data.objects)
     modifier = next(m for m in surface.modifiers if m.type == "PARTICLE_SYSTEM" and m.particle_system == system)
     if not (modifier.show_viewport and surface.visible_get()):
         raise HairError('"{name}" or its particle system is hidden: show it first.', name=name_of(surface))
-    _convert(surface)
+    _convert(surface, system.settings)
     made = next((o for o in bpy.data.objects if o not in before and o.type == "CURVES"), None)
     try:
         if made is None or not len(made.data.curves):
@@ -59,12 +59,18 @@ def as_curves(surface: Object) -> Iterator[Object]:
     modifier.show_viewport = modifier.show_render = False
 
 
-def _convert(surface):
+def _convert(surface, settings):
+    """Convert the parents of the active system: Blender would convert their children in place of them."""
     layer = bpy.context.view_layer
     for other in layer.objects:
         if other is not None:
             other.select_set(other == surface)
     layer.objects.active = surface
-    layer.update()
-    bpy.ops.curves.convert_from_particle_system()
-    layer.update()
+    children = settings.child_type
+    try:
+        settings.child_type = "NONE"
+        layer.update()
+        bpy.ops.curves.convert_from_particle_system()
+    finally:
+        settings.child_type = children
+        layer.update()

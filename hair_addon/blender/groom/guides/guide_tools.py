@@ -98,10 +98,7 @@ class CombedGuides:
 
 
 def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
-    """The `CombedGuides` of guide Curves, all of weight one. Raises `HairError` where they cannot be changed."""
-    curves.require_editable(datablock)
-    if datablock.surface is None:
-        raise HairError("The surface is missing: pick a mesh.")
+    """The `CombedGuides` of guide Curves, all of weight one. Raises `HairError` where they cannot be read."""
     surface = scene.read_surface(datablock.surface, depsgraph)
     mesh_math.check_mesh(surface.mesh)
     starts = curves.curve_offsets(datablock).astype(np.int64)
@@ -118,6 +115,7 @@ def open_guides(datablock: Curves, depsgraph: Depsgraph) -> CombedGuides:
 
 def read(datablock: Curves, settings: ToolSettings, depsgraph: Depsgraph) -> CombedGuides:
     """The `CombedGuides` of guide Curves, weighted by selection and mask. Raises `HairError`."""
+    curves.require_editable(datablock)
     guides = open_guides(datablock, depsgraph)
     weights = guides.weights.copy()
     selected = guide_curves.selection(datablock, guides.starts) if settings.selected_only else None
@@ -226,6 +224,7 @@ def attract(datablock: Curves, settings: AttractSettings, depsgraph: Depsgraph) 
 
 def copy_shape(datablock: Curves, settings: CopySettings, depsgraph: Depsgraph) -> int:
     """Give guides of one region the shape of those of another; returns and raises as above."""
+    curves.require_editable(datablock)
     guides = open_guides(datablock, depsgraph)
     is_source, weights = _regions(guides, settings, depsgraph)
     guides = replace(guides, weights=weights)

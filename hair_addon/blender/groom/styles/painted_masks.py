@@ -95,8 +95,8 @@ def from_selection(hair: Curves, item: PropertyGroup) -> int:
 def _require_paintable(surface, context):
     if surface is None or surface.type != "MESH":
         raise HairError("The surface is missing: pick a mesh.")
-    for datablock in (surface, surface.data):
-        curves.require_editable(datablock)
+    curves.require_overridable(surface)
+    curves.require_editable(surface.data)
     if surface not in [*context.view_layer.objects]:
         raise HairError('"{name}" is not in this view layer: include one of its collections.', name=name_of(surface))
 

@@ -58,7 +58,7 @@ def assign_look(hair: Curves, look: Appearance) -> None:
 
 def assign_dynamics(guides: Curves, settings: DynamicsSettings) -> None:
     """Assign settings of the simulation to guide Curves; the same settings again mark nothing. Raises `HairError`."""
-    curves.require_editable(guides)
+    curves.require_overridable(guides)
     if properties.own_dynamics_of(guides.vellus) != setting_properties.as_stored(settings):
         setting_properties.assign(guides.vellus.dynamics, settings)
 

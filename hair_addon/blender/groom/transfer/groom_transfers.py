@@ -82,11 +82,12 @@ def transferring(
     """
     if target.type != "MESH" or target == guides.surface:
         raise HairError("Pick another mesh to transfer the groom to.")
-    curves.require_editable(target)
+    curves.require_overridable(target)
     usable_surfaces.require_evaluated(target)
     usable_surfaces.require_object_mode(target)
     if hair is not None:
         pipeline.inputs_of(hair)
+    curves.require_overridable(guides)
     source = guide_tools.open_guides(guides, depsgraph)
     curves_objects.keep_rest(target)
     surface = scene.read_surface(target, bpy.context.evaluated_depsgraph_get())
@@ -169,7 +170,7 @@ def _through_landmarks(own, others):
 
 def _copy(datablock, target, made, is_rendered):
     """A copy of Curves in a new object on a mesh; both are noted in a list."""
-    copy = datablock.copy()
+    copy = datablock.copy().make_local(clear_liboverride=True)
     made.append(copy)
     copy.surface = target
     kept_shapes.forget(copy)

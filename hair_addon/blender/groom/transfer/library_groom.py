@@ -153,7 +153,7 @@ def adding_groom(
     method: of `groom_passage.METHODS`; changed: a function of the settings on this surface that gives others. Raises
     `HairError`, when nothing is left in the scene.
     """
-    curves.require_editable(surface_object)
+    curves.require_overridable(surface_object)
     usable_surfaces.require_evaluated(surface_object)
     usable_surfaces.require_object_mode(surface_object)
     surface = scene.read_surface(surface_object, depsgraph)

@@ -175,6 +175,14 @@ def test_a_file_keeps_what_the_strands_were(kept, tmp_path):
     assert np.array_equal(stored(bpy.data.objects[name]), before)
 
 
+def test_strands_whose_mesh_was_deleted_say_so(kept, sphere, capfd):
+    before = stored(kept)
+    bpy.data.objects.remove(sphere)
+    comb(guides_of(kept), STRETCH)
+    assert kept.data.vellus.status == "The surface is missing: pick a mesh."
+    assert np.array_equal(stored(kept), before) and "Traceback" not in capfd.readouterr().err
+
+
 @pytest.mark.parametrize("is_overridden", [False, True])
 def test_linked_strands_follow_simulated_guides_and_come_back(kept, tmp_path, is_overridden):
     """As other hair of a linked character does; nothing of it is kept in the file that links it."""

@@ -189,6 +189,20 @@ def test_particle_hair_is_converted_in_one_step(particles, use_as):
     assert not (particles.modifiers[0].show_viewport or particles.modifiers[0].show_render)
 
 
+@pytest.mark.parametrize("children", ["SIMPLE", "INTERPOLATED"])
+def test_of_particle_hair_with_children_the_parents_are_converted(particles, children):
+    settings = particles.particle_systems[0].settings
+    settings.child_type = children
+    update()
+    select(particles)
+    system = particles.evaluated_get(bpy.context.evaluated_depsgraph_get()).particle_systems[0]
+    parents = np.array([[particle.hair_keys[end].co for end in (0, -1)] for particle in system.particles], np.float32)
+    assert bpy.ops.vellus.convert_particles(use="HAIR", guide_count=12) == {"FINISHED"}
+    strands = stored(bpy.context.object).reshape(40, -1, 3)
+    np.testing.assert_allclose(strands[:, [0, -1]], parents, atol=1e-5)
+    assert settings.child_type == children
+
+
 def test_particle_hair_that_cannot_be_converted_leaves_nothing_behind(particles):
     particles.particle_systems[0].settings.count = 0
     update()

@@ -23,7 +23,7 @@ class VELLUS_OT_stiffen_dynamics(HairOperator, bpy.types.Operator):
 
     def change(self, context):
         guides = guides_of(context.object)
-        curves.require_editable(guides)
+        curves.require_overridable(guides)
         needed = guide_simulation.needed_stiffness(guides, context.scene, context.evaluated_depsgraph_get())
         settings = guides.vellus.dynamics
         if needed.max() <= settings.bend_stiffness:

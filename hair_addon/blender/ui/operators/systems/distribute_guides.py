@@ -6,6 +6,7 @@ import bpy
 from .....core.grooming import cost
 from .....core.grooming.groom import GuideSettings
 from ....data import scene
+from ....data.strands.curves import require_editable
 from ....groom import pipeline
 from ....groom.selection import guides_again, surface_of
 from ....settings import setting_properties
@@ -41,6 +42,8 @@ class VELLUS_OT_distribute_guides(LongOperator, bpy.types.Operator):
         settings = setting_properties.given_settings(self, GuideSettings)
         depsgraph = context.evaluated_depsgraph_get()
         surface, target = surface_of(context.object), guides_again(context.object)
+        if target is not None:
+            require_editable(target)
         may_drape = not self.properties.is_property_set("drape")
         return pipeline.distributing_guides(surface, settings, depsgraph, target, may_drape=may_drape)
 

@@ -6,6 +6,7 @@ import bpy
 from .....core.grooming import cost
 from .....core.grooming.groom import HairSettings
 from ....data import scene
+from ....data.strands.curves import require_editable
 from ....groom import pipeline
 from ....groom.selection import active_of_kind, guides_of, surface_of
 from ....settings import setting_properties
@@ -41,9 +42,10 @@ class VELLUS_OT_interpolate_hair(LongOperator, bpy.types.Operator):
     def work(self, context):
         settings = setting_properties.given_settings(self, HairSettings)
         depsgraph = context.evaluated_depsgraph_get()
-        return pipeline.interpolating_hair(
-            guides_of(context.object), settings, depsgraph, active_of_kind(context.object, "HAIR")
-        )
+        hair = active_of_kind(context.object, "HAIR")
+        if hair is not None:
+            require_editable(hair)
+        return pipeline.interpolating_hair(guides_of(context.object), settings, depsgraph, hair)
 
     def after(self, context, made):
         setting_properties.show(self, made.vellus.hair, HairSettings)
