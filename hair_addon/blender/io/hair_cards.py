@@ -46,6 +46,7 @@ def making_cards(hair, settings, folder=None):
     """
     settings.require_size(hair_meshes.strand_count(hair))
     if folder is not None:
+        folder = folder.absolute()  # Blender takes other paths of images from the folder of the .blend file
         require_place(folder / "texture.png")
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
