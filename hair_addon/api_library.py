@@ -12,7 +12,7 @@ from .api_arguments import choice, heard, path_of
 from .core import grooming, lazy
 from .core.errors import HairError
 from .core.long_work import Progress, no_progress, run_now
-from .core.params import described, is_text
+from .core.params import array_of, described, is_text
 
 blender = lazy.Package(".blender", __package__)
 
@@ -47,11 +47,8 @@ def _pixels(picture):
     """A picture as (height, width, 4) float32, None for None. Raises `HairError`."""
     if picture is None:
         return None
-    try:
-        pixels = np.asarray(picture, np.float32)
-    except (TypeError, ValueError, OverflowError):
-        pixels = np.zeros(0)
-    if pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size or not np.isfinite(pixels).all():
+    pixels = array_of(picture, np.float32)
+    if pixels is None or pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size or not np.isfinite(pixels).all():
         raise HairError("picture must be an array (height, width, 4) of finite numbers.")
     return pixels
 
