@@ -27,10 +27,10 @@ def save_groom(
 ) -> Path:
     """Save hair Curves and their guides as an asset; returns the file.
 
-    path: the folder of an asset library, or a .blend file, which is replaced; name: of the groom, the hair's for none;
-    catalog: of the library, such as "Hair/Short", empty for none; picture: (height, width, 4), sRGB, the first row at
-    the bottom, drawn by Vellus for None. The file holds the guides at rest, their surface, masks and settings; not the
-    strands, which grow again.
+    path: the folder of an asset library, or a .blend file, which is replaced if it has nothing but grooms; name: of the
+    groom, the hair's for none; catalog: of the library, such as "Hair/Short", empty for none; picture: (height, width,
+    4), sRGB, the first row at the bottom, drawn by Vellus for None. The file holds the guides at rest, their surface,
+    masks and settings; not the strands, which grow again.
 
     >>> file = api.save_groom(bpy.data.objects["Hair"], "library", name="Bob")
     >>> file.name
