@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair and guides of the scene as `GroomCurves`, to be exported."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -23,11 +23,15 @@ _RESERVED = ("groom", "materials")  # names of other objects in files
 
 @dataclass(frozen=True)
 class Source:
-    """Guides or strands to export."""
+    """Guides or strands to export.
+
+    matrix: (4, 4), from where they are [m] to where another object shows them; None for where they are.
+    """
 
     datablock: Remembered
     curves: GroomCurves
     moves: bool
+    matrix: np.ndarray | None = None
 
 
 def hair_on(active):
@@ -138,13 +142,47 @@ def points_of(source, per_metre):
     shape = (strand_arrays.shape_of(datablock) if local is None else local.shape)[:2]
     if shape != (exported.curve_count, exported.point_count):
         raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
-    return strand_arrays.world_rows(datablock, per_metre, local)
+    rows, matrix = strand_arrays.world_rows(datablock, per_metre, local), source.matrix
+    return rows if matrix is None else lambda some: rows(some) @ matrix[:3, :3].T + matrix[:3, 3] * per_metre
 
 
 def instances_of(chosen):
     """[(group, (4, 4) matrix)] of hair that other objects show too, as `strand_arrays.other_places` gives them."""
     pairs = zip(chosen, group_names(chosen), strict=True)
     return [(name, matrix) for hair, name in pairs for matrix in strand_arrays.other_places(hair)]
+
+
+def copies_of(sources, instances):
+    """A `Source` for each of an instance's group, for files in which hair is written for each object that shows it."""
+    groups = {source.curves.group_id: source.curves.group_name for source in sources}
+    instances = [(name, matrix) for name, matrix in instances if name in groups.values()]
+    wanted = [*groups.values(), *(f"{name}_instance" for name, _matrix in instances)]
+    names = groom_curves.group_names(wanted, _RESERVED)[len(groups) :]
+    first_id, first_group, copies = _next_id(sources), max(groups) + 1, []
+    for group, (new_name, (name, matrix)) in enumerate(zip(names, instances, strict=True), first_group):
+        its = [source for source in sources if source.curves.group_name == name]
+        shift = first_id - min(source.curves.first_id for source in its)
+        copies += [_copy(source, group, new_name, shift, matrix) for source in its]
+        first_id = _next_id(copies)
+    return copies
+
+
+def _next_id(sources):
+    return max(source.curves.first_id + source.curves.curve_count for source in sources)
+
+
+def _copy(source, group, name, shift, matrix):
+    its = source.curves
+    scale = np.float32(abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0))
+    curves_there = replace(
+        its,
+        group_id=group,
+        group_name=name,
+        first_id=its.first_id + shift,
+        widths=lambda some: its.widths(some) * scale,
+        guide_ids=None if its.guide_ids is None else its.guide_ids + np.int32(shift),
+    )
+    return replace(source, curves=curves_there, matrix=matrix)
 
 
 def counts_of(sources):
