@@ -16,7 +16,7 @@ from ..groom.dynamics import frame_folders
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import properties
-from . import strand_arrays
+from . import modified_strands, strand_arrays
 
 _RESERVED = ("groom", "materials")  # names of other objects in files
 
@@ -25,12 +25,14 @@ _RESERVED = ("groom", "materials")  # names of other objects in files
 class Source:
     """Guides or strands to export.
 
-    matrix: (4, 4), from where they are [m] to where another object shows them; None for where they are.
+    is_modified: whether they are as an artist's modifiers make them; matrix: (4, 4), from where they are [m] to where
+    another object shows them; None for where they are.
     """
 
     datablock: Remembered
     curves: GroomCurves
     moves: bool
+    is_modified: bool = False
     matrix: np.ndarray | None = None
 
 
@@ -60,8 +62,9 @@ def sources_of(chosen, settings, per_metre):
             made = _guide_curves(guides, group, name, first_id, per_metre)
             sources.append(Source(Remembered(guides), made, settings.moves(True)))
         if settings.has_hair:
-            made = _strand_curves(hair, group, name, first_id, per_metre, settings)
-            sources.append(Source(Remembered(hair), made, settings.moves(False)))
+            shown = modified_strands.curves_of(hair)
+            made = _strand_curves(hair, shown or hair, group, name, first_id, per_metre, settings)
+            sources.append(Source(Remembered(hair), made, settings.moves(False), shown not in (None, hair)))
         first_id += (len(guides.curves) if guides is not None else 0) + len(hair.curves)
     return sources
 
@@ -81,19 +84,20 @@ def _guide_curves(guides, group, name, first_id, per_metre):
         curve_count=curve_count,
         point_count=point_count,
         first_id=first_id,
-        widths=_widths(guides, point_count, per_metre),
+        widths=_widths(guides, guides, point_count, per_metre),
         root_uvs=exported_curves.read_root_uvs(guides),
     )
 
 
-def _strand_curves(hair, group, name, first_id, per_metre, settings):
+def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
+    curve_count, point_count, _ = strand_arrays.shape_of(hair)
+    widths = _widths(hair, shown, point_count, per_metre)  # first: what follows may evaluate again
     guides = hair.vellus.guide_curves
     guide_count = 0 if guides is None else len(guides.curves)
     # Without guides in the file there are none to name.
     depsgraph = bpy.context.evaluated_depsgraph_get()
     guide_map = guide_maps.of(hair, depsgraph) if guide_count and settings.has_guides else None
     ids, weights = (None, None) if guide_map is None else groom_curves.closest_guides(*guide_map, first_id)
-    curve_count, point_count, _ = strand_arrays.shape_of(hair)
     look, randoms = properties.look_of(hair.vellus), curves.read_randoms(hair)
 
     def colors(some):
@@ -109,7 +113,7 @@ def _strand_curves(hair, group, name, first_id, per_metre, settings):
         curve_count=curve_count,
         point_count=point_count,
         first_id=first_id + guide_count,
-        widths=_widths(hair, point_count, per_metre),
+        widths=widths,
         root_uvs=exported_curves.read_root_uvs(hair),
         guide_ids=ids,
         guide_weights=weights,
@@ -119,9 +123,9 @@ def _strand_curves(hair, group, name, first_id, per_metre, settings):
     )
 
 
-def _widths(datablock, point_count, per_metre):
-    """Diameters of some strands, in the file's units."""
-    radii = exported_curves.read_radii(datablock, point_count)
+def _widths(datablock, shown, point_count, per_metre):
+    """Diameters of some strands, in the file's units; shown: the Curves that have the radii."""
+    radii = exported_curves.read_radii(shown, point_count)
     factor = 2.0 * strand_arrays.world_scale(datablock) * per_metre
     return lambda some: radii(some) * np.float32(factor)
 
@@ -136,13 +140,19 @@ def _guides_at_rest(guides):
 
 
 def points_of(source, per_metre):
-    """The points of a `Source` now, as `strand_arrays.world_rows` gives them. Raises `HairError`."""
+    """The points of a `Source` now, as `strand_arrays.shown_rows` gives them. Raises `HairError`."""
     datablock, exported = source.datablock.find(), source.curves
+    if source.is_modified and modified_strands.curves_of(datablock) is None:
+        raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
     local = _guides_at_rest(datablock) if exported.is_guide else None
     shape = (strand_arrays.shape_of(datablock) if local is None else local.shape)[:2]
     if shape != (exported.curve_count, exported.point_count):
         raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
-    rows, matrix = strand_arrays.world_rows(datablock, per_metre, local), source.matrix
+    if exported.is_guide:
+        rows = strand_arrays.world_rows(datablock, per_metre, local)
+    else:
+        rows = strand_arrays.shown_rows(datablock, per_metre)
+    matrix = source.matrix
     return rows if matrix is None else lambda some: rows(some) @ matrix[:3, :3].T + matrix[:3, 3] * per_metre
 
 
@@ -197,6 +207,8 @@ def notes_of(chosen, sources, settings):
     for group, (hair, name) in enumerate(zip(chosen, group_names(chosen), strict=True)):
         if name_of(hair) != name:
             yield HairError('"{name}" is called {group} in the file.', name=name_of(hair), group=name)
+        if settings.has_hair:
+            yield from modified_strands.notes_of(hair)
         if not (settings.has_hair and settings.has_guides):
             continue
         if hair.vellus.guide_curves is None:

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core.cards import atlas, outlines, ribbons, texels
 from ...core.cards.polygon_mesh import PolygonMesh
+from ...core.errors import HairError
 from ...core.files import file_names
 from ...core.files.whole_file import require_place
 from ...core.geometry import clusters
@@ -19,13 +20,17 @@ from . import hair_meshes
 
 @dataclass(frozen=True)
 class CardLevel:
-    """A level of detail that was made: its object, {map: image}, number of cards and pictures, and triangles."""
+    """A level of detail that was made: its object, {map: image}, number of cards, pictures and triangles.
+
+    notes: what of the hair is left out.
+    """
 
     mesh_object: object
     images: dict
     card_count: int
     picture_count: int
     triangle_count: int
+    notes: list[HairError]
 
 
 @dataclass(frozen=True)
@@ -128,5 +133,5 @@ def _written(read, drawn, folder):
         if index:
             made_meshes.hide(mesh_object)
         counts = level.card_count, level.picture_count, level.mesh.triangle_count
-        made.append(CardLevel(mesh_object, its, *counts))
+        made.append(CardLevel(mesh_object, its, *counts, read.notes))
     return made
