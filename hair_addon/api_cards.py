@@ -36,8 +36,10 @@ def make_hair_cards(
     (240, 60)
     """
     wanted, place = changed(CardSettings, settings, changes), None if folder is None else path_of(folder)
-    work = blender.io.hair_cards.making_cards(blender.data.arguments.curves_of(hair, "HAIR"), wanted, place)
-    return [level.mesh_object for level in run_now(work, heard(progress))]
+    target = blender.data.arguments.curves_of(hair, "HAIR")
+    levels = run_now(blender.io.hair_cards.making_cards(target, wanted, place), heard(progress))
+    _say(levels[0].notes)
+    return [level.mesh_object for level in levels]
 
 
 def make_hair_tubes(
@@ -52,5 +54,12 @@ def make_hair_tubes(
     1500
     """
     wanted = changed(TubeSettings, settings, changes)
-    work = blender.io.hair_meshes.making_tubes(blender.data.arguments.curves_of(hair, "HAIR"), wanted)
-    return run_now(work, heard(progress)).mesh_object
+    target = blender.data.arguments.curves_of(hair, "HAIR")
+    made = run_now(blender.io.hair_meshes.making_tubes(target, wanted), heard(progress))
+    _say(made.notes)
+    return made.mesh_object
+
+
+def _say(notes):
+    for note in notes:
+        blender.host.notices.say(str(note))

@@ -15,7 +15,7 @@ from .core.dynamics.rod.settings import DynamicsSettings
 from .core.errors import HairError
 from .core.geometry.strands import Strands, check_strands
 from .core.long_work import Progress, no_progress, run_now
-from .core.params import Param, plain_value
+from .core.params import Param, array_of, plain_value
 
 blender = lazy.Package(".blender", __package__)
 
@@ -182,10 +182,7 @@ def simulate(
 
 def _regions_of(given, guide_count):
     """(G,) int32 from 0. Raises `HairError`."""
-    try:
-        regions = np.asarray(given)
-    except (TypeError, ValueError):
-        regions = np.empty(0)
-    if regions.dtype.kind not in "iu" or regions.shape != (guide_count,):
+    regions = array_of(given)
+    if regions is None or regions.dtype.kind not in "iu" or regions.shape != (guide_count,):
         raise HairError(f"regions must be whole numbers of shape ({guide_count},), one of each guide.")
     return np.unique(regions, return_inverse=True)[1].astype(np.int32)

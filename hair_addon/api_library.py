@@ -12,7 +12,7 @@ from .api_arguments import choice, heard, path_of
 from .core import grooming, lazy
 from .core.errors import HairError
 from .core.long_work import Progress, no_progress, run_now
-from .core.params import described, is_text
+from .core.params import array_of, described, is_text
 
 blender = lazy.Package(".blender", __package__)
 
@@ -27,10 +27,10 @@ def save_groom(
 ) -> Path:
     """Save hair Curves and their guides as an asset; returns the file.
 
-    path: the folder of an asset library, or a .blend file, which is replaced; name: of the groom, the hair's for none;
-    catalog: of the library, such as "Hair/Short", empty for none; picture: (height, width, 4), sRGB, the first row at
-    the bottom, drawn by Vellus for None. The file holds the guides at rest, their surface, masks and settings; not the
-    strands, which grow again.
+    path: the folder of an asset library, or a .blend file, which is replaced if it has nothing but grooms; name: of the
+    groom, the hair's for none; catalog: of the library, such as "Hair/Short", empty for none; picture: (height, width,
+    4), sRGB, the first row at the bottom, drawn by Vellus for None. The file holds the guides at rest, their surface,
+    masks and settings; not the strands, which grow again.
 
     >>> file = api.save_groom(bpy.data.objects["Hair"], "library", name="Bob")
     >>> file.name
@@ -47,11 +47,8 @@ def _pixels(picture):
     """A picture as (height, width, 4) float32, None for None. Raises `HairError`."""
     if picture is None:
         return None
-    try:
-        pixels = np.asarray(picture, np.float32)
-    except (TypeError, ValueError, OverflowError):
-        pixels = np.zeros(0)
-    if pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size or not np.isfinite(pixels).all():
+    pixels = array_of(picture, np.float32)
+    if pixels is None or pixels.ndim != 3 or pixels.shape[2] != 4 or not pixels.size or not np.isfinite(pixels).all():
         raise HairError("picture must be an array (height, width, 4) of finite numbers.")
     return pixels
 

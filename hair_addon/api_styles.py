@@ -17,7 +17,7 @@ from .core.geometry.strands import Strands
 from .core.grooming import following, groom, hair_styles
 from .core.grooming.groom import HairSettings
 from .core.long_work import Progress
-from .core.params import Param, declared, described, plain_value
+from .core.params import Param, array_of, declared, described, plain_value
 from .core.styling.base import StyleSettings
 from .core.styling.bend import Settings as Bend
 from .core.styling.braid import Settings as Braid
@@ -147,12 +147,8 @@ def _mask(mesh, masks, key):
         raise HairError("Images mask styles in Blender only: pass weights of vertices as masks={name: weights}.")
     if name not in masks:
         raise HairError(f"There is no mask {name!r}: pass weights of vertices as masks={{name: weights}}.")
-    try:
-        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
-            weights = np.asarray(masks[name], np.float32)
-    except (TypeError, ValueError, OverflowError):
-        weights = np.empty(0)
-    if weights.shape != (len(mesh.vertices),) or not np.isfinite(weights).all():
+    weights = array_of(masks[name], np.float32)
+    if weights is None or weights.shape != (len(mesh.vertices),) or not np.isfinite(weights).all():
         raise HairError(f"The mask {name!r} must have a finite weight for each of {len(mesh.vertices)} vertices.")
     return Mask(weights[mesh.triangles], is_inverted=is_inverted)
 

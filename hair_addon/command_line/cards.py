@@ -31,10 +31,11 @@ def run(given, console):
 
 
 def _cards(given, console, hair, settings):
-    """([object], counts of the finest level)."""
+    """([object], counts of the finest level, notes)."""
     folder = given.textures
     if folder is None and not blender.io.mesh_export.has_textures(given.out):
         folder = given.out.parent
     levels = run_now(blender.io.hair_cards.making_cards(hair, settings, folder), console.progress)
     counts = {"cards": levels[0].card_count, "pictures": levels[0].picture_count, "levels": len(levels)}
-    return [level.mesh_object for level in levels], counts | {"triangles": [one.triangle_count for one in levels]}
+    counts["triangles"] = [level.triangle_count for level in levels]
+    return [level.mesh_object for level in levels], counts, levels[0].notes

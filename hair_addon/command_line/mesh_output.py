@@ -20,13 +20,18 @@ def add(parser):
 
 
 def make(given, console, made_of):
-    """Open the input, make meshes of each hair and write them; made_of(hair): ([object], {what is counted: count})."""
+    """Open the input, make meshes of each hair and write them.
+
+    made_of(hair): ([object], {what is counted: count}, what is left out).
+    """
     blender.io.mesh_files.require_blend(given.input)
     blender.io.mesh_export.require_writable(given.out)
     opening.open_file(given, console)
     started, objects, told = time.perf_counter(), [], []
     for hair in export.chosen_hair(given):
-        made, counts = made_of(hair)
+        made, counts, notes = made_of(hair)
+        for note in notes:
+            console.warn(str(note))
         objects += made
         told.append({"hair": blender.host.notices.name_of(hair), **counts})
     blender.io.mesh_export.write(given.out, objects)

@@ -31,4 +31,4 @@ def run(given, console):
 
 def _tubes(console, hair, settings):
     made = run_now(blender.io.hair_meshes.making_tubes(hair, settings), console.progress)
-    return [made.mesh_object], {"tubes": made.tube_count, "triangles": made.triangle_count}
+    return [made.mesh_object], {"tubes": made.tube_count, "triangles": made.triangle_count}, made.notes

@@ -18,6 +18,8 @@ def cause_of(error: Exception) -> str:
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     lines = [line for line in str(error).splitlines() if line.strip()] or [type(error).__name__]
-    # For an operator in Python, Blender passes on the whole traceback, which ends with the error.
-    line = lines[-1] if "Traceback" in lines[0] else lines[0]
+    if "Traceback" in lines[0]:
+        # For an operator in Python, Blender passes on the whole traceback, then the error and where it was called.
+        lines = [line for line in lines if not line.startswith("Location: ")][-1:]
+    line = lines[0]
     return line.strip().removeprefix("Error: ").rstrip(".")

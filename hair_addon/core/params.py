@@ -142,6 +142,15 @@ def described(value: object) -> str:
     return f"a value of type {type(value).__name__}"
 
 
+def array_of(given: Any, dtype: type | None = None) -> np.ndarray | None:
+    """Return a script's values as an array; None for what NumPy cannot take as one."""
+    try:
+        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
+            return np.asarray(given, dtype)
+    except (TypeError, ValueError, OverflowError, RuntimeError):  # rows of several lengths; tensors with gradients
+        return None
+
+
 def plain_value(label: str, value: Any, default: Any, details: Param) -> Any:
     """A value as the type of a setting's default, within its range. Raises `HairError`."""
     if isinstance(default, str):

@@ -69,6 +69,13 @@ def simulate(poses, guides=None, triangles=TRIANGLE, **changes):
     return api.simulate(poses, triangles, strands() if guides is None else guides, **changes)
 
 
+class Tensor:
+    """What PyTorch's tensors with gradients are to NumPy."""
+
+    def __array__(self, dtype=None, copy=None):
+        raise RuntimeError("Can't call numpy() on Tensor that requires grad. Use tensor.detach().numpy() instead.")
+
+
 def evaluated_curves(name):
     return data(name).evaluated_get(bpy.context.evaluated_depsgraph_get()).data
 
@@ -210,6 +217,15 @@ REFUSED = {
     "objects for vertices": (lambda: mesh([[None, 0, 0]] * 3), "must be numbers"),
     "complex vertices": (lambda: mesh(1j * np.eye(3)), "must be numbers"),
     "ragged vertices": (lambda: mesh([[0, 0, 0], [1, 0]]), "must be an array of numbers"),
+    "a tensor for vertices": (lambda: mesh(Tensor()), "must be an array of numbers"),
+    "a tensor for a mask": (lambda: masked({"top": Tensor()}), "must have a finite weight"),
+    "a tensor for lines": (lambda: lines_of_arrays(Tensor()), "Curves must be a non-empty sequence"),
+    "a tensor for a pose": (lambda: [*simulate([np.eye(3), Tensor()])], "Pose 1 must be"),
+    "a tensor for regions": (lambda: simulate([np.eye(3)], regions=Tensor()), "regions must be whole numbers"),
+    "a tensor for a picture": (
+        lambda: api.save_groom(data("Hair"), "a.blend", picture=Tensor()),
+        "must be an array (height, width, 4)",
+    ),
     "flat vertices": (lambda: mesh(np.arange(9.0)), "A mesh is vertices"),
     "vertices that single precision cannot hold": (lambda: mesh(1e200 * np.eye(3)), "non-finite"),
     "a mesh of lists": (lambda: api.distribute_guides(TriMesh([[None] * 3], TRIANGLE)), "must be numbers"),

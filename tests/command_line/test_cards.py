@@ -3,6 +3,7 @@
 
 import json
 import struct
+from pathlib import Path
 
 import bpy
 import pytest
@@ -39,6 +40,30 @@ def test_textures_lie_beside_files_that_have_none(shot):
     assert ended.status == 0 and "1 meshes" in ended.out
     names = {path.name for path in (shot.parent / "out").iterdir()}
     assert {"cards.obj", "Hair_Cards_LOD0_color.png"} <= names and len(names) == 7
+
+
+def test_relative_paths_lead_to_all_levels_and_their_textures(shot, monkeypatch):
+    """In a folder beside the .blend: USD names textures from the file's folder, a .blend wherever it is opened."""
+    bpy.utils.expose_bundled_modules()
+    from pxr import Usd, UsdGeom, UsdShade
+
+    here = shot.parent / "here"
+    here.mkdir()
+    monkeypatch.chdir(here)
+    words = ("--cards", "10", "--texture-size", "128", "--level-count", "2")
+    for more in (("--out", "cards.usdc"), ("--out", "out/cards.blend", "--textures", "textures")):
+        assert run_here("cards", "../shot.blend", *more, *words).status == 0
+    stage = Usd.Stage.Open("cards.usdc")
+    meshes = {prim.GetName() for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)}
+    assert meshes == {"Hair_Cards_LOD0", "Hair_Cards_LOD1"}
+    named = [prim.GetAttribute("inputs:file").Get() for prim in stage.Traverse() if prim.IsA(UsdShade.Shader)]
+    named = [asset.path for asset in named if asset is not None]
+    assert len(named) == 4 and all((here / path).is_file() for path in named)
+    monkeypatch.chdir("/")
+    bpy.ops.wm.open_mainfile(filepath=str(here / "out" / "cards.blend"))
+    made = [image for image in bpy.data.images if "LOD" in image.name]
+    assert made and {Path(bpy.path.abspath(image.filepath)).parent for image in made} == {here / "textures"}
+    assert all(Path(bpy.path.abspath(image.filepath)).is_file() for image in made)
 
 
 def test_tubes_go_into_a_file(shot):

@@ -4,7 +4,6 @@
 import itertools
 import json
 import re
-import shlex
 from dataclasses import replace
 from pathlib import Path
 
@@ -368,23 +367,6 @@ def test_quiet_output_is_what_programs_asked_for(tmp_path):
     bake = ("bake-tables", "--size", 32, "--out", tmp_path, "--quiet")
     assert run_here(*bake) == Ended(0, "", "")
     assert run_here(*bake, "--json").results[0]["verb"] == "bake-tables"
-
-
-def test_readme_shows_commands_that_work(lit, tmp_path, monkeypatch):
-    """Those of its section, with less to do, one after the other in a folder that holds what they name."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "head.obj").write_bytes(HEAD.read_bytes())
-    bpy.context.scene.render.resolution_percentage, bpy.context.scene.vellus.sample_count = 3, 1
-    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
-    commands = re.findall(r"^python -m hair_addon (.*)$", text, re.MULTILINE)
-    assert len(commands) >= 7
-    for command in commands:
-        words = re.sub(r"--strands (\d+)000\b", r"--strands \g<1>0", command).replace("--frames 1-24", "--frames 1-2")
-        is_large = words.startswith("groom") and not {"--strands", "--settings"} & {*words.split()}
-        ended = run_here(*shlex.split(words), *(("--strands", 300) if is_large else ()))
-        assert ended.status == 0, f"{command}: {ended.errors}"
-    assert len(list((tmp_path / "frames").glob("[!.]*"))) == 2
 
 
 @pytest.mark.parametrize("engine", ["vellus", "cycles"])

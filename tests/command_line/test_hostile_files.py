@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Files that are not what they seem, and places that cannot be written: one sentence, status 1, nothing lost."""
 
+import json
 import os
 import shutil
 import subprocess
@@ -93,6 +94,21 @@ def test_files_of_another_format_are_refused(tmp_path, ending, rng):
     path = tmp_path / f"noise{ending}"
     path.write_bytes(rng.bytes(3000))
     refuse(path, "no mesh" if ending == ".obj" else str(path))
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"accessors": []}, "IndexError: list index out of range"),  # an error of the importer
+        ({"buffers": [{"uri": "gone.bin", "byteLength": 36}]}, "gone.bin"),
+    ],
+)
+def test_a_gltf_with_parts_missing(mesh, capsys, change, said):
+    path = mesh("parts.gltf")
+    path.write_text(json.dumps(json.loads(path.read_text()) | change))
+    capsys.readouterr()
+    refuse(path, said)
+    assert capsys.readouterr().err == ""  # no traceback, no message of the importer's own
 
 
 @pytest.mark.parametrize("version", [b"v0503", b"v0600", b"v9900"])

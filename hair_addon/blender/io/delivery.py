@@ -9,6 +9,7 @@ import bpy
 import numpy as np
 
 from ...core.errors import HairError
+from ...core.files import file_names
 from ...core.files.whole_file import require_place, whole_file
 from ...core.long_work import Stage
 from ..data import scene
@@ -44,13 +45,21 @@ class _Task:
 
 
 def path_of(guides, blend_path=None):
-    """The file that hair of some guides is delivered to: beside a .blend, the open one for None. Raises `HairError`."""
+    """The file that hair of some guides is delivered to: beside a .blend, the open one for None. Raises `HairError`.
+
+    No hair of other guides plays it.
+    """
     if blend_path is None:
         if not bpy.data.filepath:
             raise HairError("Hair is delivered to a file beside the .blend file: save the file first.")
         blend_path = Path(bpy.data.filepath)
-    kept = "".join(letter if letter.isalnum() or letter in "-_" else "_" for letter in name_of(guides))
-    return blend_path.with_name(f"{blend_path.stem}_{kept}.usdc")
+    others = [hair for hair in bpy.data.hair_curves if hair.vellus.guide_curves != guides]
+    played = {str(path).casefold() for hair in others for path in delivered_hair.files_of(hair)}
+
+    def place(stem):
+        return blend_path.with_name(f"{blend_path.stem}_{stem}.usdc")
+
+    return place(file_names.free_stem(name_of(guides), lambda stem: str(place(stem).resolve()).casefold() in played))
 
 
 def delivering(guides, path, blender_scene):

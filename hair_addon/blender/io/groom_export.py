@@ -68,6 +68,8 @@ def exporting(path, chosen, settings, blender_scene):
         notes, instances = list(groom_sources.notes_of(chosen, sources, settings)), groom_sources.instances_of(chosen)
         if not sources:
             raise HairError("Neither hair nor guides would be exported: choose one of them.")
+        if not _is_usd(path) and instances:
+            sources += groom_sources.copies_of(sources, instances)
         with whole_file(path) as partial, _opened(partial, path, chosen, frames[0], blender_scene) as writer:
             numbers = yield _adding(writer, sources, path)
             for name, matrix in instances if _is_usd(path) else ():
@@ -79,7 +81,8 @@ def exporting(path, chosen, settings, blender_scene):
                 read = _read(sources, numbers, per_metre, is_first=index == 0)
                 yield _writing(writer, read, path, frame, index / len(frames))
     guide_count, strand_count = groom_sources.counts_of(sources)
-    counts = len(remembered), guide_count, strand_count, len(frames)
+    group_count = len({source.curves.group_id for source in sources})
+    counts = group_count, guide_count, strand_count, len(frames)
     return Exported(path, *counts, path.stat().st_size, [*notes, *writer.notes()])
 
 

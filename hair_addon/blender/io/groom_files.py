@@ -9,6 +9,7 @@ from ...core.files.whole_file import require_place, require_room, whole_file
 from ..groom.selection import object_of
 from ..host import paths, scene_time
 from . import strand_arrays
+from .chosen_objects import only_chosen
 
 _USD = (".usd", ".usdc", ".usda", ".usdz")
 ENDINGS = (".blend", ".npz", *_USD, ".abc")
@@ -43,8 +44,8 @@ def write(path, guides, hair, file_axes):
         if ending == ".npz":
             np.savez(partial, **arrays(guides, hair, file_axes))
         else:
-            _select(guides, hair)
-            _export(partial, ending, guides, hair)
+            with only_chosen(_objects(guides, hair)):
+                _export(partial.absolute(), ending, guides, hair)
 
 
 def save_copy(path):
@@ -62,13 +63,12 @@ def arrays(guides, hair, file_axes):
     return {"roots": turned["strand_points"][:, 0], **turned}
 
 
-def _select(guides, hair):
-    """Select only the objects of guides, hair and their surface, for exporters."""
+def _objects(guides, hair):
+    """The objects of guides, hair and their surface."""
     layer = bpy.context.view_layer
     layer.update()
-    wanted = [object_of(guides, layer), object_of(hair, layer), guides.surface]
-    for shown in layer.objects:
-        shown.select_set(shown in wanted)
+    found = (object_of(guides, layer), object_of(hair, layer), guides.surface)
+    return [one for one in found if one is not None]
 
 
 def _export(partial, ending, guides, hair):

@@ -14,7 +14,7 @@ import numpy as np
 
 from ...core import geometry, grooming
 from ...core.errors import HairError, cause_of
-from ...core.files import settings_file
+from ...core.files import file_names, settings_file
 from ...core.files.whole_file import require_place, whole_file
 from ...core.geometry.mesh import SurfacePoints, check_mesh
 from ...core.long_work import Stage, Work
@@ -35,11 +35,44 @@ _BLEND = (b"BLENDER", b"\x28\xb5\x2f\xfd", b"\x1f\x8b")  # first bytes of .blend
 
 
 def path_of(folder: Path, name: str) -> Path:
-    """The file of a groom in an asset library. Raises `HairError`."""
-    stem = bpy.path.clean_name(name.strip())
-    if not stem.strip("_."):
+    """The file of a groom in an asset library: its own, or a new one. Raises `HairError`."""
+    name = name.strip()
+    if not file_names.stem_of(name).strip("_. "):
         raise HairError("The name is empty: type one.")
-    return folder / f"{stem}{ENDING}"
+
+    def place(stem):
+        return folder / f"{stem}{ENDING}"
+
+    return place(file_names.free_stem(name, lambda stem: _is_of_others(place(stem), name)))
+
+
+def _is_of_others(path, name):
+    """Whether there is a file, and not of this groom alone."""
+    if not path.exists():
+        return False
+    try:
+        return names_in(path) != [name]
+    except HairError:
+        return True
+
+
+def _require_replaceable(path):
+    """Raise `HairError` where there is a file that has more than grooms, or that is open."""
+    if not path.is_file():
+        return
+    if bpy.data.filepath and path.resolve() == Path(bpy.data.filepath).resolve():
+        raise HairError("{path} is the open file: choose another one.", path=path)
+    names, before = names_in(path), _datablocks()
+    try:
+        with bpy.data.libraries.load(str(path), assets_only=True) as (_there, wanted):
+            wanted.objects = names
+        is_groom = [asset is not None and isinstance(asset.get(_SETTINGS), str) for asset in wanted.objects]
+    finally:
+        bpy.data.batch_remove(_datablocks() - before)
+    with bpy.data.libraries.load(str(path)) as (there, _wanted):
+        has_scenes = bool(there.scenes)
+    if has_scenes or not names or not all(is_groom):
+        raise HairError("{path} has more than grooms in it: choose another file.", path=path)
 
 
 def saving(
@@ -55,6 +88,7 @@ def saving(
         raise HairError("The name is too long: use at most {most} bytes.", most=_MOST_NAME)
     target = path if path.suffix.lower() == ".blend" else path_of(path, name)
     require_place(target)
+    _require_replaceable(target)
     depsgraph = scene.present_depsgraph()
     groom = library_groom.take(hair, name, depsgraph)
     if picture is None:

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair and guides of the scene as `GroomCurves`, to be exported."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import bpy
 import numpy as np
@@ -16,18 +16,24 @@ from ..groom.dynamics import frame_folders
 from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..settings import properties
-from . import strand_arrays
+from . import modified_strands, strand_arrays
 
 _RESERVED = ("groom", "materials")  # names of other objects in files
 
 
 @dataclass(frozen=True)
 class Source:
-    """Guides or strands to export."""
+    """Guides or strands to export.
+
+    is_modified: whether they are as an artist's modifiers make them; matrix: (4, 4), from where they are [m] to where
+    another object shows them; None for where they are.
+    """
 
     datablock: Remembered
     curves: GroomCurves
     moves: bool
+    is_modified: bool = False
+    matrix: np.ndarray | None = None
 
 
 def hair_on(active):
@@ -56,8 +62,9 @@ def sources_of(chosen, settings, per_metre):
             made = _guide_curves(guides, group, name, first_id, per_metre)
             sources.append(Source(Remembered(guides), made, settings.moves(True)))
         if settings.has_hair:
-            made = _strand_curves(hair, group, name, first_id, per_metre, settings)
-            sources.append(Source(Remembered(hair), made, settings.moves(False)))
+            shown = modified_strands.curves_of(hair)
+            made = _strand_curves(hair, shown or hair, group, name, first_id, per_metre, settings)
+            sources.append(Source(Remembered(hair), made, settings.moves(False), shown not in (None, hair)))
         first_id += (len(guides.curves) if guides is not None else 0) + len(hair.curves)
     return sources
 
@@ -77,19 +84,20 @@ def _guide_curves(guides, group, name, first_id, per_metre):
         curve_count=curve_count,
         point_count=point_count,
         first_id=first_id,
-        widths=_widths(guides, point_count, per_metre),
+        widths=_widths(guides, guides, point_count, per_metre),
         root_uvs=exported_curves.read_root_uvs(guides),
     )
 
 
-def _strand_curves(hair, group, name, first_id, per_metre, settings):
+def _strand_curves(hair, shown, group, name, first_id, per_metre, settings):
+    curve_count, point_count, _ = strand_arrays.shape_of(hair)
+    widths = _widths(hair, shown, point_count, per_metre)  # first: what follows may evaluate again
     guides = hair.vellus.guide_curves
     guide_count = 0 if guides is None else len(guides.curves)
     # Without guides in the file there are none to name.
     depsgraph = bpy.context.evaluated_depsgraph_get()
     guide_map = guide_maps.of(hair, depsgraph) if guide_count and settings.has_guides else None
     ids, weights = (None, None) if guide_map is None else groom_curves.closest_guides(*guide_map, first_id)
-    curve_count, point_count, _ = strand_arrays.shape_of(hair)
     look, randoms = properties.look_of(hair.vellus), curves.read_randoms(hair)
 
     def colors(some):
@@ -105,7 +113,7 @@ def _strand_curves(hair, group, name, first_id, per_metre, settings):
         curve_count=curve_count,
         point_count=point_count,
         first_id=first_id + guide_count,
-        widths=_widths(hair, point_count, per_metre),
+        widths=widths,
         root_uvs=exported_curves.read_root_uvs(hair),
         guide_ids=ids,
         guide_weights=weights,
@@ -115,9 +123,9 @@ def _strand_curves(hair, group, name, first_id, per_metre, settings):
     )
 
 
-def _widths(datablock, point_count, per_metre):
-    """Diameters of some strands, in the file's units."""
-    radii = exported_curves.read_radii(datablock, point_count)
+def _widths(datablock, shown, point_count, per_metre):
+    """Diameters of some strands, in the file's units; shown: the Curves that have the radii."""
+    radii = exported_curves.read_radii(shown, point_count)
     factor = 2.0 * strand_arrays.world_scale(datablock) * per_metre
     return lambda some: radii(some) * np.float32(factor)
 
@@ -132,19 +140,59 @@ def _guides_at_rest(guides):
 
 
 def points_of(source, per_metre):
-    """The points of a `Source` now, as `strand_arrays.world_rows` gives them. Raises `HairError`."""
+    """The points of a `Source` now, as `strand_arrays.shown_rows` gives them. Raises `HairError`."""
     datablock, exported = source.datablock.find(), source.curves
+    if source.is_modified and modified_strands.curves_of(datablock) is None:
+        raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
     local = _guides_at_rest(datablock) if exported.is_guide else None
     shape = (strand_arrays.shape_of(datablock) if local is None else local.shape)[:2]
     if shape != (exported.curve_count, exported.point_count):
         raise HairError('The number of strands of "{name}" changes: remove its keys.', name=name_of(datablock))
-    return strand_arrays.world_rows(datablock, per_metre, local)
+    if exported.is_guide:
+        rows = strand_arrays.world_rows(datablock, per_metre, local)
+    else:
+        rows = strand_arrays.shown_rows(datablock, per_metre)
+    matrix = source.matrix
+    return rows if matrix is None else lambda some: rows(some) @ matrix[:3, :3].T + matrix[:3, 3] * per_metre
 
 
 def instances_of(chosen):
     """[(group, (4, 4) matrix)] of hair that other objects show too, as `strand_arrays.other_places` gives them."""
     pairs = zip(chosen, group_names(chosen), strict=True)
     return [(name, matrix) for hair, name in pairs for matrix in strand_arrays.other_places(hair)]
+
+
+def copies_of(sources, instances):
+    """A `Source` for each of an instance's group, for files in which hair is written for each object that shows it."""
+    groups = {source.curves.group_id: source.curves.group_name for source in sources}
+    instances = [(name, matrix) for name, matrix in instances if name in groups.values()]
+    wanted = [*groups.values(), *(f"{name}_instance" for name, _matrix in instances)]
+    names = groom_curves.group_names(wanted, _RESERVED)[len(groups) :]
+    first_id, first_group, copies = _next_id(sources), max(groups) + 1, []
+    for group, (new_name, (name, matrix)) in enumerate(zip(names, instances, strict=True), first_group):
+        its = [source for source in sources if source.curves.group_name == name]
+        shift = first_id - min(source.curves.first_id for source in its)
+        copies += [_copy(source, group, new_name, shift, matrix) for source in its]
+        first_id = _next_id(copies)
+    return copies
+
+
+def _next_id(sources):
+    return max(source.curves.first_id + source.curves.curve_count for source in sources)
+
+
+def _copy(source, group, name, shift, matrix):
+    its = source.curves
+    scale = np.float32(abs(np.linalg.det(matrix[:3, :3])) ** (1.0 / 3.0))
+    curves_there = replace(
+        its,
+        group_id=group,
+        group_name=name,
+        first_id=its.first_id + shift,
+        widths=lambda some: its.widths(some) * scale,
+        guide_ids=None if its.guide_ids is None else its.guide_ids + np.int32(shift),
+    )
+    return replace(source, curves=curves_there, matrix=matrix)
 
 
 def counts_of(sources):
@@ -159,6 +207,8 @@ def notes_of(chosen, sources, settings):
     for group, (hair, name) in enumerate(zip(chosen, group_names(chosen), strict=True)):
         if name_of(hair) != name:
             yield HairError('"{name}" is called {group} in the file.', name=name_of(hair), group=name)
+        if settings.has_hair:
+            yield from modified_strands.notes_of(hair)
         if not (settings.has_hair and settings.has_guides):
             continue
         if hair.vellus.guide_curves is None:

@@ -1,13 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Hair → cards: ribbons, textures drawn of the strands, and materials with them, for each level of detail."""
 
-import re
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...core.cards import atlas, outlines, ribbons, texels
 from ...core.cards.polygon_mesh import PolygonMesh
+from ...core.errors import HairError
+from ...core.files import file_names
 from ...core.files.whole_file import require_place
 from ...core.geometry import clusters
 from ...core.long_work import Stage, part_of
@@ -19,13 +20,17 @@ from . import hair_meshes
 
 @dataclass(frozen=True)
 class CardLevel:
-    """A level of detail that was made: its object, {map: image}, number of cards and pictures, and triangles."""
+    """A level of detail that was made: its object, {map: image}, number of cards, pictures and triangles.
+
+    notes: what of the hair is left out.
+    """
 
     mesh_object: object
     images: dict
     card_count: int
     picture_count: int
     triangle_count: int
+    notes: list[HairError]
 
 
 @dataclass(frozen=True)
@@ -46,6 +51,7 @@ def making_cards(hair, settings, folder=None):
     """
     settings.require_size(hair_meshes.strand_count(hair))
     if folder is not None:
+        folder = folder.absolute()  # Blender takes other paths of images from the folder of the .blend file
         require_place(folder / "texture.png")
     yield Stage("Reading strands", 0.0)
     read = hair_meshes.read_hair(hair)
@@ -100,13 +106,24 @@ def _flat_cards(read, level, picture_count, progress):
     return read.local(mesh), placed, len(places.shown)
 
 
+def _stem(name, taken):
+    """What names of texture files begin with, as none of those that are taken do."""
+
+    def begun(stem):
+        return f"{stem}_Cards_LOD"
+
+    return begun(
+        file_names.free_stem(name, lambda stem: any(file.startswith(begun(stem).casefold()) for file in taken))
+    )
+
+
 def _written(read, drawn, folder):
     surface_object = read.surface_object.find()
     name = f"{read.name} Cards"
+    stem = "" if folder is None else _stem(read.name, card_images.files_of_others(f"{name} LOD", folder))
     images = []
     for index, level in enumerate(drawn):
-        stem = re.sub(r"[^\w.-]+", "_", f"{name}_LOD{index}")
-        images.append(card_images.new_images(f"{name} LOD{index}", level.maps, folder, stem))
+        images.append(card_images.new_images(f"{name} LOD{index}", level.maps, folder, f"{stem}{index}"))
     collection, made = made_meshes.new_collection(name, surface_object), []
     for index, (level, its) in enumerate(zip(drawn, images, strict=True)):
         title = f"{name} LOD{index}"
@@ -116,5 +133,5 @@ def _written(read, drawn, folder):
         if index:
             made_meshes.hide(mesh_object)
         counts = level.card_count, level.picture_count, level.mesh.triangle_count
-        made.append(CardLevel(mesh_object, its, *counts))
+        made.append(CardLevel(mesh_object, its, *counts, read.notes))
     return made

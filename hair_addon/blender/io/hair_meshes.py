@@ -20,14 +20,15 @@ from ..host.datablocks import Remembered
 from ..host.notices import name_of
 from ..materials import card_material
 from ..settings import properties
-from . import strand_arrays
+from . import modified_strands, strand_arrays
 
 
 @dataclass(frozen=True)
 class HairBeside:
     """Strands of length above zero in world axes around their surface's origin, in the scene's unit.
 
-    points (S, P, 3), radii (S, P), randoms (S,); surface: the posed mesh there; to_local (3, 3): to its coordinates.
+    points (S, P, 3), radii (S, P), randoms (S,); surface: the posed mesh there; to_local (3, 3): to its coordinates;
+    notes: what is left out.
     """
 
     name: str
@@ -38,6 +39,7 @@ class HairBeside:
     look: Appearance
     surface: TriMesh
     to_local: np.ndarray
+    notes: list[HairError]
 
     def colors(self) -> np.ndarray:
         """Linear RGB (S, P, 3)."""
@@ -55,10 +57,11 @@ def read_hair(hair):
     if surface_object is None:
         raise HairError('"{name}" has no surface: attach it to a mesh.', name=name_of(hair))
     metres = strand_arrays.metres_per_unit(scene_time.present_scene())
-    points = strand_arrays.world_points(hair) / metres - np.array(surface_object.matrix_world.translation)
+    points = strand_arrays.shown_points(hair) / metres - np.array(surface_object.matrix_world.translation)
     if not np.isfinite(points).all():
         raise HairError('"{name}" has points with non-finite coordinates: regenerate the hair.', name=name_of(hair))
-    radii = exported_curves.read_radii(hair, points.shape[1])(slice(None)) * (strand_arrays.world_scale(hair) / metres)
+    shown = modified_strands.curves_of(hair) or hair
+    radii = exported_curves.read_radii(shown, points.shape[1])(slice(None)) * (strand_arrays.world_scale(hair) / metres)
     is_hair = np.linalg.norm(np.diff(points, axis=1), axis=-1).sum(axis=1) > 1e-9
     if not is_hair.any():
         raise HairError('"{name}" has no strands.', name=name_of(hair))
@@ -72,6 +75,7 @@ def read_hair(hair):
         properties.look_of(hair.vellus),
         surface.posed_mesh,
         surface.to_local_axes,
+        list(modified_strands.notes_of(hair)),
     )
 
 
@@ -82,11 +86,12 @@ def strand_count(hair):
 
 @dataclass(frozen=True)
 class MadeTubes:
-    """The object of tubes, their number, and its polygons."""
+    """The object of tubes, their number, its triangles, and what is left out."""
 
     mesh_object: object
     tube_count: int
     triangle_count: int
+    notes: list[HairError]
 
 
 def making_tubes(hair, settings):
@@ -102,7 +107,7 @@ def making_tubes(hair, settings):
     mesh_object = made_meshes.new_object(name, made, surface_object, collection, material)
     tube_count = settings.count_of(len(read.points))
     armature_weights.bind(mesh_object, surface_object, len(made.vertices) // tube_count)
-    return MadeTubes(mesh_object, tube_count, made.triangle_count)
+    return MadeTubes(mesh_object, tube_count, made.triangle_count, read.notes)
 
 
 def _tubes(read, settings, progress):

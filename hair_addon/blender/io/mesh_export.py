@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Mesh objects → a file of their own for engines, or the whole scene as a .blend."""
 
+import contextlib
+
 import bpy
 
 from ...core.errors import HairError
 from ...core.files.whole_file import require_place, whole_file
 from ..data.made import armature_weights
 from ..host import paths
+from .chosen_objects import only_chosen
 
 
 def _blend(path):
@@ -67,12 +70,8 @@ def write(path, objects):
     Raises `HairError`.
     """
     require_writable(path)
-    for other in bpy.context.view_layer.objects:
-        other.select_set(False)
-    rigs = [modifier.object for one in objects for modifier in armature_weights.armatures_of(one)]
-    for chosen in dict.fromkeys([*objects, *rigs]):
-        chosen.hide_set(False)
-        chosen.select_set(True)
     export = _FORMATS[path.suffix.lower()][0]
-    with whole_file(path) as partial:
-        export(str(partial))
+    rigs = [modifier.object for one in objects for modifier in armature_weights.armatures_of(one)]
+    chosen = [*dict.fromkeys([*objects, *rigs])]
+    with contextlib.nullcontext() if export is _blend else only_chosen(chosen), whole_file(path) as partial:
+        export(str(partial.absolute()))  # exporters name textures from there

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Opening of .blend files, and import of mesh files into an empty scene, in Blender's axes and in metres."""
 
+import contextlib
+import io
 from pathlib import Path
 
 import bpy
@@ -28,7 +30,10 @@ def _import_stl(path, up):
 
 
 def _import_gltf(path, _up):
-    return bpy.ops.import_scene.gltf(filepath=path, disable_bone_shape=True)  # which would add a mesh
+    # It is written in Python, whose messages and tracebacks go where Blender's own do: an error is raised as well.
+    blenders = io.TextIOWrapper(io.FileIO(2, "w", closefd=False), errors="backslashreplace", write_through=True)
+    with contextlib.redirect_stderr(blenders):
+        return bpy.ops.import_scene.gltf(filepath=path, disable_bone_shape=True)  # which would add a mesh
 
 
 def _import_usd(path, _up):

@@ -12,6 +12,7 @@ from ..data.strands import attributes, curves, posed_strands
 from ..groom import selection
 from ..host.notices import name_of
 from ..live import live_hair
+from . import modified_strands
 
 
 def metres_per_unit(blender_scene):
@@ -26,11 +27,30 @@ def world_points(datablock):
     Without other modifiers than ours. Curves of different point counts are resampled to the largest, and Catmull-Rom
     splines to points on the curve, as many as strands have.
     """
-    rows = world_rows(datablock)
-    world = np.empty(shape_of(datablock), np.float32)
+    return _whole(world_rows(datablock), shape_of(datablock))
+
+
+def shown_points(datablock):
+    """The same with an artist's modifiers, where `modified_strands` has curves that they have made."""
+    return _whole(shown_rows(datablock), shape_of(datablock))
+
+
+def _whole(rows, shape):
+    world = np.empty(shape, np.float32)
     for some in slices(len(world)):
         world[some] = rows(some)
     return world
+
+
+def shown_rows(datablock, per_metre=1.0) -> Rows:
+    """What `shown_points` has of a slice of curves, as `world_rows`."""
+    bring_up_to_date()
+    shown = modified_strands.curves_of(datablock)
+    if shown is None or shown == datablock:
+        return world_rows(datablock, per_metre)
+    to_world = _to_world(datablock) * (metres_per_unit(bpy.context.scene) * per_metre)
+    points = _at_rest(shown)
+    return lambda some: (points[some].astype(np.float64) @ to_world[:3, :3].T + to_world[:3, 3]).astype(np.float32)
 
 
 def world_rows(datablock, per_metre=1.0, local=None) -> Rows:

@@ -6,6 +6,7 @@ from pathlib import Path
 import bpy
 
 from ...core.errors import HairError
+from ...core.files.file_names import stem_of
 from . import preferences
 
 
@@ -33,8 +34,8 @@ class SavedFiles:
         folder = self.folder(create)
         if folder is None:
             raise HairError("Only the installed extension can save looks and styles: install it.")
-        stem = bpy.path.clean_name(name.strip())  # no separators, no paths out of the folder
-        if not stem.strip("_."):
+        stem = stem_of(name)  # no separators, no paths out of the folder
+        if not stem.strip("_. "):
             raise HairError("The name is empty: type one.")
         return folder / f"{stem}.json"
 

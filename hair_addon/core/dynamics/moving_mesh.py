@@ -13,6 +13,7 @@ from ..geometry import mesh as mesh_math
 from ..geometry import surface_deform, vertex_turns
 from ..geometry.mesh import Faces, TriMesh, require_finite
 from ..geometry.strands import Strands
+from ..params import array_of
 from .rod import rotations
 from .rod.settings import DynamicsSettings
 from .root_motion import RootPose
@@ -68,12 +69,8 @@ def require(mesh: TriMesh, guides: Strands) -> None:
 
 def _checked(given, number, vertex_count):
     """(V, 3) float32 of a pose. Raises `HairError`, which names it."""
-    try:
-        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
-            vertices = np.asarray(given, np.float32)
-    except (TypeError, ValueError, OverflowError):
-        vertices = np.empty(0)
-    if vertices.shape != (vertex_count, 3) or not np.isfinite(vertices).all():
+    vertices = array_of(given, np.float32)
+    if vertices is None or vertices.shape != (vertex_count, 3) or not np.isfinite(vertices).all():
         raise HairError(f"Pose {number} must be finite numbers of shape ({vertex_count}, 3), as the first one.")
     return vertices
 

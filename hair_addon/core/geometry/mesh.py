@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from ..errors import HairError
 from ..kernels.checks import require_count, require_indices
+from ..params import array_of
 
 # Of the box around a mesh along each axis, into the cells by which triangles are put in order.
 _HALVINGS = 10
@@ -161,10 +162,9 @@ def from_arrays(vertices: ArrayLike, triangles: ArrayLike) -> TriMesh:
 
 
 def _numbers(given, name):
-    try:
-        array = np.asarray(given)
-    except (TypeError, ValueError, OverflowError) as error:  # rows of several lengths, among others
-        raise HairError(f"The {name} of a mesh must be an array of numbers.") from error
+    array = array_of(given)
+    if array is None:
+        raise HairError(f"The {name} of a mesh must be an array of numbers.")
     if array.dtype.kind not in "iuf":
         raise HairError(f"The {name} of a mesh must be numbers, not values of type {array.dtype}.")
     return array

@@ -11,7 +11,7 @@ from .. import geometry
 from ..errors import HairError
 from ..geometry.mesh import SurfacePoints, TriMesh, check_mesh, positions
 from ..geometry.strands import curve_offsets
-from ..params import Param, plain_value
+from ..params import Param, array_of, plain_value
 
 # If the ends' distances to the surface differ by less than this part of the curve's size, its direction is ambiguous.
 _CLEAR = 0.1
@@ -132,10 +132,10 @@ def _run_backwards(at_first, at_last, sizes):
 def polylines(curves: Iterable[ArrayLike]) -> tuple[np.ndarray, np.ndarray]:
     """(N, 3) float32 points and (C+1,) starts of a sequence of (P, 3) arrays. Raises `HairError`."""
     try:
-        with np.errstate(over="ignore"):  # what single precision cannot hold becomes infinite
-            lines: list[np.ndarray] = [np.asarray(line, np.float32) for line in curves]
-    except (TypeError, ValueError, OverflowError):
-        lines = [np.empty(0)]
-    if not lines or any(line.ndim != 2 or line.shape[1] != 3 for line in lines):
+        lines = [array_of(line, np.float32) for line in curves]
+    except (TypeError, ValueError, OverflowError):  # what cannot be iterated over
+        lines = []
+    usable = [line for line in lines if line is not None and line.ndim == 2 and line.shape[1] == 3]
+    if not usable or len(usable) < len(lines):
         raise HairError("Curves must be a non-empty sequence of arrays (P, 3), one per curve.")
-    return np.concatenate(lines), curve_offsets([len(line) for line in lines])
+    return np.concatenate(usable), curve_offsets([len(line) for line in usable])

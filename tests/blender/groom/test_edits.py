@@ -241,13 +241,13 @@ def user_folder(tmp_path, monkeypatch):
 def test_a_look_is_saved_applied_and_removed(hair, user_folder):
     look = Appearance(melanin=0.31, tint=(0.2, 0.4, 0.6), roughness=0.55)
     saved_looks.write("My look", look)
-    assert saved_looks.names() == ["My_look"]
+    assert saved_looks.names() == ["My look"]
     assert saved_looks.read("My look") == look
-    bpy.ops.vellus.apply_saved_look(name="My_look")
+    bpy.ops.vellus.apply_saved_look(name="My look")
     assert hair.data.vellus.appearance.melanin == pytest.approx(0.31)
     bpy.ops.vellus.save_look(name="Again")
     assert saved_looks.read("Again").tint == pytest.approx(look.tint)
-    bpy.ops.vellus.remove_look(name="My_look")
+    bpy.ops.vellus.remove_look(name="My look")
     assert saved_looks.names() == ["Again"]
 
 

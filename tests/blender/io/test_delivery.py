@@ -181,6 +181,15 @@ def refuse(guides, sentence):
     assert state() == before
 
 
+def test_a_file_that_hair_of_other_guides_plays_is_not_replaced(shot):
+    """Some systems take capitals for small letters."""
+    made, other, third = deliver(shot), bpy.data.hair_curves.new("guides"), bpy.data.hair_curves.new("Grün (2)")
+    names = [delivery.path_of(guides).name for guides in (shot, other, third)]
+    assert names == ["shot_Guides.usdc", "shot_guides.001.usdc", "shot_Grün (2).usdc"] and names[0] == made.path.name
+    delivery.take_off(shot)
+    assert delivery.path_of(other).name == "shot_guides.usdc"
+
+
 def test_what_cannot_be_delivered_is_refused(shot, tmp_path):
     path = delivery.path_of(shot)
     (tmp_path / "frames").chmod(0o700)

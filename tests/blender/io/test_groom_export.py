@@ -4,6 +4,7 @@
 import bpy
 import numpy as np
 import pytest
+from mathutils import Matrix
 
 from hair_addon import api
 from hair_addon.blender.data import scene
@@ -225,6 +226,28 @@ def test_each_hair_is_a_group_with_its_guides(hair, tmp_path):
     for name in ("Hair", "Flaum_1"):
         named = groups[name]["groom_closest_guides"].only
         assert np.isin(named, groups[f"{name}_guides"]["groom_id"].only).all()
+
+
+def test_hair_of_several_objects_is_a_group_for_each(twisted, tmp_path):
+    hair, _guides = twisted
+    again = bpy.data.objects.new("Again", hair.data)
+    bpy.context.scene.collection.objects.link(again)
+    placed = Matrix.Translation((5.0, 1.0, 0.0)) @ Matrix.Rotation(0.7, 4, "Y") @ Matrix.Scale(2.0, 4)
+    again.matrix_world = placed @ hair.matrix_world
+    update()
+    made = export(tmp_path / "groom.abc")
+    assert (made.groups, made.guides, made.strands) == (2, 120, 1000)
+    archive, matrix = alembic_reader.read(tmp_path / "groom.abc"), np.array(placed)
+    first, second = (shape(archive, name) for name in ("Hair", "Hair_instance"))
+    wanted = 100.0 * (world(hair).reshape(-1, 3) @ matrix[:3, :3].T + matrix[:3, 3])
+    np.testing.assert_allclose(second["P"].only, wanted, atol=1e-3)
+    np.testing.assert_allclose(second["groom_width"].only, 2.0 * first["groom_width"].only, rtol=1e-5)
+    ids = [shape(archive, f"{name}_guides")["groom_id"].only for name in ("Hair", "Hair_instance")]
+    for found, its in zip((first, second), ids, strict=True):
+        assert np.isin(found["groom_closest_guides"].only, its).all()
+    every = np.concatenate([*ids, first["groom_id"].only, second["groom_id"].only])
+    assert len(np.unique(every)) == len(every) == 1120
+    assert (first["groom_group_id"].only[0], second["groom_group_id"].only[0]) == (0, 1)
 
 
 def test_colors_are_those_of_the_look_from_root_to_tip(hair, tmp_path):

@@ -221,6 +221,37 @@ def test_arguments_of_scripts_are_refused_in_one_sentence(groom, tmp_path):
     assert datablocks() == before and not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("names", [("Grün", "Grän"), ("Bob/1", "Bob:1")])
+def test_a_groom_replaces_itself_and_no_other(groom, tmp_path, names):
+    def save(name, count):
+        return api.save_groom(groom[1], tmp_path, name=name, catalog="", picture=PICTURE[:count])
+
+    paths = [save(name, 16) for name in names]
+    assert [api.groom_names(path) for path in paths] == [[name] for name in names]
+    others = paths[0].read_bytes()
+    assert save(names[1], 8) == paths[1] and sorted(tmp_path.iterdir()) == sorted(paths)
+    assert paths[0].read_bytes() == others
+
+
+def test_files_with_more_than_grooms_are_not_replaced(groom, library, tmp_path):
+    def refuse(path, said):
+        content = path.read_bytes()
+        with pytest.raises(HairError, match=said):
+            api.save_groom(groom[1], path, picture=PICTURE)
+        assert path.read_bytes() == content
+
+    scene, asset = tmp_path / "scene.blend", tmp_path / "asset.blend"
+    bpy.data.objects["Sphere"].asset_mark()
+    bpy.data.libraries.write(str(asset), {bpy.data.objects["Sphere"]})
+    bpy.ops.wm.save_as_mainfile(filepath=str(scene), copy=True)
+    for path in (scene, asset):
+        refuse(path, "more than grooms")
+    bpy.ops.wm.save_as_mainfile(filepath=str(scene))
+    refuse(scene, "is the open file")
+    assert api.save_groom(groom[1], library, name="Other", picture=PICTURE) == library
+    assert api.groom_names(library) == ["Other"]
+
+
 def test_names_that_are_no_file_names(groom, tmp_path):
     path = api.save_groom(groom[1], tmp_path, name="a/b: é", catalog="", picture=PICTURE)
     assert path.parent == tmp_path and api.groom_names(path) == ["a/b: é"]

@@ -144,6 +144,18 @@ def test_textures_are_written_to_a_folder(hair, tmp_path):
     np.testing.assert_array_equal(pixels(again), pixels(made))
 
 
+def test_textures_replace_those_of_the_same_hair_and_of_no_other(hair, tmp_path):
+    def files(name):
+        hair.data.name = name
+        (made,) = api.make_hair_cards(hair, card_count=2, segment_count=1, texture_size=128, folder=tmp_path)
+        nodes = made.data.materials[0].node_tree.nodes
+        return {node.image.filepath for node in nodes if node.bl_idname == "ShaderNodeTexImage"}
+
+    first, second = files("Top/L"), files("Top:L")
+    assert first and first.isdisjoint(second) and len([*tmp_path.iterdir()]) == 2 * len(texels.MAPS)
+    assert (files("Top/L"), files("Top:L")) == (first, second)
+
+
 def test_undo_takes_cards_and_tubes_away(hair):
     bpy.ops.ed.undo_push(message="hair")
     before = {kind: len(getattr(bpy.data, kind)) for kind in ("objects", "meshes", "collections", "materials")}

@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Textures of cards: arrays → images, in files or packed into the .blend."""
 
+from pathlib import Path
+
 import bpy
 import numpy as np
 
 from ....core.cards import texels
 from ....core.files.whole_file import whole_files
+from ...host.notices import name_of
 
 
 def new_images(name, maps, folder, stem):
@@ -28,6 +31,13 @@ def new_images(name, maps, folder, stem):
             bpy.data.images.remove(image)
         raise
     return made
+
+
+def files_of_others(name, folder):
+    """Names of the files in a folder, in small letters, of images whose names begin in another way."""
+    others = [image for image in bpy.data.images if image.filepath and not name_of(image).startswith(name)]
+    files = [Path(bpy.path.abspath(image.filepath, library=image.library)).resolve() for image in others]
+    return {file.name.casefold() for file in files if file.parent == folder.resolve()}
 
 
 def _new_image(name, kind, values):

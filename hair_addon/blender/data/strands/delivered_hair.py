@@ -31,6 +31,12 @@ def is_delivered(hair):
     return any(modifier_of(user) is not None for user in objects_of(hair))
 
 
+def files_of(hair):
+    """The files that objects of hair Curves play."""
+    playing = [modifier_of(user) for user in objects_of(hair)]
+    return {_absolute(m.cache_file.filepath) for m in playing if m is not None and m.cache_file is not None}
+
+
 def objects_of(hair):
     """The objects of hair Curves, in all scenes."""
     return [user for user in bpy.data.objects if user.type == "CURVES" and user.data == hair]

@@ -9,7 +9,7 @@ from ....host import paths
 from ....host.notices import text_of
 from ....io import hair_cards, hair_meshes
 from ....settings import properties, setting_properties
-from ....settings.translations import interface_text
+from ....settings.translations import error_text, interface_text
 from ... import setting_rows
 from ..base.asked import AskedOperator
 from ..base.hair_operator import needs_hair
@@ -45,6 +45,10 @@ class VELLUS_OT_hair_cards(AskedOperator, bpy.types.Operator):
         place = paths.resolve(folder) if folder else None
         settings = setting_properties.to_settings(self, CardSettings)
         return hair_cards.making_cards(hair_of(context.object), settings, place)
+
+    def after(self, context, made):
+        for note in made[0].notes:
+            self.report({"WARNING"}, error_text(note))
 
     def message(self, made):
         counts = {"cards": made[0].card_count, "pictures": made[0].picture_count, "triangles": made[0].triangle_count}

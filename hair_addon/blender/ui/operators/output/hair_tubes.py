@@ -7,7 +7,7 @@ from .....core.cards.card_settings import TubeSettings
 from ....groom.selection import hair_of
 from ....io import hair_meshes
 from ....settings import setting_properties
-from ....settings.translations import interface_text
+from ....settings.translations import error_text, interface_text
 from ... import setting_rows
 from ..base.asked import AskedOperator
 from ..base.hair_operator import needs_hair
@@ -35,6 +35,10 @@ class VELLUS_OT_hair_tubes(AskedOperator, bpy.types.Operator):
 
     def work(self, context):
         return hair_meshes.making_tubes(hair_of(context.object), self._settings())
+
+    def after(self, context, made):
+        for note in made.notes:
+            self.report({"WARNING"}, error_text(note))
 
     def message(self, made):
         counts = {"tubes": made.tube_count, "triangles": made.triangle_count}

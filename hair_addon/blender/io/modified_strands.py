@@ -1,0 +1,47 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Strands as an artist's modifiers make them: what renders show is what files and meshes have."""
+
+import bpy
+import numpy as np
+
+from ...core.errors import HairError
+from ..data.strands import attributes, curves, delivered_hair, follow_nodes
+from ..groom import selection
+from ..host.notices import name_of
+
+
+def curves_of(datablock):
+    """Evaluated Curves of hair Curves with modifiers, until the next evaluation; the datablock itself without any.
+
+    None where viewports do not evaluate what renders do, or strands have other points then: none of what is stored
+    for each would fit.
+    """
+    shown = selection.object_of(datablock, bpy.context.view_layer)
+    if not _modifiers(shown):
+        return datablock
+    others = [m for m in shown.modifiers if m != follow_nodes.modifier_of(shown)]
+    if not shown.visible_get() or any(m.show_viewport != m.show_render for m in others):
+        return None
+    evaluated = shown.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
+    if not isinstance(evaluated, bpy.types.Curves):
+        return None
+    is_same = np.array_equal(curves.point_counts(evaluated), curves.point_counts(datablock))
+    is_same = is_same and np.array_equal(attributes.are_smooth(evaluated), attributes.are_smooth(datablock))
+    return evaluated if is_same else None
+
+
+def notes_of(datablock):
+    """What is said of hair Curves whose modifiers are left out."""
+    if curves_of(datablock) is None:
+        names = ", ".join(_modifiers(selection.object_of(datablock, bpy.context.view_layer)))
+        sentence = 'Modifiers of "{name}" are left out, as they change its number of points or are hidden: {names}.'
+        yield HairError(sentence, name=name_of(datablock), names=names)
+
+
+def _modifiers(shown):
+    """Names of the modifiers of an object, or None, that an artist has added."""
+    if shown is None:
+        return []
+    delivered = delivered_hair.modifier_of(shown)
+    names = follow_nodes.modifiers_of_artist(shown)
+    return [name for name in names if delivered is None or name != name_of(delivered)]

@@ -1,0 +1,50 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Commands that README and the manual show: they are understood, and those of README work."""
+
+import re
+import shlex
+
+import bpy
+import pytest
+
+from hair_addon import command_line
+from tests.support.commands import HEAD, ROOT, run_here
+
+
+def test_readme_shows_commands_that_work(lit, tmp_path, monkeypatch):
+    """Those of its section, with less to do, one after the other in a folder that holds what they name."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "head.obj").write_bytes(HEAD.read_bytes())
+    bpy.context.scene.render.resolution_percentage, bpy.context.scene.vellus.sample_count = 3, 1
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "shot.blend"))
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    commands = re.findall(r"^python -m hair_addon (.*)$", text, re.MULTILINE)
+    assert len(commands) >= 7
+    for command in commands:
+        words = re.sub(r"--strands (\d+)000\b", r"--strands \g<1>0", command).replace("--frames 1-24", "--frames 1-2")
+        is_large = words.startswith("groom") and not {"--strands", "--settings"} & {*words.split()}
+        ended = run_here(*shlex.split(words), *(("--strands", 300) if is_large else ()))
+        assert ended.status == 0, f"{command}: {ended.errors}"
+    assert len(list((tmp_path / "frames").glob("[!.]*"))) == 2
+
+
+def commands_of(page):
+    """Words of the command lines that a page shows, in blocks of code and within sentences."""
+    text = page.read_text(encoding="utf-8")
+    blocks = re.findall(r"^```\w*\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
+    spans = re.findall(r"(?<!`)`([^`]+)`(?!`)", text)
+    for line in [line for block in blocks for line in block.splitlines()] + [" ".join(span.split()) for span in spans]:
+        found = re.match(r"(?:python -m hair_addon|blender --command vellus|vellus) (.+)", line)
+        if found:
+            yield shlex.split(found[1])
+
+
+def test_pages_show_commands_that_are_understood(capfd):
+    pages = [ROOT / "README.md", ROOT / "docs" / "farm" / "README.md", *(ROOT / "docs" / "manual").glob("*.md")]
+    shown = [words for page in pages for words in commands_of(page)]
+    assert len({words[0] for words in shown}) >= 8
+    for words in shown:
+        try:
+            command_line.parser("vellus").parse_args(words)
+        except SystemExit:
+            pytest.fail(capfd.readouterr().err)
