@@ -2,6 +2,7 @@
 // Visibility buffer of strands drawn as strips: segment index, and depth of the round side as in strand_segments.comp.
 
 #include "include/coverage.glsl"
+#include "include/unclipped.glsl"
 
 void main()
 {
@@ -15,6 +16,9 @@ void main()
   float offset = strand_offset_part * sample_offset(int(place.x), middle, offset_turn(view.coverage_turn));
   float side = strand_side_place + offset * slope;
   if (strand_offset_part > 0.0 && abs(side) >= strand_coverage) {
+    discard;
+  }
+  if (IS_CLIPPED && is_cut_off(drawn_position)) {
     discard;
   }
   int pieces = view.drawn_points - 1;

@@ -5,6 +5,7 @@
 #include "include/coverage.glsl"
 #include "include/segment.glsl"
 #include "include/tile.glsl"
+#include "include/unclipped.glsl"
 
 // Constants of a program, which are known when it is compiled: software drivers run all of a branch, even if no thread takes it.
 //
@@ -211,13 +212,28 @@ void walk_run(ivec2 size)
   for (; piece < last; piece++) {
     vec4 second = strand_point(strand, texel, head, piece_start(piece + 1));
     vec4 end = to_clip(second);
+    vec2 left = vec2(0.0, 1.0);
+    vec4 left_first = first;
+    vec4 left_second = second;
+    vec4 left_start = start;
+    vec4 left_end = end;
+    if (IS_CLIPPED) {
+      vec3 from = (view.object_to_world * vec4(first.xyz, 1.0)).xyz;
+      left = part_left(from, (view.object_to_world * vec4(second.xyz, 1.0)).xyz);
+      left_first = mix(first, second, left.x);
+      left_second = mix(first, second, left.y);
+      left_start = mix(start, end, left.x);
+      left_end = mix(start, end, left.y);
+    }
     Segment segment;
-    if (segment_in_front(start, end, vec2(first.w, second.w), vec2(size), axis, segment)) {
-      begin(strand, piece, segment, first, second);
-      bool is_first = piece == 0 && segment.part.x == 0.0;
-      bool is_last = piece + 1 == pieces && segment.part.y == 1.0;
+    vec2 radii = vec2(left_first.w, left_second.w);
+    if (left.x < left.y && segment_in_front(left_start, left_end, radii, vec2(size), axis, segment)) {
+      begin(strand, piece, segment, left_first, left_second);
+      bool is_whole_end = left.y == 1.0 && segment.part.y == 1.0;
+      bool is_first = piece == 0 && left.x == 0.0 && segment.part.x == 0.0;
+      bool is_last = piece + 1 == pieces && is_whole_end;
       walk_to_ends(segment, bvec2(is_first, is_last), size);
-      if (IS_ROUND && piece + 1 < pieces && segment.part.y == 1.0 && segment.half_width.y >= LEAST_BEND) {
+      if (IS_ROUND && piece + 1 < pieces && is_whole_end && segment.half_width.y >= LEAST_BEND) {
         vec4 third = to_clip(strand_point(strand, texel, head, piece_start(piece + 2)));
         if (third.z + third.w > 0.0) {
           vec2 next = sample_place(third, vec2(size)).xy;

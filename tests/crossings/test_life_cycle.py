@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import hair_addon
+from hair_addon.blender.data.strands import curves
 from hair_addon.blender.host.caches import Cache
 from hair_addon.blender.live import handlers, invalidation
 from hair_addon.blender.render import hair_cache, offscreen
@@ -114,6 +115,34 @@ def test_appended_hair_brings_what_it_follows(groom_file):
     hair.data.vellus.hair.strand_count = 30
     bpy.context.view_layer.update()
     assert (len(hair.data.curves), hair.data.vellus.status) == (30, "")
+
+
+def linked_guides(file):
+    """The guides of a file, linked, after Blender has evaluated their surface."""
+    return bring(file, is_linked=True).data.vellus.guide_curves
+
+
+def test_linked_guides_say_nothing_where_nothing_would_change(groom_file):
+    guides = linked_guides(groom_file)
+    assert guides.library is not None and guides.vellus.status == ""
+
+
+def test_linked_guides_on_an_edited_surface_say_what_to_do(groom_file):
+    guides = linked_guides(groom_file)
+    before = curves.read_points(guides)
+    surface = guides.surface
+    surface.data.vertices[0].co *= 1.2  # as a change of the library's file, since these guides were written
+    surface.data.update()
+    bpy.context.view_layer.update()
+    assert np.array_equal(curves.read_points(guides), before) and "make a library override" in guides.vellus.status
+
+
+def test_a_library_override_does_not_ask_for_one(groom_file):
+    hair = bring(groom_file, is_linked=True)
+    hair.override_hierarchy_create(bpy.context.scene, bpy.context.view_layer)
+    bpy.context.view_layer.update()
+    states = [made.vellus for made in bpy.data.hair_curves if made.override_library is not None]
+    assert sorted((state.kind, state.status) for state in states) == [("GUIDES", ""), ("HAIR", "")]
 
 
 LINKED = {

@@ -1,10 +1,21 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Whether a mesh object can take grooms: Blender evaluates it, it is not in Edit Mode, and its mesh can be painted."""
+"""Whether a mesh object can take grooms: it is there, evaluated, not in Edit Mode, and its mesh can be painted."""
 
 import bpy
 
 from ...core.errors import HairError
 from ..host.notices import name_of
+
+
+def is_deleted(surface_object):
+    """Whether a mesh object was deleted, and is only kept by the hair that grows on it: it is in no collection.
+
+    Panels ask with every redraw: a view layer finds an object by its name at once, collections are searched.
+    """
+    view_layer = bpy.context.view_layer
+    if view_layer is not None and view_layer.objects.get(name_of(surface_object)) == surface_object:
+        return False
+    return surface_object.library is None and not surface_object.users_collection
 
 
 def require_evaluated(surface_object):

@@ -141,20 +141,22 @@ def _parts(strand_count):
     return size, stride
 
 
-def draw_strands(strands, program, view, lights, object_to_world, samplers=None, steps=_ALL):
+def draw_strands(strands, program, view, lights, object_to_world, samplers=None, steps=_ALL, clip_planes=None):
     """Draw `StrandsOnGPU` as strips into the bound framebuffer, by a program of `scene_programs.strip_program`.
 
     view, lights: records of `uniforms`; samplers: {sampler: texture} that the program reads beside the strands; steps:
-    for pictures too coarse to show all.
+    for pictures too coarse to show all; clip_planes: (6, 4) of a program that is clipped.
     """
     record = strand_record(strands, view, object_to_world, steps)
-    draw_strip(strands, program, record, uniforms.uniform_buffer(lights), samplers)
+    draw_strip(strands, program, record, uniforms.uniform_buffer(lights), samplers, clip_planes)
 
 
-def draw_strip(strands, program, record, lights, samplers=None):
+def draw_strip(strands, program, record, lights, samplers=None, clip_planes=None):
     """The same with a record of `strand_record` and lights on the GPU."""
     count = vertex_count(int(record["drawn_strands"]), int(record["drawn_points"]))
-    _draw(strands.batch, program, record, lights, {**strand_samplers(strands), **(samplers or {})}, count)
+    blocks = {"view": uniforms.uniform_buffer(record), "lights": lights, **uniforms.clipping_blocks(clip_planes)}
+    with bound(program, blocks, {**strand_samplers(strands), **(samplers or {})}):
+        strands.batch.draw_range(program, elem_count=count)
 
 
 def strand_samplers(strands):
@@ -197,11 +199,6 @@ def dispatch_over(program, size):
     """Run a bound compute program once for every texel of a picture of this size."""
     width, height = (-(-length // scene_programs.PICTURE_GROUP_SIZE) for length in size)
     gpu.compute.dispatch(program, width, height, 1)
-
-
-def _draw(batch, program, view, lights, samplers, count=0):
-    with bound(program, {"view": uniforms.uniform_buffer(view), "lights": lights}, samplers):
-        batch.draw_range(program, elem_count=count)  # zero: all there are
 
 
 @contextmanager

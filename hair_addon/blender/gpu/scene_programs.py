@@ -30,35 +30,46 @@ def declare_scene(info, structs="", shadow_samplers=SHADOW_SAMPLERS, is_lit=True
             info.sampler(slot, "FLOAT_2D", name)
 
 
+def declare_clipped_scene(info, shadow_samplers, is_clipped):
+    """`declare_scene` without the world's lighting; returns the includes that are replaced where planes clip it."""
+    structs = uniforms.CLIPPING.source if is_clipped else ""
+    declare_scene(info, structs, shadow_samplers, is_lit=False)
+    if not is_clipped:
+        return {}
+    info.uniform_buf(2, "Clipping", "clipping")
+    return {"include/unclipped.glsl": "include/clipped.glsl"}
+
+
 def has_image_atomics():
     """Whether image atomics are available: Metal has none that Python can declare."""
     return gpu.platform.backend_type_get() in {"OPENGL", "VULKAN"}
 
 
 @kept
-def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=()):
+def strip_program(fragment, shadow_samplers=(), targets=COLOR, samplers=(), is_clipped=False):
     """The program that draws strips of strands: a .frag, the shadow maps that it reads, (output, type), ... of it.
 
-    samplers: of other textures that it reads.
+    samplers: of other textures that it reads; is_clipped: whether planes cut something off, as guides.frag knows.
     """
     info = gpu.types.GPUShaderCreateInfo()
-    _strip(info, shadow_samplers)
+    replaced = _strip(info, shadow_samplers, is_clipped)
     for slot, name in enumerate(samplers, start=len(SHADOW_SAMPLERS) + len(STRAND_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
-    return compile_drawing(info, "strand.vert", fragment, targets)
+    return compile_drawing(info, "strand.vert", fragment, targets, replaced)
 
 
 @kept
-def strip_segments_program():
+def strip_segments_program(is_clipped):
     """The program that draws strips of strands as samples of a picture: see strand_segments.frag."""
     info = gpu.types.GPUShaderCreateInfo()
-    _strip(info, ())
+    replaced = _strip(info, (), is_clipped)
     info.depth_write("ANY")
-    return compile_drawing(info, "strand.vert", "strand_segments.frag", (("segment", "UINT"), ("depth", "UINT")))
+    targets = (("segment", "UINT"), ("depth", "UINT"))
+    return compile_drawing(info, "strand.vert", "strand_segments.frag", targets, replaced)
 
 
-def _strip(info, shadow_samplers):
-    declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
+def _strip(info, shadow_samplers, is_clipped):
+    replaced = declare_clipped_scene(info, shadow_samplers, is_clipped)
     for slot, name in enumerate(STRAND_SAMPLERS, start=len(SHADOW_SAMPLERS)):
         info.sampler(slot, "FLOAT_2D", name)
     varying = gpu.types.GPUStageInterfaceInfo("strand_varying")
@@ -70,6 +81,7 @@ def _strip(info, shadow_samplers):
     varying.smooth("FLOAT", "strand_place")  # in points that are drawn
     varying.flat("INT", "strand_index")
     info.vertex_out(varying)
+    return replaced
 
 
 RUN_GROUP_SIZE = 64  # runs of segments that one work group of a program that walks along strands takes
@@ -77,11 +89,11 @@ RUN_LENGTH = 8  # segments of a run: RUN_LENGTH of shaders/include/walk_segment.
 
 
 @kept
-def segments_program(is_depth, is_round):
+def segments_program(is_depth, is_round, is_clipped=False):
     """The compute program that draws strands as samples of a picture: see strand_segments.comp."""
-    constants, samplers = ("first_run", "are_tiles_known"), (("farthest_depths", "UINT_2D"),)
-    defined = {"IS_DEPTH": is_depth, "IS_ROUND": is_round}
-    return _walk("strand_segments.comp", ("depths", "segments", "seen_runs"), defined, constants, samplers=samplers)
+    images, constants = ("depths", "segments", "seen_runs"), ("first_run", "are_tiles_known")
+    defined, samplers = {"IS_DEPTH": is_depth, "IS_ROUND": is_round}, (("farthest_depths", "UINT_2D"),)
+    return _walk("strand_segments.comp", images, defined, constants, samplers=samplers, is_clipped=is_clipped)
 
 
 @kept
@@ -92,11 +104,11 @@ def strand_shadow_program(is_front):
     return _walk("strand_shadow.comp", images, defined, shadow_samplers=("hair_front",), samplers=samplers)
 
 
-def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=()):
+def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=(), is_clipped=False):
     info = gpu.types.GPUShaderCreateInfo()
     for name, value in defined.items():
         info.define(name, str(value).lower())
-    declare_scene(info, shadow_samplers=shadow_samplers, is_lit=False)
+    replaced = declare_clipped_scene(info, shadow_samplers, is_clipped)
     info.local_group_size(RUN_GROUP_SIZE)
     own = tuple((name, "FLOAT_2D") for name in STRAND_SAMPLERS)
     for slot, (name, kind) in enumerate((*own, *samplers), start=len(SHADOW_SAMPLERS)):
@@ -105,7 +117,7 @@ def _walk(file, images, defined, constants=(), shadow_samplers=(), samplers=()):
         info.image(slot, "R32UI", "UINT_2D", name, qualifiers={"NO_RESTRICT", "READ", "WRITE"})
     for name in (*constants, "walked_part"):
         info.push_constant("INT", name)
-    return compile_compute(info, file)
+    return compile_compute(info, file, replaced)
 
 
 PICTURE_FORMAT = "RGBA16F"  # of the light that `shading_program` leaves

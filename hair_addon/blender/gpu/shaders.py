@@ -70,10 +70,13 @@ COLOR = (("color", "VEC4"),)  # what a fragment shader leaves where nothing else
 complaint_cache = Cache()  # files of a program → their compile error
 
 
-def compile_drawing(info, vertex, fragment, targets=COLOR):
-    """The program of a vertex and a fragment shader; targets: (output, type), ... of the latter. Raises `HairError`."""
+def compile_drawing(info, vertex, fragment, targets=COLOR, replaced=None):
+    """The program of a vertex and a fragment shader, the latter with some of its includes replaced as `expand` says.
+
+    targets: (output, type), ... of the fragment shader. Raises `HairError`.
+    """
     vertex_text, vertex_lines = expand(vertex)
-    fragment_text, fragment_lines = expand(fragment)
+    fragment_text, fragment_lines = expand(fragment, replaced)
     info.vertex_source(vertex_text)
     info.fragment_source(fragment_text)
     for slot, (target, kind) in enumerate(targets):

@@ -61,14 +61,17 @@ def arrival_program(fragment):
 
 
 @kept
-def depth_program(fragment="shadow_surface.frag"):
-    """The program that draws a surface into a shadow map, or one that only hides."""
+def depth_program(fragment="shadow_surface.frag", is_clipped=False):
+    """The program that draws a surface into a shadow map, or one that only hides.
+
+    is_clipped: whether planes cut something off, as surface_hides.frag knows.
+    """
     info, varying = gpu.types.GPUShaderCreateInfo(), gpu.types.GPUStageInterfaceInfo("surface_varying")
-    scene_programs.declare_scene(info, shadow_samplers=(), is_lit=False)
+    replaced = scene_programs.declare_clipped_scene(info, (), is_clipped)
     info.sampler(0, "FLOAT_2D", "places")
     varying.smooth("VEC3", "drawn_position")
     info.vertex_out(varying)
-    return compile_drawing(info, "surface_place.vert", fragment)
+    return compile_drawing(info, "surface_place.vert", fragment, replaced=replaced)
 
 
 def _declare_material(info):

@@ -182,15 +182,19 @@ def _texture_of(vectors, known):
 _COLORED = "shadow_surface.frag"  # the only one that a material's color matters to
 
 
-def draw_depth(surface, view, lights, fragment=_COLORED):
-    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surface_hides.frag."""
-    program = surface_programs.depth_program(fragment)
+def draw_depth(surface, view, lights, fragment=_COLORED, clip_planes=None):
+    """Draw a `SurfaceOnGPU` into a shadow map's first pass, or where it only hides: surface_hides.frag.
+
+    clip_planes: (6, 4) that cut off what only hides, None for none.
+    """
+    program = surface_programs.depth_program(fragment, clip_planes is not None)
     placed, light_block = surface.placed(view), uniforms.uniform_buffer(lights)
+    clipping = uniforms.clipping_blocks(clip_planes)
     first, has_color = 0, fragment == _COLORED
     for color, parts in groupby(surface.corners.colors, key=lambda part: part[1] if has_color else 0.0):
         count = sum(part_count for part_count, _color in parts)
         placed["surface_color"] = color
-        blocks = {"view": uniforms.uniform_buffer(placed), "lights": light_block}
+        blocks = {"view": uniforms.uniform_buffer(placed), "lights": light_block, **clipping}
         with drawing.bound(program, blocks, {"places": surface.places}):
             surface.corners.triangles.draw_range(program, elem_start=first, elem_count=count)
         first += count

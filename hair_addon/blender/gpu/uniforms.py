@@ -228,6 +228,8 @@ HISTORY = Block(
     },
 )
 
+CLIPPING = Block("Clipping", {"planes": ("vec4", 6)})  # a place p of the world is left where each (p, 1) is not below
+
 ENVIRONMENT = Block(
     "Environment",
     {
@@ -273,6 +275,15 @@ def fill(settings):
 def uniform_buffer(record):
     """A GPUUniformBuf with the bytes of a record."""
     return gpu.types.GPUUniformBuf(bytes_of(record))
+
+
+def clipping_blocks(planes):
+    """{instance: GPUUniformBuf} of programs that are clipped by planes, (6, 4); none where these are None."""
+    if planes is None:
+        return {}
+    record = CLIPPING.record()
+    record["planes"] = planes
+    return {"clipping": uniform_buffer(record)}
 
 
 def bytes_of(record):

@@ -71,6 +71,7 @@ class VisibilityBuffer:
         self._seen_runs = None  # a texel for each run of segments that is walked along
         self.surface_depth = gpu.types.GPUTexture(self.size, format="DEPTH_COMPONENT32F")
         self._hair = []  # _Placed
+        self._clip_planes = None  # of `find_hair`
         self._has_strips = False  # whether `depths` are of strips alone
         # (format, background) → (framebuffer, texture, framebuffer of `behind_hair`, depth) of additional passes
         self._parts = {}
@@ -140,9 +141,9 @@ class VisibilityBuffer:
                 with windows.drawn_in(window):
                     drawing.cover(program)
 
-    def add_hair(self, hair, lights, view, in_compute=None):
+    def add_hair(self, hair, lights, view, in_compute=None, clip_planes=None):
         """Find the hair in front of the surfaces and shade it: arguments as for `find_hair`."""
-        self.find_hair(hair, lights, view, in_compute)
+        self.find_hair(hair, lights, view, in_compute, clip_planes)
         self.shade_hair()
 
     def shade_hair(self):
@@ -150,13 +151,15 @@ class VisibilityBuffer:
         for placed in self._hair:
             self._shade(placed, self.color)
 
-    def find_hair(self, hair, lights, view, in_compute=None):
+    def find_hair(self, hair, lights, view, in_compute=None, clip_planes=None):
         """Fill `segments` and `depths` with the hair that is nearest, in front of the surfaces. Raises `HairError`.
 
         hair: [(StrandsOnGPU, Shading, object to world, {sampler: texture} of the scene, Steps), ...];
         lights, view: records of `uniforms`, lights one of all hair or (H,) of each; in_compute: whether a compute
-        program finds the nearest strands, None: where it can.
+        program finds the nearest strands, None: where it can; clip_planes: (6, 4) of `uniforms.CLIPPING` that cut hair
+        off, None for none.
         """
+        self._clip_planes = clip_planes
         self._hair = self._placed(hair, lights, view)
         is_refused = bool(self._hair) and self._hair[-1].first + self._hair[-1].segment_count > NO_SEGMENT
         if not is_refused and (scene_programs.has_image_atomics() if in_compute is None else in_compute):
@@ -260,8 +263,10 @@ class VisibilityBuffer:
         self._copy_depths(is_start=True)
         self._provide_runs(sum(placed.run_count for placed in self._hair))
         self._is_color_stale = self._has_strips = False
+        clipping = uniforms.clipping_blocks(self._clip_planes)
         all_blocks = [
-            {"view": uniforms.uniform_buffer(placed.record), "lights": placed.lights} for placed in self._hair
+            {"view": uniforms.uniform_buffer(placed.record), "lights": placed.lights} | clipping
+            for placed in self._hair
         ]
         if sum(placed.segment_count for placed in self._hair) < _FEW_SEGMENTS:
             self._walk(all_blocks, drawing.WALK_ALL, is_depth=True)
@@ -292,7 +297,7 @@ class VisibilityBuffer:
         samplers, first_run = {"farthest_depths": self._farthest}, 0
         for placed, blocks in zip(self._hair, all_blocks, strict=True):
             constants = {"first_run": first_run, "are_tiles_known": int(are_tiles_known)}
-            program = scene_programs.segments_program(is_depth, placed.is_round)
+            program = scene_programs.segments_program(is_depth, placed.is_round, self._clip_planes is not None)
             first_run += placed.run_count
             drawing.walk_strands(placed.strands, program, placed.record, blocks, samplers, images, constants, part)
 
@@ -318,10 +323,10 @@ class VisibilityBuffer:
 
     def _draw_strips(self):
         """The nearest segments, as strips of triangles that the graphics driver draws."""
-        program = scene_programs.strip_segments_program()
+        program = scene_programs.strip_segments_program(self._clip_planes is not None)
         with self._strips.bind(), drawing.gpu_state("LESS_EQUAL", depth_writes=True):
             for placed in self._hair:
-                drawing.draw_strip(placed.strands, program, placed.record, placed.lights)
+                drawing.draw_strip(placed.strands, program, placed.record, placed.lights, clip_planes=self._clip_planes)
         self._has_strips = True
 
     def _shade(self, placed, picture, parts=None):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import bpy
 from bpy.types import Curves, Object
 
-from ..data import rest_nodes
+from ..data import rest_nodes, usable_surfaces
 from ..data.strands import follow_nodes
 from ..data.strands.curves import followers
 from ..host.notices import name_of, text_of
@@ -28,7 +28,8 @@ class Warning:
 def warnings_of(surface: Object | None, parts: Iterable[Curves]) -> list[Warning]:
     """[Warning] about a mesh object, or None where it is missing, and the guide and hair Curves that grow on it."""
     partings = [warning for part in parts if part.vellus.kind == "HAIR" for warning in parting_warnings(part)]
-    first = [*_of_library(surface, parts), *_of_surface(surface, parts), *_of_uv_map(surface, parts)]
+    there = None if surface is None or usable_surfaces.is_deleted(surface) else surface
+    first = [*_of_library(surface, parts), *_of_surface(there, parts), *_of_uv_map(there, parts)]
     flows = [warning for part in parts if part.vellus.kind == "GUIDES" for warning in flow_warnings(part)]
     return [*first, *_of_guides(parts), *dict.fromkeys([*partings, *flows])]
 

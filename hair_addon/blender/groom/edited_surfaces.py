@@ -16,13 +16,14 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
 
     axes_before: `to_world_axes` of the surface before the edit, None if unknown. Shape keys and modifiers are not
     edits: strands are stored on the surface at rest. If faces were added or removed, roots move to the nearest
-    points. Raises `HairError`.
+    points. Raises `HairError`, for linked guides only if they would change.
     """
     state = guide_curves.vellus
     surface = scene.read_surface(guide_curves.surface, depsgraph)
     roots = curves.read_root_places(guide_curves, len(surface.rest))
     stored = curves.stored_roots(guide_curves, surface)
     if state.topology != surface.topology or roots is None or stored is None:
+        curves.require_not_linked(guide_curves)
         _root_again(guide_curves, surface)
         what = "strands" if state.kind == "HAIR" else "guides"
         state.status = f'The faces of "{surface.name}" have changed: {what} are rooted at the nearest points.'
@@ -30,6 +31,7 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
     before = curves.stood_on(guide_curves)
     if before is None or before.shape != surface.rest.shape or np.array_equal(before, surface.rest):
         return False
+    curves.require_not_linked(guide_curves)
     require_finite(surface.rest)
     applied = None if axes_before is None else np.linalg.solve(surface.to_world_axes, axes_before)
     if applied is not None and np.allclose(before @ applied.T, surface.rest, rtol=0.0, atol=1e-5 * surface.extent):

@@ -125,6 +125,9 @@ def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
     scale = tuple(surface_object.scale)
     if not all(scale):
         raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
+    all_guides = curves_on(surface_object, "GUIDES")  # those too that are not live
+    for guides in all_guides:
+        curves.require_editable(guides)
     axes_before = np.array(surface_object.matrix_world.to_3x3(), np.float64)
     with bpy.context.temp_override(
         active_object=surface_object,
@@ -134,5 +137,5 @@ def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
     ):
         bpy.ops.object.transform_apply(location=False, rotation=False, scale=True)
     view_layer.update()
-    for guides in curves_on(surface_object, "GUIDES"):  # those too that are not live
+    for guides in all_guides:
         edited_surfaces.follow_surface(guides, bpy.context.evaluated_depsgraph_get(), axes_before)

@@ -7,6 +7,7 @@ import bpy
 from bpy.types import Context, Curves, Object, SpaceView3D, ViewLayer
 
 from ..data.strands.curves import followers
+from ..data.usable_surfaces import is_deleted
 from ..host.notices import text_of
 from ..settings import style_items
 
@@ -142,7 +143,8 @@ def mesh_to_attach_to(context: Context) -> Object | None:
     if not any(active_of_kind(context.object, kind) for kind in ("GUIDES", "HAIR")):
         return None
     selected = next((o for o in context.selected_objects if o.type == "MESH"), None)
-    return selected or context.object.data.surface
+    surface = context.object.data.surface
+    return selected or (None if surface is None or is_deleted(surface) else surface)
 
 
 def object_of(curves: Curves, view_layer: ViewLayer) -> Object | None:

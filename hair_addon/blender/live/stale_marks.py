@@ -25,7 +25,6 @@ def follow_surface(surface_object, depsgraph, is_mesh_edited):
         if guides.surface != surface_object or not _is_carried(guides) or not state.is_live:
             continue
         try:
-            curves.require_not_linked(guides)
             was_edited = edited_surfaces.follow_surface(guides, depsgraph, axes_before)
             is_placed = not curves.is_hand_made(guides)  # where its mask says
             if is_mesh_edited and not was_edited and is_placed and _may_be_painted(guides, depsgraph):

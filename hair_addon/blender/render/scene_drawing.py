@@ -13,11 +13,14 @@ from ..gpu import (
 )
 
 
-def draw_hiding(drawn, view):
-    """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer."""
+def draw_hiding(drawn, view, clip_planes=None):
+    """Draw the depth of all surfaces, and nothing of their light, into the bound framebuffer.
+
+    clip_planes: (6, 4) of `uniforms.CLIPPING` that cut them off, None for none.
+    """
     with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
         for surface, _parts in drawn.surfaces:
-            surface_textures.draw_depth(surface, view, drawn.lights, "surface_hides.frag")
+            surface_textures.draw_depth(surface, view, drawn.lights, "surface_hides.frag", clip_planes)
 
 
 def draw(drawn, view, buffer, is_transparent):
@@ -41,12 +44,14 @@ def _number_surfaces(drawn, view):
             first_triangle += surface.triangle_count
 
 
-def draw_hair(drawn, view, buffer, is_viewport=False):
+def draw_hair(drawn, view, buffer, is_viewport=False, clip_planes=None):
     """Draw all hair in front of the surfaces of a `VisibilityBuffer`.
 
-    view: a `uniforms.VIEW` record; is_viewport: only as much of it as is seen from there, and as the artist wants.
+    view: a `uniforms.VIEW` record; is_viewport: only as much of it as is seen from there, and as the artist wants;
+    clip_planes: as for `draw_hiding`.
     """
-    buffer.add_hair(_hair_in_view(drawn, view, is_viewport), _hair_lights(drawn), view)
+    hair = _hair_in_view(drawn, view, is_viewport)
+    buffer.add_hair(hair, _hair_lights(drawn), view, clip_planes=clip_planes)
 
 
 def relight_viewport(drawn, view, buffer, is_shadowed=False):
@@ -72,13 +77,14 @@ def _relight_hair(drawn, view, buffer, picture, is_viewport=False):
     return picture
 
 
-def find_hair(drawn, view, buffer, chosen=None):
+def find_hair(drawn, view, buffer, chosen=None, clip_planes=None):
     """Find the nearest strands of hair for a `VisibilityBuffer` as a viewport shows them, and shade none.
 
-    chosen: indices of the hair, None for all.
+    chosen: indices of the hair, None for all; clip_planes: as for `draw_hiding`.
     """
     hair = _hair_in_view(drawn, view, is_viewport=True)
-    buffer.find_hair(hair if chosen is None else [hair[index] for index in chosen], drawn.lights, view)
+    hair = hair if chosen is None else [hair[index] for index in chosen]
+    buffer.find_hair(hair, drawn.lights, view, clip_planes=clip_planes)
 
 
 def _hair_lights(drawn):

@@ -357,9 +357,10 @@ def only_files(pattern):
     return bpy.props.StringProperty(default=pattern, options={"HIDDEN"})
 
 
-def text(name, description):
-    """A string that is not a setting."""
-    return bpy.props.StringProperty(name=name, description=description, translation_context=CONTEXT)
+def text(name, description, is_remembered=False):
+    """A string of an operator that is not a setting. is_remembered: whether it is offered again when next called."""
+    options = set() if is_remembered else {"SKIP_SAVE"}
+    return bpy.props.StringProperty(name=name, description=description, options=options, translation_context=CONTEXT)
 
 
 def choice(name, description, labels, tooltips=None):
@@ -369,9 +370,14 @@ def choice(name, description, labels, tooltips=None):
 
 
 def mesh_name(name, description):
-    """The name of a mesh object, offered by name."""
+    """The name of a mesh object, offered by name, which an operator does not remember."""
     return bpy.props.StringProperty(
-        name=name, description=description, translation_context=CONTEXT, search=_mesh_names, search_options=set()
+        name=name,
+        description=description,
+        options={"SKIP_SAVE"},
+        translation_context=CONTEXT,
+        search=_mesh_names,
+        search_options=set(),
     )
 
 

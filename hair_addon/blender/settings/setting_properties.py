@@ -19,8 +19,9 @@ _SMALL_WORDS = {"in", "of", "per", "to", "with"}  # stay lower case in titles
 def annotations(settings_class, update=None, skip=(), unkeyed=(), high=None, override=frozenset()):
     """{name: bpy property} for the fields of a `Settings` class but those of `skip`; `update` as in bpy.props.
 
-    A radius has its diameter beside it, which is shown in its place. Operators have no `update`. Structural settings,
-    and those of `unkeyed`, take no keys. high: {name: largest value} of fields whose range is shorter here.
+    A radius has its diameter beside it, which is shown in its place. Operators have no `update`, and do not remember
+    text, which names data of one file. Structural settings, and those of `unkeyed`, take no keys. high: {name: largest
+    value} of fields whose range is shorter here.
     """
     highs = high or {}
     made = {}
@@ -47,6 +48,8 @@ def _property(name, default, details, update, is_unkeyed, override):
     if isinstance(default, str):
         if details.choices:
             return bpy.props.EnumProperty(items=details.choices, **common)
+        if update is None:
+            common["options"] = common.get("options", set()) | {"SKIP_SAVE"}
         return bpy.props.StringProperty(**common)
     if isinstance(default, bool):
         return bpy.props.BoolProperty(**common)

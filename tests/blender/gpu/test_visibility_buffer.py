@@ -31,7 +31,7 @@ def shading():
     return hair_shading.kajiya_kay_shading(kajiya_kay.Settings())
 
 
-def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
+def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL, clip_planes=None):
     """(segments, depths), each (height, width), of [(points, radii, object to world)] seen along -Z from the origin.
 
     A segment is negative where there is none. hiding_at: distance of a surface that fills the left half of the view.
@@ -46,12 +46,12 @@ def drawn(placed, view_to_clip, shading, in_compute, hiding_at=None, steps=ALL):
             corners = np.array([[-9, -9, -hiding_at], [0, -9, -hiding_at], [0, 9, -hiding_at]] * 2, np.float32)
             corners[3:, :2] = [[-9, -9], [0, 9], [-9, 9]]
             surface = surface_textures.upload_surface(corners, np.arange(6, dtype=np.int32))
-            surface_textures.draw_depth(surface, view, lights, "surface_hides.frag")
+            surface_textures.draw_depth(surface, view, lights, "surface_hides.frag", clip_planes)
     hair = [
         (strand_textures.upload_strands(points, radii), shading, to_world, none, steps)
         for points, radii, to_world in placed
     ]
-    buffer.add_hair(hair, lights, view, in_compute)
+    buffer.add_hair(hair, lights, view, in_compute, clip_planes)
     counts = [len(points) * ((steps.point_count or points.shape[1]) - 1) for points, _radii, _place in placed]
     segments = np.array(buffer.segments.read(), np.int64).reshape(SIZE[::-1])
     depths = np.array(buffer.depths.read()).astype(np.uint32).reshape(SIZE[::-1]).view(np.float32)
@@ -251,3 +251,47 @@ def test_bends_and_ends_are_left_out_only_where_strands_are_too_thin_for_them(sh
         for chosen_program, whole_program in zip(*found, strict=True):
             np.testing.assert_array_equal(chosen_program, whole_program)
     assert 0 < sum(chosen) < len(chosen)
+
+
+def planes(*rows):
+    """(6, 4) of some planes, and of others that cut nothing off."""
+    return np.array([*rows, *[(0.0, 0.0, 0.0, 0.0)] * (6 - len(rows))], np.float32)
+
+
+@pytest.mark.parametrize("in_compute", [True, False])
+@pytest.mark.parametrize("view_to_clip", [PERSPECTIVE, PARALLEL], ids=["perspective", "parallel"])
+@pytest.mark.parametrize("thickness", [0.004, 0.03])
+def test_planes_along_the_view_leave_a_rectangle_of_the_picture(rng, shading, view_to_clip, thickness, in_compute):
+    """As Blender's Clipping Region: within it all is as without, and there is nothing around it."""
+    placed = [(*tuft(rng, thickness=thickness), np.eye(4)), (*tuft(rng, 20), np.diag([1.5, 1.5, 1.5, 1.0]))]
+    # x and y of clip space between parts of its w, where the camera is at the origin.
+    sides = [view_to_clip[row] * sign + 0.5 * view_to_clip[3] for row in (0, 1) for sign in (1.0, -1.0)]
+    (whole, depths), (left, same) = (
+        drawn(placed, view_to_clip, shading, in_compute, clip_planes=clipping) for clipping in (None, planes(*sides))
+    )
+    height, width = np.indices(SIZE[::-1])
+    away = np.maximum(np.abs(2 * width + 1 - SIZE[0]) / SIZE[0], np.abs(2 * height + 1 - SIZE[1]) / SIZE[1]) - 0.5
+    # Strands are cut off across themselves or along columns.
+    border = 4.0 / SIZE[1] + thickness * np.abs(view_to_clip[1, 1]) / 0.5
+    inside, outside = away < -border, away > border
+    assert (whole[inside] >= 0).sum() > 200 and (whole[outside] >= 0).sum() > 200
+    assert (left[inside] == whole[inside]).mean() > 0.98 and (left[outside] == -1).mean() > 0.99
+    alike = inside & (left == whole) & (whole >= 0)
+    np.testing.assert_allclose(same[alike], depths[alike], atol=1e-5)
+
+
+@pytest.mark.parametrize("in_compute", [True, False])
+def test_a_plane_across_the_view_shows_what_is_behind_it(rng, shading, in_compute):
+    """Strands and surfaces before it are cut off, and hide nothing."""
+    placed, behind = [(*tuft(rng), np.eye(4))], planes((0.0, 0.0, -1.0, -0.8))
+    whole, depths = drawn(placed, PARALLEL, shading, in_compute)
+    left, later = drawn(placed, PARALLEL, shading, in_compute, clip_planes=behind)
+    plane = 0.5 * (0.8 * abs(PARALLEL[2, 2]) + PARALLEL[2, 3] + 1.0)
+    far = depths > plane + 2e-3
+    np.testing.assert_array_equal(left[far], whole[far])
+    assert later[left >= 0].min() > plane - 2e-3
+    near = (whole >= 0) & ~far
+    assert (left[near] >= 0).any() and (left[near] == -1).any()
+    for at, is_hidden in ((0.7, False), (0.9, True)):
+        hidden, _depths = drawn(placed, PARALLEL, shading, in_compute, at, clip_planes=behind)
+        assert np.array_equal(hidden, left) != is_hidden

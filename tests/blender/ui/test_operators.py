@@ -68,6 +68,28 @@ def test_operators_run_again_on_what_they_made(guides):
     assert len(guides.data.curves) == 30
 
 
+# Of no one file: paths, and libraries of the user's preferences.
+REMEMBERED = {"filepath", "directory", "folder", "filter_glob", "library", "catalog"}
+
+
+def test_what_names_data_is_not_remembered():
+    """Blender calls an operator with its last values again, where data of these names may be missing."""
+    remembered = {
+        (name, rna.identifier)
+        for name in dir(bpy.ops.vellus)
+        for rna in getattr(bpy.ops.vellus, name).get_rna_type().properties
+        if rna.type == "STRING" and not rna.is_skip_save and rna.identifier not in REMEMBERED
+    }
+    assert not remembered
+
+
+def test_a_mask_does_not_stay_for_the_next_mesh(sphere):
+    bpy.ops.vellus.distribute_guides("EXEC_DEFAULT", True, guide_count=10, density_group="top")
+    bpy.ops.mesh.primitive_cube_add()
+    bpy.ops.vellus.distribute_guides("EXEC_DEFAULT", True)
+    assert sorted(len(curves.curves) for curves in bpy.data.hair_curves) == [10, 10]
+
+
 def test_a_mesh_may_carry_several_systems(sphere):
     bpy.ops.vellus.distribute_guides(guide_count=10)
     bpy.ops.vellus.distribute_guides(guide_count=20)

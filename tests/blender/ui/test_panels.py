@@ -114,11 +114,26 @@ def test_the_cost_that_is_shown_is_what_curves_take(guides, strand_count, guide_
     assert cost.curves_bytes(strand_count, slot_count=slot_count) == taken
 
 
+def delete(sphere):
+    """Delete an object as the X key does: hair keeps it in the file."""
+    with bpy.context.temp_override(selected_objects=[sphere]):
+        bpy.ops.object.delete()
+
+
+def join_to_cube(sphere):
+    bpy.ops.mesh.primitive_cube_add()
+    with bpy.context.temp_override(selected_editable_objects=[sphere, bpy.context.object]):
+        bpy.ops.object.join()
+    make_active("Hair")
+
+
 WARNINGS = {
     "no UV map": (lambda sphere: sphere.data.uv_layers.remove(sphere.data.uv_layers[0]), "vellus.make_uv_map"),
     "a renamed UV map": (lambda sphere: setattr(sphere.data.uv_layers[0], "name", "Other"), "vellus.use_uv_map"),
     "a scale": (lambda sphere: setattr(sphere, "scale", (1.0, 2.0, 1.0)), "vellus.apply_scale"),
     "a lost surface": (lambda sphere: bpy.data.objects.remove(sphere), "vellus.attach_to_surface"),
+    "a deleted surface": (delete, "vellus.attach_to_surface"),
+    "a surface joined to another": (join_to_cube, "vellus.attach_to_surface"),
     "no guides' object": (lambda _: bpy.data.objects.remove(bpy.data.objects["Guides"]), "vellus.restore_guides"),
 }
 
@@ -129,6 +144,23 @@ def test_problems_are_shown_with_the_button_that_fixes_them(hair, case):
     assert operator not in draw(named("surface")).drawn
     break_it(bpy.data.objects["Sphere"])
     assert draw(named("surface")).drawn[operator] == 1
+
+
+def test_a_surface_that_no_scene_shows_is_not_missing(hair):
+    """An excluded collection or another scene has it: it was not deleted."""
+    sphere = bpy.data.objects["Sphere"]
+    other = bpy.data.collections.new("Characters")
+    other.objects.link(sphere)
+    for owner in set(sphere.users_collection) - {other}:
+        owner.objects.unlink(sphere)
+    assert sphere.users_scene == ()
+    assert not draw(named("surface")).drawn["vellus.attach_to_surface"]
+
+
+def test_hair_is_not_attached_to_its_deleted_surface(hair):
+    delete(bpy.data.objects["Sphere"])
+    assert hair.data.surface is not None
+    assert not bpy.ops.vellus.attach_to_surface.poll()
 
 
 @pytest.mark.parametrize("is_locked", [False, True])

@@ -58,11 +58,21 @@ class HairPicture:
             self._first_turn = 0
         self.pass_count = 0
 
-    def add_pass(self, drawn, world_to_view, view_to_clip, is_see_through=False, outline=None, is_shadowed=False):
+    def add_pass(
+        self,
+        drawn,
+        world_to_view,
+        view_to_clip,
+        is_see_through=False,
+        outline=None,
+        is_shadowed=False,
+        clip_planes=None,
+    ):
         """Draw a `DrawnScene` once more.
 
         world_to_view, view_to_clip: (4, 4); is_see_through: surfaces do not hide hair; outline: a `HairOutline` that
-        takes part in it until it is fine; is_shadowed: whether it darkens surfaces by the shadow of hair.
+        takes part in it until it is fine; is_shadowed: whether it darkens surfaces by the shadow of hair; clip_planes:
+        (6, 4) of `uniforms.CLIPPING` that cut off hair, and surfaces that only hide it; None for none.
         """
         camera, turn = (world_to_view, view_to_clip), self._first_turn + self.pass_count
         if self.pass_count == 0:
@@ -73,14 +83,14 @@ class HairPicture:
         self._view = view = self._detail.pass_record(camera, self.size, turn)
         is_outlined = outline is not None and not outline.is_fine
         if is_outlined:
-            outline.add_pass(drawn, view, self._pass, self._detail)
+            outline.add_pass(drawn, view, self._pass, self._detail, clip_planes)
         has_shadow = is_shadowed and not is_see_through
         with self._pass.surfaces() if has_shadow else self._pass.hiding():
             if has_shadow:
                 scene_drawing.draw_viewport_shadow(drawn, view)
             elif not is_see_through:
-                scene_drawing.draw_hiding(drawn, view)
-        scene_drawing.draw_hair(drawn, view, self._pass, is_viewport=True)
+                scene_drawing.draw_hiding(drawn, view, clip_planes)
+        scene_drawing.draw_hair(drawn, view, self._pass, is_viewport=True, clip_planes=clip_planes)
         if is_outlined:
             outline.add_seen(self._pass, self._detail)
         with self._sum.bind():

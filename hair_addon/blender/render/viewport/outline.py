@@ -76,14 +76,15 @@ class HairOutline:
         """Whether another pass would change nothing that is seen."""
         return self._pass_count >= _PASS_COUNT
 
-    def add_pass(self, drawn, view, buffer, detail):
+    def add_pass(self, drawn, view, buffer, detail, clip_planes=None):
         """Find the hair where nothing hides it in a `VisibilityBuffer`.
 
-        view: a `uniforms.VIEW` record; detail: `picture_detail.Detail` of the buffer.
+        view: a `uniforms.VIEW` record; detail: `picture_detail.Detail` of the buffer; clip_planes: (6, 4) of
+        `uniforms.CLIPPING` that cut hair off, None for none.
         """
         with buffer.hiding():
             pass
-        scene_drawing.find_hair(drawn, view, buffer, self._channels)
+        scene_drawing.find_hair(drawn, view, buffer, self._channels, clip_planes)
         self._add(buffer, detail, zip(self._channels.values(), buffer.segment_ranges, strict=True))
         self._pass_count += 1
 

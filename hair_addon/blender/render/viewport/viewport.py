@@ -98,7 +98,8 @@ def _draw_hair(context):
     xray = _xray(viewport.shading)
     outlined = selected_hair.outlined(context, drawn, is_see_through=xray is not None)
     is_shadowed = viewport.shading.type == "MATERIAL" and context.scene.vellus.has_preview_shadow
-    kept = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed)
+    clip_planes = _clip_planes(context)
+    kept = _picture(drawn, context.region_data, region, xray is not None, outlined, is_shadowed, clip_planes)
     kept.picture.show(
         _display_table(DisplayTransform.of(context.scene)),
         2.0**context.scene.view_settings.exposure,
@@ -199,14 +200,26 @@ def _xray(shading):
     return shading.xray_alpha if shading.type == "SOLID" and shading.show_xray else None
 
 
-def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=False):
+def _clip_planes(context):
+    """((x, y, z, w), ... of six planes) of Blender's Clipping Region, None without: as it, in two modes of shading.
+
+    A place p of the world is left where no dot((x, y, z, w), (p, 1)) is negative.
+    """
+    view = context.region_data
+    if not view.use_clip_planes or context.space_data.shading.type not in {"WIREFRAME", "SOLID"}:
+        return None
+    planes = tuple(map(tuple, view.clip_planes))
+    return (*planes[:4], *[(0.0, 0.0, 0.0, 0.0)] * 2) if view.use_box_clip else planes  # a box of a quad view has four
+
+
+def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=False, clip_planes=None):
     """The `RegionPicture` of a region, of this scene and view: restarted, with another pass, or unchanged.
 
-    outlined: as `selected_hair.outlined` returns it; is_shadowed: as for `HairPicture.add_pass`.
+    outlined: as `selected_hair.outlined` returns it; is_shadowed, clip_planes: as for `HairPicture.add_pass`.
     """
     kept = region_pictures.picture_of(region, hair_picture.HairPicture)
-    options = is_see_through, is_shadowed
-    is_moved = kept.seen[:2] == options
+    options = is_see_through, is_shadowed, clip_planes
+    is_moved = kept.seen[:3] == options
     seen = (*options, outlined, *map(tuple, view.view_matrix), *map(tuple, view.window_matrix))
     if kept.turn_to(drawn, seen):
         kept.picture.restart(is_moved)
@@ -216,7 +229,8 @@ def _picture(drawn, view, region, is_see_through, outlined=None, is_shadowed=Fal
             kept.outline = kept.outline or HairOutline(kept.picture.size)
             kept.outline.restart(dict(outlined[0]), outlined[1])
     if not kept.picture.is_fine:
-        kept.picture.add_pass(drawn, *matrices_of(view), is_see_through, kept.outline, is_shadowed)
+        options = is_see_through, kept.outline, is_shadowed, clip_planes
+        kept.picture.add_pass(drawn, *matrices_of(view), *options)
     return kept
 
 
@@ -236,20 +250,21 @@ def _draw_guides(context):
         lights = drawn_scene_of(context).lights
         view = drawing.view_record(*matrices_of(context.region_data), context.region.height, _GUIDE_WIDTH)
         for guide_object in guide_objects:
-            _draw_guide_object(guide_object, view, lights)
+            _draw_guide_object(guide_object, view, lights, _clip_planes(context))
 
 
 def _is_guide_shown(guide_object):
     return guide_object.select_get() or guide_object.mode != "OBJECT" or looks.are_guides_shown(guide_object.data)
 
 
-def _draw_guide_object(guide_object, view, lights):
+def _draw_guide_object(guide_object, view, lights, clip_planes):
     try:
         guides = hair_cache.strands_on_gpu(guide_object.data)
     except HairError as error:
         hair_cache.refuse(guide_object.data, error)
         return
     if guides is not None:
-        program = scene_programs.strip_program("guides.frag")
+        program = scene_programs.strip_program("guides.frag", is_clipped=clip_planes is not None)
+        place = np.array(guide_object.matrix_world, np.float64)
         with drawing.gpu_state("LESS_EQUAL", depth_writes=True):
-            drawing.draw_strands(guides, program, view, lights, np.array(guide_object.matrix_world, np.float64))
+            drawing.draw_strands(guides, program, view, lights, place, clip_planes=clip_planes)

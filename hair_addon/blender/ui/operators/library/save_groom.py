@@ -21,7 +21,7 @@ class VELLUS_OT_save_groom(LongOperator, bpy.types.Operator):
     __annotations__ = {
         "name": properties.text("Name", "Name of the groom. Leave empty to use the name of the hair"),
         "library": asset_libraries.library_name("Library", "Asset library to save to"),
-        "catalog": properties.text("Catalog", "Catalog of the groom, such as Hair/Short. Leave empty for none"),
+        "catalog": properties.text("Catalog", "Catalog of the groom, such as Hair/Short. Leave empty for none", True),
         "overwrites": properties.switch("Overwrite", "Replace a groom of the same name", False),
     }
     applies = needs_hair
