@@ -134,7 +134,7 @@ def test_linked_guides_on_an_edited_surface_say_what_to_do(groom_file):
     surface.data.vertices[0].co *= 1.2  # as a change of the library's file, since these guides were written
     surface.data.update()
     bpy.context.view_layer.update()
-    assert np.array_equal(curves.read_points(guides), before) and "make a library override" in guides.vellus.status
+    assert np.array_equal(curves.read_points(guides), before) and "make it local" in guides.vellus.status
 
 
 def test_a_library_override_does_not_ask_for_one(groom_file):
