@@ -36,7 +36,7 @@ def read_surface(surface_object, depsgraph):
     to_world_axes = np.array(surface_object.matrix_world.to_3x3(), np.float64)
     determinant = np.linalg.det(to_world_axes)
     if not np.isfinite(to_world_axes).all() or abs(determinant) < 1e-30:
-        raise HairError(f'"{name_of(surface_object)}" has a scale of zero: change its scale.')
+        raise HairError('"{name}" has a scale of zero: change its scale.', name=name_of(surface_object))
     evaluated, known = surface_object.evaluated_get(depsgraph), surface_cache.get(surface_object.session_uid)
     mesh = evaluated.to_mesh()
     try:
@@ -236,9 +236,8 @@ def read_vertex_group(surface_object, depsgraph, name):
         return None
     group = surface_object.vertex_groups.get(name)
     if group is None:
-        raise HairError(
-            f'"{name_of(surface_object)}" has no vertex group "{name}": pick another group, or clear the field.'
-        )
+        sentence = '"{name}" has no vertex group "{group}": pick another group, or clear the field.'
+        raise HairError(sentence, name=name_of(surface_object), group=name)
     evaluated = surface_object.evaluated_get(depsgraph)
     mesh = evaluated.to_mesh()
     try:

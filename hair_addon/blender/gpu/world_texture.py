@@ -94,5 +94,6 @@ def _draw(fragment, world, record):
     try:
         picture = gpu.texture.from_image(world.image)
     except RuntimeError as error:
-        raise HairError(f'The world\'s image "{world.image.name}" cannot be read: {error}.') from error
+        sentence = 'The image "{name}" of the world cannot be read: {error}.'
+        raise HairError(sentence, name=world.image.name, error=error) from error
     drawing.draw_cover(scene_programs.environment_program(fragment), {"environment": record}, {"surroundings": picture})

@@ -10,6 +10,11 @@ from ..data import scene
 from ..data.strands import curves, curves_objects, kept_shapes, posed_strands
 from . import bindings
 
+_ROOTED_AGAIN = {
+    "GUIDES": 'The faces of "{name}" have changed: guides are rooted at the nearest points.',
+    "HAIR": 'The faces of "{name}" have changed: strands are rooted at the nearest points.',
+}
+
 
 def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.ndarray | None = None) -> bool:
     """Carry guides, combed or not, or hair that is kept as it came, with an edited surface; whether it was edited.
@@ -25,8 +30,7 @@ def follow_surface(guide_curves: Curves, depsgraph: Depsgraph, axes_before: np.n
     if state.topology != surface.topology or roots is None or stored is None:
         curves.require_not_linked(guide_curves)
         _root_again(guide_curves, surface)
-        what = "strands" if state.kind == "HAIR" else "guides"
-        state.status = f'The faces of "{surface.name}" have changed: {what} are rooted at the nearest points.'
+        state.status = _ROOTED_AGAIN[state.kind].format(name=surface.name)
         return True
     before = curves.stood_on(guide_curves)
     if before is None or before.shape != surface.rest.shape or np.array_equal(before, surface.rest):

@@ -115,7 +115,7 @@ def check_uvs(surface_object: Object, depsgraph: Depsgraph) -> float:
 
 
 def apply_scale(surface_object: Object, view_layer: ViewLayer) -> None:
-    """Apply a mesh object's scale, and keep its hair in place."""
+    """Apply a mesh object's scale, and keep its guides in place; hair follows them again."""
     curves.require_overridable(surface_object)
     curves.require_editable(surface_object.data)
     if surface_object.data.users > 1:

@@ -374,7 +374,7 @@ def inputs_of(target: Curves) -> tuple[Curves, HairSettings]:
     """(guide Curves, `HairSettings`) of a hair Curves datablock. Raises `HairError`."""
     state = target.vellus
     if state.guide_curves is None:
-        raise HairError(f'"{name_of(target)}" has no guides: pick them in the Strands panel.')
+        raise HairError('"{name}" has no guides: pick them in the Strands panel.', name=name_of(target))
     return state.guide_curves, setting_properties.to_settings(state.hair, groom.HairSettings)
 
 

@@ -22,9 +22,10 @@ def resolve(path, library=None):
     if "\0" in path:
         raise HairError("The path contains an invalid character: type it again.")
     if path.startswith("//") and library is None and not bpy.data.filepath:
-        raise HairError(f"{path} is relative to the .blend file: save the file first.")
+        raise HairError("{path} is relative to the .blend file: save the file first.", path=path)
     if path.startswith("\\\\"):
-        raise HairError(f"{path} is on another computer, to which Vellus does not write: pick a local folder.")
+        sentence = "{path} is on another computer, to which Vellus does not write: pick a local folder."
+        raise HairError(sentence, path=path)
     return Path(bpy.path.abspath(path, library=library)).resolve()
 
 

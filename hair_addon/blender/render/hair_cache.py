@@ -326,7 +326,7 @@ def read_strands(datablock):
     """
     counts = curves.point_counts(datablock)
     if not len(counts):
-        raise HairError(f'"{name_of(datablock)}" has no strands to draw.')
+        raise HairError('"{name}" has no strands to draw.', name=name_of(datablock))
     points, radii, randoms = (read(datablock) for read in (curves.read_points, curves.read_radii, curves.read_randoms))
     wetness = curves.read_wetness(datablock)
     most, is_smooth = int(counts.max()), attributes.are_smooth(datablock)

@@ -6,6 +6,9 @@ here. languages/ has a dictionary for each language, in gettext's format.
 """
 
 import json
+import re
+import string
+from functools import lru_cache
 from pathlib import Path
 
 import bpy
@@ -30,6 +33,53 @@ def report_text(sentence, **values):
 def error_text(error):
     """Translate a `HairError`."""
     return report_text(error.sentence, **error.values)
+
+
+def status_text(status):
+    """Translate a sentence that is stored in English with its values in it, as what is wrong with hair."""
+    sentence, values = _taken_apart(status)
+    text = interface_text(sentence)
+    return _Stored().format(text, **values) if values else text
+
+
+class _Stored(string.Formatter):
+    """Fills in values that are texts already."""
+
+    def format_field(self, value, _form):
+        return value
+
+
+@lru_cache(maxsize=64)  # panels ask with every redraw
+def _taken_apart(status):
+    """(sentence, {name: text}) of a status, of the sentence that has most words of its own; (status, {}) of none."""
+    if status in _sentences():
+        return status, {}
+    for sentence, pattern in _patterns():
+        found = pattern.fullmatch(status)
+        if found:
+            return sentence, found.groupdict()
+    return status, {}
+
+
+@lru_cache(maxsize=1)
+def _sentences():
+    return {sentence for texts in dictionaries().values() for sentence in texts}
+
+
+@lru_cache(maxsize=1)
+def _patterns():
+    """[(sentence, regular expression)] of all sentences with values, those with most words of their own first."""
+    found = []
+    for sentence in _sentences():
+        pattern, length, names = "", 0, set()
+        for words, name, _form, _conversion in string.Formatter().parse(sentence):
+            pattern, length = pattern + re.escape(words), length + len(words)
+            if name:
+                pattern += f"(?P={name})" if name in names else f"(?P<{name}>.*)"
+                names.add(name)
+        if names:
+            found.append((-length, sentence, re.compile(pattern, re.DOTALL)))
+    return [(sentence, pattern) for _length, sentence, pattern in sorted(found, key=lambda entry: entry[:2])]
 
 
 def _filled(sentence, values):

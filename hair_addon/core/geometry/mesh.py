@@ -190,12 +190,15 @@ def check_mesh(mesh: TriMesh) -> None:
     bad_count = int(np.count_nonzero(~np.isfinite(mesh.vertices).all(axis=1)))
     if bad_count:
         raise HairError(
-            f"{bad_count} of the surface's {len(mesh.vertices)} vertices have non-finite coordinates: "
-            "repair the mesh or the modifier that makes them."
+            "{count} of the surface's {all} vertices have non-finite coordinates: "
+            "repair the mesh or the modifier that makes them.",
+            count=bad_count,
+            all=len(mesh.vertices),
         )
     largest = float(np.abs(mesh.vertices).max())
     if largest > 1e15:  # squares of single-precision lengths must stay finite
-        raise HairError(f"The surface extends {largest:g} m from the origin: check the object's scale.")
+        sentence = "The surface extends {distance:g} m from the origin: check the object's scale."
+        raise HairError(sentence, distance=largest)
     if not np.any(mesh.areas > 0.0):
         raise HairError("Every face of the surface has zero area: check the object's shape and scale.")
 
@@ -213,7 +216,8 @@ def check_points(mesh: TriMesh, points: SurfacePoints) -> None:
         raise HairError("There are no guides: generate guides first.")
     on_mesh = (triangle >= 0) & (triangle < len(mesh.triangles)) & np.isfinite(barycentric).all(axis=1)
     if not on_mesh.all():
-        raise HairError(f"{np.count_nonzero(~on_mesh)} guides are rooted on missing faces: regenerate the guides.")
+        sentence = "{count} guides are rooted on missing faces: regenerate the guides."
+        raise HairError(sentence, count=np.count_nonzero(~on_mesh))
 
 
 def interpolate(values: np.ndarray, mesh: TriMesh, points: SurfacePoints) -> np.ndarray:

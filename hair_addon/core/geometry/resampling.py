@@ -92,7 +92,7 @@ def resample(
     if is_smooth is not None and len(is_smooth) != len(counts):
         raise ValueError(f"is_smooth must be ({len(counts)},), not ({len(is_smooth)},)")
     if np.any(counts == 0):
-        raise HairError(f"{np.count_nonzero(counts == 0)} curves have no points: delete them.")
+        raise HairError("{count} curves have no points: delete them.", count=np.count_nonzero(counts == 0))
     points = np.ascontiguousarray(points, np.float32)
     if not np.isfinite(points).all():
         raise HairError("Some points of the curves have non-finite coordinates: delete those curves.")

@@ -24,7 +24,8 @@ def check_density(mesh: TriMesh, density: np.ndarray | None) -> np.ndarray:
         )
     bad_count = int(np.count_nonzero(~(np.isfinite(density) & (density >= 0.0))))
     if bad_count:
-        raise HairError(f"The density of {bad_count} vertices is negative or not a number: it must be at least zero.")
+        sentence = "The density of {count} vertices is negative or not a number: it must be at least zero."
+        raise HairError(sentence, count=bad_count)
     if not np.any(corner_masses(mesh, density) > 0.0):
         raise HairError("The density is zero everywhere: paint weight where hair should grow.")
     return density

@@ -156,7 +156,7 @@ def resample(points: np.ndarray, starts: np.ndarray, point_count: int) -> np.nda
     if len(starts) < 1 or starts[0] != 0 or starts[-1] != len(points) or np.any(counts < 0):
         raise ValueError("starts must rise from 0 to the number of points")
     if np.any(counts == 0):
-        raise HairError(f"{np.count_nonzero(counts == 0)} curves have no points: delete them.")
+        raise HairError("{count} curves have no points: delete them.", count=np.count_nonzero(counts == 0))
     if not np.isfinite(points).all():
         raise HairError("Some points of the curves have non-finite coordinates: delete those curves.")
     if len(counts) == 0:

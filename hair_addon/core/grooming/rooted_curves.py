@@ -78,7 +78,7 @@ def root(mesh: TriMesh, points: np.ndarray, starts: np.ndarray, every: int = 1) 
     ends = points[np.concatenate([starts[:-1][kept], starts[1:][kept] - 1])]
     reach = float(np.abs(ends).max())
     if reach > 0.1 * geometry.closest_point.FARTHEST:
-        raise HairError(f"The curves extend {reach:g} m from the origin: check their units.")
+        raise HairError("The curves extend {distance:g} m from the origin: check their units.", distance=reach)
     found = geometry.closest_point.SurfaceQuery(mesh).nearest(ends)
     distances = np.linalg.norm(positions(mesh, found) - ends, axis=1)
     at_first, at_last = distances[: len(kept)], distances[len(kept) :]

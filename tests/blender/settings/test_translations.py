@@ -4,10 +4,17 @@
 import string
 
 import bpy
+import numpy as np
 import pytest
 
+from hair_addon.blender.data import scene
+from hair_addon.blender.data.strands import style_inputs
+from hair_addon.blender.groom import pipeline
+from hair_addon.blender.host import paths
 from hair_addon.blender.settings import translations
 from hair_addon.core.errors import HairError
+from hair_addon.core.geometry import sampling
+from hair_addon.core.geometry.mesh import TriMesh, check_mesh
 from tests.support.interface import spoken
 
 LANGUAGES = translations.dictionaries()
@@ -56,6 +63,69 @@ def test_an_error_keeps_its_sentence_apart_from_its_values(monkeypatch):
     german = LANGUAGES["de_DE"]
     monkeypatch.setattr(translations, "pgettext_rpt", lambda sentence, _context: german[sentence])
     assert translations.error_text(error) == "„Head {1}“ ist verknüpft: Erstellen Sie einen Bibliotheks-Override."
+
+
+@pytest.fixture
+def german(monkeypatch):
+    """{msgid: msgstr}, while Blender translates by them: in background mode its interface has no language."""
+    texts = LANGUAGES["de_DE"]
+    for name in ("pgettext_iface", "pgettext_rpt"):
+        monkeypatch.setattr(translations, name, lambda sentence, _context: texts.get(sentence, sentence))
+    return texts
+
+
+def test_a_stored_sentence_is_translated_as_it_was_raised(german):
+    """Hair keeps what is wrong with it in English, with the values in it, as files of any language do."""
+    said = {}  # sentence → translations: some sentences differ in the names of their values alone
+    for msgid, msgstr in german.items():
+        values = {name: 7 if form else f"Head {i}" for i, (name, form) in enumerate(fields(msgid))}
+        said.setdefault(msgid.format(**values), set()).add(msgstr.format(**values))
+    assert [sentence for sentence, texts in said.items() if translations.status_text(sentence) not in texts] == []
+
+
+def test_a_stored_sentence_of_nobody_is_shown_as_it_is(german):
+    assert translations.status_text("Something {else} went wrong.") == "Something {else} went wrong."
+
+
+def lost_guides(hair):
+    hair.data.vellus.guide_curves = None
+    pipeline.inputs_of(hair.data)
+
+
+def flat(sphere):
+    sphere.scale = (0.0, 1.0, 1.0)
+    bpy.context.view_layer.update()
+    scene.read_surface(sphere, bpy.context.evaluated_depsgraph_get())
+
+
+def mesh_of(*vertices):
+    return TriMesh(np.array(vertices, np.float32), np.array([[0, 1, 2]], np.int32))
+
+
+REFUSALS = {
+    "a lost vertex group": lambda hair: scene.read_vertex_group(
+        hair.data.surface, bpy.context.evaluated_depsgraph_get(), "lost"
+    ),
+    "a scale of zero": lambda hair: flat(hair.data.surface),
+    "hair without guides": lost_guides,
+    "a style's lost object": lambda _hair: style_inputs._matrix_of("lost", "Trim"),
+    "a path beside no file": lambda _hair: paths.resolve("//folder"),
+    "vertices without a place": lambda _hair: check_mesh(mesh_of((0, 0, 0), (1, 0, 0), (0, np.nan, 0))),
+    "a surface out of reach": lambda _hair: check_mesh(mesh_of((0, 0, 0), (1e20, 0, 0), (0, 1, 0))),
+    "a negative density": lambda _hair: sampling.check_density(
+        mesh_of((0, 0, 0), (1, 0, 0), (0, 1, 0)), np.array([1.0, -1.0, 1.0])
+    ),
+}
+
+
+@pytest.mark.parametrize("refusal", REFUSALS)
+def test_refusals_with_values_are_translated(hair, monkeypatch, request, refusal):
+    with pytest.raises(HairError) as caught:
+        REFUSALS[refusal](hair)
+    german = request.getfixturevalue("german")
+    said = translations.error_text(caught.value)
+    assert said != str(caught.value) and said == german[caught.value.sentence].format(**caught.value.values)
+    assert translations.status_text(str(caught.value)) == said
 
 
 def test_a_sentence_with_braces_and_no_values_is_left_alone():

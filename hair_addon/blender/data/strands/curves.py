@@ -307,7 +307,7 @@ def read_guides(curves, surface, device, known=None, local=None):
     """
     counts = point_counts(curves)
     if not len(counts):
-        raise HairError(f'"{name_of(curves)}" has no guides: generate guides first.')
+        raise HairError('"{name}" has no guides: generate guides first.', name=name_of(curves))
     local = read_points(curves) if local is None else local
     flat = local.ravel()
     # The sum of squares tells it in a tenth of the time, where it does not overflow.

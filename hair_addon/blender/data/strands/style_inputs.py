@@ -41,7 +41,8 @@ def _matrix_of(name, label):
     """(4, 4) float64: an object's place in the world. Raises `HairError`."""
     found = bpy.data.objects.get(name)
     if found is None:
-        raise HairError(f'There is no object "{name}" for the style {label}: pick another object, or clear the field.')
+        sentence = 'There is no object "{name}" for the style {style}: pick another object, or clear the field.'
+        raise HairError(sentence, name=name, style=label)
     return np.array(found.matrix_world, np.float64)
 
 
@@ -49,7 +50,7 @@ def _z_axis(matrix, name):
     axis = matrix[:3, 2]
     size = np.linalg.norm(axis)
     if not (np.isfinite(matrix).all() and size > 1e-12):
-        raise HairError(f'"{name}" has a scale of zero or a non-finite transform: change its scale.')
+        raise HairError('"{name}" has a scale of zero or a non-finite transform: change its scale.', name=name)
     return axis / size
 
 

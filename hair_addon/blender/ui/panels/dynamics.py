@@ -10,7 +10,7 @@ from ...live import dynamics_state, simulated_hair, unlocked_renders
 from ...settings import shared_wetness
 from ...settings.translations import error_text, interface_text
 from .. import setting_rows
-from .tab import HairTab, split, write
+from .tab import HairTab, split, write, write_status
 
 
 class _OfGuides(HairTab):
@@ -52,8 +52,7 @@ class VELLUS_PT_dynamics(_OfGuides, bpy.types.Panel):
             write(layout, context, interface_text(sentence, **values))
             for error in simulated_hair.notes_of(guides):
                 write(layout, context, error_text(error), "ERROR")
-        if guides.vellus.dynamics_status:
-            write(layout, context, guides.vellus.dynamics_status, "ERROR")
+        write_status(layout, context, guides.vellus, "dynamics_status")
         if frame_folders.has_frames(guides) and not context.scene.render.use_lock_interface:
             write(layout, context, interface_text(unlocked_renders.SENTENCE), "INFO")
             layout.prop(context.scene.render, "use_lock_interface")

@@ -4,7 +4,7 @@
 import textwrap
 
 from ...host.notices import text_of
-from ...settings.translations import CONTEXT, interface_text
+from ...settings.translations import CONTEXT, interface_text, status_text
 
 _CHARACTER_WIDTH = 6.8  # pixels of Blender's interface font on average, at a scale of one
 _ICON_AND_MARGINS = 66.0
@@ -44,7 +44,7 @@ def write_status(layout, context, state, name="status"):
     """What is wrong with guides or hair, if anything is; state: `VellusCurves`; name: of the property that says it."""
     status = text_of(state, name)
     if status:
-        write(layout, context, interface_text(status), "ERROR")
+        write(layout, context, status_text(status), "ERROR")
 
 
 def megabytes(count):

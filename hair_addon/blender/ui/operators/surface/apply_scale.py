@@ -9,7 +9,7 @@ from ..base.hair_operator import HairOperator
 
 
 class VELLUS_OT_apply_scale(HairOperator, bpy.types.Operator):
-    """Apply the surface's scale to its mesh without changing its hair"""
+    """Apply the surface's scale to its mesh and leave its guides in place"""
 
     bl_idname = "vellus.apply_scale"
     bl_label = "Apply Scale"
