@@ -93,8 +93,11 @@ def after_depsgraph_update(scene, depsgraph):
 
 
 def _tells_apart(surface_object):
-    """Whether nodes were added to a surface, or moved, with which Blender will report it again."""
-    return surface_object.add_rest_position_attribute and rest_nodes.tell_apart(surface_object)
+    """Whether nodes were added to a surface of our hair, or moved, with which Blender will report it again."""
+    if not surface_object.add_rest_position_attribute:
+        return False
+    is_ours = any(one.surface == surface_object and one.vellus.kind != "NONE" for one in bpy.data.hair_curves)
+    return is_ours and rest_nodes.tell_apart(surface_object)
 
 
 def _surfaces():

@@ -138,6 +138,15 @@ def test_nodes_follow_the_last_modifier_that_copies_faces(half):
     assert kinds() == ["SUBSURF"]
 
 
+def test_meshes_without_our_hair_are_left_alone(half):
+    half.add_rest_position_attribute = True
+    curves = bpy.data.hair_curves.new("Hair of Blender")
+    curves.surface = half
+    mirror(half)
+    update()
+    assert [modifier.type for modifier in half.modifiers] == ["MIRROR"]
+
+
 def test_copies_of_deformed_faces_are_named(half):
     half.modifiers.new("Bend", "SIMPLE_DEFORM")
     copied = solidify(half)
