@@ -38,6 +38,7 @@ def comb(count):
 def test_a_stroke_passes_few_files_and_comes_back_to_none(watched, count, monkeypatch):
     """Printed: all of it. What is drawn is handed over, and not asked for again."""
     comb(count)  # compiles what is compiled once
+    hair_cache.strands_on_gpu(watched.data)
     way, follow_guides = Way(), live_hair.follow_guides
 
     def follow(*given):

@@ -212,16 +212,16 @@ def test_saved_presets_come_back(styled, tmp_path, monkeypatch):
     before = styles(), names()
     state().hair.tip_taper = 0.75
     assert bpy.ops.vellus.save_style_preset(name="My style") == {"FINISHED"}
-    assert saved_styles.names() == ["My_style"]
+    assert saved_styles.names() == ["My style"]
     operate(bpy.ops.vellus.apply_style_preset, preset="BUZZ")
-    operate(bpy.ops.vellus.apply_saved_style, name="My_style")
+    operate(bpy.ops.vellus.apply_saved_style, name="My style")
     assert (styles(), names()) == before and state().hair.tip_taper == 0.75
     drawn = draw(bpy.types.VELLUS_PT_style_presets).drawn
     assert drawn["vellus.apply_saved_style"] == drawn["vellus.remove_style_preset"] == 1
-    bpy.ops.vellus.remove_style_preset(name="My_style")
+    bpy.ops.vellus.remove_style_preset(name="My style")
     assert saved_styles.names() == []
     with pytest.raises(RuntimeError, match="does not exist"):
-        bpy.ops.vellus.apply_saved_style(name="My_style")
+        bpy.ops.vellus.apply_saved_style(name="My style")
     for name in ("", "  ", ".."):
         with pytest.raises(RuntimeError, match="The name is empty"):
             bpy.ops.vellus.save_style_preset(name=name)
