@@ -1,9 +1,20 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Scenes rendered to files, and what is in these."""
 
+import math
+
 import bpy
 import numpy as np
 import OpenEXR
+
+
+def add_orthographic_camera(scene):
+    """Let a scene be seen along Y, at two metres."""
+    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
+    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
+    camera.location, camera.rotation_euler = (0.0, -4.0, 0.0), (math.pi / 2, 0.0, 0.0)
+    scene.collection.objects.link(camera)
+    scene.camera = camera
 
 
 def rendered(folder, **settings):

@@ -96,6 +96,8 @@ def read(
     if before is None or before.shadow_maps is None:
         has_normals = is_shaded or viewport.shading.type == "MATERIAL"  # by which hair's shadow falls on them
         meshes = drawn_meshes.read_drawn_meshes(depsgraph, viewport, former is not None, has_normals)
+        if is_shaded:
+            meshes = drawn_meshes.told_apart(meshes)
         shown = _upload(meshes, is_shaded, has_paths=viewport is None)
         world = light_door.read_world(blender_scene, view_layer)
         lamps = maps = None
@@ -211,7 +213,7 @@ def read_render(depsgraph, known, refused):
 def read_unlit(depsgraph, known, refused):
     """The same without lighting, for motion vectors."""
     found = list(_read_rendered_hair(depsgraph, known, refused))
-    meshes = drawn_meshes.read_drawn_meshes(depsgraph)
+    meshes = drawn_meshes.told_apart(drawn_meshes.read_drawn_meshes(depsgraph))
     if depsgraph.scene.vellus.is_hair_only:
         meshes = drawn_meshes.held_out(meshes)
     hair, owners = [hair for hair, _owner in found], tuple(owner for _hair, owner in found)

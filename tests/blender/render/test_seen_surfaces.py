@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from hair_addon.blender.gpu import lights
-from hair_addon.blender.render import offscreen
+from hair_addon.blender.render import drawn_scene, offscreen
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from tests.support.rendering import add_orthographic_camera
 
 SIZE = 48
 MIDDLE = slice(SIZE // 2 - 2, SIZE // 2 + 2)
@@ -68,11 +69,7 @@ def hair_on(surface, **settings):
 @pytest.fixture
 def stage(scene):
     """A blue wall in the sun, and an orthographic camera that looks along Y at two metres."""
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
-    camera.location, camera.rotation_euler = (0.0, -4.0, 0.0), (math.pi / 2, 0.0, 0.0)
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    add_orthographic_camera(scene)
     sun(0.0)
     plane(matt(0.1, 0.2, 0.8), size=4.0, name="Wall")
     return scene
@@ -94,6 +91,16 @@ def test_what_reflects_nothing_and_is_seen_through_is_not_there(made, stage):
     bare = picture()
     plane(made(), depth=0.5)
     np.testing.assert_array_equal(picture(), bare)
+
+
+def test_a_viewport_without_materials_shows_what_is_transparent_as_solid(stage):
+    """Solid shading draws it, so it hides hair there; in renders it does not."""
+    hair_on(bpy.data.objects["Wall"])
+    plane(material("ShaderNodeBsdfTransparent"), depth=0.5)
+    bpy.context.view_layer.update()
+    space = next(a.spaces.active for s in bpy.data.screens for a in s.areas if a.type == "VIEW_3D")
+    given = stage, bpy.context.view_layer, bpy.context.evaluated_depsgraph_get()
+    assert [len(drawn_scene.read(*given, viewport).surfaces) for viewport in (space, None)] == [2, 1]
 
 
 def test_glass_reflects_and_shows_what_is_behind_it(stage):

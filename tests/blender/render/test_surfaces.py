@@ -13,6 +13,7 @@ from hair_addon.blender.gpu import drawing, visibility_buffer
 from hair_addon.blender.host import notices
 from hair_addon.blender.render import drawn_scene, offscreen, scene_drawing
 from hair_addon.core.imaging.pixel_sampling import PictureSettings
+from tests.support.rendering import add_orthographic_camera
 
 SIZE = 48
 
@@ -53,11 +54,7 @@ def material_of(surface, **inputs):
 @pytest.fixture
 def stage(scene):
     """A scene with an orthographic camera that looks along Y at two metres, without lights; nothing in it."""
-    camera = bpy.data.objects.new("Camera", bpy.data.cameras.new("Camera"))
-    camera.data.type, camera.data.ortho_scale = "ORTHO", 2.0
-    camera.location, camera.rotation_euler = (0.0, -4.0, 0.0), (math.pi / 2, 0.0, 0.0)
-    scene.collection.objects.link(camera)
-    scene.camera = camera
+    add_orthographic_camera(scene)
     return scene
 
 

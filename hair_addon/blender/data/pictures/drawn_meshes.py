@@ -70,10 +70,6 @@ class DrawnMesh:
         """Whether all of it lets light through: it hides nothing, and casts no shadow."""
         return self.parts is not None and all(material.is_clear for _first, _count, material in self.parts)
 
-    @property
-    def stops_light(self):
-        return self.casts_shadow and not self.is_clear
-
 
 @dataclass(frozen=True)
 class _Layout:
@@ -115,8 +111,13 @@ def read_drawn_meshes(depsgraph, viewport=None, is_moving=False, has_normals=Tru
                 continue
             mesh = _read_drawn_mesh(instance.object, matrix, is_holdout, is_moving, has_normals, override)
             rays = {} if viewport is not None else _rays_of(instance, depsgraph.view_layer)
-            meshes += [replace(part, owner=owner_of(instance), **rays) for part in _solid_and_clear(mesh)]
+            meshes.append(replace(mesh, owner=owner_of(instance), **rays))
     return [mesh for mesh in meshes if len(mesh.triangles)]
+
+
+def told_apart(meshes):
+    """The same meshes where materials are shown: what is solid of each and what is clear, without what is invisible."""
+    return [part for mesh in meshes for part in _solid_and_clear(mesh)]
 
 
 def held_out(meshes):
@@ -150,12 +151,11 @@ def _rays_of(instance, view_layer):
 
 
 def _solid_and_clear(mesh):
-    """What is solid of a `DrawnMesh` and what is clear of it, without what is invisible."""
     if mesh.parts is None:
         return [mesh]
     kinds = [(material.is_clear, material.is_invisible) for _first, _count, material in mesh.parts]
     if len(set(kinds)) == 1:
-        return [] if mesh.parts and kinds[0][1] else [mesh]
+        return [] if kinds[0][1] else [mesh]
     return [
         _some_parts(mesh, [part for part, found in zip(mesh.parts, kinds, strict=True) if found == kind])
         for kind in ((False, False), (True, False))
