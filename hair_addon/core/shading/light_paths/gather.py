@@ -28,6 +28,7 @@ _MOST_EVENTS = wp.constant(1000)
 _DIM = wp.constant(0.1)  # weight below which paths are left out at random
 _FAR = wp.constant(grid_walk.FAR)
 _KNOWN = 0.015  # standard error of the mean light, as a part of it, below which no more paths are taken
+_FAINT = 0.3  # of the mean light that is drawn: light below it is worth no shadow each time
 _MOST_TURNS = 64  # of paths on the same hair
 _LEAST_TURN = 0.125  # paths of a further turn, as a part of all before
 
@@ -138,7 +139,7 @@ def gather(
         mesh = mesh_of(surroundings.corners)
         medium = medium_of(grid, mesh, surroundings.normals, surroundings.albedo, surroundings.gloss)
         in_sight, _hiding = _sight_of(grid, surroundings) or (medium, mesh)
-        sources = sources_of(surroundings)
+        sources = sources_of(surroundings, _FAINT * float(seen.drawn.sum(axis=1, dtype=np.float64).mean()))
         drawn = np.concatenate([seen.drawn, _even_there(medium, seen, device)], axis=-1)
         _add_by_voxel(sums[..., 6:], grid, seen.places, systems[seen.segments], drawn)
         total, squares, taken, tried, turn, more = 0.0, 0.0, 0, 0, 0, path_count

@@ -111,8 +111,24 @@ def _scattered(here: Event, lit: Lit, shift: float):
 
 
 @wp.func
+def _by_lot(light: wp.vec3, faint: float, random: wp.uint32):
+    """(light, random state): of light whose sum of RGB is below `faint`, as much as that or none, the same in the mean
+    [Arvo90]. What is none needs no shadow.
+    """
+    state = random
+    amount = light[0] + light[1] + light[2]
+    lot = wp.randf(state) * faint  # always, that all numbers after it are the same
+    kept = light
+    if amount < faint:
+        kept = wp.vec3(0.0, 0.0, 0.0)
+        if lot < amount:
+            kept = light * (faint / amount)
+    return kept, state
+
+
+@wp.func
 def light_at_once(medium: Medium, sources: Sources, here: Event, random: wp.uint32):
-    """(radiance of light that an event sends to the viewer, random state): all lamps are traced."""
+    """(radiance of light that an event sends to the viewer, random state): all lamps are traced that are not faint."""
     state = random
     light = wp.vec3(0.0, 0.0, 0.0)
     lamp_count = wp.min(sources.count, _LAMPS_AT_ONCE)
@@ -121,8 +137,12 @@ def light_at_once(medium: Medium, sources: Sources, here: Event, random: wp.uint
         state = after
         if index >= lamp_count:
             share = share / float(_WORLD_AT_ONCE)
-        if wp.max(lit.irradiance) > 0.0 and not _is_shadowed(medium, lit, here):
-            light += share * _scattered(here, lit, wp.randf(state))
+        if wp.max(lit.irradiance) > 0.0:
+            scattered = share * _scattered(here, lit, wp.randf(state))
+            found, after_lot = _by_lot(scattered, sources.faint, state)
+            state = after_lot
+            if wp.max(found) > 0.0 and not _is_shadowed(medium, lit, here):
+                light += found
     return light, state
 
 
@@ -147,10 +167,11 @@ def light_by_share(medium: Medium, sources: Sources, here: Event, random: wp.uin
             if wp.randf(state) * total <= amount:
                 kept = light / amount
                 kept_lit = lit
-    if total > 0.0:
+    found, after_lot = _by_lot(kept * total, sources.faint, state)
+    if wp.max(found) > 0.0:
         if _is_shadowed(medium, kept_lit, here):
-            total = 0.0
-    return kept * total, state
+            found = wp.vec3(0.0, 0.0, 0.0)
+    return found, after_lot
 
 
 @wp.func

@@ -25,6 +25,7 @@ class Sources:
     shape: wp.array[wp.vec4]  # radius, cos_cone, blend, whether it casts shadows
     chance: wp.array[float]  # of being chosen
     world: World
+    faint: float  # sum of RGB, as the viewer sees it, below which light is looked for at random
 
 
 @wp.struct

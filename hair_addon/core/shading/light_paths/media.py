@@ -88,8 +88,8 @@ def unlit_medium_of(grid: StrandGrid, mesh: wp.Mesh | None) -> Medium:
     return medium_of(grid, mesh, np.zeros((corner_count, 3)), np.zeros((corner_count // 3, 3)))
 
 
-def sources_of(surroundings: Surroundings) -> Sources:
-    """Lamps and world on the current device."""
+def sources_of(surroundings: Surroundings, faint: float) -> Sources:
+    """Lamps and world on the current device; faint: as of `Sources`."""
     lamps = surroundings.lamps
     require_count("lamps", len(surroundings.importance), len(lamps))
     sources = Sources()
@@ -104,7 +104,7 @@ def sources_of(surroundings: Surroundings) -> Sources:
     importance = np.asarray(surroundings.importance, float)
     chance = importance + 0.1 * importance.mean() + 1e-12 if len(lamps) else importance
     sources.chance = wp.array((chance / max(chance.sum(), 1e-30)).astype(np.float32), dtype=float)
-    sources.world = world_of(surroundings.world)
+    sources.world, sources.faint = world_of(surroundings.world), faint
     return sources
 
 

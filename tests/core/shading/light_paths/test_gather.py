@@ -91,6 +91,18 @@ def test_paths_are_the_same_again(rng):
     np.testing.assert_array_equal(first, again)
 
 
+def test_faint_light_counts_as_much_in_the_mean(rng):
+    """What is drawn tells which light is faint: if it is thirty times as bright as what paths find, nearly all is."""
+    grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
+    light = surroundings(lamps=np.concatenate([sun((0.0, 1.0, 0.0)), sun((0.6, 0.8, 0.0), 1.0), sun((0.0, 0.6, -0.8))]))
+    seen = seen_rays.seen_by(grid, light.corners, ALONG_Y, 20_000)
+    exact = gather.gather(grid, light, replace(seen, drawn=0.0 * seen.drawn), 60_000)[0]
+    for factor, tolerance in ((1.0, 0.025), (30.0, 0.06)):
+        drawn = np.full_like(seen.drawn, factor * ratio(exact).mean())
+        found = gather.gather(grid, light, replace(seen, drawn=drawn), 60_000, seed=1)[0]
+        np.testing.assert_allclose(ratio(found), ratio(exact), rtol=tolerance)
+
+
 def test_light_of_voxels_and_what_they_keep_of_the_drawn_is_that_of_paths(rng):
     """In every voxel and in each channel; of what is drawn as much is kept as is like the paths' light."""
     grid = grid_of(strands_in_a_box(rng, 300), (0.1, 0.3, 1.0), voxel_count=625)
